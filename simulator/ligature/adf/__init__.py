@@ -1,0 +1,1 @@
+"""The AMBF Description Format: schema, reader, diagnostics, path resolver, writer and patcher."""

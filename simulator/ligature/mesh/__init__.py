@@ -1,0 +1,1 @@
+"""Mesh tools free of Blender and of the physics engine: load, split, decompose, inertia, cache."""

@@ -1,0 +1,74 @@
+"""Commands to a running scene: plain values that any front end (ROS, Python, a replay) can make.
+
+Indices are those of the `Scene`. Poses are x y z qx qy qz qw. A command is a persistent target: it
+holds until the next one for the same object or until a `Release`. SI units, world axes unless a
+field says otherwise.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+Vector = tuple[float, ...]
+
+
+class CommandType(enum.IntEnum):
+    """What a number in a command means; the values are those of ``ambf_msgs/RigidBodyCmd``."""
+
+    FORCE = 0
+    POSITION = 1
+    VELOCITY = 2
+
+
+@dataclass(frozen=True)
+class BodyCommand:
+    """Cartesian and joint command of one body (interface reference §3.1, §3.2).
+
+    ``target`` is a pose (7,) for POSITION, a twist (6,) for VELOCITY, a wrench (6,) for FORCE.
+    ``joint_values[i]`` goes to the i-th active joint of the body's tree, as ``joint_types[i]``.
+    """
+
+    body: int
+    type: CommandType
+    target: Vector
+    joint_types: tuple[CommandType, ...] = ()
+    joint_values: Vector = ()
+
+
+@dataclass(frozen=True)
+class ActuatorCommand:
+    """Grasp or release with a constraint actuator (interface reference §3.4)."""
+
+    actuator: int
+    actuate: bool
+    body: str = ""
+    offset: Vector | None = None
+    sensor: str | None = None
+
+
+@dataclass(frozen=True)
+class PlaceCommand:
+    """Put a camera or a light (``kind``) at a pose in its parent's frame; None lets it be."""
+
+    kind: str
+    index: int
+    pose: Vector | None
+
+
+@dataclass(frozen=True)
+class Release:
+    """The watchdog of one object expired: its command is cleared (interface reference §2.4)."""
+
+    kind: str
+    index: int
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Put objects back to their initial poses; ``bodies_only`` leaves cameras and lights."""
+
+    bodies_only: bool = False
+
+
+Command = BodyCommand | ActuatorCommand | PlaceCommand | Release | Reset

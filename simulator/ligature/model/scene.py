@@ -1,0 +1,513 @@
+"""The resolved scene: what a launch file means, after every default, reference and path is settled.
+
+Frames: W world; B body frame (mesh origin, the frame of ``location``, pivots, axes and published
+poses); I inertial frame (centre of mass, principal axes). ``T_x_y`` is the 4x4 homogeneous pose of
+frame y expressed in frame x. Units are SI: metres, kilograms, seconds, radians. Everything here is
+immutable and knows nothing of Bullet; objects refer to each other by their index in the scene.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.adf import Diagnostic, Mark
+
+Array = NDArray[np.float64]
+"""A float64 array; the docstring beside each use gives its shape and frame."""
+
+
+# --- shapes ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Box with full edge lengths ``size`` (3,) metres, centred."""
+
+    size: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """Sphere of ``radius`` metres, centred."""
+
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder:
+    """Cylinder along local Z, centred; the ADF axis is folded into the shape's pose."""
+
+    radius: float
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class Capsule:
+    """Capsule along local Z, centred; ``height`` is the total length including both caps."""
+
+    radius: float
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class Cone:
+    """Cone along local Z, apex towards +Z, origin at half height."""
+
+    radius: float
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Static half space below the plane n·p = offset; ``normal`` (3,) is a unit vector."""
+
+    normal: Array
+    offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """Convex hull of ``vertices`` (n, 3)."""
+
+    vertices: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TriMesh:
+    """Triangle mesh: ``vertices`` (n, 3), ``faces`` (m, 3) of int32 indices."""
+
+    vertices: Array
+    faces: NDArray[np.int32]
+
+
+Shape = Box | Sphere | Cylinder | Capsule | Cone | Plane | Hull | TriMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Collider:
+    """One collision shape of a body, placed at ``T_body_shape`` (4, 4) in the body frame B."""
+
+    shape: Shape
+    T_body_shape: Array
+
+
+# --- looks ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Colour:
+    """Material override of an ADF colour block; every component in 0..1, ``alpha`` 1 is opaque."""
+
+    diffuse: tuple[float, float, float] = (0.7, 0.7, 0.7)
+    ambient: tuple[float, float, float] = (0.3, 0.3, 0.3)
+    specular: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    shininess: int = 64
+    alpha: float = 1.0
+
+
+@dataclass(frozen=True)
+class ShaderFiles:
+    """A shader program named by a scene file; paths are resolved but may not exist."""
+
+    vertex: Path
+    fragment: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Visual:
+    """What is drawn for a body or ghost: a mesh file, or primitive shapes in the body frame."""
+
+    mesh: Path | None = None
+    low_resolution_mesh: Path | None = None
+    scale: float = 1.0
+    shapes: tuple[Collider, ...] = ()
+    colour: Colour | None = None
+    visible: bool = True
+    shaders: ShaderFiles | None = None
+
+
+# --- objects --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Identity:
+    """How an object is called (ADF specification §4).
+
+    ``identifier`` is the qualified identifier with its remap suffix, for example
+    ``/ambf/env/phantom/BODY Needle``; ``topic`` is the ROS name below which its topics live, for
+    example ``/ambf/env/phantom/Needle``; ``name`` is the bare name without blanks.
+    """
+
+    key: str
+    name: str
+    identifier: str
+    topic: str
+    model: int
+    passive: bool = False
+    publish_low: int = 50
+    publish_high: int = 1000
+    parent_text: str = ""
+    mark: Mark | None = None
+
+
+class OutputType(enum.Enum):
+    """What a controller's output is applied as (ADF specification §13, §15.6)."""
+
+    FORCE = "force"
+    VELOCITY = "velocity"
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of one PID loop; units follow from the error and the output type."""
+
+    p: float = 10.0
+    i: float = 0.0
+    d: float = 1.0
+
+
+@dataclass(frozen=True)
+class CartesianController:
+    """Cartesian controller of a body (ADF specification §13)."""
+
+    linear: Gains = Gains()
+    angular: Gains = Gains()
+    linear_output: OutputType = OutputType.VELOCITY
+    angular_output: OutputType = OutputType.VELOCITY
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One rigid body.
+
+    ``inertia`` (3,) are the principal moments about I; ``T_body_inertial`` is I in B;
+    ``T_world_body`` the initial pose; ``gravity`` (3,) in world axes is already settled (body over
+    model over world). ``joints`` are the active descendant joints in command-vector order (ADF
+    specification §11), ``children`` the matching child bodies. ``no_collision_with`` holds the
+    bodies whose contacts with this one are switched off by joints, files or groups.
+    """
+
+    index: int
+    identity: Identity
+    mass: float
+    inertia: Array
+    T_body_inertial: Array
+    T_world_body: Array
+    gravity: Array
+    colliders: tuple[Collider, ...] = ()
+    visual: Visual = Visual()
+    collision_margin: float = 0.001
+    friction: float = 0.5
+    rolling_friction: float = 0.01
+    restitution: float = 0.1
+    linear_damping: float = 0.04
+    angular_damping: float = 0.1
+    controller: CartesianController = CartesianController()
+    publish_children_names: bool = False
+    publish_joint_names: bool = True
+    publish_joint_positions: bool = True
+    joints: tuple[int, ...] = ()
+    children: tuple[int, ...] = ()
+    no_collision_with: frozenset[int] = frozenset()
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def static(self) -> bool:
+        """Whether the body never moves by forces (ADF ``mass: 0``); commands may still move it."""
+        return self.mass == 0.0
+
+
+class JointType(enum.Enum):
+    """Joint types of the format; the values are the canonical ADF spellings."""
+
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+    FIXED = "fixed"
+    LINEAR_SPRING = "linear spring"
+    TORSION_SPRING = "torsion spring"
+    P2P = "p2p"
+    CONE_TWIST = "cone twist"
+    SIX_DOF = "six dof"
+    SIX_DOF_SPRING = "six dof spring"
+
+
+@dataclass(frozen=True, eq=False)
+class SixDof:
+    """Limits and springs of a six-DOF joint, each (6,): linear xyz then angular xyz, in frame A.
+
+    ``low == high`` locks an axis, ``low > high`` frees it. Springs are zero for plain ``six dof``.
+    """
+
+    low: Array
+    high: Array
+    stiffness: Array
+    damping: Array
+    equilibrium: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One joint between two bodies (ADF specification §14, §15).
+
+    ``axis`` (3,) is a_A, the unit joint axis in the parent's inertial frame. ``T_parent_a`` is the
+    constraint frame A in the parent's inertial frame, ``T_child_b`` frame B in the child's inertial
+    frame (§15.2). ``T_parent_child_zero`` is the child's body frame in the parent's body frame at
+    joint position zero. ``low``/``high`` are None when the joint has no limits.
+    """
+
+    index: int
+    identity: Identity
+    type: JointType
+    parent: int
+    child: int
+    axis: Array
+    T_parent_a: Array
+    T_child_b: Array
+    T_parent_child_zero: Array
+    low: float | None = None
+    high: float | None = None
+    controller: Gains = Gains()
+    output: OutputType = OutputType.VELOCITY
+    max_motor_impulse: float = 0.1
+    erp: float = 0.1
+    cfm: float = 0.1
+    stiffness: float = 0.0
+    damping: float = 0.0
+    equilibrium: float = 0.0
+    six_dof: SixDof | None = None
+    cone_twist: tuple[float, float, float] | None = None
+    motor_enabled: bool = True
+    feedback: bool = False
+    passive: bool = False
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Attachment:
+    """Where an object without mass sits: ``T_parent_object`` (4, 4) in its parent's frame.
+
+    ``parent`` is the kind (``"body"``, ``"camera"``, ``"light"``, ``"ghost"``, ``"volume"``) and
+    index of the parent; None means the world.
+    """
+
+    parent: tuple[str, int] | None
+    T_parent_object: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """A volume that senses what overlaps it and never produces a contact force (§16)."""
+
+    index: int
+    identity: Identity
+    attachment: Attachment
+    colliders: tuple[Collider, ...]
+    visual: Visual
+    collision_groups: tuple[int, ...] = ()
+    collision_margin: float = 0.001
+
+
+class SensorType(enum.Enum):
+    """Sensor types (§17); the values are those of the ``type`` field of the messages."""
+
+    PROXIMITY = "PROXIMITY"
+    RESISTANCE = "RESISTANCE"
+    CONTACT = "CONTACT"
+
+
+@dataclass(frozen=True)
+class Resistance:
+    """Parameters of a resistance sensor (§17.3)."""
+
+    static_friction: float = 0.0
+    damping: float = 0.1
+    dynamic_friction: float = 0.0
+    variable: bool = False
+    contact_area: float = 0.1
+    contact_stiffness: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A ray or contact sensor on a body.
+
+    ``rays`` (n, 2, 3) are start and end points in the sensor frame S; ``T_body_sensor`` (4, 4).
+    """
+
+    index: int
+    identity: Identity
+    type: SensorType
+    parent: int
+    T_body_sensor: Array
+    rays: Array
+    range: float = 0.5
+    resistance: Resistance = Resistance()
+    distance_threshold: float = 0.0
+    contact_details: bool = True
+    visible: bool = False
+    visible_size: float = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """A constraint actuator (§17.5); ``T_body_actuator`` (4, 4) in the parent's body frame."""
+
+    index: int
+    identity: Identity
+    parent: int
+    T_body_actuator: Array
+    visible: bool = False
+    visible_size: float = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera (§18); the camera frame looks along -X, +Y is image right, +Z is image up."""
+
+    index: int
+    identity: Identity
+    attachment: Attachment
+    near: float = 0.1
+    far: float = 10.0
+    field_of_view: float = 0.7
+    orthographic_width: float | None = None
+    stereo: tuple[float, float] | None = None
+    intrinsics: dict[str, float] | None = None
+    projection: Array | None = None
+    resolution: tuple[int, int] = (640, 480)
+    publish_image: bool = False
+    image_interval: int = 1
+    publish_depth: bool = False
+    depth_interval: int = 10
+    depth_noise: tuple[float, float, float] | None = None
+    multipass: bool = False
+    visible: bool = True
+    monitor: int = 0
+    preprocessing_shaders: ShaderFiles | None = None
+    depth_shaders: ShaderFiles | None = None
+    mouse_multipliers: dict[str, float] = field(default_factory=dict)
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """A spot light (§19) shining along the +X axis of its frame."""
+
+    index: int
+    identity: Identity
+    attachment: Attachment
+    spot_exponent: float = 0.7
+    cutoff: float = 0.7
+    shadow_quality: int = 0
+    attenuation: tuple[float, float, float] = (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class InputDevice:
+    """An input device of the launch file (§8), as written; teleoperation gives it a meaning."""
+
+    key: str
+    hardware_name: str
+    root_link: str
+    settings: dict[str, Any]
+    mark: Mark | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """One model file of the scene; index 0 is the environment when the world has one."""
+
+    index: int
+    path: Path
+    namespace: str
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A body inside an articulation, with the joint that carries it (None for the root)."""
+
+    body: int
+    joint: int | None
+    parent_link: int
+
+
+@dataclass(frozen=True, eq=False)
+class Articulation:
+    """A spanning tree of bodies joined by revolute, prismatic and fixed joints, root first."""
+
+    links: tuple[Link, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RodChain:
+    """A chain of bodies that is simulated as one elastic rod (DESIGN §4.1), from end to end.
+
+    ``bodies`` are the elements in order, ``joints`` the joints between neighbours. ``anchors`` are
+    the joints that tie an element to a body outside the chain. ``radius`` in metres, ``lengths``
+    (n,) the rest length of each element between its joint pivots, along the element's local axis.
+    """
+
+    name: str
+    bodies: tuple[int, ...]
+    joints: tuple[int, ...]
+    anchors: tuple[int, ...]
+    radius: float
+    lengths: Array
+
+
+@dataclass(frozen=True, eq=False)
+class WorldSettings:
+    """What the world file says: ``gravity`` (3,), namespace, and limits of the loop."""
+
+    namespace: str = "/ambf/env/"
+    topic: str = "/ambf/env/World"
+    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.8]))
+    max_substeps: int = 10
+    shaders: ShaderFiles | None = None
+    skybox: dict[str, Path] | None = None
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything a launch file describes, ready for physics, sensing, robots and drawing.
+
+    ``articulations`` cover every non-rod body once (a lone body is an articulation of one link);
+    ``loops`` are the joints that close a kinematic loop or that an articulation cannot express and
+    that constraints must hold; ``rods`` are the recognised sutures. ``diagnostics`` are all the
+    findings of reading and resolving, in order.
+    """
+
+    name: str
+    world: WorldSettings
+    models: tuple[Model, ...]
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    ghosts: tuple[Ghost, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    lights: tuple[Light, ...] = ()
+    input_devices: tuple[InputDevice, ...] = ()
+    articulations: tuple[Articulation, ...] = ()
+    loops: tuple[int, ...] = ()
+    rods: tuple[RodChain, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+    @cached_property
+    def body_index(self) -> dict[str, int]:
+        """Body index by qualified identifier."""
+        return {body.identity.identifier: body.index for body in self.bodies}
+
+    @cached_property
+    def rod_bodies(self) -> frozenset[int]:
+        """Indices of the bodies that are elements of a rod."""
+        return frozenset(index for rod in self.rods for index in rod.bodies)

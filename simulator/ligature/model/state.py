@@ -1,0 +1,80 @@
+"""The state of a running scene: one record of numpy arrays with a layout fixed by the scene.
+
+The record is plain memory, so that a snapshot is one copy and another process can map it.
+Poses are x y z qx qy qz qw in world axes unless a field says otherwise; twists are linear then
+angular in world axes, the linear part at the centre of mass. SI units.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.scene import Scene
+
+MAX_CONTACT_EVENTS = 64
+"""Most contact points that contact sensors report in one state; more are counted, not listed."""
+
+StateDtype = np.dtype[np.void]
+StateRecord = NDArray[np.void]
+"""One-element record array of `state_dtype`; index fields by name, then ``[0]``."""
+
+
+def state_dtype(scene: Scene, n_arms: int = 0) -> StateDtype:
+    """The memory layout of the state of ``scene``.
+
+    ``tick`` counts ticks, ``update`` counts updates of 1/p seconds (``WorldState.sim_step``);
+    ``stamp`` is Unix time of the update that wrote the record, zero in process.
+    ``ghost_sensed[g, b]`` tells whether body b overlaps ghost g. ``ray_*`` are the rays of all
+    sensors one after the other; ``ray_body`` is -1 for no hit. ``camera_pose`` and ``light_pose``
+    are in the parent's frame, as the messages want them; ``*_world`` beside them in world axes.
+    """
+    nb, nj = len(scene.bodies), len(scene.joints)
+    ng, na = len(scene.ghosts), len(scene.actuators)
+    nc, nl = len(scene.cameras), len(scene.lights)
+    nr = sum(len(sensor.rays) for sensor in scene.sensors)
+    return np.dtype(
+        [
+            ("tick", "u8"),
+            ("update", "u8"),
+            ("resets", "u8"),
+            ("sim_time", "f8"),
+            ("wall_time", "f8"),
+            ("stamp", "f8"),
+            ("body_pose", "f8", (nb, 7)),
+            ("body_twist", "f8", (nb, 6)),
+            ("body_wrench", "f8", (nb, 6)),
+            ("joint_position", "f8", (nj,)),
+            ("joint_velocity", "f8", (nj,)),
+            ("joint_effort", "f8", (nj,)),
+            ("ghost_world", "f8", (ng, 7)),
+            ("ghost_sensed", "?", (ng, nb)),
+            ("ray_measurement", "f8", (nr,)),
+            ("ray_point", "f8", (nr, 3)),
+            ("ray_normal", "f8", (nr, 3)),
+            ("ray_body", "i4", (nr,)),
+            ("contact_count", "i4"),
+            ("contact_sensor", "i4", (MAX_CONTACT_EVENTS,)),
+            ("contact_body", "i4", (MAX_CONTACT_EVENTS,)),
+            ("contact_distance", "f8", (MAX_CONTACT_EVENTS,)),
+            ("contact_point", "f8", (MAX_CONTACT_EVENTS, 3)),
+            ("contact_normal", "f8", (MAX_CONTACT_EVENTS, 3)),
+            ("actuator_active", "?", (na,)),
+            ("actuator_body", "i4", (na,)),
+            ("camera_pose", "f8", (nc, 7)),
+            ("camera_world", "f8", (nc, 7)),
+            ("light_pose", "f8", (nl, 7)),
+            ("light_world", "f8", (nl, 7)),
+            ("rod_tension", "f8", (nb,)),
+        ]
+    )
+
+
+def new_state(scene: Scene) -> StateRecord:
+    """A zeroed state record of ``scene`` with identity poses, shape (1,)."""
+    state = np.zeros(1, dtype=state_dtype(scene))
+    for field_name in ("body_pose", "ghost_world", "camera_pose", "camera_world", "light_pose", "light_world"):
+        state[field_name][..., 6] = 1.0
+    state["ray_body"] = -1
+    state["actuator_body"] = -1
+    return state

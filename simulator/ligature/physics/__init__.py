@@ -1,0 +1,1 @@
+"""Rigid bodies on Bullet: articulations, springs, controllers, contacts."""

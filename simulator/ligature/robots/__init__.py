@@ -1,0 +1,1 @@
+"""Surgical arms free of transport: kinematics, CRTK behaviour, trajectories."""

@@ -1,0 +1,1 @@
+"""rospy adapters: AMBF topics, CRTK topics, images."""

@@ -1,0 +1,1 @@
+"""Ghost objects, rays, contact sensors and constraint actuators."""
