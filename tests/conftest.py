@@ -1,0 +1,31 @@
+"""Fixtures of all tests: where the scenes of others and the recordings of the reference are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+np.seterr(divide="raise", over="raise", invalid="raise")
+
+
+def _shared(variable: str, default: Path) -> Path:
+    path = Path(os.environ.get(variable, default))
+    if not path.is_dir():
+        pytest.skip(f"{path} is absent; set {variable} to run this test")
+    return path
+
+
+@pytest.fixture(scope="session")
+def corpus() -> Path:
+    """Folder of real scenes of others; skips when it is absent."""
+    return _shared("LIGATURE_CORPUS", ROOT.parent / "shared" / "corpus")
+
+
+@pytest.fixture(scope="session")
+def golden() -> Path:
+    """Folder of topic lists, samples and traces recorded from AMBF; skips when it is absent."""
+    return _shared("LIGATURE_GOLDEN", ROOT.parent / "shared" / "golden")
