@@ -1,0 +1,111 @@
+"""World poses of ghosts, cameras and lights: objects without mass that ride on bodies or on each other.
+
+Poses are x y z qx qy qz qw; ``local`` is in the parent's frame (body frame B, or the frame of the
+parent camera, light or ghost), ``world`` in world axes. Lengths in metres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ligature.model.frames import matrix_pose7
+from ligature.model.scene import Attachment, Scene
+
+KINDS = ("ghost", "camera", "light")
+
+
+@njit(cache=True)
+def compose(parent: NDArray[np.float64], local: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Write the pose ``local`` (7,), given in the frame ``parent`` (7,), into ``out`` (7,)."""
+    x, y, z, w = parent[3], parent[4], parent[5], parent[6]
+    px, py, pz = local[0], local[1], local[2]
+    # v' = v + 2 u x (u x v + w v), u the vector part of a unit quaternion
+    cx, cy, cz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
+    out[0] = parent[0] + px + 2.0 * (y * cz - z * cy)
+    out[1] = parent[1] + py + 2.0 * (z * cx - x * cz)
+    out[2] = parent[2] + pz + 2.0 * (x * cy - y * cx)
+    a, b, c, d = local[3], local[4], local[5], local[6]
+    out[3] = w * a + x * d + y * c - z * b
+    out[4] = w * b - x * c + y * d + z * a
+    out[5] = w * c + x * b - y * a + z * d
+    out[6] = w * d - x * a - y * b - z * c
+
+
+@njit(cache=True)
+def _update(
+    body_pose: NDArray[np.float64],
+    local: NDArray[np.float64],
+    parents: NDArray[np.int64],
+    order: NDArray[np.int64],
+    world: NDArray[np.float64],
+) -> None:
+    n_bodies = body_pose.shape[0]
+    for i in order:
+        parent = parents[i]
+        if parent < 0:
+            world[i] = local[i]
+        elif parent < n_bodies:
+            compose(body_pose[parent], local[i], world[i])
+        else:
+            compose(world[parent - n_bodies], local[i], world[i])
+
+
+class Attachments:
+    """The attached objects of a scene, ghosts first, then cameras, then lights.
+
+    ``local`` and ``world`` are (n, 7) arrays over all of them; `of` gives the slice of one kind.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        counts = [len(scene.ghosts), len(scene.cameras), len(scene.lights)]
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        self._slices = {
+            kind: slice(int(starts[i]), int(starts[i + 1])) for i, kind in enumerate(KINDS)
+        }
+        attachments = [item.attachment for items in (scene.ghosts, scene.cameras, scene.lights) for item in items]
+        self._n_bodies = len(scene.bodies)
+        self._parents = np.array([self._parent_index(a) for a in attachments], dtype=np.int64)
+        self._order = self._parents_first()
+        self._initial = np.array([matrix_pose7(a.T_parent_object) for a in attachments]).reshape(-1, 7)
+        self.local = self._initial.copy()
+        self.world = self._initial.copy()
+
+    def of(self, kind: str) -> slice:
+        """Where the objects of ``kind`` (ghost, camera or light) stand in ``local`` and ``world``."""
+        return self._slices[kind]
+
+    def update(self, body_pose: NDArray[np.float64]) -> None:
+        """Move every object with its parent; ``body_pose`` (bodies, 7) in world axes."""
+        _update(body_pose, self.local, self._parents, self._order, self.world)
+
+    def place(self, kind: str, index: int, pose: tuple[float, ...] | None) -> None:
+        """Put one object at ``pose`` (7,) in its parent's frame; None leaves it where it is."""
+        if pose is not None:
+            self.local[self._slices[kind].start + index] = pose
+
+    def reset(self) -> None:
+        """Put every object back to where the scene says."""
+        self.local[:] = self._initial
+
+    def _parent_index(self, attachment: Attachment) -> int:
+        """Index of the parent among bodies followed by attached objects; -1 for the world."""
+        if attachment.parent is None:
+            return -1
+        kind, index = attachment.parent
+        if kind == "body":
+            return index
+        if kind not in self._slices:
+            return -1
+        return self._n_bodies + int(self._slices[kind].start) + index
+
+    def _parents_first(self) -> NDArray[np.int64]:
+        """Evaluation order in which a parent comes before what rides on it."""
+        depth = np.zeros(len(self._parents), dtype=np.int64)
+        for i in range(len(self._parents)):
+            parent = self._parents[i]
+            while parent >= self._n_bodies and depth[i] <= len(self._parents):
+                depth[i] += 1
+                parent = self._parents[parent - self._n_bodies]
+        return np.argsort(depth, kind="stable").astype(np.int64)

@@ -1,0 +1,56 @@
+"""What sensors and actuators ask of whoever knows the contacts; `ligature.physics.World` answers.
+
+Poses are x y z qx qy qz qw in world axes, lengths in metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.scene import Collider
+
+Array = NDArray[np.float64]
+
+
+class RayHits(NamedTuple):
+    """Closest hits of n rays: body index or -1, fraction along the ray in 0..1, point and normal (n, 3)."""
+
+    body: NDArray[np.int32]
+    fraction: Array
+    point: Array
+    normal: Array
+
+
+class Contact(NamedTuple):
+    """One contact point of a body with another: signed distance, point and normal (3,) on the other body."""
+
+    body: int
+    distance: float
+    point: Array
+    normal: Array
+
+
+class Queries(Protocol):
+    """Geometry questions about the bodies of a scene at their present poses."""
+
+    def add_probe(self, colliders: Sequence[Collider], margin: float) -> int:
+        """Register a volume that produces no contacts; returns its handle."""
+
+    def probe_overlaps(self, probe: int, pose: Array) -> list[int]:
+        """Bodies that penetrate the probe when it stands at ``pose`` (7,)."""
+
+    def ray_test(self, starts: Array, ends: Array) -> RayHits:
+        """Closest hits of the segments ``starts`` to ``ends``, each (n, 3)."""
+
+    def contacts(self, body: int, threshold: float) -> list[Contact]:
+        """Contact points of ``body`` whose distance is at most ``threshold``."""
+
+    def add_fixed(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
+        """Hold two frames together, given in the body frames of parent and child; returns a handle."""
+
+    def remove_fixed(self, handle: Any) -> None:
+        """Let go what `add_fixed` holds."""
