@@ -1,0 +1,52 @@
+"""Findings about scene files as values: severity, place, what is wrong, and what would be right."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class Severity(enum.IntEnum):
+    """How much a finding matters; only errors make `ligature check` fail."""
+
+    DEBUG = 0
+    INFO = 1
+    WARNING = 2
+    ERROR = 3
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place in a file; ``line`` and ``column`` count from 1."""
+
+    file: Path
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One finding. ``hint`` says what would be right; ``code`` names the kind of finding."""
+
+    severity: Severity
+    message: str
+    mark: Mark | None = None
+    hint: str = ""
+    code: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.mark}: " if self.mark else ""
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"{place}{self.severity.name.lower()}: {self.message}{hint}"
+
+
+class AdfError(Exception):
+    """A file that cannot be used; ``diagnostics`` say why."""
+
+    def __init__(self, *diagnostics: Diagnostic) -> None:
+        super().__init__("\n".join(map(str, diagnostics)))
+        self.diagnostics = diagnostics

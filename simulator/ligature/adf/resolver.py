@@ -1,0 +1,116 @@
+"""Opens files for a scene, below the scene's own roots only.
+
+Paths in scene files are joined textually to the folder of the file that names them (ADF
+specification §3); symbolic links are resolved before the roots are compared.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
+
+MAX_BYTES = 256 * 1024 * 1024
+"""Largest file that is read unless the caller says otherwise."""
+
+SEARCH_PATH = "LIGATURE_SCENE_PATH"
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
+_ROOT_SIGNS = (".git", "package.xml")
+
+
+class ResolutionError(AdfError):
+    """A path that may not be opened or does not exist; ``diagnostic`` says why."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic)
+        self.diagnostic = diagnostic
+
+
+class Resolver:
+    """Turns references into paths below ``roots`` and reads them.
+
+    Parameters
+    ----------
+    roots
+        Folders below which files may be opened.
+    """
+
+    def __init__(self, roots: Sequence[Path]) -> None:
+        self.roots = tuple(Path(root).resolve() for root in roots)
+
+    @classmethod
+    def for_file(cls, path: Path, extra_roots: Iterable[Path] = ()) -> Resolver:
+        """A resolver for the scene of ``path``, the file that the user named.
+
+        Its root is the repository or ROS package that encloses the file, else the folder above the
+        file's own; ``extra_roots`` and the folders of ``LIGATURE_SCENE_PATH`` are added.
+        """
+        listed = os.environ.get(SEARCH_PATH, "")
+        more = [Path(item) for item in listed.split(os.pathsep) if item]
+        return cls([scene_root(Path(path)), *extra_roots, *more])
+
+    def resolve(self, reference: str, base: Path, mark: Mark | None = None) -> Path:
+        """The path that ``reference`` means in a file of the folder ``base``; raises `ResolutionError`."""
+        if "\0" in reference:
+            raise self._refusal("the path holds a zero byte", mark)
+        if _URL.match(reference):
+            raise self._refusal(f"'{reference}' is a URL", mark, "only files are opened; give a path")
+        return self.allow(Path(os.path.join(base, reference)), mark)
+
+    def allow(self, path: Path, mark: Mark | None = None) -> Path:
+        """``path`` with links resolved, if it lies below a root; raises `ResolutionError`."""
+        try:
+            real = path.resolve()
+        except (OSError, RuntimeError) as error:
+            raise self._refusal(f"'{path}' cannot be followed: {error}", mark) from error
+        if not any(real == root or root in real.parents for root in self.roots):
+            roots = ", ".join(map(str, self.roots))
+            raise self._refusal(
+                f"'{real}' lies outside the scene's folders ({roots})",
+                mark,
+                f"allow it with --root {real.parent} or {SEARCH_PATH}",
+            )
+        return real
+
+    def exists(self, path: Path) -> bool:
+        """Whether ``path`` is a file that may be opened."""
+        try:
+            return self.allow(path).is_file()
+        except (ResolutionError, OSError):
+            return False
+
+    def read_bytes(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> bytes:
+        """The content of ``path``, at most ``limit`` bytes; raises `ResolutionError`."""
+        real = self.allow(path, mark)
+        try:
+            if not real.is_file():
+                reason = "is a folder" if real.is_dir() else "does not exist"
+                raise self._refusal(f"'{real}' {reason}", mark)
+            if real.stat().st_size > limit:
+                raise self._refusal(f"'{real}' is larger than {limit} bytes", mark)
+            return real.read_bytes()
+        except OSError as error:
+            raise self._refusal(f"'{real}' cannot be read: {error.strerror}", mark) from error
+
+    def read_text(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> str:
+        """The content of ``path`` as UTF-8 text; raises `ResolutionError`."""
+        try:
+            return self.read_bytes(path, limit, mark).decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise self._refusal(f"'{path}' is not UTF-8 text (byte {error.start})", mark) from error
+
+    @staticmethod
+    def _refusal(message: str, mark: Mark | None, hint: str = "") -> ResolutionError:
+        return ResolutionError(Diagnostic(Severity.ERROR, message, mark, hint, "path"))
+
+
+def scene_root(path: Path) -> Path:
+    """The repository or ROS package that encloses ``path``, else the folder above its own."""
+    folder = path.resolve().parent
+    for candidate in (folder, *folder.parents):
+        if any((candidate / sign).exists() for sign in _ROOT_SIGNS):
+            return candidate
+    return folder.parent
