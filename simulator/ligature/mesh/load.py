@@ -1,0 +1,26 @@
+"""Loads a mesh file by its extension, through the scene's resolver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ligature.adf.resolver import Resolver
+from ligature.mesh.mesh import Mesh, failure
+from ligature.mesh.obj import read_obj
+from ligature.mesh.stl import read_stl
+from ligature.mesh.tds import read_3ds
+
+EXTENSIONS = (".obj", ".stl", ".3ds")
+
+
+def load_mesh(path: Path, resolver: Resolver) -> Mesh:
+    """The mesh of ``path``; raises `MeshError`, or `ResolutionError` when it may not be opened."""
+    extension = path.suffix.lower()
+    if extension not in EXTENSIONS:
+        raise failure(path, f"'{path.name}' is not a mesh format that is read", hint=f"use {', '.join(EXTENSIONS)}")
+    data = resolver.read_bytes(path)
+    if extension == ".obj":
+        return read_obj(data, path, resolver)
+    if extension == ".stl":
+        return read_stl(data, path)
+    return read_3ds(data, path)
