@@ -1,3 +1,8 @@
 """Ligature: an open simulator for robot-assisted suturing."""
 
+from ligature.model.load import SceneError, load
+from ligature.model.scene import Scene
+
 __version__ = "0.1.0"
+
+__all__ = ["Scene", "SceneError", "load"]

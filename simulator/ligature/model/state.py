@@ -73,7 +73,14 @@ def state_dtype(scene: Scene, n_arms: int = 0) -> StateDtype:
 def new_state(scene: Scene) -> StateRecord:
     """A zeroed state record of ``scene`` with identity poses, shape (1,)."""
     state = np.zeros(1, dtype=state_dtype(scene))
-    for field_name in ("body_pose", "ghost_world", "camera_pose", "camera_world", "light_pose", "light_world"):
+    for field_name in (
+        "body_pose",
+        "ghost_world",
+        "camera_pose",
+        "camera_world",
+        "light_pose",
+        "light_world",
+    ):
         state[field_name][..., 6] = 1.0
     state["ray_body"] = -1
     state["actuator_body"] = -1

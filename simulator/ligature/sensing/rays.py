@@ -30,9 +30,7 @@ class Rays:
         ends = np.cumsum([0, *counts])
         self.slices = [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         n = int(ends[-1])
-        self.hits = RayHits(
-            np.full(n, -1, dtype=np.int32), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3))
-        )
+        self.hits = RayHits(np.full(n, -1, dtype=np.int32), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
         self._stick = [_Stick(sensor) for sensor in self.sensors]
 
     @property
@@ -50,7 +48,9 @@ class Rays:
             return
         for sensor, part, stick in zip(self.sensors, self.slices, self._stick, strict=True):
             if sensor.type is SensorType.RESISTANCE:
-                stick.push(segments[part], RayHits(*(field[part] for field in self.hits)), body_pose, apply_force)
+                stick.push(
+                    segments[part], RayHits(*(field[part] for field in self.hits)), body_pose, apply_force
+                )
 
     @staticmethod
     def _segments(sensor: Sensor, body_pose: Array) -> Array:

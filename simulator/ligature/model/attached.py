@@ -1,0 +1,187 @@
+"""Ghosts, cameras, lights and ray sensors of one element each; parents are settled by the builder.
+
+Frames and units as in `ligature.model.scene`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ligature.adf import Diagnostic, Element, Resolver, Severity
+from ligature.adf.diagnostics import AdfError
+from ligature.mesh import load_mesh
+from ligature.model.frames import Array, axis_rotation, pose_matrix
+from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
+from ligature.model.parts import camera_frame, light_frame
+from ligature.model.scene import Attachment, Camera, Ghost, Identity, Light
+
+STATIC_CUTOFF = np.pi / 2
+"""Largest half angle of a light; larger ones are clamped (§19)."""
+
+
+def ghost(element: Element, index: int, identity: Identity, context: FileContext) -> Ghost:
+    """A ghost object (§16); raises `GeometryError` when it has no shape."""
+    fallback = pose_matrix(*element.pose("inertial offset")) if element.has("inertial offset") else np.eye(4)
+    shapes = colliders(element, context, fallback)
+    if not shapes:
+        message = f"ghost object '{element.key}' has no collision shape and is left out"
+        raise GeometryError(
+            Diagnostic(Severity.ERROR, message, element.mark, "add 'collision shape'", "geometry")
+        )
+    return Ghost(
+        index,
+        identity,
+        Attachment(None, pose_matrix(*element.pose("location"))),
+        shapes,
+        visual(element, context, None),
+        tuple(int(g) for g in element.numbers("collision groups")),
+        element.number("collision margin"),
+    )
+
+
+def light(element: Element, index: int, identity: Identity) -> Light:
+    """A light (§19)."""
+    direction = np.array(element.vector("direction")) if element.has("direction") else None
+    rpy = element.vector("location.orientation")
+    return Light(
+        index,
+        identity,
+        Attachment(None, light_frame(np.array(element.vector("location")), direction, rpy)),
+        element.number("spot exponent"),
+        min(max(element.number("cutoff angle"), 0.0), STATIC_CUTOFF),
+        element.integer("shadow quality"),
+        (
+            element.number("attenuation.constant"),
+            element.number("attenuation.linear"),
+            element.number("attenuation.quadratic"),
+        ),
+    )
+
+
+def camera(element: Element, index: int, identity: Identity, folder: Path) -> Camera:
+    """A camera (§18); shader paths are joined to ``folder``."""
+    T = camera_frame(*(np.array(element.vector(k)) for k in ("location", "look at", "up")))
+    stereo = None
+    if element.has("stereo"):
+        stereo = (element.number("stereo.eye separation"), element.number("stereo.focal length"))
+    matrix = element.value("projection matrix")
+    return Camera(
+        index=index,
+        identity=identity,
+        attachment=Attachment(None, T),
+        near=element.number("clipping plane.near"),
+        far=element.number("clipping plane.far"),
+        field_of_view=element.number("field view angle"),
+        orthographic_width=element.value("orthographic view width"),
+        stereo=stereo,
+        intrinsics=_intrinsics(element),
+        projection=None if matrix is None else np.array(matrix, dtype=float),
+        resolution=_resolution(element),
+        publish_image=element.flag("publish image"),
+        image_interval=max(element.integer("publish image interval"), 1),
+        publish_depth=element.flag("publish depth"),
+        depth_interval=max(element.integer("publish depth interval"), 1),
+        depth_noise=_noise(element),
+        multipass=element.flag("multipass"),
+        visible=element.flag("visible"),
+        monitor=element.integer("monitor"),
+        preprocessing_shaders=shader_files(element, "preprocessing shaders", folder),
+        depth_shaders=shader_files(element, "depth compute shaders", folder),
+        mouse_multipliers={
+            name: element.number(f"mouse control multipliers.{name}")
+            for name in ("pan", "rotate", "scroll", "arcball")
+        },
+        extra={"plugins": element.raw_value("plugins")} if element.has("plugins") else {},
+    )
+
+
+def sensor_rays(element: Element, folder: Path, resolver: Resolver) -> Array:
+    """Start and end points (n, 2, 3) of a sensor's rays in its own frame (§17.2)."""
+    reach = element.number("range")
+    if reach < 0.0:
+        message = f"sensor '{element.key}' has the negative range {reach:g}"
+        raise GeometryError(
+            Diagnostic(Severity.ERROR, message, element.mark_of("range"), "give a length in metres", "sensor")
+        )
+    if element.has("array"):
+        rays = []
+        for item in element.children("array"):
+            start, direction = np.array(item.vector("offset")), np.array(item.vector("direction"))
+            rays.append((start, start + reach * direction))
+        return np.array(rays).reshape(-1, 2, 3)
+    if element.text("mesh"):
+        return _contour_rays(element, folder, resolver, reach)
+    if element.has("parametric"):
+        return _fan_rays(element, reach)
+    return np.zeros((0, 2, 3))
+
+
+def _contour_rays(element: Element, folder: Path, resolver: Resolver, reach: float) -> Array:
+    """One ray a triangle, from its centroid along its normal."""
+    try:
+        path = resolver.resolve(element.text("mesh"), folder, element.mark_of("mesh"))
+        if not path.is_file() and (folder / "high_res" / element.text("mesh")).is_file():
+            path = resolver.resolve(f"high_res/{element.text('mesh')}", folder)
+        mesh = load_mesh(path, resolver)
+    except AdfError as error:
+        raise GeometryError(error.diagnostics[0]) from error
+    rays = []
+    for part in mesh.parts:
+        a, b, c = (part.vertices[part.faces[:, i]] for i in range(3))
+        normal = np.cross(b - a, c - b)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        solid = length[:, 0] > 0
+        start = ((a + b + c) / 3)[solid]
+        rays.append(
+            np.stack([start, start + reach * (normal / np.where(length > 0, length, 1))[solid]], axis=1)
+        )
+    return np.concatenate(rays) if rays else np.zeros((0, 2, 3))
+
+
+def _fan_rays(element: Element, reach: float) -> Array:
+    """A square fan of rays about +X."""
+    n = element.integer("parametric.resolution")
+    if n < 2:
+        return np.zeros((0, 2, 3))
+    wide, high = element.number("parametric.horizontal angle"), element.number("parametric.vertical angle")
+    start = element.number("parametric.start offset")
+    rays = []
+    for i in range(n):
+        for j in range(n):
+            h, v = -wide / 2 + i * wide / (n - 1), -high / 2 + j * high / (n - 1)
+            direction = axis_rotation((0, 0, 1), h) @ axis_rotation((0, 1, 0), v) @ np.array([1.0, 0.0, 0.0])
+            rays.append((start * direction, (start + reach) * direction))
+    return np.array(rays)
+
+
+def _resolution(element: Element) -> tuple[int, int]:
+    for block in ("publish image resolution", "window resolution"):
+        if element.has(block):
+            return element.integer(f"{block}.width"), element.integer(f"{block}.height")
+    return 640, 480
+
+
+def _noise(element: Element) -> tuple[float, float, float] | None:
+    if not element.has("publish depth noise"):
+        return None
+    deviation = element.value("publish depth noise.std_dev")
+    if deviation is None:
+        deviation = element.value("publish depth noise.std dev")
+    return (
+        element.number("publish depth noise.mean"),
+        0.001 if deviation is None else float(deviation),
+        element.number("publish depth noise.bias"),
+    )
+
+
+def _intrinsics(element: Element) -> dict[str, float] | None:
+    if not element.has("camera intrinsics"):
+        return None
+    values = {k: element.value(f"camera intrinsics.{k}") for k in ("fx", "fy", "f", "cx", "cy", "s")}
+    focal = values.pop("f")
+    for name in ("fx", "fy"):
+        if values[name] is None:
+            values[name] = 100.0 if focal is None else focal
+    return {name: 0.0 if value is None else float(value) for name, value in values.items()}

@@ -1,0 +1,315 @@
+"""Builds a scene file by file, in the order in which AMBF creates objects.
+
+References to bodies are settled at once, parents of attached objects when they arrive. An object
+that cannot be built is reported and left out; the rest goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
+from ligature.model import attached, trees
+from ligature.model.frames import pose_matrix
+from ligature.model.geometry import FileContext, GeometryError, shader_files
+from ligature.model.lookup import candidates
+from ligature.model.naming import Names, merged
+from ligature.model.parenting import Arrivals
+from ligature.model.parts import body_of, joint_of, sensor_of
+from ligature.model.rods import rod_chains
+from ligature.model.scene import (
+    Actuator,
+    Attachment,
+    Body,
+    Camera,
+    Ghost,
+    Identity,
+    InputDevice,
+    Joint,
+    Light,
+    Model,
+    Scene,
+    Sensor,
+    SensorType,
+    ShaderFiles,
+    WorldSettings,
+)
+
+KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
+
+
+class SceneBuilder:
+    """Collects the objects of a scene; `finish` settles what needs all of them."""
+
+    def __init__(self, name: str, resolver: Resolver, world: WorldSettings, prefix: str = "") -> None:
+        self.name = name
+        self.resolver = resolver
+        self.world = world
+        self.diagnostics: list[Diagnostic] = []
+        self.models: list[Model] = []
+        self.bodies: list[Body] = []
+        self.joints: list[Joint] = []
+        self.ghosts: list[Ghost] = []
+        self.sensors: list[Sensor] = []
+        self.actuators: list[Actuator] = []
+        self.cameras: list[Camera] = []
+        self.lights: list[Light] = []
+        self.devices: list[InputDevice] = []
+        self._names = {kind: Names(prefix) for kind in KINDS}
+        self._arrivals = Arrivals()
+        self._scales: list[float] = []
+        self._groups: list[tuple[int, ...]] = []
+        self._silent_files: list[list[int]] = []
+        self._linked: list[tuple[int, int]] = []
+        self._no_rod: set[int] = set()
+
+    def report(self, diagnostic: Diagnostic) -> None:
+        """Note a finding."""
+        self.diagnostics.append(diagnostic)
+
+    def add_model(self, document: Document, shaders: ShaderFiles | None) -> None:
+        """Create the objects of one model file."""
+        top = document.top
+        model = Model(len(self.models), document.path, top.text("namespace"))
+        self.models.append(model)
+        shaders = shader_files(top, "shaders", document.path.parent) or shaders
+        context = FileContext(
+            document.path.parent, top.text("high resolution path"), top.text("low resolution path"),
+            self.resolver, self.report,
+        )  # fmt: skip
+        before = {kind: len(self._list(kind)) for kind in KINDS}
+        local = self._add_bodies(document, model, context, shaders)
+        self._add_ghosts(document, model, context)
+        self._add_sensors(document, model, local)
+        self._add_actuators(document, model, local)
+        self._add_joints(document, model, local)
+        self.add_cameras_and_lights(document, model.namespace, model.index)
+        if top.flag("ignore inter-collision"):
+            self._silent_files.append(local)
+        if not top.flag("ligature rod"):
+            self._no_rod.update(local)
+        self.arrive(before)
+
+    def arrive(self, before: dict[str, int]) -> None:
+        """Let all objects created since ``before`` (count by kind) enter the world."""
+        newcomers = [
+            (kind, item.index, item.identity.identifier, item.identity.key)
+            for kind in KINDS
+            for item in self._list(kind)[before[kind] :]
+        ]
+        self._arrivals.enter(newcomers)
+
+    def counts(self) -> dict[str, int]:
+        """Number of objects by kind."""
+        return {kind: len(self._list(kind)) for kind in KINDS}
+
+    def add_cameras_and_lights(self, document: Document, namespace: str, model: int) -> None:
+        """Create the cameras and lights of a world or model file."""
+        for element in document.elements("lights"):
+            identity = self._identity("light", element, namespace, model)
+            self.lights.append(attached.light(element, len(self.lights), identity))
+            self._wait("light", identity, len(self.lights) - 1)
+        for element in document.elements("cameras"):
+            identity = self._identity("camera", element, namespace, model)
+            self.cameras.append(attached.camera(element, len(self.cameras), identity, document.path.parent))
+            self._wait("camera", identity, len(self.cameras) - 1)
+
+    def finish(self) -> Scene:
+        """The scene of everything added."""
+        self._arrivals.report_orphans()
+        self.diagnostics += self._arrivals.diagnostics
+        rods = rod_chains(self.bodies, self.joints, frozenset(self._no_rod))
+        rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
+        rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
+        forest, loops = trees.articulations(self.bodies, self.joints, rod_bodies, rod_joints)
+        for rod in rods:
+            message = f"{len(rod.bodies)} bodies from '{rod.name}' on are simulated as one elastic rod"
+            mark = self.bodies[rod.bodies[0]].identity.mark
+            self.report(Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature rod: false'", "rod"))
+        return Scene(
+            name=self.name,
+            world=self.world,
+            models=tuple(self.models),
+            bodies=self._finished_bodies(),
+            joints=tuple(self.joints),
+            ghosts=self._attached("ghost", self.ghosts),
+            sensors=tuple(self.sensors),
+            actuators=tuple(self.actuators),
+            cameras=self._attached("camera", self.cameras),
+            lights=self._attached("light", self.lights),
+            input_devices=tuple(self.devices),
+            articulations=forest,
+            loops=loops,
+            rods=rods,
+            diagnostics=tuple(self.diagnostics),
+        )
+
+    def _list(self, kind: str) -> list[Any]:
+        lists: dict[str, list[Any]] = {
+            "body": self.bodies, "joint": self.joints, "ghost": self.ghosts, "sensor": self.sensors,
+            "actuator": self.actuators, "camera": self.cameras, "light": self.lights,
+        }  # fmt: skip
+        return lists[kind]
+
+    def _identity(self, kind: str, element: Element, namespace: str, model: int) -> Identity:
+        return self._names[kind].identity(element, namespace, model)
+
+    def _wait(self, kind: str, identity: Identity, index: int) -> None:
+        self._arrivals.wait(kind, index, identity.identifier, identity.parent_text, identity.mark)
+
+    def _add_bodies(
+        self, document: Document, model: Model, context: FileContext, shaders: ShaderFiles | None
+    ) -> list[int]:
+        own = document.top.has("gravity")
+        gravity = np.array(document.top.vector("gravity")) if own else self.world.gravity
+        local = []
+        for element in document.elements("bodies"):
+            identity = self._identity("body", element, model.namespace, model.index)
+            try:
+                body = body_of(element, len(self.bodies), identity, context, gravity, shaders)
+            except GeometryError as error:
+                self._names["body"].identifiers.pop()
+                self.report(error.diagnostic)
+                continue
+            self.bodies.append(body)
+            self._scales.append(element.number("scale"))
+            self._groups.append(self._valid_groups(element))
+            if not element.flag("ligature rod"):
+                self._no_rod.add(body.index)
+            local.append(body.index)
+        return local
+
+    def _valid_groups(self, element: Element) -> tuple[int, ...]:
+        groups = [int(g) for g in element.numbers("collision groups")]
+        for group in groups:
+            if not 0 <= group <= 999:
+                message = f"collision group {group} of body '{element.key}' is dropped"
+                mark = element.mark_of("collision groups")
+                self.report(Diagnostic(Severity.WARNING, message, mark, "groups are 0 to 999", "group"))
+        return tuple(g for g in groups if 0 <= g <= 999)
+
+    def _add_ghosts(self, document: Document, model: Model, context: FileContext) -> None:
+        for element in document.elements("ghost objects"):
+            identity = self._identity("ghost", element, model.namespace, model.index)
+            try:
+                ghost = attached.ghost(element, len(self.ghosts), identity, context)
+            except GeometryError as error:
+                self._names["ghost"].identifiers.pop()
+                self.report(error.diagnostic)
+                continue
+            self.ghosts.append(ghost)
+            self._wait("ghost", identity, ghost.index)
+
+    def _add_sensors(self, document: Document, model: Model, local: list[int]) -> None:
+        for element in document.elements("sensors"):
+            parent = self._body(element, "parent", local, "")
+            if parent is None:
+                continue
+            try:
+                rays = attached.sensor_rays(element, document.path.parent, self.resolver)
+            except GeometryError as error:
+                self.report(error.diagnostic)
+                continue
+            identity = self._identity("sensor", element, model.namespace, model.index)
+            sensor = sensor_of(element, len(self.sensors), identity, parent, rays)
+            if sensor.type is not SensorType.CONTACT and not len(rays):
+                self._names["sensor"].identifiers.pop()
+                message = f"sensor '{element.key}' has no rays and is left out"
+                self.report(
+                    Diagnostic(
+                        Severity.WARNING, message, element.mark, "give array, mesh or parametric", "sensor"
+                    )
+                )
+                continue
+            self.sensors.append(sensor)
+
+    def _add_actuators(self, document: Document, model: Model, local: list[int]) -> None:
+        for element in document.elements("actuators"):
+            parent = self._body(element, "parent", local, "")
+            if parent is None:
+                continue
+            identity = self._identity("actuator", element, model.namespace, model.index)
+            T_body_actuator = self.bodies[parent].T_body_inertial @ pose_matrix(*element.pose("location"))
+            self.actuators.append(
+                Actuator(
+                    len(self.actuators), identity, parent, T_body_actuator,
+                    element.flag("visible"), element.number("visible size"),
+                )
+            )  # fmt: skip
+
+    def _add_joints(self, document: Document, model: Model, local: list[int]) -> None:
+        for element in document.elements("joints"):
+            space = merged(model.namespace, element.text("namespace"))
+            parent = self._body(element, "parent", local, space)
+            child = self._body(element, "child", local, space)
+            if parent is None or child is None:
+                continue
+            if parent == child:
+                message = f"joint '{element.key}' joins a body to itself"
+                self.report(Diagnostic(Severity.ERROR, message, element.mark, "name two bodies", "joint"))
+                continue
+            if not np.any(element.vector("parent axis")) or not np.any(element.vector("child axis")):
+                message = f"joint '{element.key}' has an axis of length zero"
+                self.report(Diagnostic(Severity.ERROR, message, element.mark, "give a direction", "joint"))
+                continue
+            identity = self._identity("joint", element, model.namespace, model.index)
+            scales = (self._scales[parent], self._scales[child])
+            self.joints.append(
+                joint_of(element, len(self.joints), identity, self.bodies[parent], self.bodies[child], scales)
+            )
+            if element.flag("ignore inter-collision"):
+                self._linked.append((parent, child))
+            if not element.flag("ligature rod"):
+                self._no_rod.update((parent, child))
+
+    def _body(self, element: Element, key: str, local: list[int], namespace: str) -> int | None:
+        """The body that ``element`` names under ``key``, by the search order of §4.5."""
+        text = element.text(key)
+        names = [body.identity.identifier for body in self.bodies]
+        local_names = [names[i] for i in local]
+        searches = [
+            (local_names, text),
+            (local_names, namespace + text),
+            (names, namespace + text),
+            (names, text),
+        ]
+        if not namespace:
+            searches = [(local_names, text), (names, text)]
+        ambiguous: list[str] = []
+        for pool, wanted in searches:
+            found = candidates(pool, wanted) if wanted else []
+            if len(found) == 1:
+                return local[found[0]] if pool is local_names else found[0]
+            ambiguous += [pool[i] for i in found]
+        reason = f"is ambiguous ({', '.join(ambiguous[:3])}, …)" if ambiguous else "does not exist"
+        message = f"{element.kind} '{element.key}' is left out: its {key} '{text}' {reason}"
+        self.report(
+            Diagnostic(
+                Severity.ERROR,
+                message,
+                element.mark_of(key),
+                "name a body of this or an earlier file",
+                "reference",
+            )
+        )
+        return None
+
+    def _finished_bodies(self) -> tuple[Body, ...]:
+        vectors = trees.command_vectors(len(self.bodies), self.joints)
+        silent = trees.silent_pairs(len(self.bodies), self._linked, self._silent_files, self._groups)
+        return tuple(
+            replace(body, joints=joints, children=children, no_collision_with=silent[body.index])
+            for body, (joints, children) in zip(self.bodies, vectors, strict=True)
+        )
+
+    def _attached(self, kind: str, items: list[Any]) -> tuple[Any, ...]:
+        """The objects with their parents settled."""
+        settled = []
+        for item in items:
+            parent = self._arrivals.parents.get((kind, item.index))
+            settled.append(replace(item, attachment=Attachment(parent, item.attachment.T_parent_object)))
+        return tuple(settled)

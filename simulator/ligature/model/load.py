@@ -1,0 +1,248 @@
+"""From a launch file, or a single model file, to a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ligature.adf import (
+    AdfError,
+    Diagnostic,
+    Document,
+    Element,
+    LaunchDocument,
+    Mark,
+    ResolutionError,
+    Resolver,
+    Severity,
+    read_any,
+    read_devices,
+    read_model,
+    read_world,
+)
+from ligature.model.builder import SceneBuilder
+from ligature.model.geometry import shader_files
+from ligature.model.naming import topic_name
+from ligature.model.scene import InputDevice, Scene, ShaderFiles, WorldSettings
+
+SKYBOX_FACES = ("right", "left", "top", "bottom", "front", "back")
+
+
+class SceneError(AdfError):
+    """A scene that cannot run at all; ``diagnostics`` say why."""
+
+
+def load(
+    path: str | Path,
+    models: Sequence[int] | None = None,
+    files: Sequence[str | Path] = (),
+    roots: Sequence[str | Path] = (),
+    namespace_prefix: str = "",
+) -> Scene:
+    """Load a scene.
+
+    Parameters
+    ----------
+    path
+        A launch file, or one model file.
+    models
+        Indices into the launch file's ``multibody configs``, in the order of loading; repeats are
+        allowed. None loads all of them.
+    files
+        Further model files, loaded before those of ``models``.
+    roots
+        Folders below which files may be opened besides the scene's own.
+    namespace_prefix
+        Put before every namespace.
+
+    Raises
+    ------
+    SceneError
+        When there is nothing to run: the file is not readable, or no body could be created.
+    """
+    start = Path(path)
+    resolver = Resolver.for_file(start, [Path(root) for root in (*roots, *(Path(f).parent for f in files))])
+    try:
+        document = read_any(start, resolver)
+    except AdfError as error:
+        raise SceneError(*error.diagnostics) from error
+    if document.kind == "launch":
+        assert isinstance(document, LaunchDocument)
+        scene = _load_launch(document, models, files, resolver, namespace_prefix)
+    elif document.kind == "model":
+        scene = _load_models([document], files, resolver, namespace_prefix, start.stem)
+    else:
+        message = f"'{start}' is {document.kind} file, not a launch or model file"
+        raise SceneError(
+            Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file")
+        )
+    if not scene.bodies:
+        errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
+        raise SceneError(Diagnostic(Severity.ERROR, f"'{start}' yields no body to simulate"), *errors)
+    return scene
+
+
+def _load_models(
+    documents: Sequence[Document], files: Sequence[str | Path], resolver: Resolver, prefix: str, name: str
+) -> Scene:
+    builder = SceneBuilder(
+        name, resolver, WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World")), prefix
+    )
+    for document in [*_extra(files, resolver, builder), *documents]:
+        builder.diagnostics += document.diagnostics
+        builder.add_model(document, None)
+    return builder.finish()
+
+
+def _extra(files: Sequence[str | Path], resolver: Resolver, builder: SceneBuilder) -> list[Document]:
+    documents = []
+    for file in files:
+        try:
+            documents.append(read_model(Path(file), resolver))
+        except AdfError as error:
+            builder.diagnostics += error.diagnostics
+    return documents
+
+
+def _load_launch(
+    launch: LaunchDocument,
+    models: Sequence[int] | None,
+    files: Sequence[str | Path],
+    resolver: Resolver,
+    prefix: str,
+) -> Scene:
+    found = list(launch.diagnostics)
+    world = _world_document(launch, resolver, found)
+    shaders = None if world is None else shader_files(world.top, "shaders", world.path.parent)
+    builder = SceneBuilder(launch.path.stem, resolver, _settings(world, shaders, prefix, launch), prefix)
+    builder.diagnostics += found
+    if world is not None:
+        _add_environment(world, builder, resolver)
+        before = builder.counts()
+        builder.add_cameras_and_lights(world, world.top.text("namespace"), -1)
+        builder.arrive(before)
+    for document in _extra(files, resolver, builder):
+        builder.diagnostics += document.diagnostics
+        builder.add_model(document, shaders)
+    for document in _selected(launch, models, resolver, builder):
+        builder.add_model(document, shaders)
+    _add_devices(launch, builder, resolver)
+    return builder.finish()
+
+
+def _world_document(launch: LaunchDocument, resolver: Resolver, found: list[Diagnostic]) -> Document | None:
+    reference = launch.world
+    if reference is None:
+        return None
+    if reference.path is None:
+        found += [reference.diagnostic] if reference.diagnostic else []
+        return None
+    try:
+        world = read_world(reference.path, resolver)
+    except AdfError as error:
+        found += error.diagnostics
+        return None
+    found += world.diagnostics
+    return world
+
+
+def _settings(
+    world: Document | None, shaders: ShaderFiles | None, prefix: str, launch: LaunchDocument
+) -> WorldSettings:
+    extra: dict[str, Any] = {}
+    if launch.top.has("ligature arms"):
+        extra["ligature arms"] = launch.top.raw_value("ligature arms")
+    if world is None:
+        return WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World"), extra=extra)
+    top = world.top
+    namespace = top.text("namespace")
+    skybox = None
+    if top.has("skybox") and all(top.has(f"skybox.{face}") for face in SKYBOX_FACES):
+        folder = world.path.parent / top.text("skybox.path")
+        skybox = {face: folder / top.text(f"skybox.{face}") for face in SKYBOX_FACES}
+    return WorldSettings(
+        namespace=namespace,
+        topic=topic_name(prefix + namespace, "World"),
+        gravity=np.array(top.vector("gravity")),
+        max_substeps=top.integer("max iterations"),
+        shaders=shaders,
+        skybox=skybox,
+        extra=extra,
+    )
+
+
+def _add_environment(world: Document, builder: SceneBuilder, resolver: Resolver) -> None:
+    """The environment comes before everything and without the world's shader (§29.21)."""
+    top = world.top
+    if not top.has("environment"):
+        return
+    mark = top.mark_of("environment")
+    try:
+        path = resolver.resolve(top.text("environment"), world.path.parent, mark)
+        document = read_model(path, resolver)
+    except ResolutionError as error:
+        builder.report(
+            Diagnostic(Severity.ERROR, error.diagnostic.message, mark, error.diagnostic.hint, "path")
+        )
+        return
+    except AdfError as error:
+        builder.diagnostics += error.diagnostics
+        return
+    builder.diagnostics += document.diagnostics
+    builder.add_model(document, None)
+
+
+def _selected(
+    launch: LaunchDocument, models: Sequence[int] | None, resolver: Resolver, builder: SceneBuilder
+) -> list[Document]:
+    """The model files of ``models`` that can be read; the others are findings."""
+    count = len(launch.models)
+    documents = []
+    for index in range(count) if models is None else models:
+        if not 0 <= index < count:
+            message = f"there is no model {index}; 'multibody configs' lists {count}, counted from 0"
+            builder.report(
+                Diagnostic(Severity.ERROR, message, launch.top.mark_of("multibody configs"), "", "index")
+            )
+            continue
+        reference = launch.models[index]
+        if reference.path is None:
+            if reference.diagnostic is not None:
+                builder.report(reference.diagnostic)
+            continue
+        try:
+            document = read_model(reference.path, resolver)
+        except AdfError as error:
+            builder.diagnostics += error.diagnostics
+            continue
+        builder.diagnostics += document.diagnostics
+        documents.append(document)
+    return documents
+
+
+def _add_devices(launch: LaunchDocument, builder: SceneBuilder, resolver: Resolver) -> None:
+    reference = launch.devices
+    if reference is None or reference.path is None:
+        if reference is not None and reference.diagnostic is not None:
+            builder.report(reference.diagnostic)
+        return
+    try:
+        document = read_devices(reference.path, resolver)
+    except AdfError as error:
+        builder.diagnostics += error.diagnostics
+        return
+    builder.diagnostics += document.diagnostics
+    builder.devices += [_device(element) for element in document.elements("input devices")]
+
+
+def _device(element: Element) -> InputDevice:
+    return InputDevice(
+        element.key,
+        element.text("hardware name"),
+        element.text("root link"),
+        element.raw(),
+        element.mark,
+    )

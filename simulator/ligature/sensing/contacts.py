@@ -1,0 +1,37 @@
+"""Contact sensors: which bodies touch the sensor's body, where, and how deep (ADF specification §17.4).
+
+World axes, metres; points and normals are on the other body.
+"""
+
+from __future__ import annotations
+
+from ligature.model.scene import Scene, SensorType
+from ligature.model.state import MAX_CONTACT_EVENTS, StateRecord
+from ligature.sensing.queries import Contact, Queries
+
+
+class Contacts:
+    """The contact sensors of a scene and the contact points they found last."""
+
+    def __init__(self, scene: Scene, queries: Queries) -> None:
+        self._queries = queries
+        self._sensors = [s for s in scene.sensors if s.type is SensorType.CONTACT]
+        self.events: list[tuple[int, Contact]] = []
+
+    def update(self) -> None:
+        """Look at the contacts of every sensor's body again."""
+        self.events = [
+            (sensor.index, contact)
+            for sensor in self._sensors
+            for contact in self._queries.contacts(sensor.parent, sensor.distance_threshold)
+        ]
+
+    def write(self, state: StateRecord) -> None:
+        """Write the first `MAX_CONTACT_EVENTS` points; ``contact_count`` counts them all."""
+        state["contact_count"] = len(self.events)
+        for row, (sensor, contact) in enumerate(self.events[:MAX_CONTACT_EVENTS]):
+            state["contact_sensor"][0, row] = sensor
+            state["contact_body"][0, row] = contact.body
+            state["contact_distance"][0, row] = contact.distance
+            state["contact_point"][0, row] = contact.point
+            state["contact_normal"][0, row] = contact.normal
