@@ -95,7 +95,9 @@ def _cached_hulls(
     return hulls
 
 
-def _quality(vertices: Array, faces: NDArray[np.int32], hulls: Sequence[Array], seed: int) -> tuple[float, float]:
+def _quality(
+    vertices: Array, faces: NDArray[np.int32], hulls: Sequence[Array], seed: int
+) -> tuple[float, float]:
     whole = trimesh.Trimesh(vertices, faces, process=False)
     solids = [trimesh.convex.convex_hull(h) for h in hulls]
     volume = abs(float(whole.volume))
@@ -104,3 +106,20 @@ def _quality(vertices: Array, faces: NDArray[np.int32], hulls: Sequence[Array], 
     surface = trimesh.sample.sample_surface(whole, 4 * SAMPLES, seed=seed)[0]
     probe = trimesh.sample.sample_surface(trimesh.util.concatenate(solids), SAMPLES, seed=seed)[0]
     return error, float(cKDTree(surface).query(probe)[0].max())
+
+
+CONVEX_ENOUGH = 0.02
+"""Largest part of its hull's volume by which a solid may fall short of it and still count as convex."""
+
+
+def convex_pieces(vertices: Array, faces: NDArray[np.int32]) -> list[Array]:
+    """Convex pieces (n, 3) of a triangle mesh that moves: its hull when that is close, else a decomposition."""
+    points = hull_vertices(vertices)
+    try:
+        hull = trimesh.convex.convex_hull(points)
+    except Exception:
+        return [points]
+    solid = trimesh.Trimesh(vertices, faces, process=True)
+    if not solid.is_watertight or abs(hull.volume - abs(solid.volume)) <= CONVEX_ENOUGH * hull.volume:
+        return [points]
+    return list(_cached_hulls(vertices, faces, 0.1, 32, 0))

@@ -82,7 +82,11 @@ class _Reader:
 
     def _face(self, words: list[str]) -> None:
         if not 3 <= len(words) <= MAX_FACE_VERTICES:
-            raise failure(self.path, f"a face has {len(words)} vertices; 3 to {MAX_FACE_VERTICES} are allowed", self.line)
+            raise failure(
+                self.path,
+                f"a face has {len(words)} vertices; 3 to {MAX_FACE_VERTICES} are allowed",
+                self.line,
+            )
         corners = [self._corner(word) for word in words]
         rows = self.faces.setdefault(self.current, _Faces()).rows
         for i in range(1, len(corners) - 1):
@@ -96,7 +100,9 @@ class _Reader:
         try:
             v, vt, vn = (int(part) - 1 if part else -1 for part in parts)
         except ValueError:
-            raise failure(self.path, f"'{word}' is not a face corner", self.line, "write v, v/vt, v//vn or v/vt/vn") from None
+            raise failure(
+                self.path, f"'{word}' is not a face corner", self.line, "write v, v/vt, v//vn or v/vt/vn"
+            ) from None
         for index, available, what in (
             (v, len(self.points), "vertex"),
             (vt, len(self.uvs), "texture coordinate"),
@@ -121,7 +127,9 @@ class _Reader:
         parts = []
         for index in range(count):
             material = self.materials[index] if self.materials else None
-            rows = np.array(self.faces[index].rows if index in self.faces else [], dtype=np.int64).reshape(-1, 3)
+            rows = np.array(self.faces[index].rows if index in self.faces else [], dtype=np.int64).reshape(
+                -1, 3
+            )
             parts.append(_part(material, rows, points, uvs, normals))
         if not self.faces:
             parts[0] = replace(parts[0], vertices=points)
@@ -167,7 +175,9 @@ def read_mtl(text: str, path: Path) -> list[Material]:
 def _with(material: Material, word: str, rest: str, path: Path) -> Material:
     if word in ("map_Kd", "map_Bump") and rest and "\0" not in rest:
         texture = path.parent / rest
-        return replace(material, texture=texture) if word == "map_Kd" else replace(material, normal_map=texture)
+        return (
+            replace(material, texture=texture) if word == "map_Kd" else replace(material, normal_map=texture)
+        )
     try:
         values = [float(v) for v in rest.split()]
     except ValueError:

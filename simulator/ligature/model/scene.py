@@ -441,7 +441,7 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Articulation:
-    """A spanning tree of bodies joined by revolute, prismatic and fixed joints, root first."""
+    """A spanning tree of bodies joined by any joints but point-to-point ones, root first."""
 
     links: tuple[Link, ...]
 

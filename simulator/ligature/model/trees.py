@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 
 from ligature.model.scene import Articulation, Body, Joint, JointType, Link
 
-TREE_TYPES = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.FIXED)
+TREE_TYPES = tuple(kind for kind in JointType if kind is not JointType.P2P)
+"""Joints that a tree can hold, as one link per free axis."""
+
 MAX_LINKS = 120
 """Links of one tree; Bullet allows 128."""
 

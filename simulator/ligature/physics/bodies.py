@@ -1,0 +1,207 @@
+"""Single bodies in Bullet: reading and setting poses, pushing, and Cartesian control (ADF specification §13).
+
+Poses are of the body frame B in world axes; Bullet speaks of the inertial frame I.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from ligature.model.commands import CommandType
+from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, pose7_matrix
+from ligature.model.scene import Body, OutputType
+from ligature.physics.articulation import Tree
+from ligature.physics.control import KICK_SECONDS
+
+Array = NDArray[np.float64]
+
+SMALLEST_MOVE, SMALLEST_TURN = 1e-5, 1e-4
+"""A static body is not moved by less than both of these (metres, radians), as in the reference."""
+
+
+class Placement:
+    """Where a body lives in Bullet: multibody ``uid`` and ``link`` (-1 is the base)."""
+
+    def __init__(self, client: int, tree: Tree, link: int, body: Body) -> None:
+        self.client, self.uid, self.link, self.body = client, tree.uid, link, body
+        self._T_inertial_body = inverse(body.T_body_inertial)
+        self._shifted = bool(np.any(self._T_inertial_body != np.eye(4)))
+
+    def to_body_frame(self, position: Sequence[float], quaternion: Sequence[float], out: Array) -> None:
+        """Write the pose (7,) of B that belongs to Bullet's pose of I."""
+        out[:3] = position
+        out[3:] = quaternion
+        if self._shifted:
+            out[:] = matrix_pose7(pose7_matrix(out) @ self._T_inertial_body)
+
+    def read(self, pose: Array, twist: Array) -> None:
+        """Fill ``pose`` (7,) and ``twist`` (6,)."""
+        if self.link < 0:
+            position, quaternion = pybullet.getBasePositionAndOrientation(
+                self.uid, physicsClientId=self.client
+            )
+            linear, angular = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
+        else:
+            found = pybullet.getLinkState(self.uid, self.link, 1, 1, physicsClientId=self.client)
+            position, quaternion, linear, angular = found[0], found[1], found[6], found[7]
+        self.to_body_frame(position, quaternion, pose)
+        twist[:3] = linear
+        twist[3:] = angular
+
+    def put(self, pose: Array) -> None:
+        """Put the base at ``pose`` (7,) of B, at rest."""
+        T = pose7_matrix(pose) @ self.body.T_body_inertial
+        pybullet.resetBasePositionAndOrientation(
+            self.uid, T[:3, 3].tolist(), matrix_quaternion(T[:3, :3]).tolist(), physicsClientId=self.client
+        )
+        pybullet.resetBaseVelocity(self.uid, [0.0] * 3, [0.0] * 3, physicsClientId=self.client)
+
+    def set_twist(self, linear: Array, angular: Array) -> None:
+        """Set the velocity of the base."""
+        pybullet.resetBaseVelocity(self.uid, linear.tolist(), angular.tolist(), physicsClientId=self.client)
+
+    def centre(self) -> Array:
+        """Centre of mass (3,)."""
+        if self.link < 0:
+            return np.array(pybullet.getBasePositionAndOrientation(self.uid, physicsClientId=self.client)[0])
+        return np.array(pybullet.getLinkState(self.uid, self.link, physicsClientId=self.client)[0])
+
+    def push(self, force: Array, point: Array | None = None) -> None:
+        """Apply ``force`` (3,) at ``point`` (3,), default the centre of mass, for one tick."""
+        at = self.centre() if point is None else point
+        pybullet.applyExternalForce(
+            self.uid,
+            self.link,
+            force.tolist(),
+            at.tolist(),
+            pybullet.WORLD_FRAME,
+            physicsClientId=self.client,
+        )
+
+    def twist(self, torque: Array) -> None:
+        """Apply ``torque`` (3,) for one tick."""
+        pybullet.applyExternalTorque(
+            self.uid, self.link, torque.tolist(), pybullet.WORLD_FRAME, physicsClientId=self.client
+        )
+
+
+class BodyControl:
+    """Cartesian command of one body and the controller that follows it."""
+
+    def __init__(self, place: Placement, dt: float) -> None:
+        self._place, self._dt = place, dt
+        self.type = CommandType.FORCE
+        self.target = np.zeros(6)
+        self._last: Array | None = None
+        self._kick = np.zeros(6)
+        self._kick_ticks = 0
+
+    def set(self, type_: CommandType, target: Array) -> None:
+        """Take a command; a jump of a pose target is answered by the derivative over `KICK_SECONDS`."""
+        if type_ is CommandType.POSITION:
+            known = self.target if self.type is CommandType.POSITION else self._pose()
+            ticks = max(1, round(KICK_SECONDS / self._dt))
+            self._kick = (self._kick * self._kick_ticks + _difference(target, known) / self._dt) / ticks
+            self._kick_ticks = ticks
+        self.type, self.target = type_, target
+
+    def apply(self, world_gravity: Array) -> None:
+        """Act on the body for the coming tick."""
+        if self.type is CommandType.FORCE:
+            if np.any(self.target) and not self._place.body.static:
+                self._place.push(self.target[:3])
+                self._place.twist(self.target[3:])
+        elif self._place.body.static:
+            self._move_static()
+        elif self.type is CommandType.VELOCITY:
+            self._drive(self.target[:3], self.target[3:], np.zeros(3))
+        else:
+            self._follow(world_gravity)
+
+    def memory(self) -> tuple[int, Array, Array, int, Array | None]:
+        """Everything that lasts from tick to tick."""
+        return int(self.type), self.target.copy(), self._kick.copy(), self._kick_ticks, self._last
+
+    def recall(self, memory: tuple[int, Array, Array, int, Array | None]) -> None:
+        """Continue from `memory`."""
+        type_, self.target, self._kick, self._kick_ticks, self._last = memory
+        self.type = CommandType(type_)
+
+    def _pose(self) -> Array:
+        pose, twist = np.empty(7), np.empty(6)
+        self._place.read(pose, twist)
+        return pose
+
+    def _move_static(self) -> None:
+        pose = self._pose()
+        if self.type is CommandType.VELOCITY:
+            if np.any(self.target):
+                self._place.put(_moved(pose, self.target * self._dt))
+            return
+        error = _difference(self.target, pose)
+        if np.linalg.norm(error[:3]) >= SMALLEST_MOVE or np.linalg.norm(error[3:]) >= SMALLEST_TURN:
+            self._place.put(self.target)
+
+    def _follow(self, world_gravity: Array) -> None:
+        """PID towards a pose; velocity output is evaluated implicitly, as for joints."""
+        law = self._place.body.controller
+        error = _difference(self.target, self._pose())
+        kick = self._kick if self._kick_ticks > 0 else np.zeros(6)
+        self._kick_ticks = max(self._kick_ticks - 1, 0)
+        slope = np.zeros(6) if self._last is None else (error - self._last) / self._dt
+        self._last = error
+        halves = []
+        for part, gains, output in (
+            (slice(0, 3), law.linear, law.linear_output),
+            (slice(3, 6), law.angular, law.angular_output),
+        ):
+            if output is OutputType.FORCE:
+                halves.append(gains.p * error[part] + gains.d * slope[part])
+            else:
+                halves.append((gains.p * error[part] + gains.d * kick[part]) / (1.0 + gains.d))
+        if law.linear_output is OutputType.FORCE:
+            self._place.push(halves[0])
+            self._place.twist(halves[1])
+        else:
+            self._drive(halves[0], halves[1], world_gravity * self._dt)
+
+    def _drive(self, linear: Array, angular: Array, fall: Array) -> None:
+        """Make the body move with a twist; ``fall`` (3,) is what gravity adds within the tick."""
+        if self._place.link < 0:
+            self._place.set_twist(linear - fall, angular)
+            return
+        pose, twist = np.empty(7), np.empty(6)
+        self._place.read(pose, twist)
+        body = self._place.body
+        self._place.push(body.mass * (linear - twist[:3]) / self._dt)
+        R = pose7_matrix(pose)[:3, :3] @ body.T_body_inertial[:3, :3]
+        self._place.twist(R @ (body.inertia * (R.T @ (angular - twist[3:]))) / self._dt)
+
+
+def _difference(target: Array, pose: Array) -> Array:
+    """Translation and rotation vector (6,), world axes, from ``pose`` to ``target`` (7,) each."""
+    R = pose7_matrix(target)[:3, :3] @ pose7_matrix(pose)[:3, :3].T
+    q = matrix_quaternion(R)
+    sine = float(np.linalg.norm(q[:3]))
+    angle = 2.0 * np.arctan2(sine, q[3])
+    turn = np.zeros(3) if sine < 1e-12 else q[:3] / sine * angle
+    return np.concatenate([target[:3] - pose[:3], turn])
+
+
+def _moved(pose: Array, step: Array) -> Array:
+    """``pose`` (7,) after the small motion ``step`` (6,) in world axes."""
+    x, y, z, w = pose[3:]
+    r = 0.5 * step[3:]
+    turned = pose[3:] + np.array(
+        [
+            r[0] * w + r[1] * z - r[2] * y,
+            r[1] * w + r[2] * x - r[0] * z,
+            r[2] * w + r[0] * y - r[1] * x,
+            -(r @ pose[3:6]),
+        ]
+    )
+    return np.concatenate([pose[:3] + step[:3], turned / np.linalg.norm(turned)])

@@ -1,0 +1,171 @@
+"""Questions about contacts, overlaps and rays, and the constraints that grasp; mixed into `World`.
+
+World axes, metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from ligature.mesh import CollisionCache
+from ligature.model.frames import inverse, matrix_quaternion
+from ligature.model.scene import Collider, Scene
+from ligature.physics import shapes
+from ligature.physics.bodies import Placement
+
+Array = NDArray[np.float64]
+
+GRASP_FORCE = 500.0
+"""Largest force in newtons by which a grasp holds; jams yield instead of exploding."""
+
+_FAR = [0.0, 0.0, -1000.0]
+"""Where the probes of ghosts wait between questions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Closest hits of n rays: body index or -1, fraction along the ray, point and normal (n, 3)."""
+
+    body: NDArray[np.int32]
+    fraction: Array
+    point: Array
+    normal: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """One contact point: the other body, signed distance, point and normal (3,) on the other body."""
+
+    body: int
+    distance: float
+    point: Array
+    normal: Array
+
+
+@dataclass
+class _Held:
+    parent: int
+    child: int
+    T_parent_frame: Array
+    T_child_frame: Array
+    constraint: int
+
+
+class BulletQueries:
+    """Answers `ligature.sensing.queries.Queries` with Bullet."""
+
+    scene: Scene
+    client: int
+    place_of: dict[int, Placement]
+    _cache: CollisionCache
+
+    def _setup_queries(self) -> None:
+        self._body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
+        probes = getattr(self, "_probe_shapes", [])
+        self._probe_shapes: list[tuple[Sequence[Collider], float]] = []
+        self._probes: list[int] = []
+        self._held: dict[int, _Held] = {}
+        self._next_handle = 0
+        for colliders, margin in probes:
+            self.add_probe(colliders, margin)
+
+    def add_probe(self, colliders: Sequence[Collider], margin: float) -> int:
+        """Register a volume that produces no contacts; returns its handle."""
+        shape = shapes.create(self.client, self._cache, colliders, np.eye(4), moving=True)
+        uid = pybullet.createMultiBody(0, shape, basePosition=_FAR, physicsClientId=self.client)
+        pybullet.changeDynamics(uid, -1, collisionMargin=margin, physicsClientId=self.client)
+        pybullet.setCollisionFilterGroupMask(uid, -1, 0, 0, physicsClientId=self.client)
+        self._probe_shapes.append((colliders, margin))
+        self._probes.append(uid)
+        return len(self._probes) - 1
+
+    def probe_overlaps(self, probe: int, pose: Array) -> list[int]:
+        """Bodies that penetrate the probe when it stands at ``pose`` (7,)."""
+        uid = self._probes[probe]
+        pybullet.resetBasePositionAndOrientation(
+            uid, pose[:3].tolist(), pose[3:].tolist(), physicsClientId=self.client
+        )
+        low, high = pybullet.getAABB(uid, -1, physicsClientId=self.client)
+        near = pybullet.getOverlappingObjects(low, high, physicsClientId=self.client) or ()
+        found = []
+        for key in sorted(set(near)):
+            body = self._body_at.get(key)
+            if body is None:
+                continue
+            if pybullet.getClosestPoints(uid, key[0], 0.0, -1, key[1], physicsClientId=self.client):
+                found.append(body)
+        return found
+
+    def ray_test(self, starts: Array, ends: Array) -> Hits:
+        """Closest hits of the segments ``starts`` to ``ends``, each (n, 3)."""
+        results = pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self.client)
+        body = np.array(
+            [self._body_at.get((r[0], r[1]), -1) if r[0] >= 0 else -1 for r in results], dtype=np.int32
+        )
+        return Hits(
+            body,
+            np.array([r[2] for r in results]),
+            np.array([r[3] for r in results]),
+            np.array([r[4] for r in results]),
+        )
+
+    def contacts(self, body: int, threshold: float) -> list[Touch]:
+        """Contact points of ``body`` whose distance is at most ``threshold``."""
+        place = self.place_of.get(body)
+        if place is None:
+            return []
+        found = []
+        for first in (True, False):
+            side = (
+                {"bodyA": place.uid, "linkIndexA": place.link}
+                if first
+                else {"bodyB": place.uid, "linkIndexB": place.link}
+            )
+            for point in pybullet.getContactPoints(physicsClientId=self.client, **side):
+                other = self._body_at.get((point[2], point[4]) if first else (point[1], point[3]))
+                if other is None or other == body or point[8] > threshold:
+                    continue
+                on_other = np.array(point[6] if first else point[5])
+                normal = np.array(point[7]) if first else -np.array(point[7])
+                found.append(Touch(other, float(point[8]), on_other, normal))
+            if found:
+                break
+        return found
+
+    def add_fixed(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
+        """Hold two frames together, given in the body frames of parent and child; returns a handle."""
+        bodies = self.scene.bodies
+        in_parent = inverse(bodies[parent].T_body_inertial) @ T_parent_frame
+        in_child = inverse(bodies[child].T_body_inertial) @ T_child_frame
+        one, two = self.place_of[parent], self.place_of[child]
+        constraint = pybullet.createConstraint(
+            one.uid, one.link, two.uid, two.link, pybullet.JOINT_FIXED, [0.0] * 3,
+            in_parent[:3, 3].tolist(), in_child[:3, 3].tolist(),
+            matrix_quaternion(in_parent[:3, :3]).tolist(), matrix_quaternion(in_child[:3, :3]).tolist(),
+            physicsClientId=self.client,
+        )  # fmt: skip
+        pybullet.changeConstraint(constraint, maxForce=GRASP_FORCE, physicsClientId=self.client)
+        self._next_handle += 1
+        self._held[self._next_handle] = _Held(parent, child, T_parent_frame, T_child_frame, int(constraint))
+        return self._next_handle
+
+    def remove_fixed(self, handle: Any) -> None:
+        """Let go what `add_fixed` holds."""
+        held = self._held.pop(handle)
+        pybullet.removeConstraint(held.constraint, physicsClientId=self.client)
+
+    def held_constraints(self) -> dict[int, _Held]:
+        """The grasps that hold, to be made again after a rebuild."""
+        return dict(self._held)
+
+    def hold_again(self, held: dict[int, _Held]) -> None:
+        """Make the grasps of `held_constraints` again under their old handles."""
+        for handle, grasp in held.items():
+            self._next_handle = handle - 1
+            self.add_fixed(grasp.parent, grasp.child, grasp.T_parent_frame, grasp.T_child_frame)

@@ -1,0 +1,314 @@
+"""The rigid bodies of a scene on Bullet, advanced one tick at a time.
+
+Frames and units as in `ligature.model.scene`; poses are x y z qx qy qz qw of the body frame B in
+world axes, twists are linear at the centre of mass, then angular, in world axes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from ligature.adf import Diagnostic, Severity
+from ligature.mesh import CollisionCache
+from ligature.model.commands import BodyCommand, CommandType
+from ligature.model.frames import matrix_pose7
+from ligature.model.scene import JointType, Scene
+from ligature.model.state import StateRecord
+from ligature.physics.articulation import Tree, build
+from ligature.physics.bodies import BodyControl, Placement
+from ligature.physics.closures import Closures
+from ligature.physics.control import TreeControl
+from ligature.physics.queries import BulletQueries
+
+Array = NDArray[np.float64]
+
+SOLVER_ITERATIONS = 20
+MAX_SPEED = 1e4
+"""Speed in m/s or rad/s beyond which a body has diverged."""
+
+
+class World(BulletQueries):
+    """All rigid bodies of ``scene`` outside rods; one Bullet client of its own."""
+
+    def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
+        self.scene = scene
+        self.dt = dt
+        self._cache = CollisionCache()
+        self.problems: list[Diagnostic] = []
+        self._create()
+
+    def _create(self) -> None:
+        scene = self.scene
+        self.client = pybullet.connect(pybullet.DIRECT)
+        self._world_gravity = _common_gravity(scene)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS,
+            deterministicOverlappingPairs=1, physicsClientId=self.client,
+        )  # fmt: skip
+        pybullet.setGravity(*self._world_gravity.tolist(), physicsClientId=self.client)
+        self.trees = [build(self.client, self._cache, scene, a) for a in scene.articulations]
+        self.place_of = {
+            body: Placement(self.client, tree, link, scene.bodies[body])
+            for tree in self.trees
+            for body, link in tree.link_of.items()
+        }
+        self._tree_of_joint: dict[int, TreeControl] = {}
+        self._controls = [TreeControl(self.client, tree, scene.joints, self.dt) for tree in self.trees]
+        for control in self._controls:
+            self._tree_of_joint.update(dict.fromkeys(control.row, control))
+        self._body_controls: dict[int, BodyControl] = {}
+        self._uplifted = self._gravity_corrections()
+        self._silence_pairs()
+        self._closures = Closures(self.client, scene, self.place_of, self.report)
+        self._feedback_setup()
+        self._setup_queries()
+
+    def report(self, diagnostic: Diagnostic) -> None:
+        """Note a finding."""
+        self.problems.append(diagnostic)
+
+    # --- commands ---------------------------------------------------------------------------
+
+    def set_command(self, command: BodyCommand) -> None:
+        """Take a body command; it holds until the next one or `release` (interface reference §3.1, §3.2)."""
+        body = self.scene.bodies[command.body]
+        if command.body in self.place_of:
+            control = self._body_controls.get(command.body)
+            if control is None:
+                control = self._body_controls[command.body] = BodyControl(
+                    self.place_of[command.body], self.dt
+                )
+            control.set(command.type, np.array(command.target, dtype=float))
+        types = command.joint_types
+        for i, (joint, value) in enumerate(zip(body.joints, command.joint_values, strict=False)):
+            tree = self._tree_of_joint.get(joint)
+            if tree is not None:
+                type_ = types[i] if i < len(types) else CommandType.FORCE
+                tree.command(self.scene.joints[joint], type_, value)
+
+    def release(self, body: int) -> None:
+        """Clear the command of a body: no force, its joints limp."""
+        self._body_controls.pop(body, None)
+        for joint in self.scene.bodies[body].joints:
+            if joint in self._tree_of_joint:
+                self._tree_of_joint[joint].release(joint)
+
+    # --- the tick ---------------------------------------------------------------------------
+
+    def pre_step(self) -> None:
+        """Controllers, springs and gravity of the coming tick."""
+        for control in self._controls:
+            if control.active:
+                control.read()
+                control.apply()
+        for place, force in self._uplifted:
+            place.push(force)
+        for control_ in self._body_controls.values():
+            control_.apply(self._world_gravity)
+
+    def step(self) -> None:
+        """Advance Bullet by one tick."""
+        pybullet.stepSimulation(physicsClientId=self.client)
+
+    def write_state(self, state: StateRecord) -> None:
+        """Write poses, twists, joints and wrenches into a state record."""
+        poses, twists = state["body_pose"][0], state["body_twist"][0]
+        for tree in self.trees:
+            self._write_tree(tree, poses, twists)
+        self._write_joints(state)
+
+    def _write_tree(self, tree: Tree, poses: Array, twists: Array) -> None:
+        root = self.place_of[tree.root]
+        root.read(poses[tree.root], twists[tree.root])
+        links = [(body, link) for body, link in tree.link_of.items() if link >= 0]
+        if not links:
+            return
+        states = pybullet.getLinkStates(
+            tree.uid, [link for _, link in links], computeLinkVelocity=1, computeForwardKinematics=1,
+            physicsClientId=self.client,
+        )  # fmt: skip
+        for (body, _), found in zip(links, states, strict=True):
+            self.place_of[body].to_body_frame(found[0], found[1], poses[body])
+            twists[body, :3] = found[6]
+            twists[body, 3:] = found[7]
+
+    def _write_joints(self, state: StateRecord) -> None:
+        position, velocity, effort = (state[f"joint_{k}"][0] for k in ("position", "velocity", "effort"))
+        joints = self.scene.joints
+        wrench = state["body_wrench"][0]
+        wrench[:] = 0.0
+        for control in self._controls:
+            if not control.links:
+                continue
+            control.read()
+            for index, row in control.row.items():
+                joint = joints[index]
+                if joint.type in (JointType.SIX_DOF, JointType.SIX_DOF_SPRING, JointType.CONE_TWIST):
+                    continue
+                q = control.position[row]
+                turns = joint.type is JointType.REVOLUTE
+                position[index] = (q + np.pi) % (2 * np.pi) - np.pi if turns and abs(q) > np.pi else q
+                velocity[index] = control.velocity[row]
+                if joint.feedback:
+                    effort[index] = control.motor_effort[row]
+        for joint_index, uid, link in self._feedback:
+            joint = joints[joint_index]
+            reaction = pybullet.getJointState(uid, link, physicsClientId=self.client)[2]
+            wrench[joint.child] += np.array(reaction)
+
+    # --- bodies -----------------------------------------------------------------------------
+
+    def pose7(self, body: int) -> Array:
+        """Pose (7,) of a body."""
+        pose, twist = np.empty(7), np.empty(6)
+        self.place_of[body].read(pose, twist)
+        return pose
+
+    def twist6(self, body: int) -> Array:
+        """Twist (6,) of a body."""
+        pose, twist = np.empty(7), np.empty(6)
+        self.place_of[body].read(pose, twist)
+        return twist
+
+    def set_pose(self, body: int, pose: Array) -> None:
+        """Put the root body of a tree at ``pose`` (7,) at rest; raises ValueError for a link of an arm."""
+        place = self.place_of[body]
+        if place.link >= 0:
+            name = self.scene.bodies[body].identity.identifier
+            raise ValueError(f"body '{name}' hangs on joints; set its joints, or the pose of its root")
+        place.put(pose)
+
+    def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
+        """Set a joint to a position and velocity at once, without dynamics."""
+        control = self._tree_of_joint[joint]
+        link = control.links[control.row[joint]]
+        pybullet.resetJointState(control._tree.uid, link, position, velocity, physicsClientId=self.client)
+
+    def apply_force(self, body: int, force: Array, point: Array) -> None:
+        """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
+        self.place_of[body].push(force, point)
+
+    def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
+        """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,)."""
+        place = self.place_of[body]
+        place.push(impulse / self.dt)
+        place.twist(moment / self.dt)
+
+    # --- health, reset, snapshots -----------------------------------------------------------
+
+    def heal(self) -> list[Diagnostic]:
+        """Put trees that diverged back to where the scene starts, and say so."""
+        found = []
+        for tree in self.trees:
+            place = self.place_of[tree.root]
+            pose, twist = np.empty(7), np.empty(6)
+            place.read(pose, twist)
+            joints = [
+                value
+                for q, qd, *_ in pybullet.getJointStates(tree.uid, [a[0] for a in tree.axes], physicsClientId=self.client)
+                for value in (q, qd)
+            ] if tree.axes else []  # fmt: skip
+            values = np.array([*pose, *twist, *joints])
+            if not np.isfinite(values).all() or np.abs(values[7:13]).max() > MAX_SPEED:
+                self._restart(tree)
+                name = self.scene.bodies[tree.root].identity.identifier
+                found.append(
+                    Diagnostic(
+                        Severity.ERROR,
+                        f"'{name}' diverged and was put back to its initial pose",
+                        code="diverged",
+                    )
+                )
+        return found
+
+    def reset(self) -> None:
+        """Put every body back to its initial pose, at rest; commands hold on."""
+        for tree in self.trees:
+            self._restart(tree)
+
+    def _restart(self, tree: Tree) -> None:
+        body = self.scene.bodies[tree.root]
+        self.place_of[tree.root].put(matrix_pose7(body.T_world_body))
+        for link, *_ in tree.axes:
+            pybullet.resetJointState(tree.uid, link, 0.0, 0.0, physicsClientId=self.client)
+
+    def snapshot(self) -> dict[str, Any]:
+        """All dynamic state; the world is rebuilt from it, so that it and a restored one continue alike."""
+        trees = []
+        for tree in self.trees:
+            pose = pybullet.getBasePositionAndOrientation(tree.uid, physicsClientId=self.client)
+            velocity = pybullet.getBaseVelocity(tree.uid, physicsClientId=self.client)
+            links = [link for link, *_ in tree.axes]
+            states = pybullet.getJointStates(tree.uid, links, physicsClientId=self.client) if links else []
+            trees.append((pose, velocity, [(s[0], s[1]) for s in states]))
+        memory = {
+            "trees": trees,
+            "controls": [control.memory() for control in self._controls],
+            "bodies": {body: control.memory() for body, control in self._body_controls.items()},
+        }
+        self.restore(memory)
+        return memory
+
+    def restore(self, memory: dict[str, Any]) -> None:
+        """Rebuild the world and continue from `snapshot` (DESIGN §4.6: rebuilding is what is exact)."""
+        held = self.held_constraints()
+        self.close()
+        self._create()
+        for tree, (pose, velocity, joints) in zip(self.trees, memory["trees"], strict=True):
+            pybullet.resetBasePositionAndOrientation(tree.uid, *pose, physicsClientId=self.client)
+            for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
+                pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
+            pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
+        for control, kept in zip(self._controls, memory["controls"], strict=True):
+            control.recall(kept)
+        for body, kept in memory["bodies"].items():
+            control_ = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
+            control_.recall(kept)
+        self.hold_again(held)
+
+    def close(self) -> None:
+        """Give the Bullet client back."""
+        pybullet.disconnect(physicsClientId=self.client)
+
+    # --- set-up -----------------------------------------------------------------------------
+
+    def _gravity_corrections(self) -> list[tuple[Placement, Array]]:
+        """Forces (3,) on bodies whose gravity is not the common one."""
+        corrections = []
+        for body, place in self.place_of.items():
+            force = self.scene.bodies[body].mass * (self.scene.bodies[body].gravity - self._world_gravity)
+            if np.any(force):
+                corrections.append((place, force))
+        return corrections
+
+    def _silence_pairs(self) -> None:
+        for body, place in self.place_of.items():
+            for other in self.scene.bodies[body].no_collision_with:
+                if other > body and other in self.place_of:
+                    there = self.place_of[other]
+                    pybullet.setCollisionFilterPair(
+                        place.uid, there.uid, place.link, there.link, 0, physicsClientId=self.client
+                    )
+
+    def _feedback_setup(self) -> None:
+        self._feedback: list[tuple[int, int, int]] = []
+        for tree in self.trees:
+            for link, joint, _, _ in tree.axes:
+                if self.scene.joints[joint].feedback:
+                    pybullet.enableJointForceTorqueSensor(tree.uid, link, True, physicsClientId=self.client)
+                    self._feedback.append((joint, tree.uid, link))
+
+
+def _common_gravity(scene: Scene) -> Array:
+    """The gravity (3,) that most moving bodies share; Bullet has one for all."""
+    counts = Counter(
+        tuple(b.gravity.tolist()) for b in scene.bodies if not b.static and b.index not in scene.rod_bodies
+    )
+    if not counts:
+        return np.array(scene.world.gravity)
+    return np.array(max(counts, key=lambda g: (counts[g], g)))
