@@ -88,7 +88,9 @@ def joint(
     }
 
 
-def shape(kind: str, at: tuple[float, float, float], rpy: tuple[float, ...] = (0, 0, 0), **geometry: Any) -> dict[str, Any]:
+def shape(
+    kind: str, at: tuple[float, float, float], rpy: tuple[float, ...] = (0, 0, 0), **geometry: Any
+) -> dict[str, Any]:
     """One element of a compound shape, placed in the body frame."""
     return {"shape": kind, "geometry": geometry, "offset": pose(pose_matrix(at, rpy))}
 
@@ -103,7 +105,9 @@ def colour(r: float, g: float, b: float, specular: float = 0.3) -> dict[str, Any
     }
 
 
-def body(name: str, T_world_body: Matrix, mass: float, shapes: list[dict[str, Any]], **keys: Any) -> dict[str, Any]:
+def body(
+    name: str, T_world_body: Matrix, mass: float, shapes: list[dict[str, Any]], **keys: Any
+) -> dict[str, Any]:
     """An ADF body whose looks and collisions are the same primitive shapes."""
     block: dict[str, Any] = {
         "name": name,
@@ -166,7 +170,9 @@ def psm(name: str) -> dict[str, Any]:
     bodies: dict[str, Any] = {}
     joints: dict[str, Any] = {}
 
-    def add_body(link: str, T: Matrix, links: list[dict[str, Any]], mass: float, look: dict[str, Any]) -> None:
+    def add_body(
+        link: str, T: Matrix, links: list[dict[str, Any]], mass: float, look: dict[str, Any]
+    ) -> None:
         bodies[f"BODY {link}"] = body(
             link, T, mass, links,
             **{"color components": look, "collision groups": groups[link], "passive": link not in published},
@@ -188,7 +194,11 @@ def psm(name: str) -> dict[str, Any]:
         T_link_body = T_6_yaw if link == "tool yaw link" else np.eye(4)
         links, mass, look = shapes[link]
         add_body(link, T_world_link @ T_link_body, links, mass, look)
-        keys: dict[str, Any] = {"controller output type": "VELOCITY", "enable feedback": True, "passive": False}
+        keys: dict[str, Any] = {
+            "controller output type": "VELOCITY",
+            "enable feedback": True,
+            "passive": False,
+        }
         if limits[index] is not None:
             keys["joint limits"] = {"low": limits[index][0], "high": limits[index][1]}
         if index == 5:
@@ -224,7 +234,13 @@ def psm(name: str) -> dict[str, Any]:
                 "passive": False,
             },
         )  # fmt: skip
-    bodies["BODY tool id"] = {"name": f"tool_id_{TOOL_ID}", "mesh": "", "mass": 0.0, "location": pose(T_world_yaw), "passive": False}
+    bodies["BODY tool id"] = {
+        "name": f"tool_id_{TOOL_ID}",
+        "mesh": "",
+        "mass": 0.0,
+        "location": pose(T_world_yaw),
+        "passive": False,
+    }
     return {
         "bodies": list(bodies),
         "joints": list(joints),
@@ -290,13 +306,15 @@ def phantom() -> dict[str, Any]:
     T_world_block = pose_matrix((0.03, 0.2, top - 0.015), (0, 0, 0))
     block_shape = [shape("BOX", (0, 0, 0), x=0.1, y=0.16, z=0.03)]
     bodies: dict[str, Any] = {
-        "BODY Block": body("Block", T_world_block, 0.0, block_shape, **{"color components": colour(0.85, 0.6, 0.5)})
+        "BODY Block": body(
+            "Block", T_world_block, 0.0, block_shape, **{"color components": colour(0.85, 0.6, 0.5)}
+        )
     }
     T_world_camera = pose_matrix((0.0307, 0.25102, 0.81025), (0.69813, 0, -3.14158))
     bodies["BODY CameraFrame"] = body("CameraFrame", T_world_camera, 0.0, [])
 
     shapes, centre, mass = arc_shapes()
-    T_world_needle = pose_matrix((0.03, 0.205, top + NEEDLE_THICKNESS + 0.0002), (0, 0, 0))
+    T_world_needle = pose_matrix((0.03, 0.24, top + NEEDLE_THICKNESS + 0.0002), (0, 0, 0))
     bodies["BODY Needle"] = body(
         "Needle", T_world_needle, number(mass), shapes,
         **{
@@ -309,7 +327,8 @@ def phantom() -> dict[str, Any]:
     length = THREAD_LENGTH / THREAD_ELEMENTS
     area = np.pi * THREAD_RADIUS**2
     bending = THREAD_MODULUS * np.pi * THREAD_RADIUS**4 / 4 / length
-    T_needle_tail = pose_matrix((-NEEDLE_RADIUS, 0, 0), (HALF_PI, 0, 0))
+    tail = NEEDLE_RADIUS * np.array([np.cos(NEEDLE_START), np.sin(NEEDLE_START), 0.0])
+    T_needle_tail = pose_matrix(tuple(tail), (HALF_PI, 0, NEEDLE_START - np.pi))
     joints: dict[str, Any] = {}
     names = ["Thread"] + [f"Thread_{i:03d}" for i in range(1, THREAD_ELEMENTS)]
     mass_element = THREAD_DENSITY * area * length

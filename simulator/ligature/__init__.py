@@ -2,7 +2,8 @@
 
 from ligature.model.load import SceneError, load
 from ligature.model.scene import Scene
+from ligature.simulation import Simulation
 
 __version__ = "0.1.0"
 
-__all__ = ["Scene", "SceneError", "load"]
+__all__ = ["Scene", "SceneError", "Simulation", "load"]

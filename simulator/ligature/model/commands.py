@@ -8,6 +8,7 @@ field says otherwise.
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
 Vector = tuple[float, ...]
@@ -72,3 +73,44 @@ class Reset:
 
 
 Command = BodyCommand | ActuatorCommand | PlaceCommand | Release | Reset
+
+
+LARGEST = 1e9
+"""Largest magnitude of a number in a command, in SI units."""
+
+_LENGTHS = {CommandType.POSITION: 7, CommandType.VELOCITY: 6, CommandType.FORCE: 6}
+
+
+def check(command: Command) -> None:
+    """Raise ValueError, saying what was expected, when a command may not reach the physics."""
+    if isinstance(command, BodyCommand):
+        wanted = _LENGTHS[command.type]
+        if len(command.target) != wanted:
+            raise ValueError(f"a {command.type.name} command has {wanted} numbers, not {len(command.target)}")
+        _finite("the command", command.target)
+        _finite("joint commands", command.joint_values)
+        if command.type is CommandType.POSITION:
+            _unit(command.target[3:])
+    elif isinstance(command, ActuatorCommand) and command.offset is not None:
+        _pose("the offset", command.offset)
+    elif isinstance(command, PlaceCommand) and command.pose is not None:
+        _pose("the pose", command.pose)
+
+
+def _pose(what: str, values: Vector) -> None:
+    if len(values) != 7:
+        raise ValueError(f"{what} has 7 numbers, not {len(values)}")
+    _finite(what, values)
+    _unit(values[3:])
+
+
+def _finite(what: str, values: Vector) -> None:
+    for value in values:
+        if not math.isfinite(value) or abs(value) > LARGEST:
+            raise ValueError(f"{what} must be finite and below {LARGEST:g}, not {value}")
+
+
+def _unit(quaternion: Vector) -> None:
+    length = math.sqrt(sum(v * v for v in quaternion))
+    if not 0.9 <= length <= 1.1:
+        raise ValueError(f"the quaternion has the length {length:.3g}; it must be 1")

@@ -12,8 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
 from ligature.model.frames import matrix_pose7
-from ligature.model.scene import Box, Capsule, Collider, Cylinder, Hull, Scene, Shape, Sphere
+from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Scene, Shape, Sphere
 from ligature.sensing.attachments import compose
 from ligature.sensing.queries import Queries
 
@@ -21,37 +22,6 @@ Array = NDArray[np.float64]
 
 SAMPLES = 5
 """Points along a rod element that are tested; neighbours are closer than the element's diameter."""
-
-BOX, SPHERE, CYLINDER, CAPSULE, CONE, HULL = range(6)
-
-
-@njit(cache=True)
-def _inside(kind: int, size: Array, planes: Array, p: Array, radius: float) -> bool:
-    """Whether a ball of ``radius`` at ``p`` (3,) in the shape's frame touches the shape."""
-    if kind == SPHERE:
-        return p[0] ** 2 + p[1] ** 2 + p[2] ** 2 <= (size[0] + radius) ** 2
-    if kind == CAPSULE:
-        half = max(0.5 * size[1] - size[0], 0.0)
-        dz = p[2] - min(max(p[2], -half), half)
-        return p[0] ** 2 + p[1] ** 2 + dz * dz <= (size[0] + radius) ** 2
-    if kind == BOX:
-        square = 0.0
-        for i in range(3):
-            d = max(abs(p[i]) - 0.5 * size[i], 0.0)
-            square += d * d
-        return square <= radius * radius
-    if kind == CYLINDER:
-        radial = max((p[0] ** 2 + p[1] ** 2) ** 0.5 - size[0], 0.0)
-        axial = max(abs(p[2]) - 0.5 * size[1], 0.0)
-        return radial**2 + axial**2 <= radius * radius
-    if kind == CONE:
-        slope = size[0] / size[1]
-        radial = (p[0] ** 2 + p[1] ** 2) ** 0.5 - slope * (0.5 * size[1] - p[2])
-        return radial / (1.0 + slope * slope) ** 0.5 <= radius and abs(p[2]) <= 0.5 * size[1] + radius
-    for i in range(planes.shape[0]):
-        if planes[i, 0] * p[0] + planes[i, 1] * p[1] + planes[i, 2] * p[2] - planes[i, 3] > radius:
-            return False
-    return planes.shape[0] > 0
 
 
 @njit(cache=True)
@@ -67,7 +37,7 @@ def _elements_inside(
     hit: NDArray[np.bool_],
 ) -> None:
     """Set ``hit[i]`` for every element (pose row of ``elements``, axis local Z) that touches the shape."""
-    inverse = np.empty(7)
+    inverse, normal = np.empty(7), np.empty(3)
     conjugate = np.array([0.0, 0.0, 0.0, -shape_pose[3], -shape_pose[4], -shape_pose[5], shape_pose[6]])
     origin = np.zeros(7)
     origin[0:3] = -shape_pose[0:3]
@@ -90,27 +60,29 @@ def _elements_inside(
             point[1] = elements[i, 1] + s * ay
             point[2] = elements[i, 2] + s * az
             compose(inverse, point, local)
-            if _inside(kind, size, planes, local, radii[i]):
+            if signed_distance(kind, size, planes, local, normal) <= radii[i]:
                 hit[i] = True
                 break
 
 
 def _shape_arrays(shape: Shape) -> tuple[int, Array, Array, float]:
-    """Kind, sizes (3,), hull planes (n, 4) as normal and offset, and bounding radius of a shape."""
+    """Kind, sizes (3,), hull planes (n, 4) and bounding radius of a convex shape."""
     none = np.zeros((0, 4))
     if isinstance(shape, Box):
         return BOX, np.asarray(shape.size, dtype=float), none, float(np.linalg.norm(shape.size)) / 2
     if isinstance(shape, Sphere):
         return SPHERE, np.array([shape.radius, 0.0, 0.0]), none, shape.radius
     if isinstance(shape, Hull):
-        from scipy.spatial import ConvexHull
-
-        equations = ConvexHull(shape.vertices).equations
-        planes = np.column_stack([equations[:, :3], -equations[:, 3]])
-        return HULL, np.zeros(3), planes, float(np.linalg.norm(shape.vertices, axis=1).max())
-    kind = {Cylinder: CYLINDER, Capsule: CAPSULE}.get(type(shape), CONE)
-    radius, height = float(shape.radius), float(shape.height)  # type: ignore[union-attr]
-    return kind, np.array([radius, height, 0.0]), none, float(np.hypot(radius, height / 2))
+        bound = float(np.linalg.norm(shape.vertices, axis=1).max())
+        return HULL, np.zeros(3), hull_planes(shape.vertices), bound
+    assert isinstance(shape, Cylinder | Capsule | Cone)
+    kind = {Cylinder: CYLINDER, Capsule: CAPSULE, Cone: CONE}[type(shape)]
+    return (
+        kind,
+        np.array([shape.radius, shape.height, 0.0]),
+        none,
+        float(np.hypot(shape.radius, shape.height / 2)),
+    )
 
 
 class _Volume:
@@ -129,7 +101,11 @@ class Ghosts:
         self._queries = queries
         self._probes = [queries.add_probe(g.colliders, g.collision_margin) for g in scene.ghosts]
         self._volumes = [
-            [_Volume(c) for c in g.colliders if isinstance(c.shape, Box | Sphere | Cylinder | Capsule | Hull)]
+            [
+                _Volume(c)
+                for c in g.colliders
+                if isinstance(c.shape, Box | Sphere | Cylinder | Capsule | Cone | Hull)
+            ]
             for g in scene.ghosts
         ]
         self._elements = np.array(sorted(scene.rod_bodies), dtype=np.int64)

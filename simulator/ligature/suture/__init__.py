@@ -1,1 +1,5 @@
 """The rod that models a suture thread, its coupling to bodies, tissue holes and grasping."""
+
+from ligature.suture.rods import Rods
+
+__all__ = ["Rods"]

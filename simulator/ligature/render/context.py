@@ -1,0 +1,20 @@
+"""The OpenGL context: EGL without a display, on a GPU or on Mesa's software rasteriser."""
+
+from __future__ import annotations
+
+import moderngl
+
+
+class RenderUnavailable(RuntimeError):
+    """No OpenGL can be had on this machine; the message says what to install."""
+
+
+def create_context() -> moderngl.Context:
+    """A stand-alone OpenGL 3.3 core context; raises `RenderUnavailable`."""
+    try:
+        return moderngl.create_context(standalone=True, backend="egl", require=330)
+    except Exception as error:
+        raise RenderUnavailable(
+            f"no OpenGL 3.3 context through EGL ({error}); install libegl1 and libgl1-mesa-dri "
+            "for the software rasteriser, or a GPU driver; the simulator runs on without cameras"
+        ) from error

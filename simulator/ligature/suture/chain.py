@@ -1,0 +1,202 @@
+"""Direct solver of a serial chain: rigid nodes joined by compliant six-row joints, in O(nodes).
+
+Solves, for corrections d (n, 6: displacement, rotation) and joint multipliers l (n - 1, 6: force,
+moment),
+
+    H_i d_i - X_i^T l_i + X'_i^T l_(i-1) = g_i          (inertia, contacts: node rows)
+    X_i d_i - X'_(i+1) d_(i+1) + a_i l_i = -c_i         (joint rows, compliance a_i > 0)
+
+with X = [[1, -[r]], [0, -B]] of the lever r from the node's centre to the pivot. Eliminating nodes
+and joints in turn from the first to the last leaves 6 x 6 blocks alone: the block-tridiagonal solver
+of Deul et al. (Direct Position-Based Solver for Stiff Rods, 2018), written with the admittance Y of
+each node and the impedance Z of each joint, so that nodes of infinite mass (Y = 0) need no special
+case. World axes.
+"""
+
+from __future__ import annotations
+
+from ligature.suture.compiled import inlined, kernel
+
+
+@inlined
+def invert_spd6(A, out):
+    """Inverse of the symmetric positive definite ``A`` (6, 6) by L D Lᵀ; ``A`` is used up."""
+    for j in range(6):
+        for k in range(j):
+            s = A[j, k] * A[k, k]
+            for i in range(j, 6):
+                A[i, j] -= A[i, k] * s
+        s = 1.0 / A[j, j]
+        for i in range(j + 1, 6):
+            A[i, j] *= s
+    for j in range(6):
+        for i in range(j + 1, 6):
+            s = -A[i, j]
+            for k in range(j + 1, i):
+                s -= A[i, k] * out[k, j]
+            out[i, j] = s
+    for k in range(6):
+        pivot = 1.0 / A[k, k]
+        out[k, k] = pivot
+        for j in range(k):
+            A[k, j] = out[k, j]
+            out[k, j] *= pivot
+    for i in range(6):
+        for j in range(i + 1):
+            s = out[i, j]
+            for k in range(i + 1, 6):
+                s += A[k, i] * out[k, j]
+            out[i, j] = s
+            out[j, i] = s
+
+
+@inlined
+def _carry_admittance(Y, r, B, out):
+    """X Y Xᵀ: the admittance of a node, felt at its pivot in the rows of the joint."""
+    rx, ry, rz = r[0], r[1], r[2]
+    for c in range(3):
+        # Columns of U = Yll - [r] Yal and V = Yla - [r] Yaa; U goes to the upper left, V to the upper right.
+        u, v = c, c + 3
+        out[0, u] = Y[0, u] - (ry * Y[5, u] - rz * Y[4, u])
+        out[1, u] = Y[1, u] - (rz * Y[3, u] - rx * Y[5, u])
+        out[2, u] = Y[2, u] - (rx * Y[4, u] - ry * Y[3, u])
+        out[0, v] = Y[0, v] - (ry * Y[5, v] - rz * Y[4, v])
+        out[1, v] = Y[1, v] - (rz * Y[3, v] - rx * Y[5, v])
+        out[2, v] = Y[2, v] - (rx * Y[4, v] - ry * Y[3, v])
+    for i in range(3):
+        vx, vy, vz = out[i, 3], out[i, 4], out[i, 5]
+        out[i, 0] += vy * rz - vz * ry
+        out[i, 1] += vz * rx - vx * rz
+        out[i, 2] += vx * ry - vy * rx
+        for j in range(3):
+            s = -(vx * B[j, 0] + vy * B[j, 1] + vz * B[j, 2])
+            out[i, 3 + j] = s
+            out[3 + j, i] = s
+    for j in range(3):
+        tx = B[j, 0] * Y[3, 3] + B[j, 1] * Y[4, 3] + B[j, 2] * Y[5, 3]
+        ty = B[j, 0] * Y[3, 4] + B[j, 1] * Y[4, 4] + B[j, 2] * Y[5, 4]
+        tz = B[j, 0] * Y[3, 5] + B[j, 1] * Y[4, 5] + B[j, 2] * Y[5, 5]
+        for i in range(j, 3):
+            out[3 + i, 3 + j] = tx * B[i, 0] + ty * B[i, 1] + tz * B[i, 2]
+
+
+@inlined
+def _add_impedance(Z, r, B, H, E):
+    """H += Xᵀ Z X: the impedance of a joint, felt at the centre of the next node; ``E`` (6, 3) is scratch."""
+    rx, ry, rz = r[0], r[1], r[2]
+    for i in range(6):
+        ax, ay, az = Z[i, 0], Z[i, 1], Z[i, 2]
+        cx, cy, cz = Z[i, 3], Z[i, 4], Z[i, 5]
+        E[i, 0] = -(ay * rz - az * ry) - (cx * B[0, 0] + cy * B[1, 0] + cz * B[2, 0])
+        E[i, 1] = -(az * rx - ax * rz) - (cx * B[0, 1] + cy * B[1, 1] + cz * B[2, 1])
+        E[i, 2] = -(ax * ry - ay * rx) - (cx * B[0, 2] + cy * B[1, 2] + cz * B[2, 2])
+    for i in range(3):
+        for j in range(3):
+            H[i, j] += Z[i, j]
+            H[i, 3 + j] += E[i, j]
+            H[3 + j, i] += E[i, j]
+    for j in range(3):
+        H[3, 3 + j] += (
+            ry * E[2, j] - rz * E[1, j] - (B[0, 0] * E[3, j] + B[1, 0] * E[4, j] + B[2, 0] * E[5, j])
+        )
+        H[4, 3 + j] += (
+            rz * E[0, j] - rx * E[2, j] - (B[0, 1] * E[3, j] + B[1, 1] * E[4, j] + B[2, 1] * E[5, j])
+        )
+        H[5, 3 + j] += (
+            rx * E[1, j] - ry * E[0, j] - (B[0, 2] * E[3, j] + B[1, 2] * E[4, j] + B[2, 2] * E[5, j])
+        )
+
+
+@inlined
+def apply_lever(d, r, B, out):
+    """out = X d: motion of the pivot, and turn in joint axes with the sign of the first node."""
+    out[0] = d[0] - (r[1] * d[5] - r[2] * d[4])
+    out[1] = d[1] - (r[2] * d[3] - r[0] * d[5])
+    out[2] = d[2] - (r[0] * d[4] - r[1] * d[3])
+    for i in range(3):
+        out[3 + i] = -(B[i, 0] * d[3] + B[i, 1] * d[4] + B[i, 2] * d[5])
+
+
+@inlined
+def add_joint_force(load, r, B, sign, out):
+    """out += sign Xᵀ load: force and moment of a joint on a node's centre."""
+    fx, fy, fz = sign * load[0], sign * load[1], sign * load[2]
+    out[0] += fx
+    out[1] += fy
+    out[2] += fz
+    out[3] += r[1] * fz - r[2] * fy
+    out[4] += r[2] * fx - r[0] * fz
+    out[5] += r[0] * fy - r[1] * fx
+    for j in range(3):
+        out[3 + j] -= sign * (B[0, j] * load[3] + B[1, j] * load[4] + B[2, j] * load[5])
+
+
+@inlined
+def _times6(A, v, out):
+    for i in range(6):
+        out[i] = (
+            A[i, 0] * v[0]
+            + A[i, 1] * v[1]
+            + A[i, 2] * v[2]
+            + A[i, 3] * v[3]
+            + A[i, 4] * v[4]
+            + A[i, 5] * v[5]
+        )
+
+
+@kernel
+def factor(n, fixed, H, r_near, r_far, B, compliance, Y, Z, scratch):
+    """Eliminate the chain's ``n`` nodes: fills ``Y`` (n, 6, 6) and ``Z`` (n - 1, 6, 6); ``H`` is used up.
+
+    ``r_near[j]``, ``r_far[j]`` are the levers of joint j on its nodes j and j + 1; nodes with
+    ``fixed`` do not move.
+    """
+    for i in range(n):
+        if i > 0:
+            j = i - 1
+            if fixed[j]:
+                for a in range(6):
+                    for b in range(6):
+                        Z[j, a, b] = 0.0
+                    Z[j, a, a] = 1.0 / compliance[j, a]
+            else:
+                _carry_admittance(Y[j], r_near[j], B[j], scratch)
+                for a in range(6):
+                    scratch[a, a] += compliance[j, a]
+                invert_spd6(scratch, Z[j])
+            if not fixed[i]:
+                _add_impedance(Z[j], r_far[j], B[j], H[i], scratch)
+        if fixed[i]:
+            Y[i] = 0.0
+        else:
+            invert_spd6(H[i], Y[i])
+
+
+@kernel
+def solve(n, r_near, r_far, B, Y, Z, c, g, d, load, scratch):
+    """Corrections ``d`` (n, 6) and multipliers ``load`` (n - 1, 6) for the rows ``c`` and loads ``g`` of the nodes.
+
+    ``g`` is left as it came.
+    """
+    u, w, far = scratch[0], scratch[1], scratch[2]
+    for i in range(n):
+        for a in range(6):
+            w[a] = g[i, a]
+        if i > 0:
+            add_joint_force(load[i - 1], r_far[i - 1], B[i - 1], -1.0, w)
+        _times6(Y[i], w, d[i])
+        if i < n - 1:
+            apply_lever(d[i], r_near[i], B[i], u)
+            for a in range(6):
+                u[a] = -(u[a] + c[i, a])
+            _times6(Z[i], u, load[i])
+    for i in range(n - 2, -1, -1):
+        apply_lever(d[i + 1], r_far[i], B[i], far)
+        _times6(Z[i], far, u)
+        for a in range(6):
+            load[i, a] += u[a]
+            w[a] = 0.0
+        add_joint_force(load[i], r_near[i], B[i], 1.0, w)
+        _times6(Y[i], w, u)
+        for a in range(6):
+            d[i, a] += u[a]

@@ -1,0 +1,103 @@
+"""Rotations for compiled code: quaternions x y z w, rotation vectors in radians, matrices as (3, 3) arrays."""
+
+from __future__ import annotations
+
+import math
+
+from ligature.suture.compiled import inlined
+
+
+@inlined
+def cross(ax, ay, az, bx, by, bz):
+    """Vector product a × b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@inlined
+def multiply(ax, ay, az, aw, bx, by, bz, bw):
+    """Quaternion product a b: the rotation b, then a."""
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+@inlined
+def quaternion_of(vx, vy, vz):
+    """Quaternion of a rotation vector (the exponential map)."""
+    square = vx * vx + vy * vy + vz * vz
+    if square < 1e-8:
+        s, c = 0.5 - square / 48.0, 1.0 - square / 8.0
+    else:
+        angle = math.sqrt(square)
+        s, c = math.sin(0.5 * angle) / angle, math.cos(0.5 * angle)
+    return s * vx, s * vy, s * vz, c
+
+
+@inlined
+def rotation_vector(x, y, z, w):
+    """Rotation vector of a quaternion (the logarithm), its length in 0..pi."""
+    if w < 0.0:
+        x, y, z, w = -x, -y, -z, -w
+    sine = math.sqrt(x * x + y * y + z * z)
+    if sine < 1e-5:
+        s = 2.0 / w
+    else:
+        s = 2.0 * math.atan2(sine, w) / sine
+    return s * x, s * y, s * z
+
+
+@inlined
+def turn(q, i, vx, vy, vz):
+    """Turn the quaternion ``q[i]`` by a rotation vector in world axes, in place, and renormalise it."""
+    ex, ey, ez, ew = quaternion_of(vx, vy, vz)
+    x, y, z, w = multiply(ex, ey, ez, ew, q[i, 0], q[i, 1], q[i, 2], q[i, 3])
+    s = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    q[i, 0], q[i, 1], q[i, 2], q[i, 3] = s * x, s * y, s * z, s * w
+
+
+@inlined
+def matrix_of(x, y, z, w, R):
+    """Write the rotation matrix of a unit quaternion into ``R`` (3, 3)."""
+    R[0, 0], R[0, 1], R[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
+    R[1, 0], R[1, 1], R[1, 2] = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
+    R[2, 0], R[2, 1], R[2, 2] = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
+
+
+@inlined
+def rotate(R, x, y, z):
+    """R v."""
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@inlined
+def rotate_back(R, x, y, z):
+    """Rᵀ v."""
+    return (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )
+
+
+@inlined
+def left_jacobian_inverse_times(vx, vy, vz, ux, uy, uz):
+    """Jl(v)⁻¹ u: how the rotation vector v changes when its rotation is turned by u from the left.
+
+    Source: Barfoot, State Estimation for Robotics, eq. 7.76b.
+    """
+    square = vx * vx + vy * vy + vz * vz
+    if square < 1e-4:
+        c = 1.0 / 12.0 + square / 720.0
+    else:
+        half = 0.5 * math.sqrt(square)
+        c = (1.0 - half * math.cos(half) / math.sin(half)) / square
+    ax, ay, az = cross(vx, vy, vz, ux, uy, uz)
+    bx, by, bz = cross(vx, vy, vz, ax, ay, az)
+    return ux - 0.5 * ax + c * bx, uy - 0.5 * ay + c * by, uz - 0.5 * az + c * bz
