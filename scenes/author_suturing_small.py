@@ -163,8 +163,8 @@ def psm(name: str) -> dict[str, Any]:
         "tool yaw link": ([shape("CYLINDER", (0, 0, 0), axis="Z", radius=0.0024, height=0.0036)], 0.1, steel),
     }
     groups = {
-        "base link": [0], "yaw link": [0], "pitch end link": [1], "main insertion link": [0],
-        "tool roll link": [2], "tool pitch link": [3], "tool yaw link": [4],
+        "base link": [0], "yaw link": [1], "pitch end link": [2], "main insertion link": [3],
+        "tool roll link": [4], "tool pitch link": [5], "tool yaw link": [6],
     }  # fmt: skip
     published = ("base link", "tool pitch link", "tool yaw link")
     bodies: dict[str, Any] = {}

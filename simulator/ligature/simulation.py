@@ -200,10 +200,12 @@ class Simulation:
         """Advance by ``ticks`` ticks and write the state."""
         for _ in range(ticks):
             self._advance()
+        with self._phase("state"):
+            self._write_bodies()
         with self._phase("sensing"):
             self._sense()
         with self._phase("state"):
-            self._write_state()
+            self._write_rest()
 
     def _advance(self) -> None:
         """One tick."""
@@ -217,7 +219,6 @@ class Simulation:
 
     def _sense(self) -> None:
         """Ghosts, rays, contact sensors and the poses of what rides on bodies."""
-        self._write_bodies()
         poses = self.state["body_pose"][0]
         self._attachments.update(poses)
         self._ghosts.update(self._attachments.world[self._attachments.of("ghost")], poses)
@@ -309,10 +310,14 @@ class Simulation:
         self._rods.write_state(self.state)
 
     def _write_state(self) -> None:
-        """Fill the state record with everything that `step` computed."""
-        state, attachments = self.state, self._attachments
+        """Fill the state record anew, after something was put elsewhere."""
         self._write_bodies()
-        attachments.update(state["body_pose"][0])
+        self._attachments.update(self.state["body_pose"][0])
+        self._write_rest()
+
+    def _write_rest(self) -> None:
+        """Fill everything of the state record but the bodies."""
+        state, attachments = self.state, self._attachments
         state["tick"] = self._tick
         state["update"] = self._tick // self.ticks_per_update
         state["resets"] = self._resets

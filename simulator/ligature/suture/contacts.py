@@ -1,180 +1,332 @@
-"""Contacts of rod elements with the convex parts of other bodies: detection and projection, compiled.
+"""Finds the contact points of a rod at the start of a tick: capsules against convex parts, and against themselves.
 
-A contact is found before the tick, from outside, with the plane that the point must not cross
-during it, so that nothing tunnels. Friction is Coulomb's on positions. World axes, SI units.
+A contact is found before anything touches, while what may move in a tick still fits between, and with
+the plane that must not be crossed in it: so nothing tunnels. Memory of friction goes from one tick's
+contact to the next one's of the same pair. World axes, SI units.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+import math
 
 from ligature.mesh.distance import signed_distance
-from ligature.suture.solver import rotate, turn
+from ligature.suture.compiled import inlined, kernel
+from ligature.suture.rotations import matrix_of, rotate, rotate_back
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+SLACK = 0.5
+"""Distance, in radii, at which a contact is found although nothing moves."""
 
-MAX_CONTACTS = 4096
+RECOVERY = 0.1
+"""Speed in m/s at which a rod that starts inside a body is pushed out."""
+
+BLEND = 0.05
+"""Difference in depth, in radii, within which both ends of an element count as touching alike."""
+
+GROUP = 8
+"""Elements that share a box in the search for self contact."""
 
 
-@njit(cache=True)
-def detect(
-    x: Array, q: Array, speed: Array, point_element: Indices, point_local: Array, radius: float,
-    collider_body: Indices, kind: Indices, size: Array, planes: Array, plane_range: Indices,
-    collider_pose: Array, bound: Array, skip: NDArray[np.bool_], dt: float,
-    element: Indices, local: Array, normal: Array, offset: Array, body: Indices,
-) -> int:  # fmt: skip
-    """Find contacts of the points of a rod; fills the last five arrays and returns their number.
+@kernel
+def detect(first, n, nodes, shapes, old, new, work, counts, self_skip, dt):
+    """Fill ``new`` with the contacts of elements ``first`` … ``first + n - 1``; ``old`` are the last tick's.
 
-    ``point_element`` (p,) and ``point_local`` (p, 3) are the rod's contact points, ``speed`` (n,) the
-    elements' speeds. Collider c belongs to ``collider_body[c]``, stands at ``collider_pose[c]`` and
-    fits into a ball of ``bound[c]``; ``skip[c, i]`` switches pairs off. A contact demands
-    ``normal · p >= offset``.
+    ``counts`` returns the contacts found, and those for which there was no room. Bonds that already
+    stand at the head of ``new`` stay.
     """
-    count = 0
-    p, r, local_p, n_local, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    inverse = np.empty(4)
-    for c in range(collider_body.shape[0]):
-        inverse[0], inverse[1], inverse[2] = -collider_pose[c, 3], -collider_pose[c, 4], -collider_pose[c, 5]
-        inverse[3] = collider_pose[c, 6]
-        hull = planes[plane_range[c, 0] : plane_range[c, 1]]
-        for k in range(point_element.shape[0]):
-            i = point_element[k]
-            reach = radius + (speed[i] + 0.2) * dt
-            dx = x[i, 0] - collider_pose[c, 0]
-            dy = x[i, 1] - collider_pose[c, 1]
-            dz = x[i, 2] - collider_pose[c, 2]
-            far = bound[c] + reach + 0.01
-            if dx * dx + dy * dy + dz * dz > far * far or skip[c, i]:
-                continue
-            rotate(q[i], point_local[k], r)
+    bonds = new.count[0]
+    capacity = new.node.shape[0]
+    _world_segments(first, n, nodes, work, dt)
+    missed = _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt)
+    settled = new.count[0]
+    missed += _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip)
+    _sort(new, settled)
+    _remember(old, new, bonds)
+    counts[0], counts[1] = new.count[0], missed
+
+
+@inlined
+def _world_segments(first, n, nodes, work, dt):
+    """Segment, reach and box of every element; the box covers what the tick may sweep."""
+    for e in range(n):
+        i = first + e
+        R = work.R[i]
+        matrix_of(nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3], R)
+        p = work.segment[e]
+        for s in range(2):
+            ex, ey, ez = rotate(R, nodes.axis[i, s, 0], nodes.axis[i, s, 1], nodes.axis[i, s, 2])
+            p[s, 0], p[s, 1], p[s, 2] = nodes.x[i, 0] + ex, nodes.x[i, 1] + ey, nodes.x[i, 2] + ez
+        vx, vy, vz, wx, wy, wz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        vx, vy, vz = nodes.v[i, 0], nodes.v[i, 1], nodes.v[i, 2]
+        wx, wy, wz = nodes.w[i, 0], nodes.w[i, 1], nodes.w[i, 2]
+        arm = 0.5 * _distance(p[0], p[1])
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz) + arm * math.sqrt(wx * wx + wy * wy + wz * wz)
+        reach = speed * dt + SLACK * nodes.radius[i]
+        work.reach[e] = reach
+        size = nodes.radius[i] + reach
+        for a in range(3):
+            work.box[e, 0, a] = min(p[0, a], p[1, a]) - size
+            work.box[e, 1, a] = max(p[0, a], p[1, a]) + size
+
+
+@inlined
+def _distance(a, b):
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+@inlined
+def _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt):
+    missed = 0
+    p, normal, R = work.three[0], work.three[1], work.R[nodes.x.shape[0]]
+    for c in range(shapes.node.shape[0]):
+        k = shapes.node[c]
+        if k < 0:
+            continue
+        pose = shapes.pose[c]
+        matrix_of(pose[3], pose[4], pose[5], pose[6], R)
+        planes = shapes.planes[shapes.plane_range[c, 0] : shapes.plane_range[c, 1]]
+        sweep = shapes.sweep[c]
+        for e in range(n):
+            box = work.box[e]
+            outside = False
             for a in range(3):
-                p[a] = x[i, a] + r[a]
-                n_local[a] = p[a] - collider_pose[c, a]
-            rotate(inverse, n_local, local_p)
-            d = signed_distance(kind[c], size[c], hull, local_p, n_local)
-            if d > reach or count == MAX_CONTACTS:
+                if box[0, a] > shapes.box[c, 1, a] + sweep or box[1, a] < shapes.box[c, 0, a] - sweep:
+                    outside = True
+            if outside or shapes.skip[c, e]:
                 continue
-            rotate(collider_pose[c, 3:7], n_local, n)
-            element[count] = i
-            body[count] = collider_body[c]
-            for a in range(3):
-                local[count, a] = point_local[k, a]
-                normal[count, a] = n[a]
-            offset[count] = n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - d + radius
-            count += 1
-    return count
+            segment = work.segment[e]
+            reach = nodes.radius[first + e] + work.reach[e] + sweep
+            s, d = _deepest(shapes.kind[c], shapes.size[c], planes, pose, R, segment, reach,
+                            nodes.radius[first + e], p, normal)  # fmt: skip
+            if d > reach:
+                continue
+            if new.count[0] == capacity:
+                missed += 1
+                continue
+            nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
+            _record(first, nodes, new, work, e, k, c, s, d, nx, ny, nz, shapes.friction[c], dt)
+    return missed
 
 
-@njit(cache=True)
-def project(
-    x: Array, q: Array, x_old: Array, q_old: Array, inverse_mass: Array, inverse_inertia: Array,
-    count: int, element: Indices, local: Array, normal: Array, offset: Array, carried: Array,
-    friction: Array, pressed: Array, pulled: Array,
-) -> None:  # fmt: skip
-    """Push points out of bodies and hold them by friction; one pass over all contacts.
+@inlined
+def _depth_at(kind, size, planes, pose, R, segment, s, p, normal):
+    dx = segment[0, 0] + s * (segment[1, 0] - segment[0, 0]) - pose[0]
+    dy = segment[0, 1] + s * (segment[1, 1] - segment[0, 1]) - pose[1]
+    dz = segment[0, 2] + s * (segment[1, 2] - segment[0, 2]) - pose[2]
+    p[0], p[1], p[2] = rotate_back(R, dx, dy, dz)
+    return signed_distance(kind, size, planes, p, normal)
 
-    ``carried`` (c, 3) is how far the surface moves during the tick. ``pressed`` (c,) and ``pulled``
-    (c, 3) accumulate the normal and tangential multipliers (N·s²).
+
+@inlined
+def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
+    """Where along a segment (0..1) it comes nearest to a convex part, and the distance there.
+
+    The distance is convex along the segment, so its slope brackets the lowest point. Where both ends
+    lie over one face, the point moves from the middle to the lower end as the element tilts.
     """
-    r, r_old, n = np.empty(3), np.empty(3), np.empty(3)
-    for c in range(count):
-        i = element[c]
-        rotate(q[i], local[c], r)
-        n[:] = normal[c]
-        depth = offset[c] - (n[0] * (x[i, 0] + r[0]) + n[1] * (x[i, 1] + r[1]) + n[2] * (x[i, 2] + r[2]))
-        depth += n[0] * carried[c, 0] + n[1] * carried[c, 1] + n[2] * carried[c, 2]
-        weight = _weight(r, n, inverse_mass[i], inverse_inertia[i], q[i])
-        if weight == 0.0:
+    middle = _depth_at(kind, size, planes, pose, R, segment, 0.5, p, normal)
+    if middle > reach + 0.5 * _distance(segment[0], segment[1]):
+        return 0.5, middle
+    tx, ty, tz = rotate_back(
+        R,
+        segment[1, 0] - segment[0, 0],
+        segment[1, 1] - segment[0, 1],
+        segment[1, 2] - segment[0, 2],
+    )
+    slope = normal[0] * tx + normal[1] * ty + normal[2] * tz
+    low, high, s = 0.0, 1.0, 0.5
+    near = 1.0 if slope < 0.0 else 0.0
+    end = _depth_at(kind, size, planes, pose, R, segment, near, p, normal)
+    end_slope = normal[0] * tx + normal[1] * ty + normal[2] * tz
+    if slope * end_slope >= 0.0:
+        # Downhill all the way: the lower end, or between it and the middle where the slope is slight.
+        tilt = abs(end_slope)
+        share = 1.0 if tilt <= BLEND * radius else BLEND * radius / tilt
+        s = near + (0.5 - near) * share
+        return s, _depth_at(kind, size, planes, pose, R, segment, s, p, normal)
+    if near == 1.0:
+        low = 0.5
+    else:
+        high = 0.5
+    depth = middle
+    for _ in range(8):
+        s = 0.5 * (low + high)
+        depth = _depth_at(kind, size, planes, pose, R, segment, s, p, normal)
+        slope = normal[0] * tx + normal[1] * ty + normal[2] * tz
+        if slope < 0.0:
+            low = s
+        else:
+            high = s
+    return s, depth
+
+
+@inlined
+def _record(first, nodes, new, work, e, k, key, s, d, nx, ny, nz, friction, dt):
+    """Add the contact of element ``e`` at ``s`` with node ``k``, whose surface is ``d`` off along -normal."""
+    c, i = new.count[0], first + e
+    new.count[0] = c + 1
+    new.node[c, 0], new.node[c, 1], new.key[c] = i, k, key
+    radius = nodes.radius[i]
+    segment, local, start = work.segment[e], new.local[c], new.start[c]
+    new.normal[c, 0], new.normal[c, 1], new.normal[c, 2] = nx, ny, nz
+    for a in range(3):
+        along = segment[0, a] + s * (segment[1, a] - segment[0, a])
+        start[0, a] = along - radius * new.normal[c, a]
+        start[1, a] = along - d * new.normal[c, a]
+    _to_local(nodes, work, i, start[0], local[0])
+    if k < first or k >= first + work.segment.shape[0]:
+        q = nodes.q[k]
+        matrix_of(q[0], q[1], q[2], q[3], work.R[k])
+    _to_local(nodes, work, k, start[1], local[1])
+    gap = d - radius
+    new.gap[c] = gap
+    new.target[c] = min(0.0, gap + RECOVERY * dt)
+    new.friction[c] = friction * nodes.friction[i]
+    new.bond[c] = False
+    new.press[c] = 0.0
+    new.closed[c] = False
+    for a in range(3):
+        new.slip[c, a] = 0.0
+
+
+@inlined
+def _to_local(nodes, work, i, point, out):
+    out[0], out[1], out[2] = rotate_back(
+        work.R[i], point[0] - nodes.x[i, 0], point[1] - nodes.x[i, 1], point[2] - nodes.x[i, 2]
+    )
+
+
+@inlined
+def _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip):
+    """Contacts between elements more than ``self_skip`` apart along the rod, boxes of groups first."""
+    missed = 0
+    groups = (n + GROUP - 1) // GROUP
+    offset = shapes.node.shape[0]
+    for g in range(groups):
+        box = work.group_box[g]
+        for a in range(3):
+            box[0, a], box[1, a] = 1e300, -1e300
+        for e in range(g * GROUP, min(n, (g + 1) * GROUP)):
+            for a in range(3):
+                box[0, a] = min(box[0, a], work.box[e, 0, a])
+                box[1, a] = max(box[1, a], work.box[e, 1, a])
+    for g in range(groups):
+        for h in range(g, groups):
+            if not _overlap(work.group_box[g], work.group_box[h]):
+                continue
+            for i in range(g * GROUP, min(n, (g + 1) * GROUP)):
+                for j in range(max(i + 1 + self_skip, h * GROUP), min(n, (h + 1) * GROUP)):
+                    if not _overlap(work.box[i], work.box[j]):
+                        continue
+                    missed += _touch_pair(first, nodes, new, work, capacity, i, j, offset)
+    return missed
+
+
+@inlined
+def _overlap(a, b):
+    for k in range(3):
+        if a[0, k] > b[1, k] or b[0, k] > a[1, k]:
+            return False
+    return True
+
+
+@inlined
+def _nearest(a, b):
+    """Parameters (0..1) of the nearest points of two segments, for crossing and parallel ones alike.
+
+    Source: Ericson, Real-Time Collision Detection, §5.1.9; parallel segments meet in the middle of
+    what they share.
+    """
+    ux, uy, uz = a[1, 0] - a[0, 0], a[1, 1] - a[0, 1], a[1, 2] - a[0, 2]
+    vx, vy, vz = b[1, 0] - b[0, 0], b[1, 1] - b[0, 1], b[1, 2] - b[0, 2]
+    wx, wy, wz = a[0, 0] - b[0, 0], a[0, 1] - b[0, 1], a[0, 2] - b[0, 2]
+    uu, vv = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz
+    uv = ux * vx + uy * vy + uz * vz
+    uw, vw = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+    determinant = uu * vv - uv * uv
+    if determinant > 1e-6 * uu * vv:
+        s = min(max((uv * vw - vv * uw) / determinant, 0.0), 1.0)
+    else:
+        at, bt = -uw / uu, (uv - uw) / uu
+        s = 0.5 * (min(max(min(at, bt), 0.0), 1.0) + min(max(max(at, bt), 0.0), 1.0))
+    t = (uv * s + vw) / vv
+    if t < 0.0:
+        t = 0.0
+        s = min(max(-uw / uu, 0.0), 1.0)
+    elif t > 1.0:
+        t = 1.0
+        s = min(max((uv - uw) / uu, 0.0), 1.0)
+    return s, t
+
+
+@inlined
+def _touch_pair(first, nodes, new, work, capacity, i, j, offset):
+    a, b = work.segment[i], work.segment[j]
+    s, t = _nearest(a, b)
+    dx = a[0, 0] + s * (a[1, 0] - a[0, 0]) - b[0, 0] - t * (b[1, 0] - b[0, 0])
+    dy = a[0, 1] + s * (a[1, 1] - a[0, 1]) - b[0, 1] - t * (b[1, 1] - b[0, 1])
+    dz = a[0, 2] + s * (a[1, 2] - a[0, 2]) - b[0, 2] - t * (b[1, 2] - b[0, 2])
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    near = nodes.radius[first + j]
+    d = length - near
+    if length < 1e-12 or d > nodes.radius[first + i] + work.reach[i] + work.reach[j]:
+        return 0
+    if new.count[0] == capacity:
+        return 1
+    per = 1.0 / length
+    # Already inside each other: no wish to recover faster than other contacts do.
+    _record(first, nodes, new, work, i, first + j, offset + j, s, d, dx * per, dy * per, dz * per,
+            nodes.friction[first + j], 1e-3)  # fmt: skip
+    return 0
+
+
+@inlined
+def _before(touches, a, b):
+    if touches.key[a] != touches.key[b]:
+        return touches.key[a] < touches.key[b]
+    return touches.node[a, 0] < touches.node[b, 0]
+
+
+@inlined
+def _swap(touches, a, b):
+    for s in range(2):
+        touches.node[a, s], touches.node[b, s] = touches.node[b, s], touches.node[a, s]
+        for k in range(3):
+            touches.local[a, s, k], touches.local[b, s, k] = touches.local[b, s, k], touches.local[a, s, k]
+            touches.start[a, s, k], touches.start[b, s, k] = touches.start[b, s, k], touches.start[a, s, k]
+    for k in range(3):
+        touches.normal[a, k], touches.normal[b, k] = touches.normal[b, k], touches.normal[a, k]
+    touches.key[a], touches.key[b] = touches.key[b], touches.key[a]
+    touches.gap[a], touches.gap[b] = touches.gap[b], touches.gap[a]
+    touches.target[a], touches.target[b] = touches.target[b], touches.target[a]
+    touches.friction[a], touches.friction[b] = touches.friction[b], touches.friction[a]
+
+
+@inlined
+def _sort(touches, begin):
+    """Bring fresh contacts from ``begin`` on into the order of key and element, by insertion."""
+    for c in range(begin + 1, touches.count[0]):
+        k = c
+        while k > begin and _before(touches, k, k - 1):
+            _swap(touches, k, k - 1)
+            k -= 1
+
+
+@inlined
+def _remember(old, new, bonds):
+    """Carry slip, pressure and state over from the contacts of the last tick; both lists are sorted."""
+    o = 0
+    while o < old.count[0] and old.bond[o]:
+        o += 1
+    for c in range(bonds, new.count[0]):
+        while o < old.count[0] and (
+            old.key[o] < new.key[c] or (old.key[o] == new.key[c] and old.node[o, 0] < new.node[c, 0])
+        ):
+            o += 1
+        if o == old.count[0] or old.key[o] != new.key[c] or old.node[o, 0] != new.node[c, 0]:
             continue
-        push = max(depth / weight, -pressed[c])
-        pressed[c] += push
-        if push != 0.0:
-            _impulse(x[i], q[i], r, n, push, inverse_mass[i], inverse_inertia[i])
-        if pressed[c] <= 0.0:
-            continue
-        rotate(q[i], local[c], r)
-        rotate(q_old[i], local[c], r_old)
-        along = 0.0
+        n, slip = new.normal[c], old.slip[o]
+        along = n[0] * slip[0] + n[1] * slip[1] + n[2] * slip[2]
         for a in range(3):
-            r_old[a] = x[i, a] + r[a] - x_old[i, a] - r_old[a] - carried[c, a]
-            along += r_old[a] * n[a]
-        length = 0.0
-        for a in range(3):
-            r_old[a] -= along * n[a]
-            length += r_old[a] * r_old[a]
-        length = length**0.5
-        if length < 1e-12:
-            continue
-        for a in range(3):
-            n[a] = -r_old[a] / length
-        weight = _weight(r, n, inverse_mass[i], inverse_inertia[i], q[i])
-        _hold(
-            x[i],
-            q[i],
-            r,
-            n,
-            length / weight,
-            friction[c] * pressed[c],
-            inverse_mass[i],
-            inverse_inertia[i],
-            pulled[c],
-        )
-
-
-@njit(cache=True)
-def _hold(
-    x: Array, q: Array, r: Array, n: Array, want: float, limit: float, inverse_mass: float, inverse_inertia: Array,
-    pulled: Array,
-) -> None:  # fmt: skip
-    """Pull the point back along ``n`` by the multiplier ``want``, the sum staying within ``limit``."""
-    total = np.empty(3)
-    for a in range(3):
-        total[a] = pulled[a] + want * n[a]
-    length = (total[0] ** 2 + total[1] ** 2 + total[2] ** 2) ** 0.5
-    scale = 1.0 if length <= limit else limit / length
-    square = 0.0
-    for a in range(3):
-        total[a] = scale * total[a] - pulled[a]
-        pulled[a] += total[a]
-        square += total[a] ** 2
-    if square > 0.0:
-        size = square**0.5
-        for a in range(3):
-            total[a] /= size
-        _impulse(x, q, r, total, size, inverse_mass, inverse_inertia)
-
-
-@njit(cache=True)
-def _turned(v: Array, q: Array, inverse_inertia: Array, out: Array) -> None:
-    """Write I^-1 v (3,) in world axes for principal inverses (3,) of an element turned by ``q``."""
-    conjugate = np.array([-q[0], -q[1], -q[2], q[3]])
-    local = np.empty(3)
-    rotate(conjugate, v, local)
-    for a in range(3):
-        local[a] *= inverse_inertia[a]
-    rotate(q, local, out)
-
-
-@njit(cache=True)
-def _weight(r: Array, n: Array, inverse_mass: float, inverse_inertia: Array, q: Array) -> float:
-    """Displacement along ``n`` of the point at ``r`` for a unit multiplier along ``n``."""
-    t, w = np.empty(3), np.empty(3)
-    t[0], t[1], t[2] = r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]
-    _turned(t, q, inverse_inertia, w)
-    return inverse_mass + t[0] * w[0] + t[1] * w[1] + t[2] * w[2]
-
-
-@njit(cache=True)
-def _impulse(
-    x: Array, q: Array, r: Array, n: Array, size: float, inverse_mass: float, inverse_inertia: Array
-) -> None:
-    """Move an element by the multiplier ``size`` along ``n`` at the arm ``r``."""
-    t, w = np.empty(3), np.empty(3)
-    t[0], t[1], t[2] = r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]
-    _turned(t, q, inverse_inertia, w)
-    for a in range(3):
-        x[a] += size * inverse_mass * n[a]
-    turn(q, size * w[0], size * w[1], size * w[2])
+            new.slip[c, a] = slip[a] - along * n[a]
+        new.press[c] = old.press[o]
+        new.closed[c] = old.closed[o]

@@ -1,0 +1,53 @@
+# Ligature: `make run` and `make test` do everything themselves; the second time they cost nothing.
+
+PYTHON := .venv/bin/python
+STAMPS := build/stamps
+SCENE  ?= scenes/suturing_small/launch.yaml
+MUTANTS ?= 100000
+
+.PHONY: run test setup lint types check-imports unit fuzz bench docs clean
+
+run: setup
+	.venv/bin/ligature run $(SCENE)
+
+test: setup lint unit
+
+setup: $(STAMPS)/package
+
+$(STAMPS)/debian: debian-packages.txt
+	@mkdir -p $(STAMPS)
+	@sh .ci/install_debian_packages.sh debian-packages.txt
+	@touch $@
+
+$(STAMPS)/python: requirements.txt requirements-dev.txt $(STAMPS)/debian
+	test -x $(PYTHON) || /usr/bin/python3 -m venv --system-site-packages .venv
+	.venv/bin/pip install --quiet --disable-pip-version-check -r requirements.txt -r requirements-dev.txt
+	@touch $@
+
+$(STAMPS)/messages: $(wildcard ros_msgs/*/msg/*.msg ros_msgs/*/srv/*.srv) ros_msgs/generate.sh $(STAMPS)/python
+	rm -rf build/python && mkdir -p build/python
+	ros_msgs/generate.sh build/python
+	echo "$(CURDIR)/build/python" > $$($(PYTHON) -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')/ligature-messages.pth
+	@touch $@
+
+$(STAMPS)/package: setup.py $(STAMPS)/messages
+	.venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+lint: setup
+	.venv/bin/ruff format --check simulator tests scenes
+	.venv/bin/ruff check simulator tests scenes
+	.venv/bin/mypy
+	.venv/bin/lint-imports
+
+unit: setup
+	$(PYTHON) -m pytest -m "not slow" tests
+
+fuzz: setup
+	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
+
+bench: setup
+	$(PYTHON) -m tests.bench.run
+
+clean:
+	rm -rf build devel dist out .venv .mypy_cache .ruff_cache

@@ -1,0 +1,68 @@
+"""When the next update may run: against the wall clock, or at the clock edges of a client.
+
+Times are seconds on a steady clock and are passed in; nothing here sleeps or looks at a clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+DEFAULT_SKIP = 10
+BACKLOG = 0.05
+"""Seconds of delay that are made up for; what is later than that stays lost, and is reported."""
+
+
+@dataclass(frozen=True)
+class Throttle:
+    """A world command (interface reference §2.5): step throttling, its clock, and updates per edge."""
+
+    enabled: bool
+    clock: bool
+    skip: int
+
+
+class Pacer:
+    """Absolute deadlines of updates of ``period`` seconds of simulated time at ``speed``."""
+
+    def __init__(self, period: float, speed: float = 1.0) -> None:
+        self._wall_period = period / speed if speed > 0 else 0.0
+        self._next: float | None = None
+        self.lost = 0.0
+        self._throttled = False
+        self._clock = False
+        self._skip = DEFAULT_SKIP
+        self._budget = 0
+
+    def throttle(self, command: Throttle) -> None:
+        """Take a world command; an edge of its clock allows ``skip`` more updates."""
+        if command.skip > 0:
+            self._skip = command.skip
+        if not command.enabled:
+            self._throttled, self._budget, self._next = False, 0, None
+            self._clock = command.clock
+            return
+        edge = command.clock != self._clock
+        if not self._throttled:
+            self._throttled, self._budget = True, 0
+        if edge and self._budget == 0:
+            self._budget = self._skip
+        self._clock = command.clock
+
+    def wait(self, now: float) -> float:
+        """Seconds until the next update may run: 0 for now, infinity while a client's clock rests."""
+        if self._throttled:
+            return 0.0 if self._budget > 0 else float("inf")
+        if self._next is None:
+            self._next = now
+        return max(self._next - now, 0.0)
+
+    def done(self, now: float) -> None:
+        """An update was run."""
+        if self._throttled:
+            self._budget -= 1
+            return
+        assert self._next is not None
+        self._next += self._wall_period
+        if now - self._next > BACKLOG:
+            self.lost += now - self._next - BACKLOG
+            self._next = now - BACKLOG

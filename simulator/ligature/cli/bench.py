@@ -1,0 +1,92 @@
+"""``ligature bench``: how fast the physics of a scene runs here."""
+
+from __future__ import annotations
+
+import json as json_module
+import resource
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import ligature
+from ligature.simulation import PHASES
+
+WARM_UP = 200
+
+
+def bench(
+    launch: Path,
+    models: tuple[int, ...] | None,
+    roots: Sequence[Path],
+    seconds: float,
+    rate: float,
+    json: bool,
+    console: Console,
+) -> int:
+    """Measure for ``seconds`` and print; returns the exit status."""
+    try:
+        figures = measure(launch, models, roots, seconds, rate)
+    except ligature.SceneError as error:
+        for diagnostic in error.diagnostics:
+            console.print(str(diagnostic), style="red", markup=False)
+        return 2
+    if json:
+        console.print_json(json_module.dumps(figures))
+        return 0
+    table = Table(title=f"{launch} at {figures['dt_ms']:g} ms, updates of {figures['update_ms']:g} ms")
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    for name in (
+        "ticks_per_second",
+        "real_time_factor",
+        "tick_p50_us",
+        "tick_p99_us",
+        "tick_max_us",
+        "start_s",
+        "memory_mb",
+    ):
+        table.add_row(name.replace("_", " "), f"{figures[name]:,.2f}")
+    for phase in PHASES:
+        table.add_row(f"{phase} per tick, us", f"{figures['phases_us'][phase]:,.1f}")
+    console.print(table)
+    return 0
+
+
+def measure(
+    launch: Path, models: tuple[int, ...] | None, roots: Sequence[Path], seconds: float, rate: float
+) -> dict[str, Any]:
+    """Figures of an unthrottled run in this process; a tick's time includes its share of an update."""
+    begin = time.perf_counter()
+    simulation = ligature.Simulation(ligature.load(launch, models, roots=roots), update=1.0 / rate)
+    batch = simulation.ticks_per_update
+    simulation.step(batch)
+    start = time.perf_counter() - begin
+    for _ in range(max(1, WARM_UP // batch)):
+        simulation.step(batch)
+    simulation.phase_seconds = dict.fromkeys(simulation.phase_seconds, 0.0)
+    times: list[float] = []
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        before = time.perf_counter()
+        simulation.step(batch)
+        times.append((time.perf_counter() - before) / batch)
+    total = float(np.sum(times)) * batch
+    ticks = len(times) * batch
+    p50, p99 = np.percentile(times, [50, 99])
+    return {
+        "dt_ms": simulation.dt * 1e3,
+        "update_ms": simulation.dt * batch * 1e3,
+        "ticks_per_second": ticks / total,
+        "real_time_factor": ticks * simulation.dt / total,
+        "tick_p50_us": p50 * 1e6,
+        "tick_p99_us": p99 * 1e6,
+        "tick_max_us": max(times) * 1e6,
+        "start_s": start,
+        "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "phases_us": {name: value / ticks * 1e6 for name, value in simulation.phase_seconds.items()},
+    }

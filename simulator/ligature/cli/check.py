@@ -1,0 +1,55 @@
+"""``ligature check``: every finding of scene files, one a line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+import ligature
+from ligature.adf import AdfError, Diagnostic, Document, Resolver, Severity, read_any
+
+_STYLES = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "", Severity.DEBUG: "dim"}
+
+
+def check(files: Sequence[Path], roots: Sequence[Path], strict: bool, verbose: bool, console: Console) -> int:
+    """Print the findings of ``files``; returns 1 when one is an error."""
+    status = 0
+    for file in files:
+        found = findings(file, roots, strict)
+        for diagnostic in found:
+            if diagnostic.severity > Severity.DEBUG or verbose:
+                console.print(str(diagnostic), style=_STYLES[diagnostic.severity], markup=False)
+        errors = sum(d.severity >= Severity.ERROR for d in found)
+        warnings = sum(d.severity is Severity.WARNING for d in found)
+        console.print(f"{file}: {errors} errors, {warnings} warnings", markup=False)
+        status = status or int(errors > 0)
+    return status
+
+
+def findings(file: Path, roots: Sequence[Path], strict: bool) -> list[Diagnostic]:
+    """Findings of one file: those of reading it, and for launch and model files those of resolving it."""
+    resolver = Resolver.for_file(file, roots)
+    try:
+        document = read_any(file, resolver, strict)
+    except AdfError as error:
+        return list(error.diagnostics)
+    if document.kind not in ("launch", "model") or (strict and not document.ok):
+        return document.diagnostics
+    if document.kind == "model" and not _has_bodies(document):
+        return document.diagnostics
+    try:
+        scene = ligature.load(file, roots=roots)
+    except ligature.SceneError as error:
+        return list(error.diagnostics)
+    return _distinct([*document.diagnostics, *scene.diagnostics])
+
+
+def _has_bodies(document: Document) -> bool:
+    """Whether a model file can stand alone; others hang on bodies of earlier files."""
+    return bool(document.elements("bodies") or document.elements("sutures"))
+
+
+def _distinct(found: Sequence[Diagnostic]) -> list[Diagnostic]:
+    return list(dict.fromkeys(found))

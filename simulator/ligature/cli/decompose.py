@@ -1,0 +1,36 @@
+"""``ligature decompose``: a concave mesh as convex parts for ADF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from ligature.adf import AdfError, Resolver
+from ligature.mesh import load_mesh
+from ligature.mesh.decompose import decompose as cut
+from ligature.mesh.decompose import obj_text
+
+
+def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, console: Console) -> int:
+    """Write ``out`` (default: beside the mesh) and its MTL; returns the exit status."""
+    target = out or mesh.with_name(f"{mesh.stem}_collision.obj")
+    library = target.with_suffix(".mtl")
+    try:
+        result = cut(load_mesh(mesh.resolve(), Resolver([mesh.resolve().parent])), threshold, max_hulls)
+        text, materials = obj_text(result.hulls, library.name)
+        library.write_text(materials, encoding="utf-8")
+        target.write_text(text, encoding="utf-8")
+    except AdfError as error:
+        console.print(str(error.diagnostics[0]), style="red", markup=False)
+        return 1
+    except (ValueError, OSError) as error:
+        console.print(f"{mesh}: {error}", style="red", markup=False)
+        return 1
+    console.print(
+        f"{target}: {len(result.hulls)} hulls, volume error {100 * result.volume_error:.2f} %, "
+        f"largest distance {1e3 * result.distance:.3f} mm",
+        markup=False,
+    )
+    console.print("use it with 'collision mesh' and 'collision mesh type: CONVEX_HULL'", style="dim")
+    return 0

@@ -1,0 +1,113 @@
+"""The command ``ligature``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+from rich.console import Console
+
+from ligature.cli.bench import bench as run_bench
+from ligature.cli.check import check as run_check
+from ligature.cli.options import RunOptions
+from ligature.cli.supervisor import Supervisor
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, help="Simulator for robot-assisted suturing.")
+
+Launch = Annotated[Path, typer.Argument(help="Launch file, or one model file.")]
+Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
+Roots = Annotated[
+    Optional[list[Path]], typer.Option("--root", help="Folder below which files may be opened too.")
+]  # noqa: UP045
+
+
+def indices(text: str | None) -> tuple[int, ...] | None:
+    """Indices of a list such as ``10, 11,6``; None for none given."""
+    if text is None:
+        return None
+    try:
+        return tuple(int(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        raise typer.BadParameter(f"'{text}' is not a list of whole numbers such as 10,11,6") from None
+
+
+@app.command()
+def run(
+    launch: Launch,
+    models: Models = None,
+    root: Roots = None,
+    rate: Annotated[
+        float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)
+    ] = 1000.0,
+    speed: Annotated[float, typer.Option("-s", help="Simulated over wall time.", min=0.001)] = 1.0,
+    namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
+    min_hz: Annotated[
+        Optional[int], typer.Option("--min-hz", help="Publishing rate without commands.", min=1)
+    ] = None,  # noqa: UP045
+    max_hz: Annotated[
+        Optional[int], typer.Option("--max-hz", help="Publishing rate with commands.", min=1)
+    ] = None,  # noqa: UP045
+    names: Annotated[
+        str, typer.Option(help="Name policy: ambf, or src for the suturing challenge's scripts.")
+    ] = "ambf",
+) -> None:
+    """Run a scene on ROS 1; starts a master when none answers."""
+    if names not in ("ambf", "src"):
+        raise typer.BadParameter("--names is 'ambf' or 'src'")
+    options = RunOptions(
+        str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
+        min_hz=min_hz, max_hz=max_hz, names=names,
+    )  # fmt: skip
+    raise typer.Exit(Supervisor(options).run())
+
+
+@app.command()
+def check(
+    files: Annotated[list[Path], typer.Argument(help="Launch, world, model or input-device files.")],
+    strict: Annotated[bool, typer.Option(help="Refuse what AMBF refuses.")] = False,
+    root: Roots = None,
+    verbose: Annotated[bool, typer.Option("-v", help="Show keys without effect too.")] = False,
+) -> None:
+    """Tell every problem of a scene as file:line:column; exit status 1 on errors."""
+    raise typer.Exit(run_check(files, root or [], strict, verbose, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def bench(
+    launch: Launch,
+    models: Models = None,
+    seconds: Annotated[float, typer.Option(help="Wall-clock seconds to measure.", min=0.1)] = 5.0,
+    rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 200.0,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    root: Roots = None,
+) -> None:
+    """Measure the physics of a scene: ticks per second, real-time factor, times by phase, memory."""
+    raise typer.Exit(
+        run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False))
+    )
+
+
+@app.command()
+def decompose(
+    mesh: Launch,
+    out: Annotated[Optional[Path], typer.Option("-o", help="OBJ file to write.")] = None,  # noqa: UP045
+    threshold: Annotated[
+        float, typer.Option(help="Concavity allowed; smaller follows closer.", min=0.01, max=1)
+    ] = 0.05,
+    max_hulls: Annotated[int, typer.Option(help="Most hulls; -1 for any number.")] = -1,
+) -> None:
+    """Cut a mesh into convex parts, one material each: a collision mesh for ADF."""
+    from ligature.cli.decompose import decompose as run_decompose
+
+    raise typer.Exit(run_decompose(mesh, out, threshold, max_hulls, Console(highlight=False, soft_wrap=True)))
+
+
+def main() -> None:
+    """Entry point of the command."""
+    app()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,49 @@
+"""What a run is: the options that all processes of one run share, and how they travel to them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+
+import ligature
+from ligature.model.scene import Scene
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of a run.
+
+    ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second,
+    ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
+    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy.
+    """
+
+    scene: str
+    models: tuple[int, ...] | None = None
+    files: tuple[str, ...] = ()
+    roots: tuple[str, ...] = ()
+    prefix: str = ""
+    rate: float = 1000.0
+    speed: float = 1.0
+    bus: str = ""
+    min_hz: int | None = None
+    max_hz: int | None = None
+    names: str = "ambf"
+    extra: dict[str, str] = field(default_factory=dict)
+
+    def load(self) -> Scene:
+        """The scene of this run; raises `ligature.SceneError`."""
+        return ligature.load(self.scene, self.models, self.files, self.roots, self.prefix)
+
+    def to_text(self) -> str:
+        """One line for the command line of a process."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_text(cls, text: str) -> RunOptions:
+        """The options of `to_text`."""
+        values = json.loads(text)
+        for name in ("models", "files", "roots"):
+            if values[name] is not None:
+                values[name] = tuple(values[name])
+        return cls(**values)

@@ -1,0 +1,137 @@
+"""The physics process: runs the simulation against the wall clock and writes every update to the bus."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import time
+from collections.abc import Iterable
+
+import numpy as np
+
+import ligature
+from ligature.adf import Severity
+from ligature.bus import Block, Mailbox, Pacer, Throttle
+from ligature.bus.codec import Message
+from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.cli.options import RunOptions
+from ligature.simulation import Simulation
+
+TICK = 1e-3
+LONGEST_NAP = 0.01
+"""Longest sleep in seconds, so that commands and signals are seen while a client's clock rests."""
+
+WINDOW = 1000
+"""Updates over which the loop's figures are taken."""
+
+
+def main() -> None:
+    """Entry point: one argument, the run's options as text."""
+    end_with_parent()
+    stop = stop_on_signal()
+    options = RunOptions.from_text(sys.argv[1])
+    try:
+        scene = options.load()
+    except ligature.SceneError as error:
+        for diagnostic in error.diagnostics:
+            tell("error", str(diagnostic))
+        sys.exit(2)
+    for diagnostic in scene.diagnostics:
+        if diagnostic.severity >= Severity.INFO:
+            tell("finding", str(diagnostic))
+    simulation = Simulation(scene, TICK, 1.0 / options.rate)
+    block = Block.create(options.bus, simulation.state.dtype)
+    try:
+        loop = _Loop(simulation, block, options)
+        simulation.step(simulation.ticks_per_update)
+        loop.publish()
+        tell("ready", f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.rods)} rods")
+        while not stop.is_set():
+            loop.turn()
+    finally:
+        block.close()
+
+
+class _Loop:
+    """One turn takes commands, waits for its time, and advances one update."""
+
+    def __init__(self, simulation: Simulation, block: Block, options: RunOptions) -> None:
+        self._simulation, self._block = simulation, block
+        self._ticks = simulation.ticks_per_update
+        self._period = self._ticks * TICK
+        self._mailbox = Mailbox(simulation.scene, block.rings)
+        self._pacer = Pacer(self._period, options.speed)
+        self._start = self._mark = time.monotonic()
+        self._durations = np.zeros(WINDOW)
+        self._updates = 0
+        self._mark_updates = 0
+        self._warned = 0
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+
+    def turn(self) -> None:
+        """Take commands and run an update when it is due."""
+        self._block.beat()
+        nap = self._pacer.wait(time.monotonic())
+        if nap > 0.0:
+            time.sleep(min(nap, LONGEST_NAP))
+            if nap > LONGEST_NAP:
+                self._obey(self._mailbox.take())
+                self._figures()
+                return
+        self._obey(self._mailbox.take())
+        before = time.perf_counter()
+        self._simulation.step(self._ticks)
+        self.publish()
+        self._durations[self._updates % WINDOW] = time.perf_counter() - before
+        self._updates += 1
+        self._pacer.done(time.monotonic())
+        if self._updates % WINDOW == 0:
+            gc.collect(0)
+        self._figures()
+
+    def publish(self) -> None:
+        """Write the newest state to the bus."""
+        state = self._simulation.state
+        state["wall_time"] = time.monotonic() - self._start
+        state["stamp"] = time.time()
+        self._block.write(state)
+
+    def _obey(self, messages: Iterable[Message]) -> None:
+        for message in messages:
+            if isinstance(message, Throttle):
+                self._pacer.throttle(message)
+            else:
+                self._simulation.apply(message)
+
+    def _figures(self) -> None:
+        """Once a second: rates, times and counts of the loop, and what went wrong."""
+        now = time.monotonic()
+        span = now - self._mark
+        if span < 1.0:
+            return
+        figures, done = self._block.figures, self._updates - self._mark_updates
+        figures["loop_hz"] = done / span
+        figures["real_time_factor"] = done * self._period / span
+        seen = self._durations[: min(self._updates, WINDOW)]
+        if len(seen):
+            figures["tick_p50"], figures["tick_p99"] = np.percentile(seen, [50, 99])
+            figures["tick_max"] = seen.max()
+        figures["behind"] = self._pacer.lost
+        for name in ("received", "coalesced", "rejected"):
+            figures[name] = getattr(self._mailbox, name)
+        self._mark, self._mark_updates = now, self._updates
+        if self._mailbox.rejected > self._warned:
+            tell(
+                "warning",
+                f"{self._mailbox.rejected - self._warned} commands rejected: {self._mailbox.last_rejection}",
+            )
+            self._warned = self._mailbox.rejected
+        for problem in self._simulation.problems[:5]:
+            tell("warning", str(problem))
+        self._simulation.problems.clear()
+
+
+if __name__ == "__main__":
+    main()

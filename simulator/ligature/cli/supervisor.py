@@ -1,0 +1,196 @@
+"""The supervisor: starts the processes of a run, tells how they are, restarts or ends them."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import xmlrpc.client
+from collections.abc import Sequence
+from dataclasses import replace
+from queue import Empty, Queue
+from urllib.parse import urlparse
+
+from rich.console import Console
+
+from ligature.bus.block import remove_leftovers
+from ligature.bus.process import end_with_parent
+from ligature.cli.options import RunOptions
+
+DEFAULT_MASTER = "http://127.0.0.1:11311"
+MASTER_PATIENCE = 15.0
+END_PATIENCE = 1.5
+"""Seconds that processes are given to end before they are killed."""
+
+RESTART_PAUSE = 0.3
+QUICK_DEATH, MAX_QUICK_DEATHS = 5.0, 5
+
+Event = tuple[str, str, str]
+"""Process, event, text."""
+
+
+class Child:
+    """One process of a run and the thread that listens to it."""
+
+    def __init__(self, name: str, command: Sequence[str], events: Queue[Event], env: dict[str, str]) -> None:
+        self.name, self._command, self._events, self._env = name, list(command), events, env
+        self.quick_deaths = 0
+        self.start()
+
+    def start(self) -> None:
+        """Start the process, again after it died."""
+        self.started = time.monotonic()
+        self.process = subprocess.Popen(
+            self._command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1, env=self._env,
+            preexec_fn=end_with_parent, start_new_session=True,
+        )  # fmt: skip
+        threading.Thread(target=self._listen, args=(self.process,), daemon=True).start()
+
+    def _listen(self, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.startswith("@"):
+                event, _, text = line[1:].rstrip("\n").partition(" ")
+                self._events.put((self.name, event, text))
+            else:
+                self._events.put((self.name, "log", line.rstrip("\n")))
+        self._events.put((self.name, "ended", str(process.wait())))
+
+    def end(self, patience: float) -> None:
+        """Ask the process to end; kill it after ``patience`` seconds."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        try:
+            self.process.wait(max(patience, 0.0))
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+class Supervisor:
+    """One run from start to end; `run` returns the exit status."""
+
+    def __init__(self, options: RunOptions, console: Console | None = None) -> None:
+        remove_leftovers()
+        self._options = replace(options, bus=f"ligature-{os.getpid()}-{secrets.token_hex(4)}")
+        self._console = console or Console(highlight=False, soft_wrap=True)
+        self._events: Queue[Event] = Queue()
+        self._children: dict[str, Child] = {}
+        self._begin = time.monotonic()
+        self._stop = False
+        self._status = 0
+        self._env = dict(os.environ, PYTHONUNBUFFERED="1", OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+
+    def run(self) -> int:
+        """Run until Ctrl-C, a signal, or the end of the physics process."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: setattr(self, "_stop", True))
+        try:
+            self._start()
+            while not self._stop:
+                try:
+                    self._handle(*self._events.get(timeout=0.1))
+                except Empty:
+                    continue
+        finally:
+            self._end_all()
+        return self._status
+
+    def _start(self) -> None:
+        self._say(f"loading [bold]{self._options.scene}[/bold]")
+        text = self._options.to_text()
+        self._children["physics"] = Child(
+            "physics", [sys.executable, "-m", "ligature.cli.physics", text], self._events, self._env
+        )
+        if self._master_ready():
+            self._children["ros"] = Child(
+                "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
+            )
+        else:
+            self._fail("no ROS master could be started; set ROS_MASTER_URI to one that answers")
+
+    def _master_ready(self) -> bool:
+        uri = self._env.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
+        if master_answers(uri):
+            self._say(f"using the ROS master at {uri}")
+            return True
+        where = urlparse(uri)
+        if where.hostname not in ("localhost", "127.0.0.1", socket.gethostname()):
+            self._say(f"the ROS master at {uri} does not answer, and it is not on this machine")
+            return False
+        self._say(f"no ROS master answers at {uri}: starting one")
+        command = ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(where.port or 11311)]
+        self._children["master"] = Child("master", command, self._events, self._env)
+        deadline = time.monotonic() + MASTER_PATIENCE
+        while time.monotonic() < deadline and not self._stop:
+            if master_answers(uri):
+                return True
+            time.sleep(0.05)
+        return False
+
+    def _handle(self, process: str, event: str, text: str) -> None:
+        if event == "ready":
+            self._say(f"{process} ready: {text}")
+        elif event == "first-state":
+            self._say(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
+        elif event in ("error", "warning", "finding"):
+            style = {"error": "red", "warning": "yellow"}.get(event, "dim")
+            self._console.print(text, style=style, markup=False)
+            if event == "error":
+                self._status = 2
+        elif event == "ended":
+            self._ended(process, int(text))
+        elif process != "master" and text:
+            self._console.print(f"{process}: {text}", style="dim", markup=False)
+
+    def _ended(self, process: str, status: int) -> None:
+        if self._stop:
+            return
+        child = self._children[process]
+        if process == "physics":
+            self._fail(f"the physics process ended with status {status}; the run is over")
+            return
+        lived = time.monotonic() - child.started
+        child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_DEATH else 0
+        if child.quick_deaths > MAX_QUICK_DEATHS:
+            self._fail(f"the {process} process dies again and again (status {status})")
+            return
+        self._say(f"[yellow]the {process} process ended with status {status}; starting it again[/yellow]")
+        time.sleep(RESTART_PAUSE if child.quick_deaths else 0.0)
+        child.start()
+
+    def _fail(self, text: str) -> None:
+        self._console.print(text, style="red", markup=False)
+        self._status = self._status or 1
+        self._stop = True
+
+    def _end_all(self) -> None:
+        self._stop = True
+        deadline = time.monotonic() + END_PATIENCE
+        order = [self._children[n] for n in ("ros", "physics", "master") if n in self._children]
+        for child in order[:-1] if "master" in self._children else order:
+            if child.process.poll() is None:
+                child.process.terminate()
+        for child in order:
+            child.end(deadline - time.monotonic())
+        self._say("ended")
+
+    def _say(self, text: str) -> None:
+        self._console.print(text)
+
+
+def master_answers(uri: str) -> bool:
+    """Whether a ROS master answers at ``uri`` within a second."""
+    where = urlparse(uri)
+    try:
+        with socket.create_connection((where.hostname or "localhost", where.port or 11311), 1.0):
+            pass
+        code, _, _ = xmlrpc.client.ServerProxy(uri).getPid("/ligature")  # type: ignore[misc]
+    except (OSError, xmlrpc.client.Error, ValueError):
+        return False
+    return bool(code == 1)

@@ -1,0 +1,136 @@
+"""The arrays of a rod, grouped for compiled code; poses are of inertial frames I in world axes, SI units.
+
+A rod is a chain of n nodes: its elements in order and, at either end, the body it is tied to. Behind
+the chain stand the other bodies that it may touch, to N nodes in all. Joint j is between nodes j and
+j + 1. Multipliers and their rows are scaled by dt²: a force f appears as f dt² (kg m).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Nodes(NamedTuple):
+    """What moves: N nodes."""
+
+    mass: Array  # (N,)
+    inertia: Array  # (N, 3) principal moments
+    fixed: NDArray[np.bool_]  # (N,) moves as told, whatever pulls at it
+    gravity: Array  # (N, 3)
+    keep: Array  # (N, 2) fraction of linear and angular speed that damping leaves after a tick
+    x: Array  # (N, 3) centre of mass
+    q: Array  # (N, 4)
+    v: Array  # (N, 3)
+    w: Array  # (N, 3) angular velocity
+    radius: Array  # (N,) of the elements' capsules
+    friction: Array  # (N,) Coulomb coefficient; that of a contact is the product of both sides'
+    axis: Array  # (N, 2, 3) ends of the capsule's segment in I
+
+
+class Joints(NamedTuple):
+    """What holds the chain together: n - 1 joints."""
+
+    pivot: Array  # (n - 1, 2, 3) in I of nodes j, j + 1
+    frame: Array  # (n - 1, 2, 4) orientation of the joint frame in I of nodes j, j + 1
+    give: Array  # (n - 1,) compliance of the translation, m/N
+    stiffness: Array  # (n - 1, 3) N m/rad about the axes of the joint frame
+    damping: Array  # (n - 1, 3) N m s/rad
+    rest: Array  # (n - 1, 3) rad
+    low: Array  # (n - 1, 3) rad
+    high: Array  # (n - 1, 3) rad
+    stop: Array  # (n - 1,) stiffness beyond the limits, N m/rad
+    angle: Array  # (n - 1, 3) rotation vector of the joint, rad
+    load: Array  # (n - 1, 6) force and moment on node j, times dt²
+
+
+class Touches(NamedTuple):
+    """Contact points; element ``node[:, 0]`` is pushed along ``normal`` off the node ``node[:, 1]``."""
+
+    count: NDArray[np.int64]  # (1,)
+    node: NDArray[np.int64]  # (C, 2)
+    key: NDArray[np.int64]  # (C,) which part was touched; the same contact keeps its key
+    local: Array  # (C, 2, 3) the point in I of both nodes
+    start: Array  # (C, 2, 3) the point at the start of the tick, world
+    normal: Array  # (C, 3)
+    gap: Array  # (C,) at the start of the tick
+    target: Array  # (C,) gap to recover to within this tick, 0 or less
+    friction: Array  # (C,) Coulomb coefficient
+    slip: Array  # (C, 3) tangential displacement that friction resists
+    press: Array  # (C,) normal force, N
+    closed: NDArray[np.bool_]  # (C,)
+    bond: NDArray[np.bool_]  # (C,) holds the points together in every direction, whatever the gap
+    force: Array  # (C, 3) on the element, N
+
+
+class Shapes(NamedTuple):
+    """The convex parts of bodies around a rod."""
+
+    node: NDArray[np.int64]  # (S,) of the body; -1 while it is far away
+    kind: NDArray[np.int64]  # (S,) as in `ligature.mesh.distance`
+    size: Array  # (S, 3)
+    planes: Array  # (P, 4) of all hulls
+    plane_range: NDArray[np.int64]  # (S, 2)
+    pose: Array  # (S, 7) at the start of the tick
+    box: Array  # (S, 2, 3) around the shape, world
+    sweep: Array  # (S,) how far its surface may move in the tick
+    friction: Array  # (S,)
+    skip: NDArray[np.bool_]  # (S, n) elements that do not touch it
+
+
+class Work(NamedTuple):
+    """Scratch of a tick; nothing in it outlives one."""
+
+    x: Array  # (N, 3) start of the tick
+    q: Array  # (N, 4)
+    xp: Array  # (N, 3) free motion
+    qp: Array  # (N, 4)
+    R: Array  # (N + 1, 3, 3)
+    lever: Array  # (n - 1, 2, 3)
+    B: Array  # (n - 1, 3, 3)
+    c: Array  # (n - 1, 6)
+    compliance: Array  # (n - 1, 6)
+    H: Array  # (N, 6, 6)
+    Y: Array  # (N, 6, 6)
+    Z: Array  # (n - 1, 6, 6)
+    g: Array  # (N, 6)
+    d: Array  # (N, 6)
+    load: Array  # (n - 1, 6)
+    cg: Array  # (4, N, 6)
+    cg_load: Array  # (2, n - 1, 6)
+    zero: Array  # (n - 1, 6)
+    K: Array  # (C, 3, 3) contact stiffness times dt²
+    six: Array  # (6, 6)
+    three: Array  # (2, 3)
+    segment: Array  # (elements, 2, 3) of each capsule, world
+    reach: Array  # (elements,) distance within which contacts are looked for
+    box: Array  # (elements, 2, 3)
+    group_box: Array  # (elements, 2, 3)
+
+
+def work(n: int, total: int, elements: int, contacts: int) -> Work:
+    """Scratch for ``n`` chain nodes (``elements`` of the rod), ``total`` nodes and ``contacts`` contact points."""
+    z = np.zeros
+    j = n - 1
+    return Work(
+        z((total, 3)), z((total, 4)), z((total, 3)), z((total, 4)), z((total + 1, 3, 3)), z((j, 2, 3)),
+        z((j, 3, 3)), z((j, 6)), z((j, 6)), z((total, 6, 6)), z((total, 6, 6)), z((j, 6, 6)),
+        z((total, 6)), z((total, 6)), z((j, 6)), z((4, total, 6)), z((2, j, 6)), z((j, 6)),
+        z((contacts, 3, 3)), z((6, 6)), z((2, 3)), z((elements, 2, 3)), z(elements),
+        z((elements, 2, 3)), z((elements, 2, 3)),
+    )  # fmt: skip
+
+
+def touches(contacts: int) -> Touches:
+    """Room for ``contacts`` contact points, none yet."""
+    z = np.zeros
+    return Touches(
+        np.zeros(1, np.int64), np.zeros((contacts, 2), np.int64), np.zeros(contacts, np.int64),
+        z((contacts, 2, 3)), z((contacts, 2, 3)), z((contacts, 3)), z(contacts), z(contacts),
+        z(contacts), z((contacts, 3)), z(contacts), np.zeros(contacts, np.bool_),
+        np.zeros(contacts, np.bool_), z((contacts, 3)),
+    )  # fmt: skip

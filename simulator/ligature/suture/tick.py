@@ -1,0 +1,239 @@
+"""One tick of a rod: free motion, then Newton steps on joints, contacts and friction at the tick's end.
+
+Implicit Euler in the form of XPBD (Macklin et al. 2016): with the multipliers scaled by dt², every
+force law is evaluated at the end of the tick, so that stiff springs and heavy pulls stay stable at any
+mass. The tension's own stiffness (Tournier et al., Stable Constrained Dynamics, 2015) is part of
+the matrix: without it a light thread under load shakes itself apart. World axes, SI units.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ligature.suture.chain import add_joint_force, factor, solve
+from ligature.suture.compiled import inlined, kernel
+from ligature.suture.coupling import add_contacts, conclude_contacts, couple, settle_contacts
+from ligature.suture.rotations import (
+    left_jacobian_inverse_times,
+    matrix_of,
+    multiply,
+    rotate,
+    rotation_vector,
+    turn,
+)
+
+MAX_NEWTON = 5
+"""Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
+
+LARGE_TURN = 0.02
+"""Correction of a joint's direction in radians beyond which the linearisation is refreshed."""
+
+
+@kernel
+def predict(n, total, nodes, work, dt):
+    """Free motion: start poses to ``work.x``, predicted poses to ``nodes`` and ``work.xp``."""
+    for i in range(total):
+        for a in range(3):
+            work.x[i, a] = nodes.x[i, a]
+            nodes.v[i, a] = (nodes.v[i, a] + dt * nodes.gravity[i, a]) * nodes.keep[i, 0]
+            nodes.w[i, a] *= nodes.keep[i, 1]
+            nodes.x[i, a] += dt * nodes.v[i, a]
+            work.xp[i, a] = nodes.x[i, a]
+        for a in range(4):
+            work.q[i, a] = nodes.q[i, a]
+        turn(nodes.q, i, dt * nodes.w[i, 0], dt * nodes.w[i, 1], dt * nodes.w[i, 2])
+        for a in range(4):
+            work.qp[i, a] = nodes.q[i, a]
+
+
+@inlined
+def joint_angle(nodes, joints, j):
+    """Rotation vector of joint ``j`` in its own frame: the six-DOF coordinates, second-order exact."""
+    ax, ay, az, aw = multiply(
+        nodes.q[j, 0], nodes.q[j, 1], nodes.q[j, 2], nodes.q[j, 3],
+        joints.frame[j, 0, 0], joints.frame[j, 0, 1], joints.frame[j, 0, 2], joints.frame[j, 0, 3],
+    )  # fmt: skip
+    bx, by, bz, bw = multiply(
+        nodes.q[j + 1, 0], nodes.q[j + 1, 1], nodes.q[j + 1, 2], nodes.q[j + 1, 3],
+        joints.frame[j, 1, 0], joints.frame[j, 1, 1], joints.frame[j, 1, 2], joints.frame[j, 1, 3],
+    )  # fmt: skip
+    dx, dy, dz, dw = multiply(-ax, -ay, -az, aw, bx, by, bz, bw)
+    vx, vy, vz = rotation_vector(dx, dy, dz, dw)
+    return vx, vy, vz, ax, ay, az, aw
+
+
+@inlined
+def _axis_row(joints, j, a, angle, dt):
+    """Stiffness and moment of one axis of a joint's spring, damper and stop, both times dt²."""
+    k, d = joints.stiffness[j, a] * dt * dt, joints.damping[j, a] * dt
+    s = k + d
+    moment = k * (angle - joints.rest[j, a]) + d * (angle - joints.angle[j, a])
+    low, high = joints.low[j, a], joints.high[j, a]
+    if low <= high and (angle < low or angle > high):
+        stop = joints.stop[j] * dt * dt
+        s += stop
+        moment += stop * (angle - (low if angle < low else high))
+    return s, moment
+
+
+@kernel
+def linearise(n, total, nodes, joints, work, dt):
+    """Levers, axes and rows of all joints at the present poses."""
+    per_dt2 = 1.0 / (dt * dt)
+    for i in range(total):
+        matrix_of(nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3], work.R[i])
+    for j in range(n - 1):
+        for side in range(2):
+            p, r = joints.pivot[j, side], work.lever[j, side]
+            r[0], r[1], r[2] = rotate(work.R[j + side], p[0], p[1], p[2])
+        for a in range(3):
+            work.c[j, a] = nodes.x[j, a] + work.lever[j, 0, a] - nodes.x[j + 1, a] - work.lever[j, 1, a]
+            work.compliance[j, a] = joints.give[j] * per_dt2
+        vx, vy, vz, ax, ay, az, aw = joint_angle(nodes, joints, j)
+        B = work.B[j]
+        matrix_of(-ax, -ay, -az, aw, B)
+        for a in range(3):
+            B[0, a], B[1, a], B[2, a] = left_jacobian_inverse_times(vx, vy, vz, B[0, a], B[1, a], B[2, a])
+        for a in range(3):
+            s, moment = _axis_row(joints, j, a, vx if a == 0 else (vy if a == 1 else vz), dt)
+            s = max(s, 1e-30)
+            work.compliance[j, 3 + a] = 1.0 / s
+            work.c[j, 3 + a] = moment / s
+
+
+@kernel
+def assemble(n, total, nodes, joints, work):
+    """Node matrices H (inertia, stiffness of the tension) and loads g (what the free motion wants)."""
+    for i in range(total):
+        H, R = work.H[i], work.R[i]
+        m = nodes.mass[i]
+        for a in range(6):
+            for b in range(6):
+                H[a, b] = 0.0
+            work.g[i, a] = 0.0
+        if nodes.fixed[i]:
+            continue
+        i0, i1, i2 = nodes.inertia[i, 0], nodes.inertia[i, 1], nodes.inertia[i, 2]
+        for a in range(3):
+            H[a, a] = m
+            for b in range(3):
+                H[3 + a, 3 + b] = R[a, 0] * i0 * R[b, 0] + R[a, 1] * i1 * R[b, 1] + R[a, 2] * i2 * R[b, 2]
+        x, y, z, w = multiply(
+            nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3],
+            -work.qp[i, 0], -work.qp[i, 1], -work.qp[i, 2], work.qp[i, 3],
+        )  # fmt: skip
+        ex, ey, ez = rotation_vector(x, y, z, w)
+        for a in range(3):
+            work.g[i, a] = -m * (nodes.x[i, a] - work.xp[i, a])
+            work.g[i, 3 + a] = -(H[3 + a, 3] * ex + H[3 + a, 4] * ey + H[3 + a, 5] * ez)
+        if i < n:
+            _stiffen_by_tension(n, joints, work, i, H)
+
+
+@inlined
+def _stiffen_by_tension(n, joints, work, i, H):
+    """Add the resistance to turning that the forces at a node's pivots bring, as far as it is positive."""
+    g = 0.0
+    ux, uy, uz = 0.0, 0.0, 0.0
+    if i < n - 1:
+        r, f = work.lever[i, 0], joints.load[i]
+        g += r[0] * f[0] + r[1] * f[1] + r[2] * f[2]
+        ux, uy, uz = r[0], r[1], r[2]
+    if i > 0:
+        r, f = work.lever[i - 1, 1], joints.load[i - 1]
+        g -= r[0] * f[0] + r[1] * f[1] + r[2] * f[2]
+        ux, uy, uz = ux - r[0], uy - r[1], uz - r[2]
+    square = ux * ux + uy * uy + uz * uz
+    if g <= 0.0 or square == 0.0:
+        return
+    s = g / square
+    H[3, 3] += g - s * ux * ux
+    H[4, 4] += g - s * uy * uy
+    H[5, 5] += g - s * uz * uz
+    H[3, 4] -= s * ux * uy
+    H[4, 3] -= s * ux * uy
+    H[3, 5] -= s * ux * uz
+    H[5, 3] -= s * ux * uz
+    H[4, 5] -= s * uy * uz
+    H[5, 4] -= s * uy * uz
+
+
+@kernel
+def correct(total, nodes, work):
+    """Move all nodes by the correction ``work.d``; returns the largest turn."""
+    largest = 0.0
+    for i in range(total):
+        if nodes.fixed[i]:
+            continue
+        d = work.d[i]
+        largest = max(largest, d[3] * d[3] + d[4] * d[4] + d[5] * d[5])
+    largest = math.sqrt(largest)
+    scale = 1.0 if largest < 0.5 else 0.5 / largest
+    for i in range(total):
+        if nodes.fixed[i]:
+            continue
+        for a in range(3):
+            nodes.x[i, a] += scale * work.d[i, a]
+        turn(nodes.q, i, scale * work.d[i, 3], scale * work.d[i, 4], scale * work.d[i, 5])
+    return largest
+
+
+@kernel
+def finish(n, total, nodes, joints, work, dt):
+    """Velocities from the motion of the tick, and the joint angles that damping starts from next."""
+    for i in range(total):
+        if nodes.fixed[i]:
+            continue
+        x, y, z, w = multiply(
+            nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3],
+            -work.q[i, 0], -work.q[i, 1], -work.q[i, 2], work.q[i, 3],
+        )  # fmt: skip
+        ex, ey, ez = rotation_vector(x, y, z, w)
+        nodes.w[i, 0], nodes.w[i, 1], nodes.w[i, 2] = ex / dt, ey / dt, ez / dt
+        for a in range(3):
+            nodes.v[i, a] = (nodes.x[i, a] - work.x[i, a]) / dt
+    for j in range(n - 1):
+        vx, vy, vz, _ax, _ay, _az, _aw = joint_angle(nodes, joints, j)
+        joints.angle[j, 0], joints.angle[j, 1], joints.angle[j, 2] = vx, vy, vz
+
+
+@kernel
+def node_load(n, work, joints, i, out):
+    """Total force and moment (6,) of the joints on the centre of chain node ``i``, times dt²."""
+    for a in range(6):
+        out[a] = 0.0
+    if i < n - 1:
+        add_joint_force(joints.load[i], work.lever[i, 0], work.B[i], 1.0, out)
+    if i > 0:
+        add_joint_force(joints.load[i - 1], work.lever[i - 1, 1], work.B[i - 1], -1.0, out)
+
+
+@kernel
+def advance(n, total, nodes, joints, touches, work, stiffness, dt):
+    """One tick of ``total`` nodes, the first ``n`` of them a chain; returns the Newton steps taken.
+
+    Contacts in ``touches`` were found at the poses of the tick's start; ``stiffness`` is theirs (N/m).
+    """
+    predict(n, total, nodes, work, dt)
+    steps = 0
+    for _ in range(MAX_NEWTON):
+        steps += 1
+        linearise(n, total, nodes, joints, work, dt)
+        assemble(n, total, nodes, joints, work)
+        coupled = add_contacts(nodes, touches, work, stiffness, dt)
+        factor(n, nodes.fixed, work.H, work.lever[:, 0], work.lever[:, 1], work.B, work.compliance,
+               work.Y, work.Z, work.six)  # fmt: skip
+        solve(n, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, work.c, work.g, work.d,
+              work.load, work.six)  # fmt: skip
+        if coupled:
+            couple(n, total, nodes, touches, work)
+        largest = correct(total, nodes, work)
+        for j in range(n - 1):
+            for a in range(6):
+                joints.load[j, a] = work.load[j, a]
+        changed = settle_contacts(total, nodes, touches, work, stiffness)
+        if largest < LARGE_TURN and not changed:
+            break
+    conclude_contacts(nodes, touches, work, stiffness, dt)
+    finish(n, total, nodes, joints, work, dt)
+    return steps
