@@ -1,11 +1,13 @@
 """Compiles the room's kernels once: the one decorator they share, and where their machine code is kept.
 
-Numba keeps the code beside the sources; where those cannot be written (a system-wide installation)
-it goes below ``LIGATURE_CACHE``, else ``XDG_CACHE_HOME``, so that only the first start ever compiles.
+The code lies below ``LIGATURE_CACHE``, else ``XDG_CACHE_HOME``, in a folder named by the digest of all
+sources that kernels are made of: Numba itself looks at one source file each, and would keep a kernel
+whose callee has changed. So only the first start after an installation compiles.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -13,18 +15,31 @@ from typing import Any, TypeVar
 
 import numba
 
+import ligature.mesh.distance
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def _cache_folder() -> Path:
+def cache_folder() -> Path:
+    """Where the machine code of this version of the sources lies."""
+    sources = [*sorted(Path(__file__).parent.glob("*.py")), Path(ligature.mesh.distance.__file__)]
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     root = os.environ.get("LIGATURE_CACHE")
-    if root:
-        return Path(root) / "numba"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "ligature" / "numba"
+    if root is None:
+        root = str(Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "ligature")
+    return Path(root) / "kernels" / digest
 
 
-if not os.access(Path(__file__).parent, os.W_OK) and not numba.config.CACHE_DIR:
-    numba.config.CACHE_DIR = str(_cache_folder())
+_FOLDER = str(cache_folder())
+
+
+def _compile(function: Function, **options: Any) -> Function:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _FOLDER
+    try:
+        return numba.njit(cache=True, error_model="numpy", **options)(function)
+    finally:
+        numba.config.CACHE_DIR = before
 
 
 def kernel(function: Function) -> Function:
@@ -32,9 +47,9 @@ def kernel(function: Function) -> Function:
 
     No fast-math and no threads: the same input gives the same bits.
     """
-    return numba.njit(cache=True, error_model="numpy")(function)
+    return _compile(function)
 
 
 def inlined(function: Function) -> Function:
     """Like `kernel`, for the small functions of inner loops: LLVM folds them into their callers."""
-    return numba.njit(cache=True, error_model="numpy", inline="never", forceinline=True)(function)
+    return _compile(function, forceinline=True)

@@ -15,7 +15,8 @@ from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.scene import Body, Joint, JointType, RodChain, Scene
 from ligature.model.state import StateRecord
-from ligature.suture import contacts, solver
+from ligature.suture import projection as contacts
+from ligature.suture import solver
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 

@@ -35,8 +35,9 @@ def predict(n, total, nodes, work, dt):
     for i in range(total):
         for a in range(3):
             work.x[i, a] = nodes.x[i, a]
-            nodes.v[i, a] = (nodes.v[i, a] + dt * nodes.gravity[i, a]) * nodes.keep[i, 0]
-            nodes.w[i, a] *= nodes.keep[i, 1]
+            if not nodes.fixed[i]:
+                nodes.v[i, a] = (nodes.v[i, a] + dt * nodes.gravity[i, a]) * nodes.keep[i, 0]
+                nodes.w[i, a] *= nodes.keep[i, 1]
             nodes.x[i, a] += dt * nodes.v[i, a]
             work.xp[i, a] = nodes.x[i, a]
         for a in range(4):

@@ -1,0 +1,50 @@
+"""``/diagnostics``: how the loop runs, what was dropped, coalesced and rejected."""
+
+from __future__ import annotations
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from ligature.bus import Block
+
+PERIOD = 1.0
+SLOW = 0.95
+"""Real-time factor below which the status is a warning."""
+
+
+class Diagnostics:
+    """Publishes the figures of the bus once a second."""
+
+    def __init__(self, block: Block) -> None:
+        self._block = block
+        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
+        self._next = 0.0
+
+    def publish(self, now: float) -> None:
+        """Publish when a second has passed; ``now`` on the monotonic clock."""
+        if now < self._next:
+            return
+        self._next = now + PERIOD
+        figures = self._block.figures[0]
+        factor = float(figures["real_time_factor"])
+        status = DiagnosticStatus(name="ligature: physics loop", hardware_id="ligature")
+        status.level = DiagnosticStatus.OK if factor >= SLOW or factor == 0.0 else DiagnosticStatus.WARN
+        status.message = f"real-time factor {factor:.2f}"
+        rows = {
+            "loop rate (Hz)": f"{figures['loop_hz']:.1f}",
+            "real-time factor": f"{factor:.3f}",
+            "behind the wall clock (s)": f"{figures['behind']:.3f}",
+            "update p50 (ms)": f"{1e3 * figures['tick_p50']:.3f}",
+            "update p99 (ms)": f"{1e3 * figures['tick_p99']:.3f}",
+            "update max (ms)": f"{1e3 * figures['tick_max']:.3f}",
+            "commands received": str(figures["received"]),
+            "commands coalesced": str(figures["coalesced"]),
+            "commands rejected": str(int(figures["rejected"]) + int(figures["malformed"])),
+            "commands dropped": str(sum(ring.refused for ring in self._block.rings.values())),
+            "messages published": str(figures["published"]),
+            "publications dropped": str(figures["publish_late"]),
+        }
+        status.values = [KeyValue(key=k, value=v) for k, v in rows.items()]
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = rospy.Time.now()
+        self._publisher.publish(array)

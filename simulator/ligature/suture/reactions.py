@@ -1,0 +1,90 @@
+"""What a tick gives back: impulses on bodies, tension of elements; and bonds, which hold points together.
+
+World axes, SI units.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ligature.suture.compiled import kernel
+from ligature.suture.rotations import cross, matrix_of, rotate
+from ligature.suture.tick import node_load
+
+
+@kernel
+def bond(nodes, work, touches, i, k, points):
+    """Add bonds that hold ``points`` (m, 2, 3), given in the frames of nodes i and k, together this tick."""
+    for node in (i, k):
+        matrix_of(nodes.q[node, 0], nodes.q[node, 1], nodes.q[node, 2], nodes.q[node, 3], work.R[node])
+    for m in range(points.shape[0]):
+        c = touches.count[0]
+        if c == touches.node.shape[0]:
+            return
+        touches.count[0] = c + 1
+        touches.key[c] = -1
+        touches.node[c, 0], touches.node[c, 1] = i, k
+        touches.bond[c], touches.closed[c] = True, True
+        touches.target[c], touches.friction[c], touches.press[c] = 0.0, 0.0, 0.0
+        for s in range(2):
+            node = touches.node[c, s]
+            rx, ry, rz = rotate(work.R[node], points[m, s, 0], points[m, s, 1], points[m, s, 2])
+            touches.start[c, s, 0] = nodes.x[node, 0] + rx
+            touches.start[c, s, 1] = nodes.x[node, 1] + ry
+            touches.start[c, s, 2] = nodes.x[node, 2] + rz
+            for a in range(3):
+                touches.local[c, s, a] = points[m, s, a]
+        touches.normal[c, 0], touches.normal[c, 1], touches.normal[c, 2] = 1.0, 0.0, 0.0
+        touches.gap[c] = touches.start[c, 0, 0] - touches.start[c, 1, 0]
+        touches.slip[c, 0] = 0.0
+        for a in range(1, 3):
+            touches.slip[c, a] = touches.start[c, 0, a] - touches.start[c, 1, a]
+
+
+@kernel
+def react(n, total, nodes, joints, touches, work, impulse, dt):
+    """Impulse (N s) and its moment about the centre of mass on every node, from joints and contacts."""
+    for i in range(total):
+        if i < n:
+            node_load(n, work, joints, i, impulse[i])
+            for a in range(6):
+                impulse[i, a] /= dt
+        else:
+            for a in range(6):
+                impulse[i, a] = 0.0
+    for c in range(touches.count[0]):
+        if not touches.closed[c]:
+            continue
+        f = touches.force[c]
+        for s in range(2):
+            i = touches.node[c, s]
+            sign = dt if s == 0 else -dt
+            p = touches.local[c, s]
+            rx, ry, rz = rotate(work.R[i], p[0], p[1], p[2])
+            mx, my, mz = cross(rx, ry, rz, f[0], f[1], f[2])
+            impulse[i, 0] += sign * f[0]
+            impulse[i, 1] += sign * f[1]
+            impulse[i, 2] += sign * f[2]
+            impulse[i, 3] += sign * mx
+            impulse[i, 4] += sign * my
+            impulse[i, 5] += sign * mz
+
+
+@kernel
+def pull_of_elements(first, n, joints, work, tension, dt):
+    """Tension of each element in newtons: the mean pull of its joints along it, positive when taut."""
+    for e in range(tension.shape[0]):
+        i = first + e
+        near = work.lever[i - 1, 1] if i > 0 else work.lever[i, 0]
+        far = work.lever[i, 0] if i < n - 1 else work.lever[i - 1, 1]
+        ux, uy, uz = far[0] - near[0], far[1] - near[1], far[2] - near[2]
+        if i == 0:
+            ux, uy, uz = far[0], far[1], far[2]
+        elif i == n - 1:
+            ux, uy, uz = -near[0], -near[1], -near[2]
+        pull = 0.0
+        for j in (i - 1, i):
+            if 0 <= j < n - 1:
+                f = joints.load[j]
+                pull += f[0] * ux + f[1] * uy + f[2] * uz
+        tension[e] = 0.5 * pull / (math.sqrt(ux * ux + uy * uy + uz * uz) * dt * dt)

@@ -1,0 +1,321 @@
+"""One rod: its state, its tick, what it gives back to the bodies that it is tied to or touches.
+
+World axes, SI units. Outside, poses are x y z qx qy qz qw of body frames B, twists linear then angular
+with the linear part at the centre of mass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
+from ligature.suture import layout
+from ligature.suture.contacts import detect
+from ligature.suture.description import RodDescription, Tie, frame_quaternions
+from ligature.suture.reactions import bond, pull_of_elements, react
+from ligature.suture.tick import advance
+
+Array = NDArray[np.float64]
+
+INDENTATION = 0.05
+"""How deep, in radii, a contact is pressed in by 1 N."""
+
+LOCKED = 1e6
+"""Stiffness in N m/rad of a joint axis that does not turn."""
+
+MAX_SPEED = 1e4
+"""Speed in m/s beyond which a rod counts as diverged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Partner:
+    """A body outside the rod that it may be tied to or touch.
+
+    ``body`` is its index in the scene. ``fixed`` bodies move as they do, whatever the rod does; they
+    receive the reaction all the same. ``gravity`` (3,) is what the physics will add to its motion.
+    """
+
+    body: int
+    mass: float
+    inertia: Array
+    T_body_inertial: Array
+    gravity: Array
+    fixed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """Holds ``element`` to a partner ``body`` while it lasts: the same point in the two inertial frames."""
+
+    element: int
+    body: int
+    points: Array
+
+
+class Rod:
+    """An elastic rod among bodies.
+
+    Parameters
+    ----------
+    description
+        What the rod is made of.
+    partners
+        The bodies that it may meet; ties name them by index.
+    shapes
+        Their convex parts, from `Colliders`; None for a rod that touches nothing but itself.
+    dt
+        Length of a tick in seconds.
+    """
+
+    def __init__(
+        self,
+        description: RodDescription,
+        partners: Sequence[Partner] = (),
+        shapes: layout.Shapes | None = None,
+        dt: float = 1e-3,
+    ) -> None:
+        self.description = description
+        self.partners = tuple(partners)
+        self.dt = dt
+        self.grips: list[Grip] = []
+        n = len(description.mass)
+        known = {partner.body: partner for partner in partners}
+        for tie in description.ties:
+            if tie.body not in known:
+                raise ValueError(
+                    f"rod '{description.name}' is tied to body {tie.body}, which is no partner of it"
+                )
+        head, tail, others = _ends(description)
+        self._first = 1 if head else 0
+        self._own = slice(self._first, self._first + n)
+        self._chain = n + self._first + (1 if tail else 0)
+        ends = {tie.body: node for tie, node in ((head, 0), (tail, self._chain - 1)) if tie}
+        rest = [partner for partner in partners if partner.body not in ends]
+        self.node_of = {**ends, **{p.body: self._chain + k for k, p in enumerate(rest)}}
+        self._total = self._chain + len(rest)
+        self._joints = _joints(description, head, tail)
+        self._nodes = self._new_nodes()
+        self._shapes = shapes or _no_shapes(n)
+        capacity = 256 + 8 * n + 3 * len(others)
+        self._work = layout.work(self._chain, self._total, n, capacity)
+        self._touches = (layout.touches(capacity), layout.touches(capacity))
+        self._counts = np.zeros(2, np.int64)
+        self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
+        lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
+        self._self_skip = int(np.ceil(np.pi * description.radius.max() / lengths.min()))
+        self._permanent = [self._grip_of(tie) for tie in others]
+        self._T_inertial_body = np.array([inverse(T) for T in description.T_body_inertial])
+        self.impulse = np.zeros((self._total, 6))
+        self.tension = np.zeros(n)
+        self.newton_steps = 0
+        self.reset()
+
+    # --- building ---------------------------------------------------------------------------
+
+    def _new_nodes(self) -> layout.Nodes:
+        total, own, description = self._total, self._own, self.description
+        nodes = layout.Nodes(
+            mass=np.ones(total), inertia=np.ones((total, 3)), fixed=np.zeros(total, np.bool_),
+            gravity=np.zeros((total, 3)), keep=np.ones((total, 2)), x=np.zeros((total, 3)),
+            q=np.tile([0.0, 0.0, 0.0, 1.0], (total, 1)), v=np.zeros((total, 3)), w=np.zeros((total, 3)),
+            radius=np.zeros(total), friction=np.ones(total), axis=np.zeros((total, 2, 3)),
+        )  # fmt: skip
+        nodes.mass[own], nodes.inertia[own] = description.mass, description.inertia
+        nodes.gravity[own], nodes.radius[own] = description.gravity, description.radius
+        nodes.friction[own], nodes.axis[own] = description.friction, description.ends
+        nodes.keep[own] = (1.0 - np.clip(description.damping, 0.0, 1.0)) ** self.dt
+        for partner in self.partners:
+            i = self.node_of[partner.body]
+            nodes.fixed[i] = partner.fixed
+            if not partner.fixed:
+                nodes.mass[i], nodes.inertia[i], nodes.gravity[i] = (
+                    partner.mass,
+                    partner.inertia,
+                    partner.gravity,
+                )
+        return nodes
+
+    def _grip_of(self, tie: Tie) -> Grip:
+        """A tie in the middle of the rod, as three points that stay together."""
+        arm = 0.5 * float(np.linalg.norm(np.diff(self.description.ends[tie.element], axis=0)))
+        corners = arm * np.array([[1.0, 0.0, 0.0], [-0.5, 0.866, 0.0], [-0.5, -0.866, 0.0]])
+        return Grip(
+            tie.element,
+            tie.body,
+            np.stack([corners @ T[:3, :3].T + T[:3, 3] for T in (tie.T_element_a, tie.T_body_b)], axis=1),
+        )
+
+    # --- state ------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Put every element back to its initial pose, at rest, and let go of all grips."""
+        poses = np.array([matrix_pose7(T) for T in self.description.T_world_inertial])
+        self._nodes.x[self._own], self._nodes.q[self._own] = poses[:, :3], poses[:, 3:]
+        self._nodes.v[:], self._nodes.w[:] = 0.0, 0.0
+        self._joints.load[:], self._joints.angle[:] = 0.0, 0.0
+        self.grips = []
+        self.tension[:], self.impulse[:] = 0.0, 0.0
+        for touches in self._touches:
+            touches.count[0] = 0
+
+    def memory(self) -> dict[str, Array]:
+        """Everything that lasts from tick to tick."""
+        nodes, joints, touches = self._nodes, self._joints, self._touches[0]
+        kept = {name: getattr(nodes, name).copy() for name in ("x", "q", "v", "w")}
+        kept |= {"angle": joints.angle.copy(), "load": joints.load.copy(), "tension": self.tension.copy()}
+        n = int(touches.count[0])
+        kept |= {f"touch_{name}": np.array(getattr(touches, name)[:n]) for name in TOUCH_MEMORY}
+        kept["grips"] = np.array([[g.element, g.body, *g.points.ravel()] for g in self.grips]).reshape(-1, 20)
+        return kept
+
+    def recall(self, memory: dict[str, Array]) -> None:
+        """Continue from `memory`."""
+        for name in ("x", "q", "v", "w"):
+            getattr(self._nodes, name)[:] = memory[name]
+        self._joints.angle[:], self._joints.load[:] = memory["angle"], memory["load"]
+        self.tension[:] = memory["tension"]
+        touches = self._touches[0]
+        n = len(memory["touch_key"])
+        touches.count[0] = n
+        for name in TOUCH_MEMORY:
+            getattr(touches, name)[:n] = memory[f"touch_{name}"]
+        self.grips = [Grip(int(g[0]), int(g[1]), g[2:].reshape(3, 2, 3)) for g in memory["grips"]]
+
+    def finite(self) -> bool:
+        """Whether the state is usable."""
+        nodes = self._nodes
+        sound = all(np.isfinite(getattr(nodes, name)[self._own]).all() for name in ("x", "q", "v", "w"))
+        return bool(sound and np.abs(nodes.v[self._own]).max() < MAX_SPEED)
+
+    @property
+    def positions(self) -> Array:
+        """Centres of mass (n, 3) of the elements."""
+        return self._nodes.x[self._own]
+
+    @property
+    def orientations(self) -> Array:
+        """Quaternions (n, 4) of the elements' inertial frames."""
+        return self._nodes.q[self._own]
+
+    @property
+    def twists(self) -> Array:
+        """Velocities (n, 6) of the elements."""
+        return np.hstack([self._nodes.v[self._own], self._nodes.w[self._own]])
+
+    def set_motion(self, poses: Array, twists: Array) -> None:
+        """Put the elements' inertial frames to ``poses`` (n, 7) moving with ``twists`` (n, 6)."""
+        nodes, own = self._nodes, self._own
+        nodes.x[own], nodes.q[own] = poses[:, :3], poses[:, 3:]
+        nodes.v[own], nodes.w[own] = twists[:, :3], twists[:, 3:]
+
+    def hold_element(self, element: int, held: bool = True) -> None:
+        """Make an element move with its present velocity, whatever pulls at it, or free it again."""
+        self._nodes.fixed[self._first + element] = held
+
+    @property
+    def body_poses(self) -> Array:
+        """Poses (n, 7) of the elements' body frames."""
+        own = np.hstack([self.positions, self.orientations])
+        frames = [pose7_matrix(p) @ T for p, T in zip(own, self._T_inertial_body, strict=True)]
+        return np.array([matrix_pose7(T) for T in frames])
+
+    @property
+    def contacts(self) -> layout.Touches:
+        """Contact points of the last tick; only the first ``count[0]`` rows count."""
+        return self._touches[0]
+
+    # --- the tick ---------------------------------------------------------------------------
+
+    def place(self, body: int, T_world_body: Array, twist: Array) -> None:
+        """Tell where a partner is, (4, 4), and how it moves, (6,), at the start of the tick."""
+        node = self.node_of[body]
+        partner = next(p for p in self.partners if p.body == body)
+        pose = matrix_pose7(T_world_body @ partner.T_body_inertial)
+        self._nodes.x[node], self._nodes.q[node] = pose[:3], pose[3:]
+        self._nodes.v[node], self._nodes.w[node] = twist[:3], twist[3:]
+
+    def step(self) -> None:
+        """Advance by one tick; `impulse` then holds what each partner receives."""
+        old, new = self._touches
+        new.count[0] = 0
+        for grip in (*self._permanent, *self.grips):
+            bond(
+                self._nodes, self._work, new, self._first + grip.element, self.node_of[grip.body], grip.points
+            )
+        n = len(self.tension)
+        detect(self._first, n, self._nodes, self._shapes, old, new, self._work, self._counts,
+               self._self_skip, self.dt)  # fmt: skip
+        self.newton_steps = advance(self._chain, self._total, self._nodes, self._joints, new, self._work,
+                                    self._stiffness, self.dt)  # fmt: skip
+        react(self._chain, self._total, self._nodes, self._joints, new, self._work, self.impulse, self.dt)
+        pull_of_elements(self._first, self._chain, self._joints, self._work, self.tension, self.dt)
+        self._touches = new, old
+
+    def impulse_on(self, body: int) -> Array:
+        """Linear and angular impulse (6,) of the last tick on a partner, about its centre of mass."""
+        return self.impulse[self.node_of[body]]
+
+
+TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "bond", "normal", "force", "start")
+
+
+def _ends(description: RodDescription) -> tuple[Tie | None, Tie | None, list[Tie]]:
+    """The ties that become the chain's first and last node, and the others."""
+    head = next((t for t in description.ties if t.element == 0), None)
+    last = len(description.mass) - 1
+    tail = next(
+        (t for t in description.ties if t.element == last and (head is None or t.body != head.body)), None
+    )
+    return head, tail, [t for t in description.ties if t is not head and t is not tail]
+
+
+def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> layout.Joints:
+    """Joint arrays of the whole chain, those of the ties at its ends included."""
+    pivots, frames = list(description.pivots), list(description.frames)
+    give = list(description.give)
+    rows = {
+        "stiffness": list(description.joint_stiffness), "damping": list(description.joint_damping),
+        "rest": list(description.rest), "low": list(description.low), "high": list(description.high),
+    }  # fmt: skip
+    stiffest = float(min(description.give))
+    if head is not None:
+        a, b = head.T_body_b, head.T_element_a
+        pivots.insert(0, np.array([a[:3, 3], b[:3, 3]]))
+        frames.insert(0, np.array([a[:3, :3], b[:3, :3]]))
+        give.insert(0, stiffest)
+        seen = {"stiffness": head.stiffness, "damping": head.damping, "rest": -head.rest,
+                "low": -head.high, "high": -head.low}  # fmt: skip
+        for name, values in rows.items():
+            values.insert(0, seen[name])
+    if tail is not None:
+        a, b = tail.T_element_a, tail.T_body_b
+        pivots.append(np.array([a[:3, 3], b[:3, 3]]))
+        frames.append(np.array([a[:3, :3], b[:3, :3]]))
+        give.append(stiffest)
+        for name, values in rows.items():
+            values.append(getattr(tail, name))
+    n = len(pivots)
+    arrays = {name: np.array(values, dtype=float) for name, values in rows.items()}
+    locked = arrays["low"] == arrays["high"]
+    arrays["rest"] = np.where(locked, arrays["low"], arrays["rest"])
+    arrays["stiffness"] = np.where(locked, LOCKED, arrays["stiffness"])
+    weight = description.mass.sum() * 9.81
+    span = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1).sum()
+    bending = np.where(locked, 0.0, arrays["stiffness"]).max(axis=1)
+    return layout.Joints(
+        pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), give=np.array(give),
+        **arrays, stop=np.maximum(100.0 * bending, 100.0 * weight * span),
+        angle=np.zeros((n, 3)), load=np.zeros((n, 6)),
+    )  # fmt: skip
+
+
+def _no_shapes(n: int) -> layout.Shapes:
+    z = np.zeros
+    return layout.Shapes(
+        np.zeros(0, np.int64), np.zeros(0, np.int64), z((0, 3)), z((0, 4)), np.zeros((0, 2), np.int64),
+        z((0, 7)), z((0, 2, 3)), z(0), z(0), np.zeros((0, n), np.bool_),
+    )  # fmt: skip
