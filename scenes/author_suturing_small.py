@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-
 from ligature.model.frames import minimal_rotation, pose_matrix
 
 HERE = Path(__file__).resolve().parent / "suturing_small"
@@ -105,9 +104,7 @@ def colour(r: float, g: float, b: float, specular: float = 0.3) -> dict[str, Any
     }
 
 
-def body(
-    name: str, T_world_body: Matrix, mass: float, shapes: list[dict[str, Any]], **keys: Any
-) -> dict[str, Any]:
+def body(name: str, T_world_body: Matrix, mass: float, shapes: list[dict[str, Any]], **keys: Any) -> dict[str, Any]:
     """An ADF body whose looks and collisions are the same primitive shapes."""
     block: dict[str, Any] = {
         "name": name,
@@ -170,9 +167,7 @@ def psm(name: str) -> dict[str, Any]:
     bodies: dict[str, Any] = {}
     joints: dict[str, Any] = {}
 
-    def add_body(
-        link: str, T: Matrix, links: list[dict[str, Any]], mass: float, look: dict[str, Any]
-    ) -> None:
+    def add_body(link: str, T: Matrix, links: list[dict[str, Any]], mass: float, look: dict[str, Any]) -> None:
         bodies[f"BODY {link}"] = body(
             link, T, mass, links,
             **{"color components": look, "collision groups": groups[link], "passive": link not in published},
@@ -306,9 +301,7 @@ def phantom() -> dict[str, Any]:
     T_world_block = pose_matrix((0.03, 0.2, top - 0.015), (0, 0, 0))
     block_shape = [shape("BOX", (0, 0, 0), x=0.1, y=0.16, z=0.03)]
     bodies: dict[str, Any] = {
-        "BODY Block": body(
-            "Block", T_world_block, 0.0, block_shape, **{"color components": colour(0.85, 0.6, 0.5)}
-        )
+        "BODY Block": body("Block", T_world_block, 0.0, block_shape, **{"color components": colour(0.85, 0.6, 0.5)})
     }
     T_world_camera = pose_matrix((0.0307, 0.25102, 0.81025), (0.69813, 0, -3.14158))
     bodies["BODY CameraFrame"] = body("CameraFrame", T_world_camera, 0.0, [])

@@ -5,10 +5,9 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
+import ligature
 import numpy as np
 import pytest
-
-import ligature
 from ligature.adf import Severity
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

@@ -250,9 +250,7 @@ def problems(element: Element) -> list[Diagnostic]:
     return found
 
 
-def _walk(
-    node: Mapping, prefix: str, element: Element, known: dict[str, Key], found: list[Diagnostic]
-) -> None:
+def _walk(node: Mapping, prefix: str, element: Element, known: dict[str, Key], found: list[Diagnostic]) -> None:
     for duplicate in node.duplicates:
         found.append(
             Diagnostic(
@@ -315,9 +313,7 @@ def _check_required(
         if "." not in name and "[]" not in name and name not in node.entries:
             block = f" in '{prefix.rstrip('.')}'" if prefix else ""
             message = f"{element.kind} '{element.key}' lacks the key '{name}'{block}"
-            found.append(
-                Diagnostic(Severity.ERROR, message, node.mark, f"add {name}: {key.type.value}", "missing")
-            )
+            found.append(Diagnostic(Severity.ERROR, message, node.mark, f"add {name}: {key.type.value}", "missing"))
 
 
 def _inside_atomic(prefix: str, known: dict[str, Key]) -> bool:

@@ -139,9 +139,7 @@ def _version(top: Element) -> list[Diagnostic]:
     return [Diagnostic(Severity.ERROR, message, top.mark_of("adf version"), "write 1.0", "version")]
 
 
-def _elements(
-    root: Mapping, list_name: str, kind: str, document: Document, strict: bool
-) -> tuple[Element, ...]:
+def _elements(root: Mapping, list_name: str, kind: str, document: Document, strict: bool) -> tuple[Element, ...]:
     node = root.get(list_name)
     if not isinstance(node, Sequence):
         return ()
@@ -188,9 +186,7 @@ def _joint_policy(element: Element, found: list[Diagnostic], strict: bool) -> li
             message = f"joint '{element.key}' has 'enable motor' without 'enable feedback'"
             found = [
                 *found,
-                Diagnostic(
-                    Severity.ERROR, message, element.mark_of("enable motor"), "AMBF refuses the file", "motor"
-                ),
+                Diagnostic(Severity.ERROR, message, element.mark_of("enable motor"), "AMBF refuses the file", "motor"),
             ]
         return found
     softened = []
@@ -207,12 +203,7 @@ def _unlisted(root: Mapping, document: Document) -> list[Diagnostic]:
     listed = _listed_names(root, document.kind)
     found = []
     for name, (key, node) in root.entries.items():
-        if (
-            isinstance(node, Mapping)
-            and name not in listed
-            and name not in BY_PATH[document.kind]
-            and node.get("name")
-        ):
+        if isinstance(node, Mapping) and name not in listed and name not in BY_PATH[document.kind] and node.get("name"):
             message = f"'{name}' is defined but not listed, so it does not exist"
             found.append(Diagnostic(Severity.DEBUG, message, key.mark, "", "unlisted"))
     return found

@@ -411,10 +411,31 @@ LIGHT = (
     Key("attenuation.linear", N, 0.0, "1/m"),
     Key("attenuation.quadratic", N, 0.0, "1/m²"),
 )
-_SOFT_NUMBERS = (
-    "kLST kAST kVST kVCF kDP kDG kLF kPR kVC kDF kMT kCHR kKHR kSHR kAHR kSRHR_CL kSKHR_CL kSSHR_CL "
-    "kSR_SPLT_CL kSK_SPLT_CL kSS_SPLT_CL maxvolume timescale"
-).split()
+_SOFT_NUMBERS = [
+    "kLST",
+    "kAST",
+    "kVST",
+    "kVCF",
+    "kDP",
+    "kDG",
+    "kLF",
+    "kPR",
+    "kVC",
+    "kDF",
+    "kMT",
+    "kCHR",
+    "kKHR",
+    "kSHR",
+    "kAHR",
+    "kSRHR_CL",
+    "kSKHR_CL",
+    "kSSHR_CL",
+    "kSR_SPLT_CL",
+    "kSK_SPLT_CL",
+    "kSS_SPLT_CL",
+    "maxvolume",
+    "timescale",
+]
 _SOFT_INTEGERS = (
     "viterations",
     "piterations",

@@ -43,9 +43,7 @@ def encode(message: Message) -> bytes:
         ) + _texts(message.body, message.sensor or "")
     if isinstance(message, PlaceCommand):
         pose = message.pose or ()
-        return struct.pack(
-            f"<BBiB{len(pose)}d", 3, _KINDS.index(message.kind), message.index, len(pose), *pose
-        )
+        return struct.pack(f"<BBiB{len(pose)}d", 3, _KINDS.index(message.kind), message.index, len(pose), *pose)
     if isinstance(message, Release):
         return struct.pack("<BBi", 4, _KINDS.index(message.kind), message.index)
     if isinstance(message, Reset):

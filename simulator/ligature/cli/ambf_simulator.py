@@ -31,16 +31,10 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--ns", default="", help="prefix of every namespace")
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
     flags.add_argument("--override_min_comm_freq", type=int, help="publishing rate without commands")
-    flags.add_argument(
-        "--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)"
-    )
-    flags.add_argument(
-        "--root", action="append", default=[], help="further folder of scene files (not an AMBF flag)"
-    )
+    flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
+    flags.add_argument("--root", action="append", default=[], help="further folder of scene files (not an AMBF flag)")
     for name, what in _NOT_SIMULATED.items():
-        flags.add_argument(
-            f"-{name}" if len(name) == 1 else f"--{name}", help=f"{what}; accepted, without effect"
-        )
+        flags.add_argument(f"-{name}" if len(name) == 1 else f"--{name}", help=f"{what}; accepted, without effect")
     return flags
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -18,9 +17,7 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, help="Simulator fo
 
 Launch = Annotated[Path, typer.Argument(help="Launch file, or one model file.")]
 Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
-Roots = Annotated[
-    Optional[list[Path]], typer.Option("--root", help="Folder below which files may be opened too.")
-]  # noqa: UP045
+Roots = Annotated[list[Path] | None, typer.Option("--root", help="Folder below which files may be opened too.")]  # noqa: UP045
 
 
 def indices(text: str | None) -> tuple[int, ...] | None:
@@ -38,17 +35,11 @@ def run(
     launch: Launch,
     models: Models = None,
     root: Roots = None,
-    rate: Annotated[
-        float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)
-    ] = 1000.0,
+    rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
     speed: Annotated[float, typer.Option("-s", help="Simulated over wall time.", min=0.001)] = 1.0,
     namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
-    min_hz: Annotated[
-        Optional[int], typer.Option("--min-hz", help="Publishing rate without commands.", min=1)
-    ] = None,  # noqa: UP045
-    max_hz: Annotated[
-        Optional[int], typer.Option("--max-hz", help="Publishing rate with commands.", min=1)
-    ] = None,  # noqa: UP045
+    min_hz: Annotated[int | None, typer.Option("--min-hz", help="Publishing rate without commands.", min=1)] = None,  # noqa: UP045
+    max_hz: Annotated[int | None, typer.Option("--max-hz", help="Publishing rate with commands.", min=1)] = None,  # noqa: UP045
     names: Annotated[
         str, typer.Option(help="Name policy: ambf, or src for the suturing challenge's scripts.")
     ] = "ambf",
@@ -84,9 +75,7 @@ def bench(
     root: Roots = None,
 ) -> None:
     """Measure the physics of a scene: ticks per second, real-time factor, times by phase, memory."""
-    raise typer.Exit(
-        run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False))
-    )
+    raise typer.Exit(run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False)))
 
 
 @app.command()
@@ -110,4 +99,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

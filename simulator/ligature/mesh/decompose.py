@@ -81,9 +81,7 @@ def _cached_hulls(
     except (OSError, ValueError, KeyError):
         pass
     coacd.set_log_level("error")
-    parts = coacd.run_coacd(
-        coacd.Mesh(vertices, faces), threshold=threshold, max_convex_hull=max_hulls, seed=seed
-    )
+    parts = coacd.run_coacd(coacd.Mesh(vertices, faces), threshold=threshold, max_convex_hull=max_hulls, seed=seed)
     hulls = tuple(hull_vertices(np.asarray(v, dtype=float)) for v, _ in parts)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -95,9 +93,7 @@ def _cached_hulls(
     return hulls
 
 
-def _quality(
-    vertices: Array, faces: NDArray[np.int32], hulls: Sequence[Array], seed: int
-) -> tuple[float, float]:
+def _quality(vertices: Array, faces: NDArray[np.int32], hulls: Sequence[Array], seed: int) -> tuple[float, float]:
     whole = trimesh.Trimesh(vertices, faces, process=False)
     solids = [trimesh.convex.convex_hull(h) for h in hulls]
     volume = abs(float(whole.volume))

@@ -110,8 +110,6 @@ def hull_planes(points: Array) -> Array:
     except (QhullError, ValueError):
         centred = points - points.mean(axis=0)
         axes = np.linalg.svd(centred, full_matrices=True)[2]
-        equations = np.vstack(
-            [np.append(sign * a, -(sign * points @ a).max()) for a in axes for sign in (1.0, -1.0)]
-        )
+        equations = np.vstack([np.append(sign * a, -(sign * points @ a).max()) for a in axes for sign in (1.0, -1.0)])
     planes: Array = np.column_stack([equations[:, :3], -equations[:, 3]])
     return np.unique(planes.round(12), axis=0)

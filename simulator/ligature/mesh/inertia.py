@@ -35,9 +35,7 @@ class MassProperties:
 def mass_properties(vertices: Array, faces: NDArray[np.int32], density: float = 1.0) -> MassProperties:
     """Mass properties of the solid inside a closed surface of uniform ``density`` (kg/m³)."""
     found = trimesh.triangles.mass_properties(np.asarray(vertices)[faces], density=density)
-    return MassProperties(
-        float(found["volume"]), float(found["mass"]), found["center_mass"], found["inertia"]
-    )
+    return MassProperties(float(found["volume"]), float(found["mass"]), found["center_mass"], found["inertia"])
 
 
 def hull_properties(points: Array, density: float = 1.0) -> MassProperties:

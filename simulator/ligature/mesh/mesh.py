@@ -73,7 +73,5 @@ def checked(vertices: Array, path: Path) -> Array:
     if not np.isfinite(vertices).all():
         raise failure(path, "a vertex is not finite", hint="export the mesh again without nan or inf")
     if vertices.size and np.abs(vertices).max() > MAX_COORDINATE:
-        raise failure(
-            path, f"a vertex lies farther than {MAX_COORDINATE:g} m from the origin", hint="check the units"
-        )
+        raise failure(path, f"a vertex lies farther than {MAX_COORDINATE:g} m from the origin", hint="check the units")
     return vertices

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf.resolver import ResolutionError, Resolver
-from ligature.mesh.mesh import MAX_TRIANGLES, Array, Material, Mesh, MeshPart, checked, failure
+from ligature.mesh.mesh import MAX_TRIANGLES, Array, Material, Mesh, MeshPart, Triple, checked, failure
 
 MAX_FACE_VERTICES = 256
-_COLOURS = {"Ka": "ambient", "Kd": "diffuse", "Ks": "specular"}
+_COLOURS = ("Ka", "Kd", "Ks")
 
 
 class _Faces:
@@ -127,18 +127,14 @@ class _Reader:
         parts = []
         for index in range(count):
             material = self.materials[index] if self.materials else None
-            rows = np.array(self.faces[index].rows if index in self.faces else [], dtype=np.int64).reshape(
-                -1, 3
-            )
+            rows = np.array(self.faces[index].rows if index in self.faces else [], dtype=np.int64).reshape(-1, 3)
             parts.append(_part(material, rows, points, uvs, normals))
         if not self.faces:
             parts[0] = replace(parts[0], vertices=points)
         return Mesh(self.path, tuple(parts))
 
 
-def _part(
-    material: Material | None, rows: NDArray[np.int64], points: Array, uvs: Array, normals: Array
-) -> MeshPart:
+def _part(material: Material | None, rows: NDArray[np.int64], points: Array, uvs: Array, normals: Array) -> MeshPart:
     """One part from its corner rows (3 a triangle); vertices are the distinct corners."""
     distinct, inverse = np.unique(rows, axis=0, return_inverse=True)
     faces = inverse.reshape(-1, 3).astype(np.int32)
@@ -175,9 +171,7 @@ def read_mtl(text: str, path: Path) -> list[Material]:
 def _with(material: Material, word: str, rest: str, path: Path) -> Material:
     if word in ("map_Kd", "map_Bump") and rest and "\0" not in rest:
         texture = path.parent / rest
-        return (
-            replace(material, texture=texture) if word == "map_Kd" else replace(material, normal_map=texture)
-        )
+        return replace(material, texture=texture) if word == "map_Kd" else replace(material, normal_map=texture)
     try:
         values = [float(v) for v in rest.split()]
     except ValueError:
@@ -185,10 +179,17 @@ def _with(material: Material, word: str, rest: str, path: Path) -> Material:
     if not values or not np.isfinite(values).all():
         return material
     if word in _COLOURS and len(values) >= 3:
-        colour = (values[0], values[1], values[2])
-        return replace(material, **{_COLOURS[word]: colour})
+        return _coloured(material, word, (values[0], values[1], values[2]))
     if word == "Ns":
         return replace(material, shininess=values[0])
     if word in ("d", "Tr"):
         return replace(material, alpha=values[0])
     return material
+
+
+def _coloured(material: Material, word: str, colour: Triple) -> Material:
+    if word == "Ka":
+        return replace(material, ambient=colour)
+    if word == "Kd":
+        return replace(material, diffuse=colour)
+    return replace(material, specular=colour)

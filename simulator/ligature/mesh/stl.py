@@ -25,9 +25,7 @@ def read_stl(data: bytes, path: Path) -> Mesh:
     count = int.from_bytes(data[80:84], "little")
     if len(data) < _HEADER + _RECORD.itemsize * count:
         there = (len(data) - _HEADER) // _RECORD.itemsize
-        raise failure(
-            path, f"the file announces {count} triangles but holds {there}", hint="it was cut short"
-        )
+        raise failure(path, f"the file announces {count} triangles but holds {there}", hint="it was cut short")
     return _mesh(_binary(data, count, path), path)
 
 

@@ -27,9 +27,7 @@ def ghost(element: Element, index: int, identity: Identity, context: FileContext
     shapes = colliders(element, context, fallback)
     if not shapes:
         message = f"ghost object '{element.key}' has no collision shape and is left out"
-        raise GeometryError(
-            Diagnostic(Severity.ERROR, message, element.mark, "add 'collision shape'", "geometry")
-        )
+        raise GeometryError(Diagnostic(Severity.ERROR, message, element.mark, "add 'collision shape'", "geometry"))
     return Ghost(
         index,
         identity,
@@ -90,8 +88,7 @@ def camera(element: Element, index: int, identity: Identity, folder: Path) -> Ca
         preprocessing_shaders=shader_files(element, "preprocessing shaders", folder),
         depth_shaders=shader_files(element, "depth compute shaders", folder),
         mouse_multipliers={
-            name: element.number(f"mouse control multipliers.{name}")
-            for name in ("pan", "rotate", "scroll", "arcball")
+            name: element.number(f"mouse control multipliers.{name}") for name in ("pan", "rotate", "scroll", "arcball")
         },
         extra={"plugins": element.raw_value("plugins")} if element.has("plugins") else {},
     )
@@ -134,9 +131,7 @@ def _contour_rays(element: Element, folder: Path, resolver: Resolver, reach: flo
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         solid = length[:, 0] > 0
         start = ((a + b + c) / 3)[solid]
-        rays.append(
-            np.stack([start, start + reach * (normal / np.where(length > 0, length, 1))[solid]], axis=1)
-        )
+        rays.append(np.stack([start, start + reach * (normal / np.where(length > 0, length, 1))[solid]], axis=1))
     return np.concatenate(rays) if rays else np.zeros((0, 2, 3))
 
 

@@ -7,7 +7,6 @@ that cannot be built is reported and left out; the rest goes on.
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -220,9 +219,7 @@ class SceneBuilder:
                 self._names["sensor"].identifiers.pop()
                 message = f"sensor '{element.key}' has no rays and is left out"
                 self.report(
-                    Diagnostic(
-                        Severity.WARNING, message, element.mark, "give array, mesh or parametric", "sensor"
-                    )
+                    Diagnostic(Severity.WARNING, message, element.mark, "give array, mesh or parametric", "sensor")
                 )
                 continue
             self.sensors.append(sensor)

@@ -66,7 +66,8 @@ def axis_rotation(axis: ArrayLike, angle: float) -> Array:
     """Rotation (3, 3) by ``angle`` about the unit vector ``axis`` (Rodrigues)."""
     x, y, z = np.asarray(axis, dtype=float)
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+    R: Array = np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+    return R
 
 
 def matrix_quaternion(R: Array) -> Array:
@@ -121,9 +122,7 @@ def minimal_rotation(u: ArrayLike, v: ArrayLike) -> Array:
         axis = np.cross(a, b)
     else:
         to_x = float(np.arccos(np.clip(a[0], -1.0, 1.0)))
-        axis = (
-            np.cross(a, (1.0, 0.0, 0.0)) if PARALLEL < to_x < ANTIPARALLEL else np.cross(b, (0.0, 1.0, 0.0))
-        )
+        axis = np.cross(a, (1.0, 0.0, 0.0)) if PARALLEL < to_x < ANTIPARALLEL else np.cross(b, (0.0, 1.0, 0.0))
     return axis_rotation(axis / np.linalg.norm(axis), angle)
 
 

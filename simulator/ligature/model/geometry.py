@@ -76,9 +76,7 @@ def colliders(element: Element, context: FileContext, default_offset: Array) -> 
     if element.has("compound collision shape"):
         parts = _compound(element, "compound collision shape")
         if not parts:
-            raise _error(
-                element, "compound collision shape", "the list of collision shapes is empty", "add a shape"
-            )
+            raise _error(element, "compound collision shape", "the list of collision shapes is empty", "add a shape")
         return parts
     name = element.text("collision mesh") if element.has("collision mesh") else element.text("mesh")
     if not name:
@@ -146,9 +144,7 @@ def primitive(element: Element, shape_key: str, geometry: str, T: Array) -> Coll
         value = element.value(f"{geometry}.{name}")
         if value is None:
             kind_ = element.text(shape_key)
-            raise _error(
-                element, geometry, f"a {kind_} needs '{name}' in '{geometry}'", f"add {name}: metres"
-            )
+            raise _error(element, geometry, f"a {kind_} needs '{name}' in '{geometry}'", f"add {name}: metres")
         if not value > 0.0:
             raise _error(element, f"{geometry}.{name}", f"'{name}' is {value:g}", "it must be larger than 0")
         return float(value)
@@ -166,9 +162,10 @@ def primitive(element: Element, shape_key: str, geometry: str, T: Array) -> Coll
         if length == 0.0:
             raise _error(element, geometry, "the normal of the plane is zero", "give a direction")
         return Collider(Plane(normal / length, (element.value(f"{geometry}.offset") or 0.0) / length), T)
-    round_shape = {"CYLINDER": Cylinder, "CAPSULE": Capsule, "CONE": Cone}[kind]
+    round_shapes: dict[str, type[Cylinder] | type[Capsule] | type[Cone]]
+    round_shapes = {"CYLINDER": Cylinder, "CAPSULE": Capsule, "CONE": Cone}
     turned = T @ frame(_AXIS[element.text(f"{geometry}.axis")], (0, 0, 0))
-    return Collider(round_shape(size("radius"), size("height")), turned)
+    return Collider(round_shapes[kind](size("radius"), size("height")), turned)
 
 
 def estimate_size(parts: tuple[Collider, ...], T_body_inertial: Array, margin: float) -> Array | None:
@@ -245,9 +242,7 @@ def _mesh_path(element: Element, name: str, key: str, context: FileContext, leve
     except AdfError as error:
         raise GeometryError(error.diagnostics[0]) from error
     if path.suffix.lower() not in EXTENSIONS:
-        raise _error(
-            element, key, f"'{name}' is not a mesh format that is read", f"use {', '.join(EXTENSIONS)}"
-        )
+        raise _error(element, key, f"'{name}' is not a mesh format that is read", f"use {', '.join(EXTENSIONS)}")
     if path.is_file():
         return path
     high = _allowed(context, os.path.join(context.high, element.text("high resolution path"), name))

@@ -76,9 +76,7 @@ def load(
         scene = _load_models([document], files, resolver, namespace_prefix, start.stem)
     else:
         message = f"'{start}' is {document.kind} file, not a launch or model file"
-        raise SceneError(
-            Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file")
-        )
+        raise SceneError(Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file"))
     if not scene.bodies:
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
         raise SceneError(Diagnostic(Severity.ERROR, f"'{start}' yields no body to simulate"), *errors)
@@ -88,9 +86,7 @@ def load(
 def _load_models(
     documents: Sequence[Document], files: Sequence[str | Path], resolver: Resolver, prefix: str, name: str
 ) -> Scene:
-    builder = SceneBuilder(
-        name, resolver, WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World")), prefix
-    )
+    builder = SceneBuilder(name, resolver, WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World")), prefix)
     for document in [*_extra(files, resolver, builder), *documents]:
         builder.diagnostics += document.diagnostics
         builder.add_model(document, None)
@@ -184,9 +180,7 @@ def _add_environment(world: Document, builder: SceneBuilder, resolver: Resolver)
         path = resolver.resolve(top.text("environment"), world.path.parent, mark)
         document = read_model(path, resolver)
     except ResolutionError as error:
-        builder.report(
-            Diagnostic(Severity.ERROR, error.diagnostic.message, mark, error.diagnostic.hint, "path")
-        )
+        builder.report(Diagnostic(Severity.ERROR, error.diagnostic.message, mark, error.diagnostic.hint, "path"))
         return
     except AdfError as error:
         builder.diagnostics += error.diagnostics
@@ -204,9 +198,7 @@ def _selected(
     for index in range(count) if models is None else models:
         if not 0 <= index < count:
             message = f"there is no model {index}; 'multibody configs' lists {count}, counted from 0"
-            builder.report(
-                Diagnostic(Severity.ERROR, message, launch.top.mark_of("multibody configs"), "", "index")
-            )
+            builder.report(Diagnostic(Severity.ERROR, message, launch.top.mark_of("multibody configs"), "", "index"))
             continue
         reference = launch.models[index]
         if reference.path is None:

@@ -39,9 +39,7 @@ class Arrivals:
         for identifier, text, mark in self.waiting.values():
             message = f"'{identifier}' has the parent '{text}', which is not there or not unique"
             self.diagnostics.append(
-                Diagnostic(
-                    Severity.WARNING, message, mark, "its location is taken in the world frame", "parent"
-                )
+                Diagnostic(Severity.WARNING, message, mark, "its location is taken in the world frame", "parent")
             )
 
     def _settle(self, newcomer: Key, identifier: str) -> None:

@@ -82,9 +82,7 @@ def _warn_no_mass(element: Element, context: FileContext) -> None:
     severity = Severity.WARNING if ignored else Severity.INFO
     rest = f", and its {', '.join(ignored)} has no effect" if ignored else ""
     message = f"body '{element.key}' has no 'mass': 1 kg is taken{rest}"
-    context.report(
-        Diagnostic(severity, message, element.mark, "add mass: kilograms; 0 makes it static", "mass")
-    )
+    context.report(Diagnostic(severity, message, element.mark, "add mass: kilograms; 0 makes it static", "mass"))
 
 
 def _cartesian(element: Element) -> CartesianController:

@@ -17,9 +17,7 @@ from ligature.model.scene import Body, Capsule, Cylinder, Joint, JointType, RodC
 LEAST_ELEMENTS = 4
 
 
-def rod_chains(
-    bodies: Sequence[Body], joints: Sequence[Joint], opted_out: frozenset[int]
-) -> tuple[RodChain, ...]:
+def rod_chains(bodies: Sequence[Body], joints: Sequence[Joint], opted_out: frozenset[int]) -> tuple[RodChain, ...]:
     """The chains of a scene; ``opted_out`` are bodies that must stay bodies."""
     fit = {b.index for b in bodies if b.index not in opted_out and not b.static and _round(b)}
     springs = [j for j in joints if _bends(j) and j.parent in fit and j.child in fit]
@@ -47,15 +45,12 @@ def _round(body: Body) -> bool:
 
 def _bends(joint: Joint) -> bool:
     six = joint.six_dof
-    return (
-        joint.type is JointType.SIX_DOF_SPRING
-        and six is not None
-        and bool((six.low[:3] == six.high[:3]).all())
-    )
+    return joint.type is JointType.SIX_DOF_SPRING and six is not None and bool((six.low[:3] == six.high[:3]).all())
 
 
 def _walk(start: int, neighbours: dict[int, list[Joint]]) -> tuple[list[int], list[Joint]]:
-    path, links = [start], []
+    path = [start]
+    links: list[Joint] = []
     while True:
         onward = [j for j in neighbours[path[-1]] if j not in links]
         if len(onward) != 1 or len(neighbours[path[-1]]) > 2:

@@ -63,11 +63,7 @@ def articulations(
     """
     edges: dict[int, list[Joint]] = {}
     for joint in joints:
-        if (
-            joint.type in TREE_TYPES
-            and not {joint.parent, joint.child} & rod_bodies
-            and joint.parent != joint.child
-        ):
+        if joint.type in TREE_TYPES and not {joint.parent, joint.child} & rod_bodies and joint.parent != joint.child:
             edges.setdefault(joint.parent, []).append(joint)
             edges.setdefault(joint.child, []).append(joint)
     with_parent = {joint.child for joint in joints if joint.type in TREE_TYPES}

@@ -1,5 +1,9 @@
 """Rigid bodies on Bullet: articulations, springs, controllers, contacts."""
 
-from ligature.physics.world import World
+from ligature.physics.quiet import import_quietly
+
+import_quietly("pybullet")
+
+from ligature.physics.world import World  # noqa: E402
 
 __all__ = ["World"]

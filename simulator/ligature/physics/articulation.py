@@ -80,9 +80,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
     for link in articulation.links[1:]:
         assert link.joint is not None
         inner = articulation.links[link.parent_link].body
-        _append(
-            plan, client, cache, bodies[link.body], joints[link.joint], inner, link_of, T_link_inertial, axes
-        )
+        _append(plan, client, cache, bodies[link.body], joints[link.joint], inner, link_of, T_link_inertial, axes)
     T_world_inertial = root.T_world_body @ root.T_body_inertial
     shape = shapes.create(client, cache, root.colliders, inverse(root.T_body_inertial), not root.static)
     uid = pybullet.createMultiBody(
@@ -180,9 +178,7 @@ def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: tuple[Body, ...]
     members = [bodies[index] for index in tree.link_of if not bodies[index].static]
     linear = max((decay_rate(b.linear_damping) for b in members), default=0.0)
     angular = max((decay_rate(b.angular_damping) for b in members), default=0.0)
-    pybullet.changeDynamics(
-        tree.uid, -1, linearDamping=linear, angularDamping=angular, physicsClientId=client
-    )
+    pybullet.changeDynamics(tree.uid, -1, linearDamping=linear, angularDamping=angular, physicsClientId=client)
     for link, (mass, inertia) in enumerate(zip(plan.masses, plan.inertias, strict=True)):
         pybullet.changeDynamics(
             tree.uid,

@@ -39,9 +39,7 @@ class Axis:
 
     def reversed(self) -> Axis:
         """The same degree of freedom seen from the child: same coordinate, opposite direction."""
-        return Axis(
-            self.prismatic, -self.direction, self.low, self.high, self.stiffness, self.damping, self.rest
-        )
+        return Axis(self.prismatic, -self.direction, self.low, self.high, self.stiffness, self.damping, self.rest)
 
 
 def axes_of(joint: Joint) -> tuple[Axis, ...] | None:
@@ -82,10 +80,11 @@ def _six(joint: Joint) -> tuple[Axis, ...]:
         low, high = float(six.low[i]), float(six.high[i])
         if low == high:
             continue
-        limits = (None, None) if low > high else (low, high)
+        limits: tuple[float | None, float | None] = (None, None) if low > high else (low, high)
         axes.append(
             Axis(
-                i < 3, np.eye(3)[i % 3], *limits, float(six.stiffness[i]), float(six.damping[i]),
+                i < 3, np.eye(3)[i % 3], limits[0],
+                limits[1], float(six.stiffness[i]), float(six.damping[i]),
                 float(six.equilibrium[i]),
             )
         )  # fmt: skip

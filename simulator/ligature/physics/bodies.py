@@ -41,9 +41,7 @@ class Placement:
     def read(self, pose: Array, twist: Array) -> None:
         """Fill ``pose`` (7,) and ``twist`` (6,)."""
         if self.link < 0:
-            position, quaternion = pybullet.getBasePositionAndOrientation(
-                self.uid, physicsClientId=self.client
-            )
+            position, quaternion = pybullet.getBasePositionAndOrientation(self.uid, physicsClientId=self.client)
             linear, angular = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
         else:
             found = pybullet.getLinkState(self.uid, self.link, 1, 1, physicsClientId=self.client)

@@ -49,10 +49,7 @@ class TreeControl:
         self._low = np.array([-np.inf if a.low is None else a.low for _, _, a, _ in tree.axes])
         self._high = np.array([np.inf if a.high is None else a.high for _, _, a, _ in tree.axes])
         self._turns = np.array(
-            [
-                j.type is JointType.REVOLUTE and a.low is None
-                for j, (_, _, a, _) in zip(owners, tree.axes, strict=True)
-            ],
+            [j.type is JointType.REVOLUTE and a.low is None for j, (_, _, a, _) in zip(owners, tree.axes, strict=True)],
             dtype=bool,
         )
         self._spring_setup()
@@ -126,10 +123,9 @@ class TreeControl:
     def read(self) -> None:
         """Read positions, velocities and motor efforts from Bullet."""
         states = pybullet.getJointStates(self._tree.uid, self.links, physicsClientId=self._client)
-        for i, (q, qd, _, effort) in enumerate(states):
-            self.position[i] = q
-            self.velocity[i] = qd
-            self.motor_effort[i] = effort
+        self.position[:] = [state[0] for state in states]
+        self.velocity[:] = [state[1] for state in states]
+        self.motor_effort[:] = [state[3] for state in states]
 
     def apply(self) -> None:
         """Set motors and torques of this tick; positions must have been read."""
@@ -171,9 +167,7 @@ class TreeControl:
         velocity = np.where(steering, (proportional + self._d * kick) / (1.0 + self._d), self.target)
         slope = (error - self._last_error) / self._dt
         self._last_error = error
-        effort = np.where(
-            steering, proportional + self._d * slope, np.where(self.mode == FORCE, self.target, 0.0)
-        )
+        effort = np.where(steering, proportional + self._d * slope, np.where(self.mode == FORCE, self.target, 0.0))
         spring = self._stiffness * (self._rest - self.position) - self._damping * self.velocity
         return velocity, effort + np.where(self._sprung, spring, 0.0)
 

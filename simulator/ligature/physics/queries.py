@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ligature.mesh import CollisionCache
 from ligature.model.frames import inverse, matrix_quaternion
+from ligature.model.hits import Contact, RayHits
 from ligature.model.scene import Collider, Scene
 from ligature.physics import shapes
 from ligature.physics.bodies import Placement
@@ -26,26 +27,6 @@ GRASP_FORCE = 500.0
 
 _FAR = [0.0, 0.0, -1000.0]
 """Where the probes of ghosts wait between questions."""
-
-
-@dataclass(frozen=True, eq=False)
-class Hits:
-    """Closest hits of n rays: body index or -1, fraction along the ray, point and normal (n, 3)."""
-
-    body: NDArray[np.int32]
-    fraction: Array
-    point: Array
-    normal: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Touch:
-    """One contact point: the other body, signed distance, point and normal (3,) on the other body."""
-
-    body: int
-    distance: float
-    point: Array
-    normal: Array
 
 
 @dataclass
@@ -85,37 +66,31 @@ class BulletQueries:
         self._probes.append(uid)
         return len(self._probes) - 1
 
-    def probe_overlaps(self, probe: int, pose: Array) -> list[int]:
-        """Bodies that penetrate the probe when it stands at ``pose`` (7,)."""
+    def probe_overlaps(self, probe: int, pose: Array, bodies: Sequence[int]) -> list[int]:
+        """Those of ``bodies`` that penetrate the probe when it stands at ``pose`` (7,)."""
         uid = self._probes[probe]
-        pybullet.resetBasePositionAndOrientation(
-            uid, pose[:3].tolist(), pose[3:].tolist(), physicsClientId=self.client
-        )
-        low, high = pybullet.getAABB(uid, -1, physicsClientId=self.client)
-        near = pybullet.getOverlappingObjects(low, high, physicsClientId=self.client) or ()
+        pybullet.resetBasePositionAndOrientation(uid, pose[:3].tolist(), pose[3:].tolist(), physicsClientId=self.client)
         found = []
-        for key in sorted(set(near)):
-            body = self._body_at.get(key)
-            if body is None:
+        for body in bodies:
+            place = self.place_of.get(body)
+            if place is None:
                 continue
-            if pybullet.getClosestPoints(uid, key[0], 0.0, -1, key[1], physicsClientId=self.client):
+            if pybullet.getClosestPoints(uid, place.uid, 0.0, -1, place.link, physicsClientId=self.client):
                 found.append(body)
         return found
 
-    def ray_test(self, starts: Array, ends: Array) -> Hits:
+    def ray_test(self, starts: Array, ends: Array) -> RayHits:
         """Closest hits of the segments ``starts`` to ``ends``, each (n, 3)."""
         results = pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self.client)
-        body = np.array(
-            [self._body_at.get((r[0], r[1]), -1) if r[0] >= 0 else -1 for r in results], dtype=np.int32
-        )
-        return Hits(
+        body = np.array([self._body_at.get((r[0], r[1]), -1) if r[0] >= 0 else -1 for r in results], dtype=np.int32)
+        return RayHits(
             body,
             np.array([r[2] for r in results]),
             np.array([r[3] for r in results]),
             np.array([r[4] for r in results]),
         )
 
-    def contacts(self, body: int, threshold: float) -> list[Touch]:
+    def contacts(self, body: int, threshold: float) -> list[Contact]:
         """Contact points of ``body`` whose distance is at most ``threshold``."""
         place = self.place_of.get(body)
         if place is None:
@@ -133,7 +108,7 @@ class BulletQueries:
                     continue
                 on_other = np.array(point[6] if first else point[5])
                 normal = np.array(point[7]) if first else -np.array(point[7])
-                found.append(Touch(other, float(point[8]), on_other, normal))
+                found.append(Contact(other, float(point[8]), on_other, normal))
             if found:
                 break
         return found

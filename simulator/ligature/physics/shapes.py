@@ -20,9 +20,7 @@ CONE_FACETS = 24
 NO_SHAPE = -1
 
 
-def create(
-    client: int, cache: CollisionCache, parts: Sequence[Collider], T_link_body: Array, moving: bool
-) -> int:
+def create(client: int, cache: CollisionCache, parts: Sequence[Collider], T_link_body: Array, moving: bool) -> int:
     """One Bullet shape of all ``parts`` of a body, placed at ``T_link_body`` in the link frame; -1 for none."""
     kinds: list[int] = []
     columns: dict[str, list[Any]] = {
@@ -45,9 +43,7 @@ def create(
     return int(pybullet.createCollisionShapeArray(shapeTypes=kinds, physicsClientId=client, **columns))
 
 
-def _rows(
-    cache: CollisionCache, parts: Sequence[Collider], moving: bool
-) -> list[tuple[int, dict[str, Any], Array]]:
+def _rows(cache: CollisionCache, parts: Sequence[Collider], moving: bool) -> list[tuple[int, dict[str, Any], Array]]:
     rows: list[tuple[int, dict[str, Any], Array]] = []
     hulls: dict[bytes, tuple[Array, list[Array]]] = {}
     for part in parts:

@@ -12,7 +12,7 @@ class RenderUnavailable(RuntimeError):
 def create_context() -> moderngl.Context:
     """A stand-alone OpenGL 3.3 core context; raises `RenderUnavailable`."""
     try:
-        return moderngl.create_context(standalone=True, backend="egl", require=330)
+        return moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[arg-type]
     except Exception as error:
         raise RenderUnavailable(
             f"no OpenGL 3.3 context through EGL ({error}); install libegl1 and libgl1-mesa-dri "

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Shape, Sphere, TriMesh
+from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Shape, Sphere
 
 Array = NDArray[np.float64]
 
@@ -91,9 +91,7 @@ def revolve(profile: list[tuple[float, float]], normals: list[tuple[float, float
     flat = positions.reshape(-1, 3)
     edge1, edge2 = flat[faces[:, 1]] - flat[faces[:, 0]], flat[faces[:, 2]] - flat[faces[:, 0]]
     solid = np.linalg.norm(np.cross(edge1, edge2), axis=1) > 0
-    return Triangles(
-        flat, normal.reshape(-1, 3), np.stack([u, v], -1).reshape(-1, 2), faces[solid].astype(np.int32)
-    )
+    return Triangles(flat, normal.reshape(-1, 3), np.stack([u, v], -1).reshape(-1, 2), faces[solid].astype(np.int32))
 
 
 def plane(normal: Array, offset: float) -> Triangles:
@@ -142,10 +140,7 @@ def tube(points: Array, radius: float, sides: int = 10) -> Triangles:
         side /= np.linalg.norm(side) + 1e-30
         frames[i] = side, np.cross(t, side)
     angles = np.linspace(0, 2 * np.pi, sides + 1)
-    normals = (
-        np.cos(angles)[None, :, None] * frames[:, None, 0]
-        + np.sin(angles)[None, :, None] * frames[:, None, 1]
-    )
+    normals = np.cos(angles)[None, :, None] * frames[:, None, 0] + np.sin(angles)[None, :, None] * frames[:, None, 1]
     positions = points[:, None] + radius * normals
     index = np.arange(len(points) * (sides + 1)).reshape(len(points), sides + 1)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]

@@ -81,7 +81,7 @@ class Renderer:
         context = self._context
         context.enable(moderngl.DEPTH_TEST)
         context.disable(moderngl.BLEND)
-        self._program["uProjection"].write(view.projection.T.astype("f4").tobytes())
+        self._uniform("uProjection").write(view.projection.T.astype("f4").tobytes())
         self._set_lights(state, view)
         for item in self._opaque:
             self._draw(item, poses[item.owner], view)
@@ -98,10 +98,7 @@ class Renderer:
     def _items(self, owner: int, visual: Visual) -> list[_Item]:
         if visual.mesh is None:
             colour = visual.colour or Colour()
-            return [
-                _Item(self._upload(of_shape(c.shape)), colour, None, owner, c.T_body_shape)
-                for c in visual.shapes
-            ]
+            return [_Item(self._upload(of_shape(c.shape)), colour, None, owner, c.T_body_shape) for c in visual.shapes]
         try:
             mesh = load_mesh(visual.mesh, Resolver([visual.mesh.parent]))
         except MeshError as error:
@@ -166,7 +163,7 @@ class Renderer:
 
     def _draw(self, item: _Item, pose: Array, view: CameraView) -> None:
         model_view = view.view @ pose7_matrix(pose) @ item.T_owner_item
-        self._program["uModelView"].write(model_view.T.astype("f4").tobytes())
+        self._uniform("uModelView").write(model_view.T.astype("f4").tobytes())
         self._set_material(item.colour, item.texture, item.owner)
         item.vertices.render()
 
@@ -174,7 +171,7 @@ class Renderer:
         """Draw a rod as one smooth tube through the middles and ends of its elements."""
         points = _spline(rod, poses)
         vertices = self._upload(tube(points, rod.radius))
-        self._program["uModelView"].write(view.view.T.astype("f4").tobytes())
+        self._uniform("uModelView").write(view.view.T.astype("f4").tobytes())
         visual = self._scene.bodies[rod.bodies[0]].visual
         self._set_material(visual.colour or Colour(diffuse=(0.1, 0.1, 0.35)), None, rod.bodies[0])
         vertices.render()
@@ -195,7 +192,12 @@ class Renderer:
     def _set(self, name: str, value: Any) -> None:
         """Set a uniform unless the compiler dropped it."""
         if name in self._program:
-            self._program[name].value = value
+            self._uniform(name).value = value
+
+    def _uniform(self, name: str) -> moderngl.Uniform:
+        member = self._program[name]
+        assert isinstance(member, moderngl.Uniform)
+        return member
 
 
 class _Target:

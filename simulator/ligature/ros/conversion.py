@@ -121,9 +121,7 @@ class BodyTemplate(Template):
 class _Attached(Template):
     """What rides on a parent: constant parent name, pose in the parent's frame."""
 
-    def __init__(
-        self, scene: Scene, index: int, identity: Identity, message: Any, pose: Sequence[float]
-    ) -> None:
+    def __init__(self, scene: Scene, index: int, identity: Identity, message: Any, pose: Sequence[float]) -> None:
         super().__init__(scene, index, identity, message)
         message.parent_name.data = identity.parent_text
         fill_pose(message.pose, pose)
@@ -173,9 +171,7 @@ class PlacedTemplate(_Attached):
     def __init__(self, scene: Scene, kind: str, index: int) -> None:
         item = scene.cameras[index] if kind == "camera" else scene.lights[index]
         message = CameraState() if kind == "camera" else LightState()
-        super().__init__(
-            scene, index, item.identity, message, matrix_pose7(item.attachment.T_parent_object).tolist()
-        )
+        super().__init__(scene, index, item.identity, message, matrix_pose7(item.attachment.T_parent_object).tolist())
         self.kind = kind
 
     def content(self, message: Any, state: Record) -> None:
@@ -264,9 +260,7 @@ def templates(scene: Scene) -> list[Template]:
     found += [GhostTemplate(scene, g.index) for g in scene.ghosts if not g.identity.passive]
     found += [ActuatorTemplate(scene, a.index) for a in scene.actuators if not a.identity.passive]
     found += [PlacedTemplate(scene, "camera", c.index) for c in scene.cameras if not c.identity.passive]
-    found += [
-        PlacedTemplate(scene, "light", light.index) for light in scene.lights if not light.identity.passive
-    ]
+    found += [PlacedTemplate(scene, "light", light.index) for light in scene.lights if not light.identity.passive]
     start = 0
     for sensor in scene.sensors:
         if sensor.type is SensorType.CONTACT:
@@ -283,9 +277,7 @@ def body_command(message: RigidBodyCmd, body: Body) -> BodyCommand:
     """The command of a ``RigidBodyCmd``; raises ValueError naming what is wrong."""
     kinds = {int(kind) for kind in CommandType}
     if message.cartesian_cmd_type not in kinds:
-        raise ValueError(
-            f"cartesian_cmd_type is {message.cartesian_cmd_type}; 0 force, 1 position, 2 velocity"
-        )
+        raise ValueError(f"cartesian_cmd_type is {message.cartesian_cmd_type}; 0 force, 1 position, 2 velocity")
     kind = CommandType(message.cartesian_cmd_type)
     if kind is CommandType.POSITION:
         target = pose7(message.pose)

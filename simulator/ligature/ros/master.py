@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import xmlrpc.client
 
 import rospy
@@ -34,7 +33,7 @@ class MasterWatch:
     def _ask() -> int | None:
         try:
             code, _, pid = rospy.get_master().getPid()
-        except (OSError, socket.error, xmlrpc.client.Error):
+        except (OSError, xmlrpc.client.Error):
             return None
         return int(pid) if code == 1 else None
 
@@ -51,6 +50,4 @@ def register_again() -> None:
             subscriber = manager.get_subscriber_impl(name)
             for publisher in publishers:
                 if subscriber is not None and publisher != uri:
-                    rospy.impl.registration.get_registration_listeners().notify_added(
-                        name, publisher, Registration.SUB
-                    )
+                    rospy.impl.registration.get_registration_listeners().notify_added(name, publisher, Registration.SUB)

@@ -90,9 +90,7 @@ class Node:
     # --- set-up -----------------------------------------------------------------------------
 
     def _advertise(self, min_hz: int | None, max_hz: int | None, policy: str) -> list[_Outlet]:
-        outlets = [
-            _Outlet(self._world, self._scene.world.topic, min_hz or DEFAULT_LOW, max_hz or DEFAULT_HIGH)
-        ]
+        outlets = [_Outlet(self._world, self._scene.world.topic, min_hz or DEFAULT_LOW, max_hz or DEFAULT_HIGH)]
         for template in conversion.templates(self._scene):
             identity = template.identity
             topic = names.topic(identity, template.kind, policy)
@@ -108,9 +106,7 @@ class Node:
         message = _COMMANDS.get(template.kind)
         if message is None:
             message = ContactSensorCmd if isinstance(template, conversion.ContactTemplate) else SensorCmd
-        rospy.Subscriber(
-            f"{topic}/Command", message, self._receiver(template), queue_size=QUEUE, tcp_nodelay=True
-        )
+        rospy.Subscriber(f"{topic}/Command", message, self._receiver(template), queue_size=QUEUE, tcp_nodelay=True)
 
     def _receiver(self, template: Any) -> Callable[[Any], None]:
         """What to do with a command message of one object."""
@@ -134,9 +130,7 @@ class Node:
 
     def _command(self, template: Any, message: Any) -> Message | None:
         if template.kind == "body":
-            template.ask(
-                message.publish_children_names, message.publish_joint_names, message.publish_joint_positions
-            )
+            template.ask(message.publish_children_names, message.publish_joint_names, message.publish_joint_positions)
             return conversion.body_command(message, self._scene.bodies[template.index])
         if template.kind == "actuator":
             return conversion.actuator_command(message, template.index)

@@ -62,9 +62,7 @@ class Attachments:
         counts = [len(scene.ghosts), len(scene.cameras), len(scene.lights)]
         starts = np.concatenate([[0], np.cumsum(counts)])
         self._slices = {kind: slice(int(starts[i]), int(starts[i + 1])) for i, kind in enumerate(KINDS)}
-        attachments = [
-            item.attachment for items in (scene.ghosts, scene.cameras, scene.lights) for item in items
-        ]
+        attachments = [item.attachment for items in (scene.ghosts, scene.cameras, scene.lights) for item in items]
         self._n_bodies = len(scene.bodies)
         self._parents = np.array([self._parent_index(a) for a in attachments], dtype=np.int64)
         self._order = self._parents_first()

@@ -5,9 +5,10 @@ World axes, metres; points and normals are on the other body.
 
 from __future__ import annotations
 
+from ligature.model.hits import Contact
 from ligature.model.scene import Scene, SensorType
 from ligature.model.state import MAX_CONTACT_EVENTS, StateRecord
-from ligature.sensing.queries import Contact, Queries
+from ligature.sensing.queries import Queries
 
 
 class Contacts:

@@ -6,15 +6,13 @@ World axes, metres. A body overlaps a ghost when one of its contact distances to
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
 from ligature.model.frames import matrix_pose7
-from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Scene, Shape, Sphere
+from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Scene, Shape, Sphere, TriMesh
 from ligature.sensing.attachments import compose
 from ligature.sensing.queries import Queries
 
@@ -22,6 +20,9 @@ Array = NDArray[np.float64]
 
 SAMPLES = 5
 """Points along a rod element that are tested; neighbours are closer than the element's diameter."""
+
+STILL = 1e-6
+"""Change of a pose (metres, quaternion) below which a pair is not asked about again."""
 
 
 @njit(cache=True)
@@ -101,11 +102,7 @@ class Ghosts:
         self._queries = queries
         self._probes = [queries.add_probe(g.colliders, g.collision_margin) for g in scene.ghosts]
         self._volumes = [
-            [
-                _Volume(c)
-                for c in g.colliders
-                if isinstance(c.shape, Box | Sphere | Cylinder | Capsule | Cone | Hull)
-            ]
+            [_Volume(c) for c in g.colliders if isinstance(c.shape, Box | Sphere | Cylinder | Capsule | Cone | Hull)]
             for g in scene.ghosts
         ]
         self._elements = np.array(sorted(scene.rod_bodies), dtype=np.int64)
@@ -113,24 +110,64 @@ class Ghosts:
         radii = {b: rod.radius for rod in scene.rods for b in rod.bodies}
         self._half_lengths = np.array([lengths[b] / 2 for b in self._elements], dtype=float)
         self._radii = np.array([radii[b] for b in self._elements], dtype=float)
+        self._solid = np.array(
+            [b.index for b in scene.bodies if b.colliders and b.index not in scene.rod_bodies], dtype=np.int64
+        )
+        self._reach = np.array([_reach(scene.bodies[b].colliders) for b in self._solid])
+        self._ghost_reach = np.array([_reach(g.colliders) for g in scene.ghosts])
         self.sensed = np.zeros((len(scene.ghosts), len(scene.bodies)), dtype=bool)
+        self.forget()
+
+    def forget(self) -> None:
+        """Ask again about every pair at the next update."""
+        shape = (len(self._probes), len(self._solid), 7)
+        self._seen_ghost, self._seen_body = np.full(shape, np.nan), np.full(shape, np.nan)
+        self._known = np.zeros(shape[:2], dtype=bool)
 
     def update(self, ghost_world: Array, body_pose: Array) -> None:
         """Sense again; ``ghost_world`` (ghosts, 7) and ``body_pose`` (bodies, 7) in world axes."""
-        self.sensed[:] = False
-        elements = body_pose[self._elements]
-        for ghost, probe in enumerate(self._probes):
-            self.sensed[ghost, self._queries.probe_overlaps(probe, ghost_world[ghost])] = True
-            if len(elements):
-                hit = np.zeros(len(elements), dtype=bool)
-                for volume in self._volumes[ghost]:
-                    compose(ghost_world[ghost], volume.local, volume.world)
-                    _elements_inside(
-                        volume.kind, volume.size, volume.planes, volume.world, volume.bound,
-                        elements, self._half_lengths, self._radii, hit,
-                    )  # fmt: skip
-                self.sensed[ghost, self._elements[hit]] = True
+        if not self._probes:
+            return
+        self._update_bodies(ghost_world, body_pose[self._solid])
+        self.sensed[:, self._solid] = self._known
+        if len(self._elements):
+            self._update_elements(ghost_world, body_pose[self._elements])
 
-    def sensed_bodies(self, ghost: int) -> Iterable[int]:
-        """Indices of the bodies that overlap ``ghost``, in scene order."""
-        return np.flatnonzero(self.sensed[ghost]).tolist()
+    def _update_bodies(self, ghost_world: Array, bodies: Array) -> None:
+        """Ask about the pairs that are near each other and moved since they were asked about."""
+        gap = np.linalg.norm(ghost_world[:, None, :3] - bodies[None, :, :3], axis=2)
+        near = gap <= self._ghost_reach[:, None] + self._reach[None, :]
+        self._known &= near
+        moved = np.abs(self._seen_ghost - ghost_world[:, None]) <= STILL
+        still = moved.all(axis=2) & (np.abs(self._seen_body - bodies[None]) <= STILL).all(axis=2)
+        for ghost in np.flatnonzero((near & ~still).any(axis=1)):
+            asked = np.flatnonzero(near[ghost] & ~still[ghost])
+            found = self._queries.probe_overlaps(self._probes[ghost], ghost_world[ghost], self._solid[asked].tolist())
+            self._known[ghost, asked] = np.isin(self._solid[asked], found)
+            self._seen_ghost[ghost, asked] = ghost_world[ghost]
+            self._seen_body[ghost, asked] = bodies[asked]
+
+    def _update_elements(self, ghost_world: Array, elements: Array) -> None:
+        for ghost, volumes in enumerate(self._volumes):
+            hit = np.zeros(len(elements), dtype=bool)
+            for volume in volumes:
+                compose(ghost_world[ghost], volume.local, volume.world)
+                _elements_inside(
+                    volume.kind, volume.size, volume.planes, volume.world, volume.bound,
+                    elements, self._half_lengths, self._radii, hit,
+                )  # fmt: skip
+            self.sensed[ghost, self._elements] = hit
+
+
+def _reach(colliders: tuple[Collider, ...]) -> float:
+    """Radius of the ball about the body's origin that holds all its shapes; infinite for planes."""
+    reach = 0.0
+    for part in colliders:
+        if isinstance(part.shape, Box | Sphere | Cylinder | Capsule | Cone | Hull):
+            bound = _shape_arrays(part.shape)[3]
+        elif isinstance(part.shape, TriMesh):
+            bound = float(np.linalg.norm(part.shape.vertices, axis=1).max())
+        else:
+            bound = np.inf
+        reach = max(reach, float(np.linalg.norm(part.T_body_shape[:3, 3])) + bound)
+    return reach

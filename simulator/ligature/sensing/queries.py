@@ -6,32 +6,15 @@ Poses are x y z qx qy qz qw in world axes, lengths in metres.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.model.hits import Contact, RayHits
 from ligature.model.scene import Collider
 
 Array = NDArray[np.float64]
-
-
-class RayHits(NamedTuple):
-    """Closest hits of n rays: body index or -1, fraction along the ray in 0..1, point and normal (n, 3)."""
-
-    body: NDArray[np.int32]
-    fraction: Array
-    point: Array
-    normal: Array
-
-
-class Contact(NamedTuple):
-    """One contact point of a body with another: signed distance, point and normal (3,) on the other body."""
-
-    body: int
-    distance: float
-    point: Array
-    normal: Array
 
 
 class Queries(Protocol):
@@ -40,8 +23,8 @@ class Queries(Protocol):
     def add_probe(self, colliders: Sequence[Collider], margin: float) -> int:
         """Register a volume that produces no contacts; returns its handle."""
 
-    def probe_overlaps(self, probe: int, pose: Array) -> list[int]:
-        """Bodies that penetrate the probe when it stands at ``pose`` (7,)."""
+    def probe_overlaps(self, probe: int, pose: Array, bodies: Sequence[int]) -> list[int]:
+        """Those of ``bodies`` that penetrate the probe when it stands at ``pose`` (7,)."""
 
     def ray_test(self, starts: Array, ends: Array) -> RayHits:
         """Closest hits of the segments ``starts`` to ``ends``, each (n, 3)."""

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.frames import pose7_matrix
+from ligature.model.hits import RayHits
 from ligature.model.scene import Scene, Sensor, SensorType
-from ligature.sensing.queries import Queries, RayHits
+from ligature.sensing.queries import Queries
 
 Array = NDArray[np.float64]
 ApplyForce = Callable[[int, Array, Array], None]
@@ -48,9 +49,7 @@ class Rays:
             return
         for sensor, part, stick in zip(self.sensors, self.slices, self._stick, strict=True):
             if sensor.type is SensorType.RESISTANCE:
-                stick.push(
-                    segments[part], RayHits(*(field[part] for field in self.hits)), body_pose, apply_force
-                )
+                stick.push(segments[part], self.hits.part(part), body_pose, apply_force)
 
     @staticmethod
     def _segments(sensor: Sensor, body_pose: Array) -> Array:
@@ -98,9 +97,7 @@ class _Stick:
             self._latch(ray, int(hits.body[ray]), hits.point[ray], body_pose)
         return force
 
-    def _tangential_offset(
-        self, ray: int, direction: Array, hits: RayHits, body_pose: Array
-    ) -> tuple[Array, Array]:
+    def _tangential_offset(self, ray: int, direction: Array, hits: RayHits, body_pose: Array) -> tuple[Array, Array]:
         """Offset of the stuck points across the ray, and its change since the last call, each (3,)."""
         body = int(hits.body[ray])
         if self._body[ray] != body:

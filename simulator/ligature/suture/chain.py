@@ -96,15 +96,9 @@ def _add_impedance(Z, r, B, H, E):
             H[i, 3 + j] += E[i, j]
             H[3 + j, i] += E[i, j]
     for j in range(3):
-        H[3, 3 + j] += (
-            ry * E[2, j] - rz * E[1, j] - (B[0, 0] * E[3, j] + B[1, 0] * E[4, j] + B[2, 0] * E[5, j])
-        )
-        H[4, 3 + j] += (
-            rz * E[0, j] - rx * E[2, j] - (B[0, 1] * E[3, j] + B[1, 1] * E[4, j] + B[2, 1] * E[5, j])
-        )
-        H[5, 3 + j] += (
-            rx * E[1, j] - ry * E[0, j] - (B[0, 2] * E[3, j] + B[1, 2] * E[4, j] + B[2, 2] * E[5, j])
-        )
+        H[3, 3 + j] += ry * E[2, j] - rz * E[1, j] - (B[0, 0] * E[3, j] + B[1, 0] * E[4, j] + B[2, 0] * E[5, j])
+        H[4, 3 + j] += rz * E[0, j] - rx * E[2, j] - (B[0, 1] * E[3, j] + B[1, 1] * E[4, j] + B[2, 1] * E[5, j])
+        H[5, 3 + j] += rx * E[1, j] - ry * E[0, j] - (B[0, 2] * E[3, j] + B[1, 2] * E[4, j] + B[2, 2] * E[5, j])
 
 
 @inlined
@@ -134,14 +128,7 @@ def add_joint_force(load, r, B, sign, out):
 @inlined
 def _times6(A, v, out):
     for i in range(6):
-        out[i] = (
-            A[i, 0] * v[0]
-            + A[i, 1] * v[1]
-            + A[i, 2] * v[2]
-            + A[i, 3] * v[3]
-            + A[i, 4] * v[4]
-            + A[i, 5] * v[5]
-        )
+        out[i] = A[i, 0] * v[0] + A[i, 1] * v[1] + A[i, 2] * v[2] + A[i, 3] * v[3] + A[i, 4] * v[4] + A[i, 5] * v[5]
 
 
 @kernel
@@ -167,7 +154,9 @@ def factor(n, fixed, H, r_near, r_far, B, compliance, Y, Z, scratch):
             if not fixed[i]:
                 _add_impedance(Z[j], r_far[j], B[j], H[i], scratch)
         if fixed[i]:
-            Y[i] = 0.0
+            for a in range(6):
+                for b in range(6):
+                    Y[i, a, b] = 0.0
         else:
             invert_spd6(H[i], Y[i])
 

@@ -29,10 +29,7 @@ class Colliders:
 
     def __init__(self, scene: Scene) -> None:
         parts = [
-            (body.index, part)
-            for body in scene.bodies
-            if body.index not in scene.rod_bodies
-            for part in body.colliders
+            (body.index, part) for body in scene.bodies if body.index not in scene.rod_bodies for part in body.colliders
         ]
         rows = [(index, part.T_body_shape, *_arrays(part.shape)) for index, part in parts]
         rows = [row for row in rows if row[2] >= 0]

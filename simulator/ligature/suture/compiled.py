@@ -15,14 +15,18 @@ from typing import Any, TypeVar
 
 import numba
 
-import ligature.mesh.distance
+from ligature.mesh import distance
+
+SOURCES = ("chain", "contacts", "coupling", "layout", "reactions", "rotations", "tick")
+"""Modules of this room that hold kernels."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def cache_folder() -> Path:
     """Where the machine code of this version of the sources lies."""
-    sources = [*sorted(Path(__file__).parent.glob("*.py")), Path(ligature.mesh.distance.__file__)]
+    room = Path(__file__).parent
+    sources = [*(room / f"{name}.py" for name in SOURCES), Path(__file__), Path(distance.__file__)]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     root = os.environ.get("LIGATURE_CACHE")
     if root is None:
@@ -34,10 +38,11 @@ _FOLDER = str(cache_folder())
 
 
 def _compile(function: Function, **options: Any) -> Function:
+    # Kernels allocate nothing, so they need no reference counts: counting took half of a tick.
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = _FOLDER
     try:
-        return numba.njit(cache=True, error_model="numpy", **options)(function)
+        return numba.njit(cache=True, error_model="numpy", _nrt=False, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
 
@@ -53,3 +58,4 @@ def kernel(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """Like `kernel`, for the small functions of inner loops: LLVM folds them into their callers."""
     return _compile(function, forceinline=True)
+

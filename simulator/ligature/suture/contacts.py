@@ -55,7 +55,6 @@ def _world_segments(first, n, nodes, work, dt):
         for s in range(2):
             ex, ey, ez = rotate(R, nodes.axis[i, s, 0], nodes.axis[i, s, 1], nodes.axis[i, s, 2])
             p[s, 0], p[s, 1], p[s, 2] = nodes.x[i, 0] + ex, nodes.x[i, 1] + ey, nodes.x[i, 2] + ez
-        vx, vy, vz, wx, wy, wz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         vx, vy, vz = nodes.v[i, 0], nodes.v[i, 1], nodes.v[i, 2]
         wx, wy, wz = nodes.w[i, 0], nodes.w[i, 1], nodes.w[i, 2]
         arm = 0.5 * _distance(p[0], p[1])

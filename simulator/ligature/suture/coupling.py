@@ -210,9 +210,12 @@ def couple(n, total, nodes, touches, work):
     if energy <= 0.0:
         return 0
     # s keeps S p by recurrence, so that S itself is never applied.
-    p[:total] = z[:total]
-    s[:total] = r[:total]
-    p_load[:] = z_load
+    for i in range(total):
+        for a in range(6):
+            p[i, a], s[i, a] = z[i, a], r[i, a]
+    for j in range(n - 1):
+        for a in range(6):
+            p_load[j, a] = z_load[j, a]
     iterations = 0
     for _ in range(MAX_CG):
         iterations += 1

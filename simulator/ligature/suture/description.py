@@ -101,9 +101,7 @@ class RodDescription:
             raise ValueError(f"rod '{self.name}' has {len(self.mass)} elements; it needs at least 2")
         if not np.all(lengths > 0.0):
             i = int(np.argmin(lengths))
-            raise ValueError(
-                f"rod '{self.name}': element {i} has length {lengths[i]:g} m; give it a positive one"
-            )
+            raise ValueError(f"rod '{self.name}': element {i} has length {lengths[i]:g} m; give it a positive one")
         if not (np.all(self.mass > 0.0) and np.all(self.inertia > 0.0)):
             i = int(np.argmin(np.minimum(self.mass, self.inertia.min(axis=1))))
             raise ValueError(

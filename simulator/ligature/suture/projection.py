@@ -168,9 +168,7 @@ def _weight(r: Array, n: Array, inverse_mass: float, inverse_inertia: Array, q: 
 
 
 @njit(cache=True)
-def _impulse(
-    x: Array, q: Array, r: Array, n: Array, size: float, inverse_mass: float, inverse_inertia: Array
-) -> None:
+def _impulse(x: Array, q: Array, r: Array, n: Array, size: float, inverse_mass: float, inverse_inertia: Array) -> None:
     """Move an element by the multiplier ``size`` along ``n`` at the arm ``r``."""
     t, w = np.empty(3), np.empty(3)
     t[0], t[1], t[2] = r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]

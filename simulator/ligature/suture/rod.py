@@ -86,9 +86,7 @@ class Rod:
         known = {partner.body: partner for partner in partners}
         for tie in description.ties:
             if tie.body not in known:
-                raise ValueError(
-                    f"rod '{description.name}' is tied to body {tie.body}, which is no partner of it"
-                )
+                raise ValueError(f"rod '{description.name}' is tied to body {tie.body}, which is no partner of it")
         head, tail, others = _ends(description)
         self._first = 1 if head else 0
         self._own = slice(self._first, self._first + n)
@@ -243,9 +241,7 @@ class Rod:
         old, new = self._touches
         new.count[0] = 0
         for grip in (*self._permanent, *self.grips):
-            bond(
-                self._nodes, self._work, new, self._first + grip.element, self.node_of[grip.body], grip.points
-            )
+            bond(self._nodes, self._work, new, self._first + grip.element, self.node_of[grip.body], grip.points)
         n = len(self.tension)
         detect(self._first, n, self._nodes, self._shapes, old, new, self._work, self._counts,
                self._self_skip, self.dt)  # fmt: skip
@@ -267,9 +263,7 @@ def _ends(description: RodDescription) -> tuple[Tie | None, Tie | None, list[Tie
     """The ties that become the chain's first and last node, and the others."""
     head = next((t for t in description.ties if t.element == 0), None)
     last = len(description.mass) - 1
-    tail = next(
-        (t for t in description.ties if t.element == last and (head is None or t.body != head.body)), None
-    )
+    tail = next((t for t in description.ties if t.element == last and (head is None or t.body != head.body)), None)
     return head, tail, [t for t in description.ties if t is not head and t is not tail]
 
 

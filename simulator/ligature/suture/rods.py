@@ -64,9 +64,7 @@ class Rod:
         self._T_inertial = [b.T_body_inertial for b in members]
         self._rest_pose = [matrix_pose7(b.T_world_body @ b.T_body_inertial) for b in members]
         self._gravity = np.array([b.gravity for b in members])
-        self._decay = np.array(
-            [((1 - b.linear_damping) ** dt, (1 - b.angular_damping) ** dt) for b in members]
-        )
+        self._decay = np.array([((1 - b.linear_damping) ** dt, (1 - b.angular_damping) ** dt) for b in members])
         joints = [
             *([self._head[0]] if self._head else []),
             *(scene.joints[j] for j in chain.joints),

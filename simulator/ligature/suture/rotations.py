@@ -49,9 +49,7 @@ def rotation_vector(x, y, z, w):
     square = x * x + y * y + z * z
     if square < 0.01:
         # arcsin(r) / r for the sine r of half the angle
-        s = 1.0 + square * (
-            1.0 / 6.0 + square * (3.0 / 40.0 + square * (5.0 / 112.0 + square * 35.0 / 1152.0))
-        )
+        s = 1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (5.0 / 112.0 + square * 35.0 / 1152.0)))
         s *= 2.0
     else:
         sine = math.sqrt(square)

@@ -88,11 +88,7 @@ def world_inverse_inertia(q: Array, inverse: Array, out: Array, R: Array) -> Non
     quaternion_to_matrix(q, R)
     for i in range(3):
         for j in range(3):
-            out[i, j] = (
-                R[i, 0] * inverse[0] * R[j, 0]
-                + R[i, 1] * inverse[1] * R[j, 1]
-                + R[i, 2] * inverse[2] * R[j, 2]
-            )
+            out[i, j] = R[i, 0] * inverse[0] * R[j, 0] + R[i, 1] * inverse[1] * R[j, 1] + R[i, 2] * inverse[2] * R[j, 2]
 
 
 @njit(cache=True)
@@ -137,9 +133,7 @@ def _rows(
         for k in range(3):
             WJ[i, k] = inverse_mass * J[i, k]
             WJ[i, 3 + k] = (
-                J[i, 3] * inverse_inertia[0, k]
-                + J[i, 4] * inverse_inertia[1, k]
-                + J[i, 5] * inverse_inertia[2, k]
+                J[i, 3] * inverse_inertia[0, k] + J[i, 4] * inverse_inertia[1, k] + J[i, 5] * inverse_inertia[2, k]
             )
 
 

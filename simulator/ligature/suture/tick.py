@@ -85,8 +85,9 @@ def linearise(n, total, nodes, joints, work, dt):
         matrix_of(nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3], work.R[i])
     for j in range(n - 1):
         for side in range(2):
-            p, r = joints.pivot[j, side], work.lever[j, side]
-            r[0], r[1], r[2] = rotate(work.R[j + side], p[0], p[1], p[2])
+            px, py, pz = joints.pivot[j, side, 0], joints.pivot[j, side, 1], joints.pivot[j, side, 2]
+            rx, ry, rz = rotate(work.R[j + side], px, py, pz)
+            work.lever[j, side, 0], work.lever[j, side, 1], work.lever[j, side, 2] = rx, ry, rz
         for a in range(3):
             work.c[j, a] = nodes.x[j, a] + work.lever[j, 0, a] - nodes.x[j + 1, a] - work.lever[j, 1, a]
             work.compliance[j, a] = joints.give[j] * per_dt2
@@ -128,35 +129,32 @@ def assemble(n, total, nodes, joints, work):
             work.g[i, a] = -m * (nodes.x[i, a] - work.xp[i, a])
             work.g[i, 3 + a] = -(H[3 + a, 3] * ex + H[3 + a, 4] * ey + H[3 + a, 5] * ez)
         if i < n:
-            _stiffen_by_tension(n, joints, work, i, H)
+            _stiffen_by_tension(n, joints, work, i)
 
 
 @inlined
-def _stiffen_by_tension(n, joints, work, i, H):
+def _stiffen_by_tension(n, joints, work, i):
     """Add the resistance to turning that the forces at a node's pivots bring, as far as it is positive."""
-    g = 0.0
-    ux, uy, uz = 0.0, 0.0, 0.0
+    lever, load = work.lever, joints.load
+    g, ux, uy, uz = 0.0, 0.0, 0.0, 0.0
     if i < n - 1:
-        r, f = work.lever[i, 0], joints.load[i]
-        g += r[0] * f[0] + r[1] * f[1] + r[2] * f[2]
-        ux, uy, uz = r[0], r[1], r[2]
+        ux, uy, uz = lever[i, 0, 0], lever[i, 0, 1], lever[i, 0, 2]
+        g = ux * load[i, 0] + uy * load[i, 1] + uz * load[i, 2]
     if i > 0:
-        r, f = work.lever[i - 1, 1], joints.load[i - 1]
-        g -= r[0] * f[0] + r[1] * f[1] + r[2] * f[2]
-        ux, uy, uz = ux - r[0], uy - r[1], uz - r[2]
+        rx, ry, rz = lever[i - 1, 1, 0], lever[i - 1, 1, 1], lever[i - 1, 1, 2]
+        g -= rx * load[i - 1, 0] + ry * load[i - 1, 1] + rz * load[i - 1, 2]
+        ux, uy, uz = ux - rx, uy - ry, uz - rz
     square = ux * ux + uy * uy + uz * uz
-    if g <= 0.0 or square == 0.0:
-        return
-    s = g / square
-    H[3, 3] += g - s * ux * ux
-    H[4, 4] += g - s * uy * uy
-    H[5, 5] += g - s * uz * uz
-    H[3, 4] -= s * ux * uy
-    H[4, 3] -= s * ux * uy
-    H[3, 5] -= s * ux * uz
-    H[5, 3] -= s * ux * uz
-    H[4, 5] -= s * uy * uz
-    H[5, 4] -= s * uy * uz
+    if g > 0.0 and square > 0.0:
+        s = g / square
+        H = work.H
+        H[i, 3, 3] += g - s * ux * ux
+        H[i, 4, 4] += g - s * uy * uy
+        H[i, 5, 5] += g - s * uz * uz
+        H[i, 4, 3] -= s * ux * uy
+        H[i, 5, 3] -= s * ux * uz
+        H[i, 5, 4] -= s * uy * uz
+        H[i, 3, 4], H[i, 3, 5], H[i, 4, 5] = H[i, 4, 3], H[i, 5, 3], H[i, 5, 4]
 
 
 @kernel
