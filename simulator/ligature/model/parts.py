@@ -237,11 +237,10 @@ def camera_frame(location: Array, target: Array, up: Array) -> Array:
 
 
 def light_frame(location: Array, direction: Array | None, rpy: tuple[float, float, float]) -> Array:
-    """Light frame (4, 4) in its parent's: it shines along +X (§19)."""
+    """Light frame (4, 4) in its parent's: it shines along +X, the other axes as the reference publishes (§19)."""
     if direction is None or np.linalg.norm(direction) < 0.01:
         return pose_matrix(location, rpy)
     x = direction / np.linalg.norm(direction)
-    helper = np.eye(3)[int(np.argmin(np.abs(x)))]
-    y = np.cross(helper, x)
+    y = np.cross(x, (0.0, 1.0, 0.0) if abs(x[1]) < 0.999 else (0.0, 0.0, 1.0))
     y /= np.linalg.norm(y)
     return frame(np.column_stack([x, y, np.cross(x, y)]), location)

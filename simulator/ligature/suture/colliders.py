@@ -1,6 +1,6 @@
-"""The convex parts of all bodies around a rod, as arrays for the compiled contact search.
+"""The convex parts of all bodies around rods, as arrays for the compiled contact search.
 
-Shapes stand in body frames; metres.
+Shapes stand in body frames; metres. Triangle meshes are touched as their convex hulls.
 """
 
 from __future__ import annotations
@@ -9,83 +9,117 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, HULL, SPHERE, hull_planes
-from ligature.model.frames import matrix_pose7, pose7_matrix
+from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Scene, Shape, Sphere
 from ligature.suture.bodies import Bodies
+from ligature.suture.layout import Shapes
+from ligature.suture.placing import near_bodies, place_parts
 
 Array = NDArray[np.float64]
 
 REFRESH = 8
-"""Ticks between looks at bodies that are far from the rod."""
+"""Ticks between looks at bodies that are far from every rod."""
 
-NEAR = 0.05
-"""Distance in metres within which a body's pose is read every tick; at 1 m/s it takes 50 ticks to cross."""
+NEAR = 0.03
+"""Distance in metres within which a body's pose is read every tick; at 3 m/s it takes 10 ticks to cross."""
+
+UNBOUNDED = 1e6
+"""Half size in metres of the box around a half space."""
 
 _ROUND = {Cylinder: CYLINDER, Capsule: CAPSULE, Cone: CONE}
 
 
 class Colliders:
-    """Convex parts of every body of a scene that is not an element of a rod."""
+    """Convex parts of every body of a scene that is not an element of a rod.
 
-    def __init__(self, scene: Scene) -> None:
+    ``bodies`` (b,) are the bodies that have parts, in order; ``near`` (b,) tells which of them were
+    close to a rod at the last `update`; ``motion`` holds the pose (7,) and twist (6,) last read.
+    """
+
+    def __init__(self, scene: Scene, dt: float) -> None:
         parts = [
-            (body.index, part) for body in scene.bodies if body.index not in scene.rod_bodies for part in body.colliders
+            (body.index, part.T_body_shape, *_arrays(part.shape))
+            for body in scene.bodies
+            if body.index not in scene.rod_bodies
+            for part in body.colliders
         ]
-        rows = [(index, part.T_body_shape, *_arrays(part.shape)) for index, part in parts]
-        rows = [row for row in rows if row[2] >= 0]
-        n = len(rows)
-        self.body = np.array([row[0] for row in rows], dtype=np.int64)
-        self._local = [row[1] for row in rows]
-        self.kind = np.array([row[2] for row in rows], dtype=np.int64)
-        self.size = np.array([row[3] for row in rows]).reshape(n, 3)
-        planes = [row[4] for row in rows]
+        n = len(parts)
+        body = np.array([part[0] for part in parts], dtype=np.int64)
+        self._dt = dt
+        self._local = np.array([matrix_pose7(part[1]) for part in parts]).reshape(n, 7)
+        self._extent = np.array([part[5] for part in parts]).reshape(n, 2, 3)
+        planes = [part[4] for part in parts]
         ends = np.cumsum([0] + [len(p) for p in planes])
-        self.planes = np.vstack(planes) if planes else np.zeros((0, 4))
-        self.plane_range = np.column_stack([ends[:-1], ends[1:]]).astype(np.int64)
-        self.bound = np.array([row[5] for row in rows])
-        self.pose = np.zeros((n, 7))
-        self.friction = np.array([scene.bodies[b].friction for b in self.body])
-        self._members = {int(b): np.flatnonzero(self.body == b) for b in np.unique(self.body)}
-        self._static = {b for b in self._members if scene.bodies[b].static}
+        self.bodies = sorted(set(body.tolist()))
+        self._ranges = np.array([[*np.flatnonzero(body == b)[[0, -1]]] for b in self.bodies], dtype=np.int64)
+        self._ranges = self._ranges.reshape(-1, 2) + np.array([0, 1])
+        self._static = {b for b in self.bodies if scene.bodies[b].static}
+        self._common = {
+            "kind": np.array([part[2] for part in parts], dtype=np.int64),
+            "size": np.array([part[3] for part in parts]).reshape(n, 3),
+            "planes": np.vstack(planes) if planes else np.zeros((0, 4)),
+            "plane_range": np.column_stack([ends[:-1], ends[1:]]).astype(np.int64),
+            "pose": np.zeros((n, 7)),
+            "box": np.zeros((n, 2, 3)),
+            "sweep": np.zeros(n),
+            "friction": np.array([scene.bodies[b].friction for b in body]),
+        }
+        self.near = np.zeros(len(self.bodies), dtype=np.bool_)
+        self.motion: dict[int, tuple[Array, Array]] = {}
+        self._R = np.zeros((3, 3))
         self._tick = 0
 
+    def shapes(self, elements: int) -> Shapes:
+        """The parts as a rod of ``elements`` elements sees them; all rods share poses."""
+        n = len(self._common["kind"])
+        far = np.full(n, -1, dtype=np.int64)
+        return Shapes(node=far, skip=np.zeros((n, elements), dtype=np.bool_), **self._common)
+
+    def parts_of(self, body: int) -> slice:
+        """The rows of a body's parts in `shapes`; empty for a body without any."""
+        if body not in self.bodies:
+            return slice(0, 0)
+        return slice(*self._ranges[self.bodies.index(body)].tolist())
+
     def update(self, bodies: Bodies, low: Array, high: Array) -> None:
-        """Bring the poses of parts near the box ``low`` … ``high`` (3,) up to date."""
-        everything = self._tick % REFRESH == 0
+        """Bring the poses of bodies near the box ``low`` … ``high`` (3,) up to date."""
+        look = self._tick % REFRESH == 0
         self._tick += 1
-        if everything:
-            chosen = list(self._members)
-        else:
-            gap = np.maximum(np.maximum(low - self.pose[:, :3], self.pose[:, :3] - high), 0.0)
-            near = np.linalg.norm(gap, axis=1) < self.bound + NEAR
-            chosen = [b for b in np.unique(self.body[near]).tolist() if b not in self._static]
-        for body in chosen:
-            T = pose7_matrix(bodies.pose7(body))
-            for c in self._members[body]:
-                self.pose[c] = matrix_pose7(T @ self._local[c])
+        if look:
+            for k in range(len(self.bodies)):
+                self._read(bodies, k)
+        near_bodies(self._ranges, self._common["box"], low, high, NEAR, self.near)
+        if not look:
+            for k in np.flatnonzero(self.near).tolist():
+                if self.bodies[k] not in self._static:
+                    self._read(bodies, k)
+
+    def _read(self, bodies: Bodies, k: int) -> None:
+        body, common = self.bodies[k], self._common
+        pose, twist = bodies.pose7(body), bodies.twist6(body)
+        self.motion[body] = pose, twist
+        begin, end = self._ranges[k]
+        place_parts(begin, end, self._local, self._extent, pose, twist, self._dt, common["pose"],
+                    common["box"], common["sweep"], self._R)  # fmt: skip
 
     def restart(self) -> None:
         """Forget when poses were read, so that the next update reads all."""
         self._tick = 0
 
 
-def _arrays(shape: Shape) -> tuple[int, Array, Array, float]:
-    """Kind (-1 for shapes that rods do not touch), sizes (3,), planes (n, 4), bounding radius."""
+def _arrays(shape: Shape) -> tuple[int, Array, Array, Array]:
+    """Kind, sizes (3,), planes (n, 4) and box (2, 3) of a shape in its own frame."""
     none = np.zeros((0, 4))
     if isinstance(shape, Box):
-        return BOX, np.asarray(shape.size), none, float(np.linalg.norm(shape.size)) / 2
+        half = 0.5 * np.asarray(shape.size)
+        return BOX, np.asarray(shape.size), none, np.array([-half, half])
     if isinstance(shape, Sphere):
-        return SPHERE, np.array([shape.radius, 0.0, 0.0]), none, shape.radius
+        return SPHERE, np.array([shape.radius, 0.0, 0.0]), none, np.array([[-shape.radius] * 3, [shape.radius] * 3])
     if isinstance(shape, Cylinder | Capsule | Cone):
-        size = np.array([shape.radius, shape.height, 0.0])
-        return _ROUND[type(shape)], size, none, float(np.hypot(shape.radius, shape.height / 2))
-    if isinstance(shape, Hull):
-        return (
-            HULL,
-            np.zeros(3),
-            hull_planes(shape.vertices),
-            float(np.linalg.norm(shape.vertices, axis=1).max()),
-        )
+        half = np.array([shape.radius, shape.radius, 0.5 * shape.height])
+        return _ROUND[type(shape)], np.array([shape.radius, shape.height, 0.0]), none, np.array([-half, half])
     if isinstance(shape, Plane):
-        return HALF_SPACE, np.zeros(3), np.append(shape.normal, shape.offset)[None], 1e6
-    return -1, np.zeros(3), none, 0.0
+        everything = np.array([[-UNBOUNDED] * 3, [UNBOUNDED] * 3])
+        return HALF_SPACE, np.zeros(3), np.append(shape.normal, shape.offset)[None], everything
+    box = np.array([shape.vertices.min(axis=0), shape.vertices.max(axis=0)])
+    return HULL, np.zeros(3), hull_planes(shape.vertices), box

@@ -17,7 +17,7 @@ import numba
 
 from ligature.mesh import distance
 
-SOURCES = ("chain", "contacts", "coupling", "layout", "reactions", "rotations", "tick")
+SOURCES = ("chain", "contacts", "coupling", "layout", "placing", "reactions", "rotations", "tick")
 """Modules of this room that hold kernels."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -58,4 +58,3 @@ def kernel(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """Like `kernel`, for the small functions of inner loops: LLVM folds them into their callers."""
     return _compile(function, forceinline=True)
-

@@ -51,7 +51,7 @@ class Joints(NamedTuple):
 class Touches(NamedTuple):
     """Contact points; element ``node[:, 0]`` is pushed along ``normal`` off the node ``node[:, 1]``."""
 
-    count: NDArray[np.int64]  # (1,)
+    count: NDArray[np.int64]  # (1,), or more rows than it says  # type: ignore[assignment]
     node: NDArray[np.int64]  # (C, 2)
     key: NDArray[np.int64]  # (C,) which part was touched; the same contact keeps its key
     local: Array  # (C, 2, 3) the point in I of both nodes
@@ -105,7 +105,7 @@ class Work(NamedTuple):
     zero: Array  # (n - 1, 6)
     K: Array  # (C, 3, 3) contact stiffness times dt²
     six: Array  # (6, 6)
-    three: Array  # (2, 3)
+    three: Array  # (3, 3)
     segment: Array  # (elements, 2, 3) of each capsule, world
     reach: Array  # (elements,) distance within which contacts are looked for
     box: Array  # (elements, 2, 3)
@@ -120,7 +120,7 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         z((total, 3)), z((total, 4)), z((total, 3)), z((total, 4)), z((total + 1, 3, 3)), z((j, 2, 3)),
         z((j, 3, 3)), z((j, 6)), z((j, 6)), z((total, 6, 6)), z((total, 6, 6)), z((j, 6, 6)),
         z((total, 6)), z((total, 6)), z((j, 6)), z((4, total, 6)), z((2, j, 6)), z((j, 6)),
-        z((contacts, 3, 3)), z((6, 6)), z((2, 3)), z((elements, 2, 3)), z(elements),
+        z((contacts, 3, 3)), z((6, 6)), z((3, 3)), z((elements, 2, 3)), z(elements),
         z((elements, 2, 3)), z((elements, 2, 3)),
     )  # fmt: skip
 

@@ -82,9 +82,10 @@ def pull_of_elements(first, n, joints, work, tension, dt):
             ux, uy, uz = far[0], far[1], far[2]
         elif i == n - 1:
             ux, uy, uz = -near[0], -near[1], -near[2]
-        pull = 0.0
+        pull, joined = 0.0, 0
         for j in (i - 1, i):
             if 0 <= j < n - 1:
+                joined += 1
                 f = joints.load[j]
                 pull += f[0] * ux + f[1] * uy + f[2] * uz
-        tension[e] = 0.5 * pull / (math.sqrt(ux * ux + uy * uy + uz * uz) * dt * dt)
+        tension[e] = pull / (joined * math.sqrt(ux * ux + uy * uy + uz * uz) * dt * dt)

@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.suture import layout
+from ligature.suture.bodies import Bodies
+from ligature.suture.colliders import Colliders
 from ligature.suture.contacts import detect
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
+from ligature.suture.placing import place_node
 from ligature.suture.reactions import bond, pull_of_elements, react
 from ligature.suture.tick import advance
 
@@ -106,6 +109,7 @@ class Rod:
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self._self_skip = int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._permanent = [self._grip_of(tie) for tie in others]
+        self._inertial = {p.body: matrix_pose7(p.T_body_inertial) for p in partners}
         self._T_inertial_body = np.array([inverse(T) for T in description.T_body_inertial])
         self.impulse = np.zeros((self._total, 6))
         self.tension = np.zeros(n)
@@ -228,13 +232,45 @@ class Rod:
 
     # --- the tick ---------------------------------------------------------------------------
 
-    def place(self, body: int, T_world_body: Array, twist: Array) -> None:
-        """Tell where a partner is, (4, 4), and how it moves, (6,), at the start of the tick."""
+    def box(self) -> Array:
+        """Corners (2, 3) of a box around all centres of elements."""
+        return np.array([self.positions.min(axis=0), self.positions.max(axis=0)])
+
+    def place(self, body: int, pose: Array, twist: Array) -> None:
+        """Tell where a partner is, (7,), and how it moves, (6,), at the start of the tick."""
         node = self.node_of[body]
-        partner = next(p for p in self.partners if p.body == body)
-        pose = matrix_pose7(T_world_body @ partner.T_body_inertial)
-        self._nodes.x[node], self._nodes.q[node] = pose[:3], pose[3:]
-        self._nodes.v[node], self._nodes.w[node] = twist[:3], twist[3:]
+        place_node(self._nodes, node, pose, twist, self._inertial[body], self._work.three)
+
+    def meet(self, colliders: Colliders, near: Sequence[int], bodies: Bodies) -> None:
+        """Take the motion of the partners that matter in this tick: those near, tied or gripping."""
+        self._shapes.node[:] = -1
+        for body in near:
+            self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
+            self.place(body, *colliders.motion[body])
+        for body in {*(t.body for t in self.description.ties), *(g.body for g in self.grips)} - set(near):
+            self.place(body, bodies.pose7(body), bodies.twist6(body))
+
+    def grip(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
+        """Hold frame a of an element and frame b of a partner, (4, 4) in their frames B, together."""
+        if body not in self.node_of:
+            raise ValueError(f"rod '{self.description.name}' never meets body {body}: it has no collision shape")
+        description = self.description
+        T_a = inverse(description.T_body_inertial[element]) @ T_element_a
+        T_b = inverse(pose7_matrix(self._inertial[body])) @ T_body_b
+        none = np.zeros(3)
+        self.grips.append(self._grip_of(Tie(element, body, T_a, T_b, none, none, none, none, none)))
+
+    def release(self, element: int, body: int) -> None:
+        """Let go of a grip."""
+        self.grips = [g for g in self.grips if (g.element, g.body) != (element, body)]
+
+    def pushes(self) -> list[tuple[int, Array]]:
+        """Partners that the last tick pushed, with the impulse and its moment (6,) about their centre."""
+        return [
+            (p.body, self.impulse[self.node_of[p.body]])
+            for p in self.partners
+            if p.mass > 0.0 and self.impulse[self.node_of[p.body]].any()
+        ]
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds what each partner receives."""

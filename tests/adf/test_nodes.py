@@ -1,0 +1,88 @@
+"""Marked YAML nodes: places, first key wins, limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ligature.adf import AdfError
+from ligature.adf.nodes import MAX_DEPTH, Mapping, Scalar, Sequence, parse, plain
+
+FILE = Path("scene.yaml")
+
+
+def test_values_know_their_line_and_column() -> None:
+    root = parse("a: 1\nblock:\n  inner: two\n", FILE)
+    block = root.get("block")
+    assert isinstance(block, Mapping)
+    inner = block.get("inner")
+    assert isinstance(inner, Scalar)
+    assert (inner.mark.line, inner.mark.column, inner.text) == (3, 10, "two")
+
+
+def test_the_first_of_two_equal_keys_wins() -> None:
+    root = parse("mass: 1\nmass: 2\n", FILE)
+    assert plain(root) == {"mass": "1"}
+    assert [d.mark.line for d in root.duplicates] == [2]
+
+
+def test_plain_scalars_stay_text() -> None:
+    assert plain(parse("{y: y, x: 1e-05, on: off, n: ~}", FILE)) == {"y": "y", "x": "1e-05", "on": "off", "n": None}
+
+
+def test_aliases_are_expanded() -> None:
+    assert plain(parse("a: &v {x: 1}\nb: *v\n", FILE)) == {"a": {"x": "1"}, "b": {"x": "1"}}
+
+
+def test_only_the_first_document_is_read() -> None:
+    assert plain(parse("a: 1\n---\nb: 2\n", FILE)) == {"a": "1"}
+
+
+def test_flow_maps_may_leave_their_indentation() -> None:
+    root = parse("wheel:\n  suspension: &s\n{\n  stiffness: 5,\n  damping: 2}\n  radius: 1\n", FILE)
+    wheel = root.get("wheel")
+    assert isinstance(wheel, Mapping)
+    suspension = wheel.get("suspension")
+    assert isinstance(suspension, Mapping)
+    assert plain(suspension) == {"stiffness": "5", "damping": "2"}
+    value = suspension.get("damping")
+    assert value is not None and (value.mark.line, value.mark.column) == (5, 12)
+
+
+def test_bare_keys_in_a_flow_map_are_null() -> None:
+    assert plain(parse("c: {P: 20, I, 0., D: 0.1}", FILE)) == {"c": {"P": "20", "I": None, "0.": None, "D": "0.1"}}
+
+
+def test_an_alias_bomb_is_refused() -> None:
+    lines = ["a0: &a0 [x,x,x,x,x,x,x,x,x,x]"]
+    lines += [f"a{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
+    with pytest.raises(AdfError, match="aliases expand to more than"):
+        parse("\n".join(lines), FILE)
+
+
+def test_an_alias_inside_its_own_anchor_is_refused() -> None:
+    with pytest.raises(AdfError, match=r"scene.yaml:1:9: error: alias '\*a' stands inside what it names"):
+        parse("a: &a [1, *a]".replace("1, ", " "), FILE)
+
+
+def test_deep_nesting_is_refused() -> None:
+    with pytest.raises(AdfError, match="nests deeper than"):
+        parse("a: " + "[" * (MAX_DEPTH + 2) + "]" * (MAX_DEPTH + 2), FILE)
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "- 1\n- 2\n", "just text"])
+def test_a_file_without_a_mapping_says_so(text: str) -> None:
+    with pytest.raises(AdfError, match="the file"):
+        parse(text, FILE)
+
+
+def test_broken_yaml_names_the_place() -> None:
+    with pytest.raises(AdfError, match=r"scene.yaml:2:\d+: error: this is not YAML"):
+        parse("a: [1, 2\nb: }\n", FILE)
+
+
+def test_lists_keep_their_order() -> None:
+    bodies = parse("bodies: [BODY b, BODY a]", FILE).get("bodies")
+    assert isinstance(bodies, Sequence)
+    assert [plain(item) for item in bodies.items] == ["BODY b", "BODY a"]
