@@ -40,13 +40,20 @@ class Placement:
 
     def read(self, pose: Array, twist: Array) -> None:
         """Fill ``pose`` (7,) and ``twist`` (6,)."""
+        self.read_inertial(pose, twist)
+        if self._shifted:
+            pose[:] = matrix_pose7(pose7_matrix(pose) @ self._T_inertial_body)
+
+    def read_inertial(self, pose: Array, twist: Array) -> None:
+        """Like `read`, with the pose of I: what the engine itself keeps."""
         if self.link < 0:
             position, quaternion = pybullet.getBasePositionAndOrientation(self.uid, physicsClientId=self.client)
             linear, angular = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
         else:
             found = pybullet.getLinkState(self.uid, self.link, 1, 1, physicsClientId=self.client)
             position, quaternion, linear, angular = found[0], found[1], found[6], found[7]
-        self.to_body_frame(position, quaternion, pose)
+        pose[:3] = position
+        pose[3:] = quaternion
         twist[:3] = linear
         twist[3:] = angular
 

@@ -173,6 +173,12 @@ class World(BulletQueries):
         self.place_of[body].read(pose, twist)
         return twist
 
+    def motion(self, body: int) -> tuple[Array, Array]:
+        """Pose (7,) of a body's inertial frame I, and its twist (6,), in one read."""
+        pose, twist = np.empty(7), np.empty(6)
+        self.place_of[body].read_inertial(pose, twist)
+        return pose, twist
+
     def set_pose(self, body: int, pose: Array) -> None:
         """Put the root body of a tree at ``pose`` (7,) at rest; raises ValueError for a link of an arm."""
         place = self.place_of[body]
