@@ -9,19 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, HULL, SPHERE, hull_planes
-from ligature.model.frames import matrix_pose7
-from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Scene, Shape, Sphere
+from ligature.model.frames import inverse, matrix_pose7
+from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Scene, Shape, Sphere, TriMesh
 from ligature.suture.bodies import Bodies
 from ligature.suture.layout import Shapes
 from ligature.suture.placing import near_bodies, place_parts
 
 Array = NDArray[np.float64]
 
-REFRESH = 8
-"""Ticks between looks at bodies that are far from every rod."""
+LOOKS = 2
+"""Bodies far from every rod that are looked at in a tick, in turn."""
 
-NEAR = 0.03
-"""Distance in metres within which a body's pose is read every tick; at 3 m/s it takes 10 ticks to cross."""
+NEAR = 0.02
+"""Distance in metres within which a moving body's pose is read every tick.
+
+Among 30 bodies the turn of each comes every 15 ticks; a body must not come nearer than this in between.
+"""
 
 UNBOUNDED = 1e6
 """Half size in metres of the box around a half space."""
@@ -38,7 +41,7 @@ class Colliders:
 
     def __init__(self, scene: Scene, dt: float) -> None:
         parts = [
-            (body.index, part.T_body_shape, *_arrays(part.shape))
+            (body.index, inverse(body.T_body_inertial) @ part.T_body_shape, *_arrays(part.shape))
             for body in scene.bodies
             if body.index not in scene.rod_bodies
             for part in body.colliders
@@ -53,7 +56,7 @@ class Colliders:
         self.bodies = sorted(set(body.tolist()))
         self._ranges = np.array([[*np.flatnonzero(body == b)[[0, -1]]] for b in self.bodies], dtype=np.int64)
         self._ranges = self._ranges.reshape(-1, 2) + np.array([0, 1])
-        self._static = {b for b in self.bodies if scene.bodies[b].static}
+        self._still = np.array([scene.bodies[b].static for b in self.bodies], dtype=np.bool_)
         self._common = {
             "kind": np.array([part[2] for part in parts], dtype=np.int64),
             "size": np.array([part[3] for part in parts]).reshape(n, 3),
@@ -64,10 +67,11 @@ class Colliders:
             "sweep": np.zeros(n),
             "friction": np.array([scene.bodies[b].friction for b in body]),
         }
+        self._static = self._still.copy()
         self.near = np.zeros(len(self.bodies), dtype=np.bool_)
         self.motion: dict[int, tuple[Array, Array]] = {}
         self._R = np.zeros((3, 3))
-        self._tick = 0
+        self._turn = -1
 
     def shapes(self, elements: int) -> Shapes:
         """The parts as a rod of ``elements`` elements sees them; all rods share poses."""
@@ -83,20 +87,26 @@ class Colliders:
 
     def update(self, bodies: Bodies, low: Array, high: Array) -> None:
         """Bring the poses of bodies near the box ``low`` … ``high`` (3,) up to date."""
-        look = self._tick % REFRESH == 0
-        self._tick += 1
-        if look:
-            for k in range(len(self.bodies)):
-                self._read(bodies, k)
+        n = len(self.bodies)
+        if self._turn < 0:
+            fresh = set(range(n))
+        else:
+            fresh = {(self._turn + k) % n for k in range(min(LOOKS, n))}
+        for k in sorted(fresh):
+            self._read(bodies, k)
+        self._turn = (self._turn + LOOKS) % n if n and self._turn >= 0 else 0
         near_bodies(self._ranges, self._common["box"], low, high, NEAR, self.near)
-        if not look:
-            for k in np.flatnonzero(self.near).tolist():
-                if self.bodies[k] not in self._static:
-                    self._read(bodies, k)
+        for k in np.flatnonzero(self.near & ~self._still).tolist():
+            if k not in fresh:
+                self._read(bodies, k)
 
     def _read(self, bodies: Bodies, k: int) -> None:
         body, common = self.bodies[k], self._common
-        pose, twist = bodies.pose7(body), bodies.twist6(body)
+        pose, twist = bodies.motion(body)
+        before = self.motion.get(body)
+        if self._static[k]:
+            # A body without mass moves by commands alone; while it does, it is read every tick.
+            self._still[k] = before is None or bool((before[0] == pose).all())
         self.motion[body] = pose, twist
         begin, end = self._ranges[k]
         place_parts(begin, end, self._local, self._extent, pose, twist, self._dt, common["pose"],
@@ -104,7 +114,7 @@ class Colliders:
 
     def restart(self) -> None:
         """Forget when poses were read, so that the next update reads all."""
-        self._tick = 0
+        self._turn = -1
 
 
 def _arrays(shape: Shape) -> tuple[int, Array, Array, Array]:
@@ -121,5 +131,6 @@ def _arrays(shape: Shape) -> tuple[int, Array, Array, Array]:
     if isinstance(shape, Plane):
         everything = np.array([[-UNBOUNDED] * 3, [UNBOUNDED] * 3])
         return HALF_SPACE, np.zeros(3), np.append(shape.normal, shape.offset)[None], everything
+    assert isinstance(shape, Hull | TriMesh)
     box = np.array([shape.vertices.min(axis=0), shape.vertices.max(axis=0)])
     return HULL, np.zeros(3), hull_planes(shape.vertices), box

@@ -134,7 +134,7 @@ def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
     slope = normal[0] * tx + normal[1] * ty + normal[2] * tz
     low, high, s = 0.0, 1.0, 0.5
     near = 1.0 if slope < 0.0 else 0.0
-    end = _depth_at(kind, size, planes, pose, R, segment, near, p, normal)
+    _depth_at(kind, size, planes, pose, R, segment, near, p, normal)
     end_slope = normal[0] * tx + normal[1] * ty + normal[2] * tz
     if slope * end_slope >= 0.0:
         # Downhill all the way: the lower end, or between it and the middle where the slope is slight.
@@ -222,10 +222,11 @@ def _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip):
 
 @inlined
 def _overlap(a, b):
-    for k in range(3):
-        if a[0, k] > b[1, k] or b[0, k] > a[1, k]:
-            return False
-    return True
+    return (
+        a[0, 0] <= b[1, 0] and b[0, 0] <= a[1, 0]
+        and a[0, 1] <= b[1, 1] and b[0, 1] <= a[1, 1]
+        and a[0, 2] <= b[1, 2] and b[0, 2] <= a[1, 2]
+    )  # fmt: skip
 
 
 @inlined
@@ -246,7 +247,8 @@ def _nearest(a, b):
         s = min(max((uv * vw - vv * uw) / determinant, 0.0), 1.0)
     else:
         at, bt = -uw / uu, (uv - uw) / uu
-        s = 0.5 * (min(max(min(at, bt), 0.0), 1.0) + min(max(max(at, bt), 0.0), 1.0))
+        at, bt = min(max(at, 0.0), 1.0), min(max(bt, 0.0), 1.0)
+        s = 0.5 * (at + bt)
     t = (uv * s + vw) / vv
     if t < 0.0:
         t = 0.0

@@ -51,7 +51,7 @@ class Joints(NamedTuple):
 class Touches(NamedTuple):
     """Contact points; element ``node[:, 0]`` is pushed along ``normal`` off the node ``node[:, 1]``."""
 
-    count: NDArray[np.int64]  # (1,), or more rows than it says  # type: ignore[assignment]
+    count: NDArray[np.int64]  # type: ignore[assignment]  # (1,)
     node: NDArray[np.int64]  # (C, 2)
     key: NDArray[np.int64]  # (C,) which part was touched; the same contact keeps its key
     local: Array  # (C, 2, 3) the point in I of both nodes

@@ -19,18 +19,11 @@ def _compose(pose, local, out_p, out_q, R):
 
 
 @kernel
-def place_node(nodes, i, pose, twist, inertial, R):
-    """Put node ``i`` to the inertial frame ``inertial`` (7,) of a body at ``pose`` (7,) moving with ``twist`` (6,)."""
-    _compose(pose, inertial, nodes.x[i], nodes.q[i], R)
-    for a in range(3):
-        nodes.v[i, a], nodes.w[i, a] = twist[a], twist[3 + a]
-
-
-@kernel
 def place_parts(begin, end, local, extent, pose, twist, dt, out_pose, out_box, out_sweep, R):
     """Pose, box and sweep of the parts ``begin`` … ``end`` of a body.
 
-    ``local`` (S, 7) are their poses in the body, ``extent`` (S, 2, 3) their boxes in their own frames.
+    ``pose`` is that of the body's inertial frame, ``local`` (S, 7) are those of the parts in it, and
+    ``extent`` (S, 2, 3) their boxes in their own frames.
     """
     for c in range(begin, end):
         out = out_pose[c]
@@ -63,3 +56,13 @@ def near_bodies(ranges, box, low, high, margin, near):
             if not apart:
                 near[b] = True
                 break
+
+
+@kernel
+def bounds(points, out):
+    """Corners ``out`` (2, 3) of the box around ``points`` (n, 3)."""
+    for a in range(3):
+        out[0, a], out[1, a] = points[0, a], points[0, a]
+        for i in range(1, points.shape[0]):
+            out[0, a] = min(out[0, a], points[i, a])
+            out[1, a] = max(out[1, a], points[i, a])

@@ -18,7 +18,7 @@ from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.contacts import detect
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
-from ligature.suture.placing import place_node
+from ligature.suture.placing import bounds
 from ligature.suture.reactions import bond, pull_of_elements, react
 from ligature.suture.tick import advance
 
@@ -109,7 +109,9 @@ class Rod:
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self._self_skip = int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._permanent = [self._grip_of(tie) for tie in others]
-        self._inertial = {p.body: matrix_pose7(p.T_body_inertial) for p in partners}
+        self._mobile = {p.body: p.mass > 0.0 for p in partners}
+        self._met: list[int] = []
+        self._corners = np.zeros((2, 3))
         self._T_inertial_body = np.array([inverse(T) for T in description.T_body_inertial])
         self.impulse = np.zeros((self._total, 6))
         self.tension = np.zeros(n)
@@ -234,21 +236,24 @@ class Rod:
 
     def box(self) -> Array:
         """Corners (2, 3) of a box around all centres of elements."""
-        return np.array([self.positions.min(axis=0), self.positions.max(axis=0)])
+        bounds(self.positions, self._corners)
+        return self._corners
 
     def place(self, body: int, pose: Array, twist: Array) -> None:
-        """Tell where a partner is, (7,), and how it moves, (6,), at the start of the tick."""
-        node = self.node_of[body]
-        place_node(self._nodes, node, pose, twist, self._inertial[body], self._work.three)
+        """Tell where a partner's inertial frame is, (7,), and how it moves, (6,), at the start of the tick."""
+        i, nodes = self.node_of[body], self._nodes
+        nodes.x[i], nodes.q[i], nodes.v[i], nodes.w[i] = pose[:3], pose[3:], twist[:3], twist[3:]
 
     def meet(self, colliders: Colliders, near: Sequence[int], bodies: Bodies) -> None:
         """Take the motion of the partners that matter in this tick: those near, tied or gripping."""
+        tied = {*(t.body for t in self.description.ties), *(g.body for g in self.grips)}
+        self._met = sorted({*near, *tied})
         self._shapes.node[:] = -1
         for body in near:
             self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
             self.place(body, *colliders.motion[body])
-        for body in {*(t.body for t in self.description.ties), *(g.body for g in self.grips)} - set(near):
-            self.place(body, bodies.pose7(body), bodies.twist6(body))
+        for body in sorted(tied.difference(near)):
+            self.place(body, *bodies.motion(body))
 
     def grip(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
         """Hold frame a of an element and frame b of a partner, (4, 4) in their frames B, together."""
@@ -256,7 +261,8 @@ class Rod:
             raise ValueError(f"rod '{self.description.name}' never meets body {body}: it has no collision shape")
         description = self.description
         T_a = inverse(description.T_body_inertial[element]) @ T_element_a
-        T_b = inverse(pose7_matrix(self._inertial[body])) @ T_body_b
+        partner = next(p for p in self.partners if p.body == body)
+        T_b = inverse(partner.T_body_inertial) @ T_body_b
         none = np.zeros(3)
         self.grips.append(self._grip_of(Tie(element, body, T_a, T_b, none, none, none, none, none)))
 
@@ -265,12 +271,9 @@ class Rod:
         self.grips = [g for g in self.grips if (g.element, g.body) != (element, body)]
 
     def pushes(self) -> list[tuple[int, Array]]:
-        """Partners that the last tick pushed, with the impulse and its moment (6,) about their centre."""
-        return [
-            (p.body, self.impulse[self.node_of[p.body]])
-            for p in self.partners
-            if p.mass > 0.0 and self.impulse[self.node_of[p.body]].any()
-        ]
+        """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
+        met = [(body, self.impulse[self.node_of[body]]) for body in self._met if self._mobile[body]]
+        return [(body, impulse) for body, impulse in met if impulse.any()]
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds what each partner receives."""
