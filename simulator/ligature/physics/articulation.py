@@ -173,11 +173,20 @@ def decay_rate(damping: float) -> float:
     return float(-np.log1p(-min(damping, 1.0 - 1e-9)))
 
 
+def is_alone(tree: Tree, bodies: tuple[Body, ...]) -> bool:
+    """Whether a tree is one moving body: its damping is applied exactly (`World`), not by Bullet.
+
+    Bullet's damping of multibodies has a quadratic part besides the linear one.
+    """
+    return len(tree.link_of) == 1 and not bodies[tree.root].static
+
+
 def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: tuple[Body, ...]) -> None:
     root = bodies[tree.root]
     members = [bodies[index] for index in tree.link_of if not bodies[index].static]
-    linear = max((decay_rate(b.linear_damping) for b in members), default=0.0)
-    angular = max((decay_rate(b.angular_damping) for b in members), default=0.0)
+    alone = len(tree.link_of) == 1
+    linear = 0.0 if alone else max((decay_rate(b.linear_damping) for b in members), default=0.0)
+    angular = 0.0 if alone else max((decay_rate(b.angular_damping) for b in members), default=0.0)
     pybullet.changeDynamics(tree.uid, -1, linearDamping=linear, angularDamping=angular, physicsClientId=client)
     for link, (mass, inertia) in enumerate(zip(plan.masses, plan.inertias, strict=True)):
         pybullet.changeDynamics(

@@ -69,6 +69,13 @@ class Placement:
         """Set the velocity of the base."""
         pybullet.resetBaseVelocity(self.uid, linear.tolist(), angular.tolist(), physicsClientId=self.client)
 
+    def slow_down(self, linear: float, angular: float) -> None:
+        """Multiply the velocity of the base by two factors."""
+        v, w = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
+        pybullet.resetBaseVelocity(
+            self.uid, [linear * c for c in v], [angular * c for c in w], physicsClientId=self.client
+        )
+
     def centre(self) -> Array:
         """Centre of mass (3,)."""
         if self.link < 0:

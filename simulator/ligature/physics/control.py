@@ -18,8 +18,8 @@ from ligature.physics.articulation import Tree
 
 Array = NDArray[np.float64]
 
-KICK_SECONDS = 0.005
-"""Time over which the derivative answers a jump of the target; one update of a usual AMBF session."""
+KICK_SECONDS = 0.01
+"""Time over which the derivative answers a jump of the target: two updates of a usual AMBF session."""
 
 FREE, FORCE, POSITION, VELOCITY = (
     -1,

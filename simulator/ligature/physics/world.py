@@ -19,7 +19,7 @@ from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import JointType, Scene
 from ligature.model.state import StateRecord
-from ligature.physics.articulation import Tree, build
+from ligature.physics.articulation import Tree, build, is_alone
 from ligature.physics.bodies import BodyControl, Placement
 from ligature.physics.closures import Closures
 from ligature.physics.control import TreeControl
@@ -27,7 +27,12 @@ from ligature.physics.queries import BulletQueries
 
 Array = NDArray[np.float64]
 
-SOLVER_ITERATIONS = 10
+SOLVER_ITERATIONS = 50
+"""With 10, a step on the base of an arm shakes its jaws by 0.06 rad; contacts at rest cost the same."""
+
+CLOSING = 0.8
+"""Part of a loop's gap that is closed within a tick; Bullet's 0.2 lets a swinging linkage open by 0.5 mm."""
+
 MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
 
@@ -47,7 +52,7 @@ class World(BulletQueries):
         self.client = pybullet.connect(pybullet.DIRECT)
         self._world_gravity = _common_gravity(scene)
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS,
+            fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS, erp=CLOSING,
             deterministicOverlappingPairs=1, physicsClientId=self.client,
         )  # fmt: skip
         pybullet.setGravity(*self._world_gravity.tolist(), physicsClientId=self.client)
@@ -63,6 +68,7 @@ class World(BulletQueries):
             self._tree_of_joint.update(dict.fromkeys(control.row, control))
         self._body_controls: dict[int, BodyControl] = {}
         self._uplifted = self._gravity_corrections()
+        self._damped = self._damping_factors()
         self._silence_pairs()
         self._closures = Closures(self.client, scene, self.place_of, self.report)
         self._feedback_setup()
@@ -104,6 +110,8 @@ class World(BulletQueries):
             if control.active:
                 control.read()
                 control.apply()
+        for place, linear, angular in self._damped:
+            place.slow_down(linear, angular)
         for place, force in self._uplifted:
             place.push(force)
         for control_ in self._body_controls.values():
@@ -286,6 +294,17 @@ class World(BulletQueries):
             if np.any(force):
                 corrections.append((place, force))
         return corrections
+
+    def _damping_factors(self) -> list[tuple[Placement, float, float]]:
+        """Lone bodies with the factors of a tick on their linear and angular velocity (§12.1)."""
+        factors = []
+        for tree in self.trees:
+            if is_alone(tree, self.scene.bodies):
+                body = self.scene.bodies[tree.root]
+                linear, angular = (1 - body.linear_damping) ** self.dt, (1 - body.angular_damping) ** self.dt
+                if linear < 1.0 or angular < 1.0:
+                    factors.append((self.place_of[tree.root], linear, angular))
+        return factors
 
     def _silence_pairs(self) -> None:
         for body, place in self.place_of.items():

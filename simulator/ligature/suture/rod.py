@@ -72,6 +72,13 @@ class Rod:
         Their convex parts, from `Colliders`; None for a rod that touches nothing but itself.
     dt
         Length of a tick in seconds.
+
+    Attributes
+    ----------
+    joints
+        The joints of the chain with their springs, angles and loads, those of the end ties included.
+    tension
+        (n,) pull along each element in newtons at the last tick.
     """
 
     def __init__(
@@ -98,7 +105,7 @@ class Rod:
         rest = [partner for partner in partners if partner.body not in ends]
         self.node_of = {**ends, **{p.body: self._chain + k for k, p in enumerate(rest)}}
         self._total = self._chain + len(rest)
-        self._joints = _joints(description, head, tail)
+        self.joints = _joints(description, head, tail)
         self._nodes = self._new_nodes()
         self._shapes = shapes or _no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
@@ -160,7 +167,7 @@ class Rod:
         poses = np.array([matrix_pose7(T) for T in self.description.T_world_inertial])
         self._nodes.x[self._own], self._nodes.q[self._own] = poses[:, :3], poses[:, 3:]
         self._nodes.v[:], self._nodes.w[:] = 0.0, 0.0
-        self._joints.load[:], self._joints.angle[:] = 0.0, 0.0
+        self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
         self.grips = []
         self.tension[:], self.impulse[:] = 0.0, 0.0
         for touches in self._touches:
@@ -168,7 +175,7 @@ class Rod:
 
     def memory(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick."""
-        nodes, joints, touches = self._nodes, self._joints, self._touches[0]
+        nodes, joints, touches = self._nodes, self.joints, self._touches[0]
         kept = {name: getattr(nodes, name).copy() for name in ("x", "q", "v", "w")}
         kept |= {"angle": joints.angle.copy(), "load": joints.load.copy(), "tension": self.tension.copy()}
         n = int(touches.count[0])
@@ -180,7 +187,7 @@ class Rod:
         """Continue from `memory`."""
         for name in ("x", "q", "v", "w"):
             getattr(self._nodes, name)[:] = memory[name]
-        self._joints.angle[:], self._joints.load[:] = memory["angle"], memory["load"]
+        self.joints.angle[:], self.joints.load[:] = memory["angle"], memory["load"]
         self.tension[:] = memory["tension"]
         touches = self._touches[0]
         n = len(memory["touch_key"])
@@ -284,10 +291,10 @@ class Rod:
         n = len(self.tension)
         detect(self._first, n, self._nodes, self._shapes, old, new, self._work, self._counts,
                self._self_skip, self.dt)  # fmt: skip
-        self.newton_steps = advance(self._chain, self._total, self._nodes, self._joints, new, self._work,
+        self.newton_steps = advance(self._chain, self._total, self._nodes, self.joints, new, self._work,
                                     self._stiffness, self.dt)  # fmt: skip
-        react(self._chain, self._total, self._nodes, self._joints, new, self._work, self.impulse, self.dt)
-        pull_of_elements(self._first, self._chain, self._joints, self._work, self.tension, self.dt)
+        react(self._chain, self._total, self._nodes, self.joints, new, self._work, self.impulse, self.dt)
+        pull_of_elements(self._first, self._chain, self.joints, self._work, self.tension, self.dt)
         self._touches = new, old
 
     def impulse_on(self, body: int) -> Array:

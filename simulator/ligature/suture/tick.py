@@ -36,7 +36,7 @@ def predict(n, total, nodes, work, dt):
         for a in range(3):
             work.x[i, a] = nodes.x[i, a]
             if not nodes.fixed[i]:
-                nodes.v[i, a] = (nodes.v[i, a] + dt * nodes.gravity[i, a]) * nodes.keep[i, 0]
+                nodes.v[i, a] = nodes.v[i, a] * nodes.keep[i, 0] + dt * nodes.gravity[i, a]
                 nodes.w[i, a] *= nodes.keep[i, 1]
             nodes.x[i, a] += dt * nodes.v[i, a]
             work.xp[i, a] = nodes.x[i, a]
