@@ -129,6 +129,17 @@ def body(name: str, T_world_body: Matrix, mass: float, shapes: list[dict[str, An
     return block
 
 
+def structure(shapes: list[dict[str, Any]], T_link_base: Matrix) -> dict[str, Any]:
+    """Looks given in the base frame, and an inertia: the mechanism above the tool touches nothing."""
+    placed = []
+    for item in shapes:
+        position = [item["offset"]["position"][axis] for axis in "xyz"]
+        T = T_link_base @ pose_matrix(position, (0, 0, 0))
+        placed.append({**item, "offset": pose(T)})
+    inertia = {"ix": 0.02, "iy": 0.02, "iz": 0.02}
+    return {"compound shape": placed, "compound collision shape": None, "inertia": inertia}
+
+
 def psm(name: str) -> dict[str, Any]:
     """One arm: base, six joints of the instrument, two jaws and the body that names the tool."""
     T_world_base = pose_matrix(*BASE_POSES[name])
@@ -144,8 +155,8 @@ def psm(name: str) -> dict[str, Any]:
     T_6_yaw = dh(-HALF_PI, 0, 0, HALF_PI) @ pose_matrix((0, 0, 0), (-HALF_PI, 0, -HALF_PI))
     shapes = {
         "base link": ([shape("CONE", (0, 0, 0.03), axis="Z", radius=0.008, height=0.02)], 0.0, white),
-        "yaw link": ([shape("BOX", (0.0, 0.0, 0.30), x=0.03, y=0.05, z=0.03)], 2.0, white),
-        "pitch end link": ([shape("BOX", (0.0, 0.06, -0.28), x=0.03, y=0.03, z=0.3)], 2.0, white),
+        "yaw link": ([shape("BOX", (0, 0, 0.38), x=0.05, y=0.05, z=0.06)], 2.0, white),
+        "pitch end link": ([shape("BOX", (0, 0.05, 0.3), x=0.04, y=0.03, z=0.5)], 2.0, white),
         "main insertion link": ([shape("BOX", (0, 0, -0.03), x=0.06, y=0.05, z=0.05)], 1.0, white),
         "tool roll link": (
             [shape("CYLINDER", (0, 0, -0.2), axis="Z", radius=0.00425, height=0.4)],
@@ -164,6 +175,7 @@ def psm(name: str) -> dict[str, Any]:
         "tool roll link": [4], "tool pitch link": [5], "tool yaw link": [6],
     }  # fmt: skip
     published = ("base link", "tool pitch link", "tool yaw link")
+    frames_of_looks = ("yaw link", "pitch end link")
     bodies: dict[str, Any] = {}
     joints: dict[str, Any] = {}
 
@@ -189,6 +201,9 @@ def psm(name: str) -> dict[str, Any]:
         T_link_body = T_6_yaw if link == "tool yaw link" else np.eye(4)
         links, mass, look = shapes[link]
         add_body(link, T_world_link @ T_link_body, links, mass, look)
+        if link in frames_of_looks:
+            T_link_base = np.linalg.inv(T_world_link) @ T_world_base
+            bodies[f"BODY {link}"].update(structure(links, T_link_base))
         keys: dict[str, Any] = {
             "controller output type": "VELOCITY",
             "enable feedback": True,
@@ -229,6 +244,9 @@ def psm(name: str) -> dict[str, Any]:
                 "passive": False,
             },
         )  # fmt: skip
+    for block in bodies.values():
+        if "compound collision shape" in block and block["compound collision shape"] is None:
+            del block["compound collision shape"]
     bodies["BODY tool id"] = {
         "name": f"tool_id_{TOOL_ID}",
         "mesh": "",

@@ -19,9 +19,7 @@ def test_ring_twisted_slowly_leaves_its_plane_at_michells_twist(kit):
     the critical twist is 2 pi sqrt(3) times the ratio of bending to twisting stiffness.
     """
     n, radius, poisson = 60, 0.02, 0.4
-    description = kit.from_material(
-        _ring(n, radius), 1e-3, 1e8, 1100.0, gravity=(0, 0, 0), poisson_ratio=poisson
-    )
+    description = kit.from_material(_ring(n, radius), 1e-3, 1e8, 1100.0, gravity=(0, 0, 0), poisson_ratio=poisson)
     rod = kit.Bench([]).add(kit.damped(description, 1 - 1e-6))
     rod.hold_element(0)
     rod.hold_element(n - 1)

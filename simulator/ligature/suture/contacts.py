@@ -183,6 +183,7 @@ def _record(first, nodes, new, work, e, k, key, s, d, nx, ny, nz, friction, dt):
     new.bond[c] = False
     new.press[c] = 0.0
     new.closed[c] = False
+    new.stuck[c] = True
     for a in range(3):
         new.slip[c, a] = 0.0
 
@@ -331,3 +332,4 @@ def _remember(old, new, bonds):
             new.slip[c, a] = slip[a] - along * n[a]
         new.press[c] = old.press[o]
         new.closed[c] = old.closed[o]
+        new.stuck[c] = old.stuck[o]

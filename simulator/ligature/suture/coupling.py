@@ -1,9 +1,11 @@
 """Contact points and Coulomb friction inside the implicit solve, between elements, and with bodies.
 
-A contact is a stiff spring along its normal and a bristle across it (an elastic stick up to the
-friction limit, then slip), both evaluated at the end of the tick. What each contact does to its two
-nodes apart goes into their matrices; what ties the nodes together is solved by conjugate gradients,
-with the chain's direct solver as preconditioner, to rounding. World axes, SI units.
+A contact is a stiff spring along its normal and a bristle across it: elastic while it sticks, of
+constant force against the motion while it slips, all evaluated at the end of the tick. Which contacts
+touch and which stick is found by repetition (an active-set Newton method), starting from the last
+tick. What each contact does to its two nodes apart goes into their matrices; what ties the nodes
+together is solved by conjugate gradients, with the chain's direct solver as preconditioner, to
+rounding. World axes, SI units; `Touches.drag` and the matrices K are times dt².
 """
 
 from __future__ import annotations
@@ -15,6 +17,12 @@ from ligature.suture.compiled import inlined, kernel
 from ligature.suture.rotations import cross, matrix_of, rotate
 
 MAX_CG = 40
+STICTION = 1.001
+"""Force, over the friction limit, at which a contact that stuck starts to slip."""
+
+PRESSURE = 0.1
+"""Change of the normal force, as a share of it, that a solve with the old friction limit may leave."""
+
 CG_TOLERANCE = 1e-12
 """Residual energy, relative to the first, at which the coupling is solved."""
 
@@ -91,13 +99,16 @@ def _push(g, sign, fx, fy, fz, rx, ry, rz):
 
 
 @inlined
-def _bristle(touches, c, wx, wy, wz, stiffness):
-    """Secant stiffness of the friction of contact ``c``: elastic below the limit, constant force above."""
-    limit = touches.friction[c] * touches.press[c]
+def _friction(touches, c, wx, wy, wz, scale, dt):
+    """Stiffness of the bristle of contact ``c`` across its motion and along it, and its force (3)."""
+    if touches.stuck[c]:
+        return scale, scale, -scale * wx, -scale * wy, -scale * wz
+    limit = touches.friction[c] * touches.press[c] * dt * dt
     size = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if size * stiffness > limit:
-        return limit / size
-    return stiffness
+    if size * scale <= limit:
+        return scale, scale, -scale * wx, -scale * wy, -scale * wz
+    s = limit / size
+    return s, 0.0, -s * wx, -s * wy, -s * wz
 
 
 @kernel
@@ -116,16 +127,23 @@ def add_contacts(nodes, touches, work, stiffness, dt):
         gap, wx, wy, wz, ax, ay, az, bx, by, bz = _opening(nodes, work, touches, c)
         n = touches.normal[c]
         if touches.bond[c]:
-            wx, wy, wz = wx + gap * n[0], wy + gap * n[1], wz + gap * n[2]
-            kt, press = scale, 0.0
+            fx, fy, fz = -scale * (wx + gap * n[0]), -scale * (wy + gap * n[1]), -scale * (wz + gap * n[2])
+            for a in range(3):
+                K[a, a] = scale
         else:
-            kt = _bristle(touches, c, wx, wy, wz, stiffness) * dt * dt
+            across, along, fx, fy, fz = _friction(touches, c, wx, wy, wz, scale, dt)
+            size = wx * wx + wy * wy + wz * wz
+            turn = (along - across) / size if size > 0.0 else 0.0
+            for a in range(3):
+                wa = wx if a == 0 else (wy if a == 1 else wz)
+                for b in range(3):
+                    wb = wx if b == 0 else (wy if b == 1 else wz)
+                    K[a, b] = (scale - across) * n[a] * n[b] + turn * wa * wb
+                K[a, a] += across
             press = scale * (touches.target[c] - gap)
-        for a in range(3):
-            for b in range(3):
-                K[a, b] = (scale - kt) * n[a] * n[b]
-            K[a, a] += kt
-        fx, fy, fz = press * n[0] - kt * wx, press * n[1] - kt * wy, press * n[2] - kt * wz
+            touches.drag[c, 0], touches.drag[c, 1], touches.drag[c, 2] = fx, fy, fz
+            touches.begun[c, 0], touches.begun[c, 1], touches.begun[c, 2] = wx, wy, wz
+            fx, fy, fz = fx + press * n[0], fy + press * n[1], fz + press * n[2]
         if not nodes.fixed[i]:
             _add_spring(K, ax, ay, az, work.H[i])
             _push(work.g[i], 1.0, fx, fy, fz, ax, ay, az)
@@ -252,58 +270,79 @@ def couple(n, total, nodes, touches, work):
 
 
 @kernel
-def settle_contacts(total, nodes, touches, work, stiffness):
-    """Open and close contacts by where the nodes now are; returns whether the tick must be solved again."""
+def settle_contacts(total, nodes, touches, work, stiffness, dt):
+    """Forces of the contacts as solved, and which of them now touch and stick; True if that changed."""
     changed = False
     if touches.count[0] == 0:
         return changed
     for i in range(total):
         matrix_of(nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3], work.R[i])
+    per_dt2 = 1.0 / (dt * dt)
     for c in range(touches.count[0]):
-        if touches.bond[c]:
-            continue
         gap, wx, wy, wz, _ax, _ay, _az, _bx, _by, _bz = _opening(nodes, work, touches, c)
+        n, force = touches.normal[c], touches.force[c]
         depth = touches.target[c] - gap
-        size = math.sqrt(wx * wx + wy * wy + wz * wz)
-        if touches.closed[c]:
-            grip = _bristle(touches, c, wx, wy, wz, stiffness) * size
-            press = stiffness * max(depth, 0.0)
-            changed = changed or depth < 0.0 or grip > 1.2 * touches.friction[c] * press
-            touches.press[c] = press
-            touches.closed[c] = depth >= 0.0
-        elif depth > 0.0:
-            touches.closed[c] = True
-            touches.press[c] = 0.0
-            changed = True
-    return changed
-
-
-@kernel
-def conclude_contacts(nodes, touches, work, stiffness, dt):
-    """Contact forces of the tick, and the slip that the next tick's friction starts from."""
-    for c in range(touches.count[0]):
-        n, K = touches.normal[c], work.K[c]
-        if not touches.closed[c]:
-            touches.press[c] = 0.0
-            for a in range(3):
-                touches.force[c, a] = 0.0
-                touches.slip[c, a] = 0.0
-            continue
-        gap, wx, wy, wz, _ax, _ay, _az, _bx, _by, _bz = _opening(nodes, work, touches, c)
         if touches.bond[c]:
             for a in range(3):
                 w = wx if a == 0 else (wy if a == 1 else wz)
-                touches.force[c, a] = -stiffness * (w + gap * n[a])
+                force[a] = -stiffness * (w + gap * n[a])
             continue
-        fx, fy, fz = rotate(K, wx, wy, wz)
-        press = touches.press[c]
-        per_dt2 = 1.0 / (dt * dt)
-        touches.force[c, 0] = press * n[0] - per_dt2 * fx
-        touches.force[c, 1] = press * n[1] - per_dt2 * fy
-        touches.force[c, 2] = press * n[2] - per_dt2 * fz
+        if not touches.closed[c]:
+            for a in range(3):
+                force[a] = 0.0
+            if depth > 0.0:
+                touches.closed[c] = True
+                touches.press[c] = stiffness * depth
+                changed = True
+            continue
+        begun, drag = touches.begun[c], touches.drag[c]
+        kx, ky, kz = rotate(work.K[c], wx - begun[0], wy - begun[1], wz - begun[2])
+        force[0] = stiffness * depth * n[0] + per_dt2 * (drag[0] - kx)
+        force[1] = stiffness * depth * n[1] + per_dt2 * (drag[1] - ky)
+        force[2] = stiffness * depth * n[2] + per_dt2 * (drag[2] - kz)
+        if depth < 0.0:
+            touches.closed[c] = False
+            touches.press[c] = 0.0
+            changed = True
+            continue
+        changed = _settle_friction(touches, c, wx, wy, wz, stiffness * depth, stiffness) or changed
+    return changed
+
+
+@inlined
+def _settle_friction(touches, c, wx, wy, wz, press, stiffness):
+    """Whether contact ``c`` sticks or slips after a solve; True if the solve assumed otherwise."""
+    limit = touches.friction[c] * press
+    before = touches.friction[c] * touches.press[c]
+    touches.press[c] = press
+    size = math.sqrt(wx * wx + wy * wy + wz * wz)
+    if touches.stuck[c]:
+        if size * stiffness <= limit * STICTION:
+            return False
+        touches.stuck[c] = False
+        return True
+    begun = touches.begun[c]
+    first = math.sqrt(begun[0] ** 2 + begun[1] ** 2 + begun[2] ** 2)
+    onward = (begun[0] * wx + begun[1] * wy + begun[2] * wz) / first if first > 0.0 else 0.0
+    if onward * stiffness < limit:
+        touches.stuck[c] = True
+        return True
+    return onward < 0.98 * size or abs(limit - before) > PRESSURE * limit
+
+
+@kernel
+def conclude_contacts(touches, nodes, work, stiffness):
+    """The slip that the next tick's friction starts from."""
+    for c in range(touches.count[0]):
+        slip = touches.slip[c]
+        if not touches.closed[c] or touches.bond[c]:
+            touches.press[c] = 0.0
+            touches.stuck[c] = True
+            for a in range(3):
+                slip[a] = 0.0
+            continue
+        _gap, wx, wy, wz, _ax, _ay, _az, _bx, _by, _bz = _opening(nodes, work, touches, c)
         size = math.sqrt(wx * wx + wy * wy + wz * wz)
-        limit = touches.friction[c] * press / stiffness
+        limit = touches.friction[c] * touches.press[c] / stiffness
         scale = limit / size if size > limit else 1.0
-        touches.slip[c, 0] = scale * wx
-        touches.slip[c, 1] = scale * wy
-        touches.slip[c, 2] = scale * wz
+        slip[0], slip[1], slip[2] = scale * wx, scale * wy, scale * wz

@@ -63,6 +63,9 @@ class Touches(NamedTuple):
     slip: Array  # (C, 3) tangential displacement that friction resists
     press: Array  # (C,) normal force, N
     closed: NDArray[np.bool_]  # (C,)
+    stuck: NDArray[np.bool_]  # (C,) friction holds, or else slips
+    begun: Array  # (C, 3) slip at which the last solve began
+    drag: Array  # (C, 3) friction force there, times dt²
     bond: NDArray[np.bool_]  # (C,) holds the points together in every direction, whatever the gap
     force: Array  # (C, 3) on the element, N
 
@@ -132,5 +135,5 @@ def touches(contacts: int) -> Touches:
         np.zeros(1, np.int64), np.zeros((contacts, 2), np.int64), np.zeros(contacts, np.int64),
         z((contacts, 2, 3)), z((contacts, 2, 3)), z((contacts, 3)), z(contacts), z(contacts),
         z(contacts), z((contacts, 3)), z(contacts), np.zeros(contacts, np.bool_),
-        np.zeros(contacts, np.bool_), z((contacts, 3)),
+        np.zeros(contacts, np.bool_), z((contacts, 3)), z((contacts, 3)), np.zeros(contacts, np.bool_), z((contacts, 3)),
     )  # fmt: skip

@@ -227,6 +227,10 @@ class Rod:
         """Make an element move with its present velocity, whatever pulls at it, or free it again."""
         self._nodes.fixed[self._first + element] = held
 
+    def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
+        """Let an element fall with ``acceleration`` (3,) from now on."""
+        self._nodes.gravity[self._first + element] = acceleration
+
     @property
     def body_poses(self) -> Array:
         """Poses (n, 7) of the elements' body frames."""
@@ -302,7 +306,7 @@ class Rod:
         return self.impulse[self.node_of[body]]
 
 
-TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "bond", "normal", "force", "start")
+TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "stuck", "bond", "normal", "force", "start")
 
 
 def _ends(description: RodDescription) -> tuple[Tie | None, Tie | None, list[Tie]]:

@@ -230,9 +230,9 @@ def advance(n, total, nodes, joints, touches, work, stiffness, dt):
         for j in range(n - 1):
             for a in range(6):
                 joints.load[j, a] = work.load[j, a]
-        changed = settle_contacts(total, nodes, touches, work, stiffness)
+        changed = settle_contacts(total, nodes, touches, work, stiffness, dt)
         if largest < LARGE_TURN and not changed:
             break
-    conclude_contacts(nodes, touches, work, stiffness, dt)
+    conclude_contacts(touches, nodes, work, stiffness)
     finish(n, total, nodes, joints, work, dt)
     return steps

@@ -1,0 +1,192 @@
+"""A ROS master of our own on a free port, and simulators started on it as a user would."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
+BIN = Path(sys.executable).parent
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Program:
+    """A running command with its output; ended by its own process id."""
+
+    def __init__(self, command: Sequence[str], env: dict[str, str]) -> None:
+        self.lines: list[str] = []
+        self.process = subprocess.Popen(
+            [str(word) for word in command], env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))
+
+    @property
+    def output(self) -> str:
+        return "\n".join(self.lines)
+
+    def wait_for(self, text: str, seconds: float = 60.0) -> None:
+        """Wait until a line holds ``text``."""
+        deadline = time.monotonic() + seconds
+        while not any(text in line for line in self.lines):
+            assert time.monotonic() < deadline, f"no '{text}' within {seconds} s in:\n{self.output}"
+            assert self.process.poll() is None, f"ended with {self.process.poll()}:\n{self.output}"
+            time.sleep(0.02)
+
+    def children(self) -> dict[str, int]:
+        """Process ids of the simulator's processes by module name."""
+        found = {}
+        listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+        for line in listing.splitlines()[1:]:
+            pid, parent, args = line.split(None, 2)
+            if int(parent) == self.process.pid:
+                for name in ("ligature.cli.physics", "ligature.cli.ros_process", "rosmaster"):
+                    if name in args:
+                        found[name.rpartition(".")[2]] = int(pid)
+        return found
+
+    def end(self, patience: float = 5.0) -> int:
+        """Ctrl-C; returns the exit status."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(patience)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+
+
+@pytest.fixture(scope="session")
+def ros_env() -> Iterator[dict[str, str]]:
+    """Environment of a ROS master that lives for the whole test session; also set for this process."""
+    port = free_port()
+    env = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
+    env["PYTHONPATH"] = os.pathsep.join([str(ROOT / "build" / "python"), env.get("PYTHONPATH", "")])
+    os.environ["ROS_MASTER_URI"], os.environ["ROS_IP"] = env["ROS_MASTER_URI"], env["ROS_IP"]
+    master = start_master(port, env)
+    yield env
+    master.terminate()
+    master.wait()
+
+
+def start_master(port: int, env: dict[str, str]) -> subprocess.Popen[bytes]:
+    """A ROS master on ``port``, answering."""
+    from ligature.cli.supervisor import master_answers
+
+    master = subprocess.Popen(
+        ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(port)], env=env,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    deadline = time.monotonic() + 20
+    while not master_answers(f"http://127.0.0.1:{port}"):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return master
+
+
+@pytest.fixture(scope="session")
+def node(ros_env: dict[str, str]) -> Any:
+    """This process as a ROS node; the module rospy."""
+    import rospy
+
+    rospy.init_node("ligature_tests", disable_signals=True, anonymous=True)
+    return rospy
+
+
+@pytest.fixture(scope="module")
+def start(ros_env: dict[str, str]) -> Iterator[Callable[..., Program]]:
+    """Starts commands; all of them have ended when the module is done."""
+    programs: list[Program] = []
+
+    def run(*command: object, env: dict[str, str] | None = None) -> Program:
+        programs.append(Program([str(word) for word in command], env or ros_env))
+        return programs[-1]
+
+    yield run
+    for program in programs:
+        program.end()
+
+
+class Listener:
+    """Collects the messages of one topic with their arrival times."""
+
+    def __init__(self, rospy: Any, topic: str, type_: Any) -> None:
+        self.messages: list[Any] = []
+        self.times: list[float] = []
+        self._subscriber = rospy.Subscriber(topic, type_, self._take, queue_size=1000, tcp_nodelay=True)
+
+    def _take(self, message: Any) -> None:
+        self.times.append(time.monotonic())
+        self.messages.append(message)
+
+    def wait(self, condition: Callable[[Any], bool] = lambda _: True, seconds: float = 10.0) -> Any:
+        """The newest message once it satisfies ``condition``."""
+        deadline = time.monotonic() + seconds
+        while not (self.messages and condition(self.messages[-1])):
+            assert time.monotonic() < deadline, f"last message: {self.messages[-1:]}"
+            time.sleep(0.005)
+        return self.messages[-1]
+
+    def rate(self, seconds: float) -> float:
+        """Messages a second over the coming ``seconds``."""
+        before, start = len(self.messages), time.monotonic()
+        time.sleep(seconds)
+        return (len(self.messages) - before) / (time.monotonic() - start)
+
+    def close(self) -> None:
+        self._subscriber.unregister()
+
+
+@pytest.fixture
+def listen(node: Any) -> Iterator[Callable[..., Listener]]:
+    """Makes listeners that end with the test."""
+    listeners: list[Listener] = []
+
+    def make(topic: str, type_: Any) -> Listener:
+        listeners.append(Listener(node, topic, type_))
+        return listeners[-1]
+
+    yield make
+    for listener in listeners:
+        listener.close()
+
+
+@pytest.fixture
+def publish(node: Any) -> Iterator[Callable[..., Any]]:
+    """Makes publishers that are connected to the simulator."""
+    publishers: list[Any] = []
+
+    def make(topic: str, type_: Any) -> Any:
+        publisher = node.Publisher(topic, type_, queue_size=1000, tcp_nodelay=True)
+        publishers.append(publisher)
+        deadline = time.monotonic() + 10
+        while publisher.get_num_connections() == 0:
+            assert time.monotonic() < deadline, f"nobody subscribes to {topic}"
+            time.sleep(0.01)
+        return publisher
+
+    yield make
+    for publisher in publishers:
+        publisher.unregister()
