@@ -11,6 +11,7 @@ import math
 
 from ligature.mesh.distance import signed_distance
 from ligature.suture.compiled import inlined, kernel
+from ligature.suture.coupling import SLIPS
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
 
 SLACK = 0.5
@@ -183,7 +184,7 @@ def _record(first, nodes, new, work, e, k, key, s, d, nx, ny, nz, friction, dt):
     new.bond[c] = False
     new.press[c] = 0.0
     new.closed[c] = False
-    new.stuck[c] = True
+    new.mode[c], new.switches[c] = SLIPS, 0
     for a in range(3):
         new.slip[c, a] = 0.0
 
@@ -332,4 +333,4 @@ def _remember(old, new, bonds):
             new.slip[c, a] = slip[a] - along * n[a]
         new.press[c] = old.press[o]
         new.closed[c] = old.closed[o]
-        new.stuck[c] = old.stuck[o]
+        new.mode[c] = old.mode[o]

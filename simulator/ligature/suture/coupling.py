@@ -5,7 +5,7 @@ constant force against the motion while it slips, all evaluated at the end of th
 touch and which stick is found by repetition (an active-set Newton method), starting from the last
 tick. What each contact does to its two nodes apart goes into their matrices; what ties the nodes
 together is solved by conjugate gradients, with the chain's direct solver as preconditioner, to
-rounding. World axes, SI units; `Touches.drag` and the matrices K are times dt².
+rounding. World axes, SI units; `Touches.push` and the matrices K are times dt².
 """
 
 from __future__ import annotations
@@ -14,9 +14,15 @@ import math
 
 from ligature.suture.chain import invert_spd6, solve
 from ligature.suture.compiled import inlined, kernel
-from ligature.suture.rotations import cross, matrix_of, rotate
+from ligature.suture.rotations import cross, rotate
 
 MAX_CG = 40
+SLIPS, STICKS, YIELDS = 0, 1, 2
+"""How a contact's friction enters a solve: a constant force, a spring, a spring as stiff as the limit allows."""
+
+MAX_SWITCHES = 3
+"""Switches between stick and slip after which a contact yields for the rest of the tick."""
+
 STICTION = 1.001
 """Force, over the friction limit, at which a contact that stuck starts to slip."""
 
@@ -100,15 +106,13 @@ def _push(g, sign, fx, fy, fz, rx, ry, rz):
 
 @inlined
 def _friction(touches, c, wx, wy, wz, scale, dt):
-    """Stiffness of the bristle of contact ``c`` across its motion and along it, and its force (3)."""
-    if touches.stuck[c]:
-        return scale, scale, -scale * wx, -scale * wy, -scale * wz
+    """Stiffness of the bristle of contact ``c`` across its motion and along it, and the factor of its force."""
     limit = touches.friction[c] * touches.press[c] * dt * dt
     size = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if size * scale <= limit:
-        return scale, scale, -scale * wx, -scale * wy, -scale * wz
+    if touches.mode[c] == STICKS or size * scale <= limit:
+        return scale, scale, scale
     s = limit / size
-    return s, 0.0, -s * wx, -s * wy, -s * wz
+    return s, (s if touches.mode[c] == YIELDS else 0.0), s
 
 
 @kernel
@@ -117,39 +121,33 @@ def add_contacts(nodes, touches, work, stiffness, dt):
     coupled = False
     scale = stiffness * dt * dt
     for c in range(touches.count[0]):
-        K = work.K[c]
+        K, f, begun, n = work.K[c], touches.push[c], touches.begun[c], touches.normal[c]
+        gap, wx, wy, wz, ax, ay, az, bx, by, bz = _opening(nodes, work, touches, c)
+        begun[0], begun[1], begun[2] = wx, wy, wz
+        room = gap - touches.target[c]
+        touches.room[c] = room
+        across, along, s, normal = 0.0, 0.0, 0.0, 0.0
+        if touches.bond[c]:
+            across, along, s, normal, room = scale, scale, scale, scale, gap
+        elif touches.closed[c]:
+            across, along, s = _friction(touches, c, wx, wy, wz, scale, dt)
+            normal = scale
+        size = wx * wx + wy * wy + wz * wz
+        turn = (along - across) / size if size > 0.0 else 0.0
         for a in range(3):
             for b in range(3):
-                K[a, b] = 0.0
+                K[a, b] = (normal - across) * n[a] * n[b] + turn * begun[a] * begun[b]
+            K[a, a] += across
+            f[a] = -normal * room * n[a] - s * begun[a]
         if not touches.closed[c]:
             continue
         i, k = touches.node[c, 0], touches.node[c, 1]
-        gap, wx, wy, wz, ax, ay, az, bx, by, bz = _opening(nodes, work, touches, c)
-        n = touches.normal[c]
-        if touches.bond[c]:
-            fx, fy, fz = -scale * (wx + gap * n[0]), -scale * (wy + gap * n[1]), -scale * (wz + gap * n[2])
-            for a in range(3):
-                K[a, a] = scale
-        else:
-            across, along, fx, fy, fz = _friction(touches, c, wx, wy, wz, scale, dt)
-            size = wx * wx + wy * wy + wz * wz
-            turn = (along - across) / size if size > 0.0 else 0.0
-            for a in range(3):
-                wa = wx if a == 0 else (wy if a == 1 else wz)
-                for b in range(3):
-                    wb = wx if b == 0 else (wy if b == 1 else wz)
-                    K[a, b] = (scale - across) * n[a] * n[b] + turn * wa * wb
-                K[a, a] += across
-            press = scale * (touches.target[c] - gap)
-            touches.drag[c, 0], touches.drag[c, 1], touches.drag[c, 2] = fx, fy, fz
-            touches.begun[c, 0], touches.begun[c, 1], touches.begun[c, 2] = wx, wy, wz
-            fx, fy, fz = fx + press * n[0], fy + press * n[1], fz + press * n[2]
         if not nodes.fixed[i]:
             _add_spring(K, ax, ay, az, work.H[i])
-            _push(work.g[i], 1.0, fx, fy, fz, ax, ay, az)
+            _push(work.g[i], 1.0, f[0], f[1], f[2], ax, ay, az)
         if not nodes.fixed[k]:
             _add_spring(K, bx, by, bz, work.H[k])
-            _push(work.g[k], -1.0, fx, fy, fz, bx, by, bz)
+            _push(work.g[k], -1.0, f[0], f[1], f[2], bx, by, bz)
             coupled = coupled or not nodes.fixed[i]
     return coupled
 
@@ -269,80 +267,93 @@ def couple(n, total, nodes, touches, work):
     return iterations
 
 
+@inlined
+def _moved(nodes, work, touches, c, side):
+    """Displacement of the point of contact ``c`` on a node by the solved correction."""
+    i = touches.node[c, side]
+    if nodes.fixed[i]:
+        return 0.0, 0.0, 0.0
+    d, p = work.d[i], touches.local[c, side]
+    rx, ry, rz = rotate(work.R[i], p[0], p[1], p[2])
+    ux, uy, uz = cross(d[3], d[4], d[5], rx, ry, rz)
+    return d[0] + ux, d[1] + uy, d[2] + uz
+
+
 @kernel
-def settle_contacts(total, nodes, touches, work, stiffness, dt):
-    """Forces of the contacts as solved, and which of them now touch and stick; True if that changed."""
+def settle_contacts(nodes, touches, work, stiffness, dt, last):
+    """Forces of the contacts as solved, and which of them touch and stick; True if the solve assumed otherwise.
+
+    The ``last`` solve of a tick decides nothing any more.
+    """
     changed = False
-    if touches.count[0] == 0:
-        return changed
-    for i in range(total):
-        matrix_of(nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3], work.R[i])
     per_dt2 = 1.0 / (dt * dt)
     for c in range(touches.count[0]):
-        gap, wx, wy, wz, _ax, _ay, _az, _bx, _by, _bz = _opening(nodes, work, touches, c)
-        n, force = touches.normal[c], touches.force[c]
-        depth = touches.target[c] - gap
+        n, force, w, f = touches.normal[c], touches.force[c], touches.ended[c], touches.push[c]
+        ax, ay, az = _moved(nodes, work, touches, c, 0)
+        bx, by, bz = _moved(nodes, work, touches, c, 1)
+        ux, uy, uz = ax - bx, ay - by, az - bz
+        kx, ky, kz = rotate(work.K[c], ux, uy, uz)
+        force[0], force[1], force[2] = per_dt2 * (f[0] - kx), per_dt2 * (f[1] - ky), per_dt2 * (f[2] - kz)
         if touches.bond[c]:
-            for a in range(3):
-                w = wx if a == 0 else (wy if a == 1 else wz)
-                force[a] = -stiffness * (w + gap * n[a])
             continue
-        if not touches.closed[c]:
-            for a in range(3):
-                force[a] = 0.0
-            if depth > 0.0:
-                touches.closed[c] = True
-                touches.press[c] = stiffness * depth
-                changed = True
-            continue
-        begun, drag = touches.begun[c], touches.drag[c]
-        kx, ky, kz = rotate(work.K[c], wx - begun[0], wy - begun[1], wz - begun[2])
-        force[0] = stiffness * depth * n[0] + per_dt2 * (drag[0] - kx)
-        force[1] = stiffness * depth * n[1] + per_dt2 * (drag[1] - ky)
-        force[2] = stiffness * depth * n[2] + per_dt2 * (drag[2] - kz)
-        if depth < 0.0:
+        un = ux * n[0] + uy * n[1] + uz * n[2]
+        begun = touches.begun[c]
+        w[0], w[1], w[2] = begun[0] + ux - un * n[0], begun[1] + uy - un * n[1], begun[2] + uz - un * n[2]
+        press = force[0] * n[0] + force[1] * n[1] + force[2] * n[2]
+        if last:
+            touches.press[c] = max(press, 0.0)
+        elif touches.closed[c] and press >= 0.0:
+            changed = _settle_friction(touches, c, w, press, stiffness) or changed
+        elif touches.closed[c]:
             touches.closed[c] = False
             touches.press[c] = 0.0
             changed = True
-            continue
-        changed = _settle_friction(touches, c, wx, wy, wz, stiffness * depth, stiffness) or changed
+        elif touches.room[c] + un < 0.0:
+            # How hard it presses shows in the next solve; until then it slides freely.
+            touches.closed[c] = True
+            touches.press[c] = 0.0
+            touches.mode[c] = SLIPS
+            changed = True
     return changed
 
 
 @inlined
-def _settle_friction(touches, c, wx, wy, wz, press, stiffness):
+def _settle_friction(touches, c, w, press, stiffness):
     """Whether contact ``c`` sticks or slips after a solve; True if the solve assumed otherwise."""
     limit = touches.friction[c] * press
     before = touches.friction[c] * touches.press[c]
     touches.press[c] = press
-    size = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if touches.stuck[c]:
-        if size * stiffness <= limit * STICTION:
+    size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    grip = size * stiffness
+    if touches.mode[c] == STICKS:
+        if grip <= limit * STICTION:
             return False
-        touches.stuck[c] = False
+        touches.switches[c] += 1
+        touches.mode[c] = SLIPS if touches.switches[c] < MAX_SWITCHES else YIELDS
         return True
     begun = touches.begun[c]
     first = math.sqrt(begun[0] ** 2 + begun[1] ** 2 + begun[2] ** 2)
-    onward = (begun[0] * wx + begun[1] * wy + begun[2] * wz) / first if first > 0.0 else 0.0
-    if onward * stiffness < limit:
-        touches.stuck[c] = True
+    onward = (begun[0] * w[0] + begun[1] * w[1] + begun[2] * w[2]) / first if first > 0.0 else 0.0
+    if touches.mode[c] == SLIPS and onward * stiffness < limit:
+        touches.switches[c] += 1
+        touches.mode[c] = STICKS if touches.switches[c] < MAX_SWITCHES else YIELDS
         return True
     return onward < 0.98 * size or abs(limit - before) > PRESSURE * limit
 
 
 @kernel
-def conclude_contacts(touches, nodes, work, stiffness):
+def conclude_contacts(touches, stiffness):
     """The slip that the next tick's friction starts from."""
     for c in range(touches.count[0]):
-        slip = touches.slip[c]
+        slip, w = touches.slip[c], touches.ended[c]
         if not touches.closed[c] or touches.bond[c]:
             touches.press[c] = 0.0
-            touches.stuck[c] = True
+            touches.mode[c] = SLIPS
             for a in range(3):
                 slip[a] = 0.0
             continue
-        _gap, wx, wy, wz, _ax, _ay, _az, _bx, _by, _bz = _opening(nodes, work, touches, c)
-        size = math.sqrt(wx * wx + wy * wy + wz * wz)
+        size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
         limit = touches.friction[c] * touches.press[c] / stiffness
+        touches.mode[c] = SLIPS if size > limit else STICKS
         scale = limit / size if size > limit else 1.0
-        slip[0], slip[1], slip[2] = scale * wx, scale * wy, scale * wz
+        slip[0], slip[1], slip[2] = scale * w[0], scale * w[1], scale * w[2]

@@ -63,9 +63,12 @@ class Touches(NamedTuple):
     slip: Array  # (C, 3) tangential displacement that friction resists
     press: Array  # (C,) normal force, N
     closed: NDArray[np.bool_]  # (C,)
-    stuck: NDArray[np.bool_]  # (C,) friction holds, or else slips
-    begun: Array  # (C, 3) slip at which the last solve began
-    drag: Array  # (C, 3) friction force there, times dt²
+    mode: NDArray[np.int64]  # (C,) of friction: slips, sticks, yields
+    switches: NDArray[np.int64]  # (C,) of the mode in this tick
+    room: Array  # (C,) gap beyond the target at which the last solve began
+    begun: Array  # (C, 3) slip there
+    ended: Array  # (C, 3) slip at its end
+    push: Array  # (C, 3) force on the element where it began, times dt²
     bond: NDArray[np.bool_]  # (C,) holds the points together in every direction, whatever the gap
     force: Array  # (C, 3) on the element, N
 
@@ -132,8 +135,11 @@ def touches(contacts: int) -> Touches:
     """Room for ``contacts`` contact points, none yet."""
     z = np.zeros
     return Touches(
-        np.zeros(1, np.int64), np.zeros((contacts, 2), np.int64), np.zeros(contacts, np.int64),
-        z((contacts, 2, 3)), z((contacts, 2, 3)), z((contacts, 3)), z(contacts), z(contacts),
-        z(contacts), z((contacts, 3)), z(contacts), np.zeros(contacts, np.bool_),
-        np.zeros(contacts, np.bool_), z((contacts, 3)), z((contacts, 3)), np.zeros(contacts, np.bool_), z((contacts, 3)),
+        count=np.zeros(1, np.int64), node=np.zeros((contacts, 2), np.int64), key=np.zeros(contacts, np.int64),
+        local=z((contacts, 2, 3)), start=z((contacts, 2, 3)), normal=z((contacts, 3)), gap=z(contacts),
+        target=z(contacts), friction=z(contacts), slip=z((contacts, 3)), press=z(contacts),
+        closed=np.zeros(contacts, np.bool_), mode=np.zeros(contacts, np.int64),
+        switches=np.zeros(contacts, np.int64), room=z(contacts), begun=z((contacts, 3)),
+        ended=z((contacts, 3)), push=z((contacts, 3)), bond=np.zeros(contacts, np.bool_),
+        force=z((contacts, 3)),
     )  # fmt: skip

@@ -306,7 +306,7 @@ class Rod:
         return self.impulse[self.node_of[body]]
 
 
-TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "stuck", "bond", "normal", "force", "start")
+TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "mode", "bond", "normal", "force", "start")
 
 
 def _ends(description: RodDescription) -> tuple[Tie | None, Tie | None, list[Tie]]:

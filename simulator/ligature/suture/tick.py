@@ -226,13 +226,13 @@ def advance(n, total, nodes, joints, touches, work, stiffness, dt):
               work.load, work.six)  # fmt: skip
         if coupled:
             couple(n, total, nodes, touches, work)
+        changed = settle_contacts(nodes, touches, work, stiffness, dt, steps == MAX_NEWTON)
         largest = correct(total, nodes, work)
         for j in range(n - 1):
             for a in range(6):
                 joints.load[j, a] = work.load[j, a]
-        changed = settle_contacts(total, nodes, touches, work, stiffness, dt)
         if largest < LARGE_TURN and not changed:
             break
-    conclude_contacts(touches, nodes, work, stiffness)
+    conclude_contacts(touches, stiffness)
     finish(n, total, nodes, joints, work, dt)
     return steps
