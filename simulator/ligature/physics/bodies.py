@@ -5,14 +5,13 @@ Poses are of the body frame B in world axes; Bullet speaks of the inertial frame
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
 from ligature.model.commands import CommandType
 from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, pose7_matrix
+from ligature.model.poses import compose
 from ligature.model.scene import Body, OutputType
 from ligature.physics.articulation import Tree
 from ligature.physics.control import KICK_SECONDS
@@ -28,34 +27,23 @@ class Placement:
 
     def __init__(self, client: int, tree: Tree, link: int, body: Body) -> None:
         self.client, self.uid, self.link, self.body = client, tree.uid, link, body
-        self._T_inertial_body = inverse(body.T_body_inertial)
-        self._shifted = bool(np.any(self._T_inertial_body != np.eye(4)))
-
-    def to_body_frame(self, position: Sequence[float], quaternion: Sequence[float], out: Array) -> None:
-        """Write the pose (7,) of B that belongs to Bullet's pose of I."""
-        out[:3] = position
-        out[3:] = quaternion
-        if self._shifted:
-            out[:] = matrix_pose7(pose7_matrix(out) @ self._T_inertial_body)
+        self.inertial_to_body = matrix_pose7(inverse(body.T_body_inertial))
+        self.moved = True
+        """Whether a static body was put elsewhere since its pose was last written."""
 
     def read(self, pose: Array, twist: Array) -> None:
-        """Fill ``pose`` (7,) and ``twist`` (6,)."""
+        """Fill ``pose`` (7,) of the body frame B and ``twist`` (6,)."""
         self.read_inertial(pose, twist)
-        if self._shifted:
-            pose[:] = matrix_pose7(pose7_matrix(pose) @ self._T_inertial_body)
+        compose(pose, self.inertial_to_body, pose)
 
     def read_inertial(self, pose: Array, twist: Array) -> None:
-        """Like `read`, with the pose of I: what the engine itself keeps."""
+        """Fill ``pose`` (7,) of the inertial frame I and ``twist`` (6,)."""
         if self.link < 0:
-            position, quaternion = pybullet.getBasePositionAndOrientation(self.uid, physicsClientId=self.client)
-            linear, angular = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
+            pose[:3], pose[3:] = pybullet.getBasePositionAndOrientation(self.uid, physicsClientId=self.client)
+            twist[:3], twist[3:] = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
         else:
             found = pybullet.getLinkState(self.uid, self.link, 1, 1, physicsClientId=self.client)
-            position, quaternion, linear, angular = found[0], found[1], found[6], found[7]
-        pose[:3] = position
-        pose[3:] = quaternion
-        twist[:3] = linear
-        twist[3:] = angular
+            pose[:3], pose[3:], twist[:3], twist[3:] = found[0], found[1], found[6], found[7]
 
     def put(self, pose: Array) -> None:
         """Put the base at ``pose`` (7,) of B, at rest."""
@@ -64,6 +52,7 @@ class Placement:
             self.uid, T[:3, 3].tolist(), matrix_quaternion(T[:3, :3]).tolist(), physicsClientId=self.client
         )
         pybullet.resetBaseVelocity(self.uid, [0.0] * 3, [0.0] * 3, physicsClientId=self.client)
+        self.moved = True
 
     def set_twist(self, linear: Array, angular: Array) -> None:
         """Set the velocity of the base."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 import pybullet
+from numba import njit
 from numpy.typing import NDArray
 
 from ligature.model.commands import CommandType
@@ -17,6 +18,8 @@ from ligature.model.scene import Joint, JointType, OutputType
 from ligature.physics.articulation import Tree
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 KICK_SECONDS = 0.01
 """Time over which the derivative answers a jump of the target: two updates of a usual AMBF session."""
@@ -30,6 +33,38 @@ FREE, FORCE, POSITION, VELOCITY = (
 
 MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
+
+
+@njit(cache=True)
+def outputs(
+    mode: Integers, force_output: Flags, turns: Flags, sprung: Flags, p: Array, i: Array, d: Array,
+    stiffness: Array, damping: Array, rest: Array, target: Array, position: Array, velocity: Array, dt: float,
+    integral: Array, last_error: Array, kick: Array, kick_ticks: Integers, motor: Array, effort: Array,
+) -> None:  # fmt: skip
+    """Motor velocities and efforts of one tick for n axes, all arrays (n,); the last eight change."""
+    for k in range(mode.shape[0]):
+        motor[k] = effort[k] = 0.0
+        if mode[k] == POSITION:
+            error = target[k] - position[k]
+            if turns[k]:
+                error = (error + np.pi) % (2 * np.pi) - np.pi
+            integral[k] += error * dt
+            pull = p[k] * error + i[k] * integral[k]
+            if force_output[k]:
+                effort[k] = pull + d[k] * (error - last_error[k]) / dt
+            else:
+                jump = 0.0
+                if kick_ticks[k] > 0:
+                    jump = kick[k]
+                    kick_ticks[k] -= 1
+                motor[k] = (pull + d[k] * jump) / (1.0 + d[k])
+            last_error[k] = error
+        elif mode[k] == VELOCITY:
+            motor[k] = target[k]
+        elif mode[k] == FORCE:
+            effort[k] = target[k]
+        if sprung[k]:
+            effort[k] += stiffness[k] * (rest[k] - position[k]) - damping[k] * velocity[k]
 
 
 class TreeControl:
@@ -59,10 +94,12 @@ class TreeControl:
         self._last_error = np.zeros(n)
         self._kick = np.zeros(n)
         self._kick_ticks = np.zeros(n, dtype=np.int64)
-        self._motor_on = np.zeros(n, dtype=bool)
+        self._motor, self._effort = np.zeros(n), np.zeros(n)
+        self._driven: list[int] = []
         self.position = np.zeros(n)
         self.velocity = np.zeros(n)
         self.motor_effort = np.zeros(n)
+        self._sort()
 
     def _spring_setup(self) -> None:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
@@ -76,7 +113,7 @@ class TreeControl:
     @property
     def active(self) -> bool:
         """Whether anything has to be done each tick."""
-        return bool(self._sprung.any() or (self.mode != FREE).any() or self._motor_on.any())
+        return bool(self._driven or self._pushed)
 
     def command(self, joint: Joint, type_: CommandType, value: float) -> None:
         """Take a command for one joint; a position command of a sprung or disabled joint has no effect."""
@@ -110,11 +147,14 @@ class TreeControl:
         self._switch(self.row[joint], FREE, 0.0)
 
     def _switch(self, row: int, mode: int, target: float) -> None:
+        before = self.mode[row]
         self.mode[row] = mode
         self.target[row] = target
         if mode != POSITION:
             self._kick[row] = 0.0
             self._kick_ticks[row] = 0
+        if mode != before:
+            self._sort()
 
     def _way(self, row: int, error: float) -> float:
         """``error``, the shorter way round for a joint that turns without limits."""
@@ -129,47 +169,42 @@ class TreeControl:
 
     def apply(self) -> None:
         """Set motors and torques of this tick; positions must have been read."""
-        velocity, effort = self._outputs()
-        driven = (self.mode == VELOCITY) | ((self.mode == POSITION) & ~self._force_output)
-        pushed = self._sprung | (self.mode == FORCE) | ((self.mode == POSITION) & self._force_output)
-        changed = driven | (self._motor_on & ~driven)
-        if changed.any():
-            rows = np.flatnonzero(changed)
-            strength = np.where(driven, self._strength, 0.0)
+        outputs(
+            self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
+            self._damping, self._rest, self.target, self.position, self.velocity, self._dt, self._integral,
+            self._last_error, self._kick, self._kick_ticks, self._motor, self._effort,
+        )  # fmt: skip
+        if self._driven:
             pybullet.setJointMotorControlArray(
                 self._tree.uid,
-                [self.links[r] for r in rows],
+                self._driven_links,
                 pybullet.VELOCITY_CONTROL,
-                targetVelocities=velocity[rows].tolist(),
-                forces=strength[rows].tolist(),
+                targetVelocities=self._motor[self._driven].tolist(),
+                forces=self._driven_strength,
                 physicsClientId=self._client,
             )
-            self._motor_on[:] = driven
-        if pushed.any():
-            rows = np.flatnonzero(pushed)
+        if self._pushed:
             pybullet.setJointMotorControlArray(
                 self._tree.uid,
-                [self.links[r] for r in rows],
+                self._pushed_links,
                 pybullet.TORQUE_CONTROL,
-                forces=effort[rows].tolist(),
+                forces=self._effort[self._pushed].tolist(),
                 physicsClientId=self._client,
             )
 
-    def _outputs(self) -> tuple[Array, Array]:
-        """Motor velocities and efforts (n,) of this tick."""
-        error = self.target - self.position
-        error = np.where(self._turns, (error + np.pi) % (2 * np.pi) - np.pi, error)
-        steering = self.mode == POSITION
-        self._integral = np.where(steering, self._integral + error * self._dt, 0.0)
-        kick = np.where(self._kick_ticks > 0, self._kick, 0.0)
-        self._kick_ticks = np.maximum(self._kick_ticks - 1, 0)
-        proportional = self._p * error + self._i * self._integral
-        velocity = np.where(steering, (proportional + self._d * kick) / (1.0 + self._d), self.target)
-        slope = (error - self._last_error) / self._dt
-        self._last_error = error
-        effort = np.where(steering, proportional + self._d * slope, np.where(self.mode == FORCE, self.target, 0.0))
-        spring = self._stiffness * (self._rest - self.position) - self._damping * self.velocity
-        return velocity, effort + np.where(self._sprung, spring, 0.0)
+    def _sort(self) -> None:
+        """Sort the axes into those that a motor drives and those that an effort pushes; stop idle motors."""
+        by_motor = (self.mode == VELOCITY) | ((self.mode == POSITION) & ~self._force_output)
+        by_effort = self._sprung | (self.mode == FORCE) | ((self.mode == POSITION) & self._force_output)
+        idle = [self.links[row] for row in self._driven if not by_motor[row]]
+        if idle:
+            pybullet.setJointMotorControlArray(
+                self._tree.uid, idle, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(idle), physicsClientId=self._client
+            )
+        self._driven, self._pushed = np.flatnonzero(by_motor).tolist(), np.flatnonzero(by_effort).tolist()
+        self._driven_links = [self.links[row] for row in self._driven]
+        self._driven_strength = self._strength[self._driven].tolist()
+        self._pushed_links = [self.links[row] for row in self._pushed]
 
     def memory(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick, for snapshots."""
@@ -177,7 +212,7 @@ class TreeControl:
             name: np.array(getattr(self, name))
             for name in (
                 "mode", "target", "position", "velocity", "motor_effort", "_integral", "_last_error", "_kick",
-                "_kick_ticks", "_motor_on",
+                "_kick_ticks",
             )
         }  # fmt: skip
 
@@ -185,3 +220,5 @@ class TreeControl:
         """Continue from `memory`."""
         for name, value in memory.items():
             setattr(self, name, value.copy())
+        self._driven = []
+        self._sort()

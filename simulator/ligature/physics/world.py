@@ -6,7 +6,6 @@ world axes, twists are linear at the centre of mass, then angular, in world axes
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,15 @@ from ligature.adf import Diagnostic, Severity
 from ligature.mesh import CollisionCache
 from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_pose7
-from ligature.model.scene import JointType, Scene
+from ligature.model.scene import Scene
 from ligature.model.state import StateRecord
 from ligature.physics.articulation import Tree, build, is_alone
 from ligature.physics.bodies import BodyControl, Placement
 from ligature.physics.closures import Closures
 from ligature.physics.control import TreeControl
+from ligature.physics.gravity import common_gravity, gravity_lifts
 from ligature.physics.queries import BulletQueries
+from ligature.physics.readout import Readout
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ class World(BulletQueries):
     def _create(self) -> None:
         scene = self.scene
         self.client = pybullet.connect(pybullet.DIRECT)
-        self._world_gravity = _common_gravity(scene)
+        self._world_gravity = common_gravity(scene)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS, erp=CLOSING,
             deterministicOverlappingPairs=1, physicsClientId=self.client,
@@ -67,11 +68,11 @@ class World(BulletQueries):
         for control in self._controls:
             self._tree_of_joint.update(dict.fromkeys(control.row, control))
         self._body_controls: dict[int, BodyControl] = {}
-        self._uplifted = self._gravity_corrections()
+        self._lifts = gravity_lifts(self.client, self.trees, self.place_of, self._world_gravity)
         self._damped = self._damping_factors()
         self._silence_pairs()
         self._closures = Closures(self.client, scene, self.place_of, self.report)
-        self._feedback_setup()
+        self._readout = Readout(self.client, scene, self.trees, self._controls, self.place_of)
         self._setup_queries()
 
     def report(self, diagnostic: Diagnostic) -> None:
@@ -112,8 +113,8 @@ class World(BulletQueries):
                 control.apply()
         for place, linear, angular in self._damped:
             place.slow_down(linear, angular)
-        for place, force in self._uplifted:
-            place.push(force)
+        for lift in self._lifts:
+            lift.push()
         for control_ in self._body_controls.values():
             control_.apply(self._world_gravity)
 
@@ -123,49 +124,7 @@ class World(BulletQueries):
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists, joints and wrenches into a state record."""
-        poses, twists = state["body_pose"][0], state["body_twist"][0]
-        for tree in self.trees:
-            self._write_tree(tree, poses, twists)
-        self._write_joints(state)
-
-    def _write_tree(self, tree: Tree, poses: Array, twists: Array) -> None:
-        root = self.place_of[tree.root]
-        root.read(poses[tree.root], twists[tree.root])
-        links = [(body, link) for body, link in tree.link_of.items() if link >= 0]
-        if not links:
-            return
-        states = pybullet.getLinkStates(
-            tree.uid, [link for _, link in links], computeLinkVelocity=1, computeForwardKinematics=1,
-            physicsClientId=self.client,
-        )  # fmt: skip
-        for (body, _), found in zip(links, states, strict=True):
-            self.place_of[body].to_body_frame(found[0], found[1], poses[body])
-            twists[body, :3] = found[6]
-            twists[body, 3:] = found[7]
-
-    def _write_joints(self, state: StateRecord) -> None:
-        position, velocity, effort = (state[f"joint_{k}"][0] for k in ("position", "velocity", "effort"))
-        joints = self.scene.joints
-        wrench = state["body_wrench"][0]
-        wrench[:] = 0.0
-        for control in self._controls:
-            if not control.links:
-                continue
-            control.read()
-            for index, row in control.row.items():
-                joint = joints[index]
-                if joint.type in (JointType.SIX_DOF, JointType.SIX_DOF_SPRING, JointType.CONE_TWIST):
-                    continue
-                q = control.position[row]
-                turns = joint.type is JointType.REVOLUTE
-                position[index] = (q + np.pi) % (2 * np.pi) - np.pi if turns and abs(q) > np.pi else q
-                velocity[index] = control.velocity[row]
-                if joint.feedback:
-                    effort[index] = control.motor_effort[row]
-        for joint_index, uid, link in self._feedback:
-            joint = joints[joint_index]
-            reaction = pybullet.getJointState(uid, link, physicsClientId=self.client)[2]
-            wrench[joint.child] += np.array(reaction)
+        self._readout.write(state)
 
     # --- bodies -----------------------------------------------------------------------------
 
@@ -286,15 +245,6 @@ class World(BulletQueries):
 
     # --- set-up -----------------------------------------------------------------------------
 
-    def _gravity_corrections(self) -> list[tuple[Placement, Array]]:
-        """Forces (3,) on bodies whose gravity is not the common one."""
-        corrections = []
-        for body, place in self.place_of.items():
-            force = self.scene.bodies[body].mass * (self.scene.bodies[body].gravity - self._world_gravity)
-            if np.any(force):
-                corrections.append((place, force))
-        return corrections
-
     def _damping_factors(self) -> list[tuple[Placement, float, float]]:
         """Lone bodies with the factors of a tick on their linear and angular velocity (§12.1)."""
         factors = []
@@ -314,21 +264,3 @@ class World(BulletQueries):
                     pybullet.setCollisionFilterPair(
                         place.uid, there.uid, place.link, there.link, 0, physicsClientId=self.client
                     )
-
-    def _feedback_setup(self) -> None:
-        self._feedback: list[tuple[int, int, int]] = []
-        for tree in self.trees:
-            for link, joint, _, _ in tree.axes:
-                if self.scene.joints[joint].feedback:
-                    pybullet.enableJointForceTorqueSensor(tree.uid, link, True, physicsClientId=self.client)
-                    self._feedback.append((joint, tree.uid, link))
-
-
-def _common_gravity(scene: Scene) -> Array:
-    """The gravity (3,) that most moving bodies share; Bullet has one for all."""
-    counts = Counter(
-        tuple(b.gravity.tolist()) for b in scene.bodies if not b.static and b.index not in scene.rod_bodies
-    )
-    if not counts:
-        return np.array(scene.world.gravity)
-    return np.array(max(counts, key=lambda g: (counts[g], g)))

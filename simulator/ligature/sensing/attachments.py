@@ -11,26 +11,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ligature.model.frames import matrix_pose7
+from ligature.model.poses import compose
 from ligature.model.scene import Attachment, Scene
 
 KINDS = ("ghost", "camera", "light")
-
-
-@njit(cache=True)
-def compose(parent: NDArray[np.float64], local: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """Write the pose ``local`` (7,), given in the frame ``parent`` (7,), into ``out`` (7,)."""
-    x, y, z, w = parent[3], parent[4], parent[5], parent[6]
-    px, py, pz = local[0], local[1], local[2]
-    # v' = v + 2 u x (u x v + w v), u the vector part of a unit quaternion
-    cx, cy, cz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
-    out[0] = parent[0] + px + 2.0 * (y * cz - z * cy)
-    out[1] = parent[1] + py + 2.0 * (z * cx - x * cz)
-    out[2] = parent[2] + pz + 2.0 * (x * cy - y * cx)
-    a, b, c, d = local[3], local[4], local[5], local[6]
-    out[3] = w * a + x * d + y * c - z * b
-    out[4] = w * b - x * c + y * d + z * a
-    out[5] = w * c + x * b - y * a + z * d
-    out[6] = w * d - x * a - y * b - z * c
 
 
 @njit(cache=True)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
 from ligature.model.frames import matrix_pose7
+from ligature.model.poses import compose
 from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Scene, Shape, Sphere, TriMesh
-from ligature.sensing.attachments import compose
 from ligature.sensing.queries import Queries
 
 Array = NDArray[np.float64]
