@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic
+from ligature.grasping import Holder
 from ligature.model.commands import (
     ActuatorCommand,
     BodyCommand,
@@ -182,7 +183,7 @@ class Simulation:
         self._ghosts = Ghosts(scene, self._world)
         self._rays = Rays(scene, self._world)
         self._contacts = Contacts(scene, self._world)
-        self._actuators = Actuators(scene, self._world, self._rays)
+        self._actuators = Actuators(scene, Holder(scene, self._world, self._rods), self._rays)
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._write_state()

@@ -18,7 +18,7 @@ from ligature.model.commands import ActuatorCommand
 from ligature.model.frames import pose7_matrix
 from ligature.model.lookup import find_by_text
 from ligature.model.scene import Scene, SensorType
-from ligature.sensing.queries import Queries
+from ligature.sensing.queries import Holds
 from ligature.sensing.rays import Rays
 
 Array = NDArray[np.float64]
@@ -35,9 +35,9 @@ class _Hold:
 class Actuators:
     """The actuators of a scene and what each of them holds."""
 
-    def __init__(self, scene: Scene, queries: Queries, rays: Rays) -> None:
+    def __init__(self, scene: Scene, holds: Holds, rays: Rays) -> None:
         self._scene = scene
-        self._queries = queries
+        self._holder = holds
         self._rays = rays
         self._holds: list[_Hold | None] = [None] * len(scene.actuators)
         self._identifiers = [body.identity.identifier for body in scene.bodies]
@@ -58,19 +58,25 @@ class Actuators:
             body = self._body_of(command)
         except LookupError as error:
             return Diagnostic(Severity.WARNING, str(error))
-        self._grasp(command, body, body_pose)
+        try:
+            self._grasp(command, body, body_pose)
+        except ValueError as error:
+            return Diagnostic(Severity.WARNING, f"{self._name(command.actuator)}: {error}")
         return None
 
     def release(self, actuator: int) -> None:
         """Let go whatever ``actuator`` holds."""
         hold = self._holds[actuator]
         if hold is not None:
-            self._queries.remove_fixed(hold.handle)
+            self._holder.remove_fixed(hold.handle)
             self._holds[actuator] = None
+
+    def _name(self, actuator: int) -> str:
+        return self._scene.actuators[actuator].identity.identifier
 
     def _body_of(self, command: ActuatorCommand) -> int:
         """The body that a command means; raises LookupError naming what was not found."""
-        name = self._scene.actuators[command.actuator].identity.identifier
+        name = self._name(command.actuator)
         if command.sensor is not None:
             return self._sensed(command.sensor, name)
         found = find_by_text(self._identifiers, command.body)
@@ -101,5 +107,5 @@ class Actuators:
             T_child_frame = np.linalg.inv(pose7_matrix(body_pose[body])) @ T_world_frame
         else:
             T_child_frame = self._scene.bodies[body].T_body_inertial @ pose7_matrix(np.array(command.offset))
-        handle = self._queries.add_fixed(actuator.parent, body, T_parent_frame, T_child_frame)
+        handle = self._holder.add_fixed(actuator.parent, body, T_parent_frame, T_child_frame)
         self._holds[command.actuator] = _Hold(body, handle)

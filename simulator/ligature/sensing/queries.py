@@ -32,6 +32,10 @@ class Queries(Protocol):
     def contacts(self, body: int, threshold: float) -> list[Contact]:
         """Contact points of ``body`` whose distance is at most ``threshold``."""
 
+
+class Holds(Protocol):
+    """Holding bodies together."""
+
     def add_fixed(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
         """Hold two frames together, given in the body frames of parent and child; returns a handle."""
 

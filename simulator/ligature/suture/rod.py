@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
+from ligature.model.frames import inverse, matrix_pose7
+from ligature.model.poses import compose_rows
 from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
@@ -119,7 +120,7 @@ class Rod:
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
         self._met: list[int] = []
         self._corners = np.zeros((2, 3))
-        self._T_inertial_body = np.array([inverse(T) for T in description.T_body_inertial])
+        self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self.impulse = np.zeros((self._total, 6))
         self.tension = np.zeros(n)
         self.newton_steps = 0
@@ -235,8 +236,9 @@ class Rod:
     def body_poses(self) -> Array:
         """Poses (n, 7) of the elements' body frames."""
         own = np.hstack([self.positions, self.orientations])
-        frames = [pose7_matrix(p) @ T for p, T in zip(own, self._T_inertial_body, strict=True)]
-        return np.array([matrix_pose7(T) for T in frames])
+        poses = np.empty_like(own)
+        compose_rows(own, self._inertial_to_body, np.arange(len(own)), poses)
+        return poses
 
     @property
     def contacts(self) -> layout.Touches:
