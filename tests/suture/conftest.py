@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.scene import Body, Collider, Identity, Scene, Shape, WorldSettings
 from ligature.suture.colliders import Colliders
@@ -97,7 +96,8 @@ def body(
     if R is not None:
         T[:3, :3] = R
     return Body(
-        index, Identity(f"b{index}", f"b{index}", f"/b{index}", f"/b{index}", 0), mass, np.full(3, inertia), np.eye(4), T,
+        index, Identity(f"b{index}", f"b{index}", f"/b{index}", f"/b{index}", 0), mass, np.full(3, inertia),
+        np.eye(4), T,
         np.zeros(3), (Collider(shape, np.eye(4)),) if shape is not None else (), friction=friction,
     )  # fmt: skip
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from ligature.model.frames import pose7_matrix
 from ligature.suture.description import FREE, Tie
 

@@ -103,7 +103,7 @@ def _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt):
                 missed += 1
                 continue
             nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
-            _record(first, nodes, new, work, e, k, c, s, d, nx, ny, nz, shapes.friction[c], dt)
+            _record(first, nodes, new, work, e, k, c, s, d, 0.0, nx, ny, nz, shapes.friction[c], dt)
     return missed
 
 
@@ -160,8 +160,11 @@ def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
 
 
 @inlined
-def _record(first, nodes, new, work, e, k, key, s, d, nx, ny, nz, friction, dt):
-    """Add the contact of element ``e`` at ``s`` with node ``k``, whose surface is ``d`` off along -normal."""
+def _record(first, nodes, new, work, e, k, key, s, d, inside, nx, ny, nz, friction, dt):
+    """Add the contact of element ``e`` at ``s`` with node ``k``, whose skin is ``d`` off along -normal.
+
+    ``inside`` is the depth of the point that node ``k`` keeps, below its skin.
+    """
     c, i = new.count[0], first + e
     new.count[0] = c + 1
     new.node[c, 0], new.node[c, 1], new.key[c] = i, k, key
@@ -170,13 +173,14 @@ def _record(first, nodes, new, work, e, k, key, s, d, nx, ny, nz, friction, dt):
     new.normal[c, 0], new.normal[c, 1], new.normal[c, 2] = nx, ny, nz
     for a in range(3):
         along = segment[0, a] + s * (segment[1, a] - segment[0, a])
-        start[0, a] = along - radius * new.normal[c, a]
-        start[1, a] = along - d * new.normal[c, a]
+        start[0, a] = along
+        start[1, a] = along - (d + inside) * new.normal[c, a]
     _to_local(nodes, work, i, start[0], local[0])
     if k < first or k >= first + work.segment.shape[0]:
         q = nodes.q[k]
         matrix_of(q[0], q[1], q[2], q[3], work.R[k])
     _to_local(nodes, work, k, start[1], local[1])
+    new.arm[c, 0], new.arm[c, 1] = -radius, inside
     gap = d - radius
     new.gap[c] = gap
     new.target[c] = min(0.0, gap + RECOVERY * dt)
@@ -277,7 +281,7 @@ def _touch_pair(first, nodes, new, work, capacity, i, j, offset):
         return 1
     per = 1.0 / length
     # Already inside each other: no wish to recover faster than other contacts do.
-    _record(first, nodes, new, work, i, first + j, offset + j, s, d, dx * per, dy * per, dz * per,
+    _record(first, nodes, new, work, i, first + j, offset + j, s, d, near, dx * per, dy * per, dz * per,
             nodes.friction[first + j], 1e-3)  # fmt: skip
     return 0
 
@@ -302,6 +306,8 @@ def _swap(touches, a, b):
     touches.gap[a], touches.gap[b] = touches.gap[b], touches.gap[a]
     touches.target[a], touches.target[b] = touches.target[b], touches.target[a]
     touches.friction[a], touches.friction[b] = touches.friction[b], touches.friction[a]
+    touches.arm[a, 1], touches.arm[b, 1] = touches.arm[b, 1], touches.arm[a, 1]
+    touches.arm[a, 0], touches.arm[b, 0] = touches.arm[b, 0], touches.arm[a, 0]
 
 
 @inlined

@@ -14,7 +14,7 @@ import math
 
 from ligature.suture.chain import invert_spd6, solve
 from ligature.suture.compiled import inlined, kernel
-from ligature.suture.rotations import cross, rotate
+from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
 
 MAX_CG = 40
 SLIPS, STICKS, YIELDS = 0, 1, 2
@@ -34,23 +34,43 @@ CG_TOLERANCE = 1e-12
 
 
 @inlined
-def _point(nodes, work, touches, c, side):
-    """Present position of contact ``c`` on its node ``side``, and its lever from the node's centre."""
+def lever_of(work, touches, c, side):
+    """Lever of contact ``c`` from the centre of its node ``side``: along the capsule's axis, then to its skin."""
+    p, n = touches.local[c, side], touches.normal[c]
+    rx, ry, rz = rotate(work.R[touches.node[c, side]], p[0], p[1], p[2])
+    arm = touches.arm[c, side]
+    return rx + arm * n[0], ry + arm * n[1], rz + arm * n[2]
+
+
+@inlined
+def _travel(nodes, work, touches, c, side):
+    """How far contact ``c`` has moved with its node ``side`` in this tick, and its lever.
+
+    A capsule that rolls moves its skin but not its axis, so that pressure alone never rolls it; a point
+    of the skin under pressure would topple like a pencil on its tip.
+    """
     i = touches.node[c, side]
-    p = touches.local[c, side]
-    rx, ry, rz = rotate(work.R[i], p[0], p[1], p[2])
-    return nodes.x[i, 0] + rx, nodes.x[i, 1] + ry, nodes.x[i, 2] + rz, rx, ry, rz
+    n, start, arm = touches.normal[c], touches.start[c], touches.arm[c, side]
+    rx, ry, rz = lever_of(work, touches, c, side)
+    ux = nodes.x[i, 0] + rx - arm * n[0] - start[side, 0]
+    uy = nodes.x[i, 1] + ry - arm * n[1] - start[side, 1]
+    uz = nodes.x[i, 2] + rz - arm * n[2] - start[side, 2]
+    if arm != 0.0:
+        q, p = nodes.q, work.q
+        x, y, z, w = multiply(q[i, 0], q[i, 1], q[i, 2], q[i, 3], -p[i, 0], -p[i, 1], -p[i, 2], p[i, 3])
+        tx, ty, tz = rotation_vector(x, y, z, w)
+        vx, vy, vz = cross(tx, ty, tz, n[0], n[1], n[2])
+        ux, uy, uz = ux + arm * vx, uy + arm * vy, uz + arm * vz
+    return ux, uy, uz, rx, ry, rz
 
 
 @inlined
 def _opening(nodes, work, touches, c):
     """Gap of contact ``c`` now, the slip its friction resists (3), and its levers on both nodes (6)."""
-    px, py, pz, ax, ay, az = _point(nodes, work, touches, c, 0)
-    sx, sy, sz, bx, by, bz = _point(nodes, work, touches, c, 1)
-    start, n, slip = touches.start[c], touches.normal[c], touches.slip[c]
-    ux = (px - start[0, 0]) - (sx - start[1, 0])
-    uy = (py - start[0, 1]) - (sy - start[1, 1])
-    uz = (pz - start[0, 2]) - (sz - start[1, 2])
+    px, py, pz, ax, ay, az = _travel(nodes, work, touches, c, 0)
+    sx, sy, sz, bx, by, bz = _travel(nodes, work, touches, c, 1)
+    n, slip = touches.normal[c], touches.slip[c]
+    ux, uy, uz = px - sx, py - sy, pz - sz
     un = ux * n[0] + uy * n[1] + uz * n[2]
     wx = slip[0] + ux - un * n[0]
     wy = slip[1] + uy - un * n[1]
@@ -163,9 +183,8 @@ def _apply_ties(total, nodes, touches, work, p, out):
         if not touches.closed[c] or nodes.fixed[i] or nodes.fixed[k]:
             continue
         K = work.K[c]
-        a, b = touches.local[c, 0], touches.local[c, 1]
-        ax, ay, az = rotate(work.R[i], a[0], a[1], a[2])
-        bx, by, bz = rotate(work.R[k], b[0], b[1], b[2])
+        ax, ay, az = lever_of(work, touches, c, 0)
+        bx, by, bz = lever_of(work, touches, c, 1)
         ux, uy, uz = cross(p[i, 3], p[i, 4], p[i, 5], ax, ay, az)
         vx, vy, vz = cross(p[k, 3], p[k, 4], p[k, 5], bx, by, bz)
         fx, fy, fz = rotate(K, p[k, 0] + vx, p[k, 1] + vy, p[k, 2] + vz)
@@ -273,8 +292,8 @@ def _moved(nodes, work, touches, c, side):
     i = touches.node[c, side]
     if nodes.fixed[i]:
         return 0.0, 0.0, 0.0
-    d, p = work.d[i], touches.local[c, side]
-    rx, ry, rz = rotate(work.R[i], p[0], p[1], p[2])
+    d = work.d[i]
+    rx, ry, rz = lever_of(work, touches, c, side)
     ux, uy, uz = cross(d[3], d[4], d[5], rx, ry, rz)
     return d[0] + ux, d[1] + uy, d[2] + uz
 

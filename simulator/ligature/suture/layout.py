@@ -54,8 +54,9 @@ class Touches(NamedTuple):
     count: NDArray[np.int64]  # type: ignore[assignment]  # (1,)
     node: NDArray[np.int64]  # (C, 2)
     key: NDArray[np.int64]  # (C,) which part was touched; the same contact keeps its key
-    local: Array  # (C, 2, 3) the point in I of both nodes
-    start: Array  # (C, 2, 3) the point at the start of the tick, world
+    local: Array  # (C, 2, 3) point in I of both nodes: on the axis of a capsule, on the skin of a body
+    arm: Array  # (C, 2) from there to the skin, along the normal
+    start: Array  # (C, 2, 3) that point at the start of the tick, world
     normal: Array  # (C, 3)
     gap: Array  # (C,) at the start of the tick
     target: Array  # (C,) gap to recover to within this tick, 0 or less
@@ -136,7 +137,8 @@ def touches(contacts: int) -> Touches:
     z = np.zeros
     return Touches(
         count=np.zeros(1, np.int64), node=np.zeros((contacts, 2), np.int64), key=np.zeros(contacts, np.int64),
-        local=z((contacts, 2, 3)), start=z((contacts, 2, 3)), normal=z((contacts, 3)), gap=z(contacts),
+        local=z((contacts, 2, 3)), arm=z((contacts, 2)), start=z((contacts, 2, 3)),
+        normal=z((contacts, 3)), gap=z(contacts),
         target=z(contacts), friction=z(contacts), slip=z((contacts, 3)), press=z(contacts),
         closed=np.zeros(contacts, np.bool_), mode=np.zeros(contacts, np.int64),
         switches=np.zeros(contacts, np.int64), room=z(contacts), begun=z((contacts, 3)),

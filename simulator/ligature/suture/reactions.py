@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from ligature.suture.compiled import kernel
+from ligature.suture.coupling import lever_of
 from ligature.suture.rotations import cross, matrix_of, rotate
 from ligature.suture.tick import node_load
 
@@ -29,6 +30,7 @@ def bond(nodes, work, touches, i, k, points):
         for s in range(2):
             node = touches.node[c, s]
             rx, ry, rz = rotate(work.R[node], points[m, s, 0], points[m, s, 1], points[m, s, 2])
+            touches.arm[c, s] = 0.0
             touches.start[c, s, 0] = nodes.x[node, 0] + rx
             touches.start[c, s, 1] = nodes.x[node, 1] + ry
             touches.start[c, s, 2] = nodes.x[node, 2] + rz
@@ -59,8 +61,7 @@ def react(n, total, nodes, joints, touches, work, impulse, dt):
         for s in range(2):
             i = touches.node[c, s]
             sign = dt if s == 0 else -dt
-            p = touches.local[c, s]
-            rx, ry, rz = rotate(work.R[i], p[0], p[1], p[2])
+            rx, ry, rz = lever_of(work, touches, c, s)
             mx, my, mz = cross(rx, ry, rz, f[0], f[1], f[2])
             impulse[i, 0] += sign * f[0]
             impulse[i, 1] += sign * f[1]

@@ -22,7 +22,7 @@ from ligature.suture.rotations import (
     turn,
 )
 
-MAX_NEWTON = 40
+MAX_NEWTON = 6
 """Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
 
 LARGE_TURN = 0.02
