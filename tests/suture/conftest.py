@@ -55,8 +55,7 @@ class Bench:
                 each()
             for rod in self.rods:
                 low, high = rod.box()
-                self.colliders.update(self, low, high)
-                near = [b for b, n in zip(self.colliders.bodies, self.colliders.near, strict=True) if n]
+                near = self.colliders.update(self, low, high)
                 rod.meet(self.colliders, near, self)
                 rod.step()
                 for body, impulse in rod.pushes():

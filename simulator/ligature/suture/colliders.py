@@ -17,13 +17,13 @@ from ligature.suture.placing import near_bodies, place_parts
 
 Array = NDArray[np.float64]
 
-LOOKS = 2
+LOOKS = 1
 """Bodies far from every rod that are looked at in a tick, in turn."""
 
 NEAR = 0.02
 """Distance in metres within which a moving body's pose is read every tick.
 
-Among 30 bodies the turn of each comes every 15 ticks; a body must not come nearer than this in between.
+Among 30 bodies the turn of each comes every 30 ticks; a body must not come nearer than this in between.
 """
 
 UNBOUNDED = 1e6
@@ -35,8 +35,8 @@ _ROUND = {Cylinder: CYLINDER, Capsule: CAPSULE, Cone: CONE}
 class Colliders:
     """Convex parts of every body of a scene that is not an element of a rod.
 
-    ``bodies`` (b,) are the bodies that have parts, in order; ``near`` (b,) tells which of them were
-    close to a rod at the last `update`; ``motion`` holds the pose (7,) and twist (6,) last read.
+    ``bodies`` are those that have parts, in order; ``motion`` holds the pose (7,) of the inertial frame
+    and the twist (6,) that were last read of each.
     """
 
     def __init__(self, scene: Scene, dt: float) -> None:
@@ -56,6 +56,7 @@ class Colliders:
         self.bodies = sorted(set(body.tolist()))
         self._ranges = np.array([[*np.flatnonzero(body == b)[[0, -1]]] for b in self.bodies], dtype=np.int64)
         self._ranges = self._ranges.reshape(-1, 2) + np.array([0, 1])
+        self._slices = {b: slice(*r) for b, r in zip(self.bodies, self._ranges.tolist(), strict=True)}
         self._still = np.array([scene.bodies[b].static for b in self.bodies], dtype=np.bool_)
         self._common = {
             "kind": np.array([part[2] for part in parts], dtype=np.int64),
@@ -68,7 +69,7 @@ class Colliders:
             "friction": np.array([scene.bodies[b].friction for b in body]),
         }
         self._static = self._still.copy()
-        self.near = np.zeros(len(self.bodies), dtype=np.bool_)
+        self._near = np.zeros(len(self.bodies), dtype=np.bool_)
         self.motion: dict[int, tuple[Array, Array]] = {}
         self._R = np.zeros((3, 3))
         self._turn = -1
@@ -81,12 +82,10 @@ class Colliders:
 
     def parts_of(self, body: int) -> slice:
         """The rows of a body's parts in `shapes`; empty for a body without any."""
-        if body not in self.bodies:
-            return slice(0, 0)
-        return slice(*self._ranges[self.bodies.index(body)].tolist())
+        return self._slices.get(body, slice(0, 0))
 
-    def update(self, bodies: Bodies, low: Array, high: Array) -> None:
-        """Bring the poses of bodies near the box ``low`` … ``high`` (3,) up to date."""
+    def update(self, bodies: Bodies, low: Array, high: Array) -> list[int]:
+        """Bring the poses of bodies near the box ``low`` … ``high`` (3,) up to date; returns those bodies."""
         n = len(self.bodies)
         if self._turn < 0:
             fresh = set(range(n))
@@ -95,10 +94,12 @@ class Colliders:
         for k in sorted(fresh):
             self._read(bodies, k)
         self._turn = (self._turn + LOOKS) % n if n and self._turn >= 0 else 0
-        near_bodies(self._ranges, self._common["box"], low, high, NEAR, self.near)
-        for k in np.flatnonzero(self.near & ~self._still).tolist():
-            if k not in fresh:
+        near_bodies(self._ranges, self._common["box"], low, high, NEAR, self._near)
+        near = np.flatnonzero(self._near).tolist()
+        for k in near:
+            if k not in fresh and not self._still[k]:
                 self._read(bodies, k)
+        return [self.bodies[k] for k in near]
 
     def _read(self, bodies: Bodies, k: int) -> None:
         body, common = self.bodies[k], self._common

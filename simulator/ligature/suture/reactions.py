@@ -1,4 +1,4 @@
-"""What a tick gives back: impulses on bodies, tension of elements; and bonds, which hold points together.
+"""A whole tick in one call, and what it gives back: impulses on bodies, tension of elements.
 
 World axes, SI units.
 """
@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import math
 
-from ligature.suture.compiled import kernel
+from ligature.suture.chain import add_joint_force
+from ligature.suture.compiled import inlined, kernel
+from ligature.suture.contacts import detect
 from ligature.suture.coupling import lever_of
 from ligature.suture.rotations import cross, matrix_of, rotate
-from ligature.suture.tick import node_load
+from ligature.suture.tick import advance
 
 
 @kernel
@@ -43,12 +45,23 @@ def bond(nodes, work, touches, i, k, points):
             touches.slip[c, a] = touches.start[c, 0, a] - touches.start[c, 1, a]
 
 
-@kernel
-def react(n, total, nodes, joints, touches, work, impulse, dt):
+@inlined
+def _joint_load(n, work, joints, i, out):
+    """Total force and moment (6,) of the joints on the centre of chain node ``i``, times dt²."""
+    for a in range(6):
+        out[a] = 0.0
+    if i < n - 1:
+        add_joint_force(joints.load[i], work.lever[i, 0], work.B[i], 1.0, out)
+    if i > 0:
+        add_joint_force(joints.load[i - 1], work.lever[i - 1, 1], work.B[i - 1], -1.0, out)
+
+
+@inlined
+def _react(n, total, nodes, joints, touches, work, impulse, dt):
     """Impulse (N s) and its moment about the centre of mass on every node, from joints and contacts."""
     for i in range(total):
         if i < n:
-            node_load(n, work, joints, i, impulse[i])
+            _joint_load(n, work, joints, i, impulse[i])
             for a in range(6):
                 impulse[i, a] /= dt
         else:
@@ -71,8 +84,8 @@ def react(n, total, nodes, joints, touches, work, impulse, dt):
             impulse[i, 5] += sign * mz
 
 
-@kernel
-def pull_of_elements(first, n, joints, work, tension, dt):
+@inlined
+def _pull(first, n, joints, work, tension, dt):
     """Tension of each element in newtons: the mean pull of its joints along it, positive when taut."""
     for e in range(tension.shape[0]):
         i = first + e
@@ -90,3 +103,15 @@ def pull_of_elements(first, n, joints, work, tension, dt):
                 f = joints.load[j]
                 pull += f[0] * ux + f[1] * uy + f[2] * uz
         tension[e] = pull / (joined * math.sqrt(ux * ux + uy * uy + uz * uz) * dt * dt)
+
+
+@kernel
+def run_tick(
+    first, n, total, nodes, joints, shapes, old, new, work, counts, self_skip, stiffness, impulse, tension, dt
+):
+    """One tick of a rod of ``len(tension)`` elements from node ``first`` on; returns the Newton steps taken."""
+    detect(first, tension.shape[0], nodes, shapes, old, new, work, counts, self_skip, dt)
+    steps = advance(n, total, nodes, joints, new, work, stiffness, dt)
+    _react(n, total, nodes, joints, new, work, impulse, dt)
+    _pull(first, n, joints, work, tension, dt)
+    return steps

@@ -17,11 +17,9 @@ from ligature.model.poses import compose_rows
 from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
-from ligature.suture.contacts import detect
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
 from ligature.suture.placing import bounds
-from ligature.suture.reactions import bond, pull_of_elements, react
-from ligature.suture.tick import advance
+from ligature.suture.reactions import bond, run_tick
 
 Array = NDArray[np.float64]
 
@@ -118,7 +116,8 @@ class Rod:
         self._self_skip = int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._permanent = [self._grip_of(tie) for tie in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
-        self._met: list[int] = []
+        self._near: list[int] = []
+        self._tied = [tie.body for tie in description.ties]
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self.impulse = np.zeros((self._total, 6))
@@ -259,14 +258,16 @@ class Rod:
 
     def meet(self, colliders: Colliders, near: Sequence[int], bodies: Bodies) -> None:
         """Take the motion of the partners that matter in this tick: those near, tied or gripping."""
-        tied = {*(t.body for t in self.description.ties), *(g.body for g in self.grips)}
-        self._met = sorted({*near, *tied})
-        self._shapes.node[:] = -1
+        if near != self._near:
+            self._near = list(near)
+            self._shapes.node[:] = -1
+            for body in near:
+                self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
         for body in near:
-            self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
             self.place(body, *colliders.motion[body])
-        for body in sorted(tied.difference(near)):
-            self.place(body, *bodies.motion(body))
+        for body in self._holding:
+            if body not in near:
+                self.place(body, *bodies.motion(body))
 
     def grip(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
         """Hold frame a of an element and frame b of a partner, (4, 4) in their frames B, together."""
@@ -283,10 +284,16 @@ class Rod:
         """Let go of a grip."""
         self.grips = [g for g in self.grips if (g.element, g.body) != (element, body)]
 
+    @property
+    def _holding(self) -> list[int]:
+        """Bodies that the rod is tied to or gripped by."""
+        return sorted({*self._tied, *(g.body for g in self.grips)})
+
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
-        met = [(body, self.impulse[self.node_of[body]]) for body in self._met if self._mobile[body]]
-        return [(body, impulse) for body, impulse in met if impulse.any()]
+        met = (*self._near, *(body for body in self._holding if body not in self._near))
+        pushed = [(body, self.impulse[self.node_of[body]]) for body in met if self._mobile[body]]
+        return [(body, impulse) for body, impulse in pushed if impulse.any()]
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds what each partner receives."""
@@ -294,13 +301,10 @@ class Rod:
         new.count[0] = 0
         for grip in (*self._permanent, *self.grips):
             bond(self._nodes, self._work, new, self._first + grip.element, self.node_of[grip.body], grip.points)
-        n = len(self.tension)
-        detect(self._first, n, self._nodes, self._shapes, old, new, self._work, self._counts,
-               self._self_skip, self.dt)  # fmt: skip
-        self.newton_steps = advance(self._chain, self._total, self._nodes, self.joints, new, self._work,
-                                    self._stiffness, self.dt)  # fmt: skip
-        react(self._chain, self._total, self._nodes, self.joints, new, self._work, self.impulse, self.dt)
-        pull_of_elements(self._first, self._chain, self.joints, self._work, self.tension, self.dt)
+        self.newton_steps = run_tick(
+            self._first, self._chain, self._total, self._nodes, self.joints, self._shapes, old, new, self._work,
+            self._counts, self._self_skip, self._stiffness, self.impulse, self.tension, self.dt,
+        )  # fmt: skip
         self._touches = new, old
 
     def impulse_on(self, body: int) -> Array:

@@ -57,9 +57,11 @@ class Rods:
         """Advance every rod by one tick and push the bodies that it is tied to or touches."""
         if not self.rods:
             return
-        boxes = [rod.box() for rod in self.rods]
-        self._colliders.update(bodies, np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0))
-        near = [b for b, close in zip(self._colliders.bodies, self._colliders.near, strict=True) if close]
+        box = self.rods[0].box()
+        for rod in self.rods[1:]:
+            other = rod.box()
+            box = np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
+        near = self._colliders.update(bodies, box[0], box[1])
         for rod in self.rods:
             rod.meet(self._colliders, near, bodies)
             rod.step()

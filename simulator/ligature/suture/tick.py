@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from ligature.suture.chain import add_joint_force, factor, solve
+from ligature.suture.chain import factor, solve
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import add_contacts, conclude_contacts, couple, settle_contacts
 from ligature.suture.rotations import (
@@ -194,17 +194,6 @@ def finish(n, total, nodes, joints, work, dt):
     for j in range(n - 1):
         vx, vy, vz, _ax, _ay, _az, _aw = joint_angle(nodes, joints, j)
         joints.angle[j, 0], joints.angle[j, 1], joints.angle[j, 2] = vx, vy, vz
-
-
-@kernel
-def node_load(n, work, joints, i, out):
-    """Total force and moment (6,) of the joints on the centre of chain node ``i``, times dt²."""
-    for a in range(6):
-        out[a] = 0.0
-    if i < n - 1:
-        add_joint_force(joints.load[i], work.lever[i, 0], work.B[i], 1.0, out)
-    if i > 0:
-        add_joint_force(joints.load[i - 1], work.lever[i - 1, 1], work.B[i - 1], -1.0, out)
 
 
 @kernel
