@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from ligature.adf import AdfError
 from ligature.adf.nodes import MAX_DEPTH, Mapping, Scalar, Sequence, parse, plain
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from ligature.adf import Document, Resolver, Severity, read_any, read_launch, read_model
 
 

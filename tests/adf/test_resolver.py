@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from ligature.adf import ResolutionError, Resolver
 from ligature.adf.resolver import SEARCH_PATH
 

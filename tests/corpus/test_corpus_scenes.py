@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ligature
 import numpy as np
 import pytest
 import yaml
-
-import ligature
 from ligature.adf import Severity
 from ligature.model.frames import matrix_quaternion
 from ligature.model.scene import Scene

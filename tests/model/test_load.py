@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ligature
 import numpy as np
 import pytest
-
-import ligature
 from ligature.adf import Severity
 from ligature.model.scene import JointType, Scene
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-
 from ligature.model.naming import merged, topic_name
 
 

@@ -6,10 +6,9 @@ import csv
 import gzip
 from pathlib import Path
 
+import ligature
 import numpy as np
 import pytest
-
-import ligature
 from ligature import Simulation
 
 HOME = np.array([0, 0, 0.1, 0, 0, 0, 0.5, 0.5])

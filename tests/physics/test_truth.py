@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
 from ligature import Simulation
 from ligature.model.frames import pose7_matrix
 

@@ -236,7 +236,20 @@ def test_the_corpus_scene_has_the_references_topics(
     start: Callable[..., Program], simulator: Program, node: Any, corpus: Path, golden: Path, listen: Callable[..., Any]
 ) -> None:
     assert simulator.end() == 0
-    flags = "-l 10,11,6,7,8,9 -g 0 -p 200 -t 1 --override_max_comm_freq 100 --override_min_comm_freq 100".split()
+    flags = [
+        "-l",
+        "10,11,6,7,8,9",
+        "-g",
+        "0",
+        "-p",
+        "200",
+        "-t",
+        "1",
+        "--override_max_comm_freq",
+        "100",
+        "--override_min_comm_freq",
+        "100",
+    ]
     program = start(BIN / "ambf_simulator", "--launch_file", corpus / "suturing_scene" / "launch.yaml", *flags)
     program.wait_for("first state published")
     master = node.get_master()

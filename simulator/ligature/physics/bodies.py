@@ -110,7 +110,7 @@ class BodyControl:
             self._kick_ticks = ticks
         self.type, self.target = type_, target
 
-    def apply(self, world_gravity: Array) -> None:
+    def apply(self) -> None:
         """Act on the body for the coming tick."""
         if self.type is CommandType.FORCE:
             if np.any(self.target) and not self._place.body.static:
@@ -121,7 +121,7 @@ class BodyControl:
         elif self.type is CommandType.VELOCITY:
             self._drive(self.target[:3], self.target[3:], np.zeros(3))
         else:
-            self._follow(world_gravity)
+            self._follow()
 
     def memory(self) -> tuple[int, Array, Array, int, Array | None]:
         """Everything that lasts from tick to tick."""
@@ -147,7 +147,7 @@ class BodyControl:
         if np.linalg.norm(error[:3]) >= SMALLEST_MOVE or np.linalg.norm(error[3:]) >= SMALLEST_TURN:
             self._place.put(self.target)
 
-    def _follow(self, world_gravity: Array) -> None:
+    def _follow(self) -> None:
         """PID towards a pose; velocity output is evaluated implicitly, as for joints."""
         law = self._place.body.controller
         error = _difference(self.target, self._pose())
@@ -168,7 +168,7 @@ class BodyControl:
             self._place.push(halves[0])
             self._place.twist(halves[1])
         else:
-            self._drive(halves[0], halves[1], world_gravity * self._dt)
+            self._drive(halves[0], halves[1], self._place.body.gravity * self._dt)
 
     def _drive(self, linear: Array, angular: Array, fall: Array) -> None:
         """Make the body move with a twist; ``fall`` (3,) is what gravity adds within the tick."""

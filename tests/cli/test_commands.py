@@ -1,0 +1,114 @@
+"""The commands as a user types them: check, bench, decompose, AMBF's flags, and errors that help."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ligature.cli.ambf_simulator import options_of
+
+BIN = Path(sys.executable).parent
+SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
+
+
+def ligature(*words: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([BIN / "ligature", *map(str, words)], capture_output=True, text=True, timeout=120)
+
+
+def test_check_of_a_good_scene_ends_with_zero() -> None:
+    done = ligature("check", SMALL)
+    assert done.returncode == 0, done.stdout
+    assert f"{SMALL}: 0 errors, 0 warnings" in done.stdout
+    assert "40 bodies from '/ambf/env/phantom/BODY Thread' on are simulated as one elastic rod" in done.stdout
+
+
+def test_check_names_file_line_and_column(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("bodies: [BODY a]\nBODY a:\n  name: a\n  mass: heavy\n")
+    done = ligature("check", bad)
+    assert done.returncode == 1
+    assert f"{bad}:4:9: error: 'mass' of body 'BODY a' is not usable; expected a number" in done.stdout
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_check_of_a_missing_file_says_so(tmp_path: Path) -> None:
+    done = ligature("check", tmp_path / "none.yaml")
+    assert done.returncode == 1 and "does not exist" in done.stdout
+
+
+def test_bench_prints_its_figures_as_json() -> None:
+    done = ligature("bench", SMALL, "--seconds", "0.5", "--json")
+    figures = json.loads(done.stdout)
+    assert figures["ticks_per_second"] > 0 and set(figures["phases_us"]) >= {"control", "suture", "bodies"}
+    assert figures["tick_p50_us"] <= figures["tick_p99_us"] <= figures["tick_max_us"]
+
+
+def test_bench_of_a_bad_file_ends_with_two(tmp_path: Path) -> None:
+    done = ligature("bench", tmp_path / "none.yaml")
+    assert done.returncode == 2 and "does not exist" in done.stdout
+
+
+def test_a_list_of_indices_that_is_none_is_told() -> None:
+    done = ligature("bench", SMALL, "-l", "1,x")
+    assert done.returncode == 2 and "'1,x' is not a list of whole numbers" in done.stdout + done.stderr
+
+
+def test_run_of_a_bad_file_ends_and_says_why(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("bodies: [")
+    done = ligature("run", bad)
+    assert done.returncode == 2
+    assert "bad.yaml:" in done.stdout and "Traceback" not in done.stdout
+
+
+def test_decompose_writes_one_material_per_hull(tmp_path: Path) -> None:
+    corners = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
+    lines = [f"v {x} {y} {z}" for z in (0, 1) for x, y in corners]
+    lines += ["f 6 5 4 3 2 1".replace("6 5 4 3 2 1", "1 4 3 "), "f 1 3 2", "f 1 6 5", "f 1 5 4"]
+    lines += ["f 7 9 10", "f 7 8 9", "f 7 11 12", "f 7 10 11"]
+    for i in range(6):
+        a, b = i + 1, (i + 1) % 6 + 1
+        lines += [f"f {a} {b} {b + 6}", f"f {a} {b + 6} {a + 6}"]
+    mesh = tmp_path / "ell.obj"
+    mesh.write_text("\n".join(lines) + "\n")
+    done = ligature("decompose", mesh)
+    assert done.returncode == 0, done.stdout
+    text = (tmp_path / "ell_collision.obj").read_text()
+    hulls = text.count("usemtl")
+    assert hulls >= 2 and (tmp_path / "ell_collision.mtl").read_text().count("newmtl") == hulls
+    assert f"{hulls} hulls" in done.stdout
+
+
+def test_decompose_of_nonsense_says_where(tmp_path: Path) -> None:
+    (tmp_path / "bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    done = ligature("decompose", tmp_path / "bad.obj")
+    assert done.returncode == 1 and "bad.obj:2:1: error: a face names vertex 2, but 1 are defined" in done.stdout
+
+
+def test_ambfs_own_flags_are_understood() -> None:
+    words = (
+        "--launch_file launch.yaml -l 10,11, 6 -p 200 -t1 -g 0 -s 0.5 --ns /lab --override_max_comm_freq 100 "
+        "--override_min_comm_freq 90 -d 500 -n 0 -i 0,1"
+    )
+    flags = words.replace("10,11, 6", "10,11,6").split()
+    flags[flags.index("10,11,6")] = "10,11, 6"
+    options = options_of([*flags, "--plugins", "a, b"])
+    assert options.models == (10, 11, 6) and options.rate == 200 and options.speed == 0.5
+    assert (options.min_hz, options.max_hz, options.prefix) == (90, 100, "/lab")
+
+
+def test_without_l_or_a_the_second_entry_is_loaded_as_in_ambf() -> None:
+    assert options_of(["--launch_file", "x"]).models == (1,)
+    only_files = options_of(["--launch_file", "x", "-a", "one.yaml,two.yaml"])
+    assert only_files.models == () and only_files.files == ("one.yaml", "two.yaml")
+
+
+@pytest.mark.parametrize("bad", [["-l", "a"], ["-p", "0"], ["--no_such_flag"]])
+def test_bad_flags_end_with_two(bad: list[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        options_of(["--launch_file", "x", *bad])
+    assert ended.value.code == 2
