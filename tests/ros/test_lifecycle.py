@@ -1,0 +1,148 @@
+"""What happens when processes die, masters restart and users press Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ligature.cli.supervisor import master_answers
+from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
+
+pytestmark = pytest.mark.ros
+WORLD = "/ambf/env/World/State"
+
+WATCH = """
+import sys, time, rospy
+from ambf_msgs.msg import WorldState
+rospy.init_node("watch", anonymous=True, disable_signals=True)
+rospy.Subscriber("/ambf/env/World/State", WorldState, lambda m: print(time.time(), m.sim_time, m.sim_step, flush=True))
+while True: time.sleep(0.1)
+"""
+
+
+@pytest.fixture
+def own_env(ros_env: dict[str, str]) -> dict[str, str]:
+    """Environment of a master that does not run yet, on a port of its own."""
+    return dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}")
+
+
+@pytest.fixture
+def watch(tmp_path: Path) -> Iterator[Callable[[dict[str, str]], Program]]:
+    """Starts a client that prints wall time, sim time and step of every world state."""
+    programs: list[Program] = []
+
+    def run(env: dict[str, str]) -> Program:
+        script = tmp_path / "watch.py"
+        script.write_text(WATCH)
+        programs.append(Program([str(BIN / "python"), "-u", str(script)], env))
+        return programs[-1]
+
+    yield run
+    for program in programs:
+        program.process.kill()
+        program.process.wait()
+
+
+def seen(program: Program) -> list[tuple[float, float, int]]:
+    rows = [line.split() for line in list(program.lines) if len(line.split()) == 3]
+    return [(float(a), float(b), int(c)) for a, b, c in rows]
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_until(condition: Callable[[], Any], seconds: float) -> Any:
+    deadline = time.monotonic() + seconds
+    while not (result := condition()):
+        assert time.monotonic() < deadline, "condition not met in time"
+        time.sleep(0.05)
+    return result
+
+
+def test_a_master_is_started_when_none_answers_and_all_ends_within_two_seconds(
+    start: Callable[..., Program], own_env: dict[str, str]
+) -> None:
+    program = start(BIN / "ligature", "run", SMALL, "-p", "200", env=own_env)
+    program.wait_for("first state published")
+    assert f"no ROS master answers at {own_env['ROS_MASTER_URI']}: starting one" in program.output
+    assert master_answers(own_env["ROS_MASTER_URI"])
+    pids = program.children()
+    assert set(pids) == {"physics", "ros_process", "rosmaster"}
+    begin = time.monotonic()
+    assert program.end() == 0
+    assert time.monotonic() - begin < 2.0
+    assert not any(alive(pid) for pid in pids.values())
+    assert not list(Path("/dev/shm").glob(f"ligature-{program.process.pid}-*"))
+
+
+def test_a_killed_ros_process_is_back_within_three_seconds_and_physics_never_pauses(
+    start: Callable[..., Program], ros_env: dict[str, str], watch: Callable[..., Program]
+) -> None:
+    program = start(BIN / "ligature", "run", SMALL, "-p", "200")
+    program.wait_for("first state published")
+    client = watch(ros_env)
+    wait_until(lambda: len(seen(client)) > 20, 15)
+    killed_at = time.time()
+    os.kill(program.children()["ros_process"], signal.SIGKILL)
+    back = wait_until(lambda: [row for row in seen(client) if row[0] > killed_at + 0.3], 10)
+    assert back[0][0] - killed_at < 3.0
+    before = [row for row in seen(client) if row[0] <= killed_at][-1]
+    wall, simulated = back[0][0] - before[0], back[0][1] - before[1]
+    assert simulated == pytest.approx(wall, rel=0.15)
+    assert "the ros process ended with status -9; starting it again" in program.output
+    assert program.end() == 0
+
+
+def test_a_restarted_master_finds_the_simulator_again(
+    start: Callable[..., Program], own_env: dict[str, str], watch: Callable[..., Program]
+) -> None:
+    port = int(own_env["ROS_MASTER_URI"].rpartition(":")[2])
+    master = start_master(port, own_env)
+    program = start(BIN / "ligature", "run", SMALL, "-p", "200", env=own_env)
+    program.wait_for("first state published")
+    master.kill()
+    master.wait()
+    time.sleep(1.5)
+    master = start_master(port, own_env)
+    try:
+        client = watch(own_env)
+        wait_until(lambda: len(seen(client)) > 10, 15)
+        listing = subprocess.run(["rostopic", "list"], env=own_env, capture_output=True, text=True, check=True).stdout
+        assert "/ambf/env/phantom/Needle/Command" in listing.split()
+        moved = start(
+            "/usr/bin/rostopic", "pub", "-r", "20", "/ambf/env/World/Command", "ambf_msgs/WorldCmd",
+            "{enable_step_throttling: true, step_clock: true, n_skip_steps: 1}", env=own_env,
+        )  # fmt: skip
+        wait_until(lambda: seen(client)[-1][2] == seen(client)[-20][2], 10)
+        moved.process.kill()
+    finally:
+        assert program.end() == 0
+        master.kill()
+        master.wait()
+
+
+def test_the_end_of_the_physics_process_ends_the_run_with_a_message(start: Callable[..., Program]) -> None:
+    program = start(BIN / "ligature", "run", SMALL, "-p", "200")
+    program.wait_for("first state published")
+    os.kill(program.children()["physics"], signal.SIGKILL)
+    assert program.process.wait(5) == 1
+    assert "the physics process ended with status -9; the run is over" in program.output
+
+
+def test_no_process_outlives_a_killed_supervisor(start: Callable[..., Program]) -> None:
+    program = start(BIN / "ligature", "run", SMALL, "-p", "200")
+    program.wait_for("first state published")
+    pids = program.children()
+    program.process.kill()
+    wait_until(lambda: not any(alive(pid) for pid in pids.values()), 5)
