@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-
 from ligature.bus import Block, BusError
 from ligature.bus.block import FOLDER, remove_leftovers
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from ligature.bus.codec import CodecError, Message, decode, encode
 from ligature.bus.pacing import Throttle
 from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, PlaceCommand, Release, Reset

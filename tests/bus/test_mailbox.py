@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 import ligature
+import pytest
 from ligature.bus import Mailbox, Throttle
 from ligature.bus.codec import encode
 from ligature.bus.ring import RING_BYTES, SLOTS, Ring

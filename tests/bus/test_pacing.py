@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-
 from ligature.bus import Pacer, Throttle, Watchdog
 from ligature.bus.pacing import BACKLOG, DEFAULT_SKIP
 

@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from ligature.cli.ambf_simulator import options_of
 
 BIN = Path(sys.executable).parent

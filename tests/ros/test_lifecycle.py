@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from ligature.cli.supervisor import master_answers
+
 from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
 
 pytestmark = pytest.mark.ros

@@ -16,6 +16,9 @@ from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 MAX_BYTES = 256 * 1024 * 1024
 """Largest file that is read unless the caller says otherwise."""
 
+MAX_PATH, MAX_NAME = 4000, 255
+"""Longest path in characters and longest file name in bytes that file systems take."""
+
 SEARCH_PATH = "LIGATURE_SCENE_PATH"
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
 _ROOT_SIGNS = (".git", "package.xml")
@@ -62,6 +65,8 @@ class Resolver:
 
     def allow(self, path: Path, mark: Mark | None = None) -> Path:
         """``path`` with links resolved, if it lies below a root; raises `ResolutionError`."""
+        if len(str(path)) > MAX_PATH or any(len(part.encode("utf-8", "replace")) > MAX_NAME for part in path.parts):
+            raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark)
         try:
             real = path.resolve()
         except (OSError, RuntimeError) as error:

@@ -12,7 +12,7 @@ import math
 from ligature.mesh.distance import signed_distance
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import SLIPS
-from ligature.suture.rotations import matrix_of, rotate, rotate_back
+from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 
 SLACK = 0.5
 """Distance, in radii, at which a contact is found although nothing moves."""
@@ -58,10 +58,17 @@ def _world_segments(first, n, nodes, work, dt):
             p[s, 0], p[s, 1], p[s, 2] = nodes.x[i, 0] + ex, nodes.x[i, 1] + ey, nodes.x[i, 2] + ez
         vx, vy, vz = nodes.v[i, 0], nodes.v[i, 1], nodes.v[i, 2]
         wx, wy, wz = nodes.w[i, 0], nodes.w[i, 1], nodes.w[i, 2]
+        for s in range(2):
+            rx, ry, rz = p[s, 0] - nodes.x[i, 0], p[s, 1] - nodes.x[i, 1], p[s, 2] - nodes.x[i, 2]
+            ux, uy, uz = cross(wx, wy, wz, rx, ry, rz)
+            work.ahead[e, s, 0] = p[s, 0] + dt * (vx + ux)
+            work.ahead[e, s, 1] = p[s, 1] + dt * (vy + uy)
+            work.ahead[e, s, 2] = p[s, 2] + dt * (vz + uz)
         arm = 0.5 * _distance(p[0], p[1])
         speed = math.sqrt(vx * vx + vy * vy + vz * vz) + arm * math.sqrt(wx * wx + wy * wy + wz * wz)
         reach = speed * dt + SLACK * nodes.radius[i]
         work.reach[e] = reach
+        work.clear[e] = SLACK * nodes.radius[i]
         size = nodes.radius[i] + reach
         for a in range(3):
             work.box[e, 0, a] = min(p[0, a], p[1, a]) - size
@@ -97,14 +104,30 @@ def _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt):
             reach = nodes.radius[first + e] + work.reach[e] + sweep
             s, d = _deepest(shapes.kind[c], shapes.size[c], planes, pose, R, segment, reach,
                             nodes.radius[first + e], p, normal)  # fmt: skip
-            if d > reach:
+            nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
+            if d > reach or _recede(nodes, work, e, k, s, d - nodes.radius[first + e], nx, ny, nz, dt):
                 continue
             if new.count[0] == capacity:
                 missed += 1
                 continue
-            nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
             _record(first, nodes, new, work, e, k, c, s, d, 0.0, nx, ny, nz, shapes.friction[c], dt)
     return missed
+
+
+@inlined
+def _recede(nodes, work, e, k, s, gap, nx, ny, nz, dt):
+    """Whether element ``e`` at ``s`` stays clear of the plane that node ``k`` shows it, by their present motion."""
+    begin, end = work.segment[e], work.ahead[e]
+    px = begin[0, 0] + s * (begin[1, 0] - begin[0, 0])
+    py = begin[0, 1] + s * (begin[1, 1] - begin[0, 1])
+    pz = begin[0, 2] + s * (begin[1, 2] - begin[0, 2])
+    ux, uy, uz = cross(
+        nodes.w[k, 0], nodes.w[k, 1], nodes.w[k, 2], px - nodes.x[k, 0], py - nodes.x[k, 1], pz - nodes.x[k, 2]
+    )
+    mx = end[0, 0] + s * (end[1, 0] - end[0, 0]) - px - dt * (nodes.v[k, 0] + ux)
+    my = end[0, 1] + s * (end[1, 1] - end[0, 1]) - py - dt * (nodes.v[k, 1] + uy)
+    mz = end[0, 2] + s * (end[1, 2] - end[0, 2]) - pz - dt * (nodes.v[k, 2] + uz)
+    return gap + min(nx * mx + ny * my + nz * mz, 0.0) > work.clear[e]
 
 
 @inlined
@@ -266,6 +289,17 @@ def _nearest(a, b):
 
 
 @inlined
+def _pass(a, b, dx, dy, dz, length, both):
+    """Whether strands that were (dx, dy, dz) apart end the tick apart, and on the same sides of each other."""
+    s, t = _nearest(a, b)
+    ex = a[0, 0] + s * (a[1, 0] - a[0, 0]) - b[0, 0] - t * (b[1, 0] - b[0, 0])
+    ey = a[0, 1] + s * (a[1, 1] - a[0, 1]) - b[0, 1] - t * (b[1, 1] - b[0, 1])
+    ez = a[0, 2] + s * (a[1, 2] - a[0, 2]) - b[0, 2] - t * (b[1, 2] - b[0, 2])
+    end = math.sqrt(ex * ex + ey * ey + ez * ez)
+    return end > (1.0 + SLACK) * both and dx * ex + dy * ey + dz * ez > 0.5 * length * end
+
+
+@inlined
 def _touch_pair(first, nodes, new, work, capacity, i, j, offset):
     a, b = work.segment[i], work.segment[j]
     s, t = _nearest(a, b)
@@ -276,6 +310,9 @@ def _touch_pair(first, nodes, new, work, capacity, i, j, offset):
     near = nodes.radius[first + j]
     d = length - near
     if length < 1e-12 or d > nodes.radius[first + i] + work.reach[i] + work.reach[j]:
+        return 0
+    both = near + nodes.radius[first + i]
+    if length > both + 2.0 * SLACK * near and _pass(work.ahead[i], work.ahead[j], dx, dy, dz, length, both):
         return 0
     if new.count[0] == capacity:
         return 1

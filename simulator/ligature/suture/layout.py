@@ -114,7 +114,9 @@ class Work(NamedTuple):
     six: Array  # (6, 6)
     three: Array  # (3, 3)
     segment: Array  # (elements, 2, 3) of each capsule, world
+    ahead: Array  # (elements, 2, 3) where it would be after the tick
     reach: Array  # (elements,) distance within which contacts are looked for
+    clear: Array  # (elements,) distance that counts as touching although nothing moves
     box: Array  # (elements, 2, 3)
     group_box: Array  # (elements, 2, 3)
 
@@ -124,11 +126,12 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
     z = np.zeros
     j = n - 1
     return Work(
-        z((total, 3)), z((total, 4)), z((total, 3)), z((total, 4)), z((total + 1, 3, 3)), z((j, 2, 3)),
-        z((j, 3, 3)), z((j, 6)), z((j, 6)), z((total, 6, 6)), z((total, 6, 6)), z((j, 6, 6)),
-        z((total, 6)), z((total, 6)), z((j, 6)), z((4, total, 6)), z((2, j, 6)), z((j, 6)),
-        z((contacts, 3, 3)), z((6, 6)), z((3, 3)), z((elements, 2, 3)), z(elements),
-        z((elements, 2, 3)), z((elements, 2, 3)),
+        x=z((total, 3)), q=z((total, 4)), xp=z((total, 3)), qp=z((total, 4)), R=z((total + 1, 3, 3)),
+        lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
+        Y=z((total, 6, 6)), Z=z((j, 6, 6)), g=z((total, 6)), d=z((total, 6)), load=z((j, 6)),
+        cg=z((4, total, 6)), cg_load=z((2, j, 6)), zero=z((j, 6)), K=z((contacts, 3, 3)), six=z((6, 6)),
+        three=z((3, 3)), segment=z((elements, 2, 3)), ahead=z((elements, 2, 3)), reach=z(elements),
+        clear=z(elements), box=z((elements, 2, 3)), group_box=z((elements, 2, 3)),
     )  # fmt: skip
 
 

@@ -113,7 +113,7 @@ class Rod:
         self._counts = np.zeros(2, np.int64)
         self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
-        self._self_skip = int(np.ceil(np.pi * description.radius.max() / lengths.min()))
+        self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._permanent = [self._grip_of(tie) for tie in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
         self._near: list[int] = []

@@ -14,6 +14,7 @@ from ligature.suture.chain import factor, solve
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import add_contacts, conclude_contacts, couple, settle_contacts
 from ligature.suture.rotations import (
+    cross,
     left_jacobian_inverse_times,
     matrix_of,
     multiply,
@@ -25,8 +26,11 @@ from ligature.suture.rotations import (
 MAX_NEWTON = 6
 """Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
 
-LARGE_TURN = 0.02
-"""Correction of a joint's direction in radians beyond which the linearisation is refreshed."""
+LARGE_SWING = 0.02
+"""Swing of an element in radians, in one Newton step, after which another follows."""
+
+MAX_SWING = 0.5
+"""Largest swing of a Newton step; steps that want more are shortened."""
 
 
 @kernel
@@ -158,16 +162,24 @@ def _stiffen_by_tension(n, joints, work, i):
 
 
 @kernel
-def correct(total, nodes, work):
-    """Move all nodes by the correction ``work.d``; returns the largest turn."""
+def correct(n, total, nodes, work):
+    """Move all nodes by the correction ``work.d``; returns the largest swing of a lever.
+
+    Rolling about the line between its pivots moves no pivot, and does not count.
+    """
     largest = 0.0
-    for i in range(total):
+    for i in range(n):
         if nodes.fixed[i]:
             continue
         d = work.d[i]
-        largest = max(largest, d[3] * d[3] + d[4] * d[4] + d[5] * d[5])
+        j, side = (i, 0) if i < n - 1 else (i - 1, 1)
+        rx, ry, rz = work.lever[j, side, 0], work.lever[j, side, 1], work.lever[j, side, 2]
+        sx, sy, sz = cross(d[3], d[4], d[5], rx, ry, rz)
+        arm = rx * rx + ry * ry + rz * rz
+        if arm > 0.0:
+            largest = max(largest, (sx * sx + sy * sy + sz * sz) / arm)
     largest = math.sqrt(largest)
-    scale = 1.0 if largest < 0.5 else 0.5 / largest
+    scale = 1.0 if largest < MAX_SWING else MAX_SWING / largest
     for i in range(total):
         if nodes.fixed[i]:
             continue
@@ -216,11 +228,11 @@ def advance(n, total, nodes, joints, touches, work, stiffness, dt):
         if coupled:
             couple(n, total, nodes, touches, work)
         changed = settle_contacts(nodes, touches, work, stiffness, dt, steps == MAX_NEWTON)
-        largest = correct(total, nodes, work)
+        largest = correct(n, total, nodes, work)
         for j in range(n - 1):
             for a in range(6):
                 joints.load[j, a] = work.load[j, a]
-        if largest < LARGE_TURN and not changed:
+        if largest < LARGE_SWING and not changed:
             break
     conclude_contacts(touches, stiffness)
     finish(n, total, nodes, joints, work, dt)
