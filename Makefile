@@ -49,5 +49,9 @@ fuzz: setup
 bench: setup
 	$(PYTHON) -m tests.bench.run
 
+docs: setup
+	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md
+	$(PYTHON) -m docs.pictures
+
 clean:
 	rm -rf build devel dist out .venv .mypy_cache .ruff_cache

@@ -46,6 +46,11 @@ def test_a_bad_value_leaves_the_object_out_and_says_where(model) -> None:
     ]
 
 
+@pytest.mark.parametrize("text", [".nan", ".inf", "1e300"])
+def test_a_number_that_no_scene_can_use_is_an_error(model, text: str) -> None:
+    assert f"expected a finite number below 1e+12, not '{text}'" in messages(model(BODY + f"  scale: {text}\n"))[0]
+
+
 def test_a_missing_part_of_a_vector_is_named(model) -> None:
     document = model(BODY + "  gravity: {x: 0, z: 1}\n")
     assert "expected all of x, y, z; 'y' is missing" in messages(document)[0]

@@ -18,6 +18,9 @@ from ligature.adf.schema import BY_PATH, SCHEMA, Key, Status, Type
 
 Vector = tuple[float, float, float]
 
+LARGEST = 1e12
+"""Largest magnitude of a number in a scene; .inf and .nan are numbers for YAML, but no scene can use them."""
+
 _SCALARS = {
     Type.NUMBER: scalars.number,
     Type.INTEGER: scalars.integer,
@@ -174,9 +177,12 @@ def _read(rule: Any, node: Node) -> Any:
     if not isinstance(node, Scalar):
         raise BadValue(node, "a single value")
     try:
-        return rule(node.text)
+        value = rule(node.text)
     except (ValueError, OverflowError) as error:
         raise BadValue(node, f"{error}, not '{node.text}'") from error
+    if isinstance(value, float) and not abs(value) <= LARGEST:
+        raise BadValue(node, f"a finite number below {LARGEST:g}, not '{node.text}'")
+    return value
 
 
 def _items(node: Node, lenient: bool = False) -> list[Node]:
