@@ -316,8 +316,8 @@ def arc_shapes() -> tuple[list[dict[str, Any]], np.ndarray, float]:
 def phantom() -> dict[str, Any]:
     """The block, the needle, the thread and the frame that carries the cameras."""
     top = 0.715
-    T_world_block = pose_matrix((0.03, 0.2, top - 0.015), (0, 0, 0))
-    block_shape = [shape("BOX", (0, 0, 0), x=0.1, y=0.16, z=0.03)]
+    T_world_block = pose_matrix((0.03, 0.18, top - 0.015), (0, 0, 0))
+    block_shape = [shape("BOX", (0, 0, 0), x=0.1, y=0.2, z=0.03)]
     bodies: dict[str, Any] = {
         "BODY Block": body("Block", T_world_block, 0.0, block_shape, **{"color components": colour(0.85, 0.6, 0.5)})
     }
@@ -325,7 +325,7 @@ def phantom() -> dict[str, Any]:
     bodies["BODY CameraFrame"] = body("CameraFrame", T_world_camera, 0.0, [])
 
     shapes, centre, mass = arc_shapes()
-    T_world_needle = pose_matrix((0.03, 0.24, top + NEEDLE_THICKNESS + 0.0002), (0, 0, 0))
+    T_world_needle = pose_matrix((0.005, 0.2, top + NEEDLE_THICKNESS + 0.0002), (0, 0, 0))
     bodies["BODY Needle"] = body(
         "Needle", T_world_needle, number(mass), shapes,
         **{

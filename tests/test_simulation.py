@@ -192,7 +192,7 @@ def test_ghosts_sense_what_enters_them(sim: Simulation) -> None:
 def test_ghosts_sense_the_thread_too(tmp_path: Path) -> None:
     text = (SMALL.parent / "phantom.yaml").read_text()
     ghost = (
-        "ghost objects: [GHOST g]\nGHOST g: {name: g, parent: BODY Block, location: {position: {x: -0.0135, y: -0.0, z: 0.0152}}, "
+        "ghost objects: [GHOST g]\nGHOST g: {name: g, parent: BODY Block, location: {position: {x: -0.035, y: 0.0, z: 0.0152}}, "
         "collision shape: BOX, collision geometry: {x: 0.05, y: 0.01, z: 0.002}}\n"
     )
     (tmp_path / "phantom.yaml").write_text(text + ghost)
@@ -204,7 +204,7 @@ def test_ghosts_sense_the_thread_too(tmp_path: Path) -> None:
     expected = {
         simulation.scene.bodies[b].identity.name
         for b, y in zip(simulation.scene.rods[0].bodies, middles, strict=True)
-        if abs(y - 0.2) < 0.005
+        if abs(y - 0.18) < 0.005
     }
     assert expected and expected <= inside
     assert "Thread" not in inside and "Thread_039" not in inside

@@ -76,6 +76,13 @@ def test_a_key_that_stands_twice_is_told(model) -> None:
     assert "key 'mass' stands twice; the first one counts" in messages(model(BODY + "  mass: 3\n"))[0]
 
 
+def test_a_bad_value_of_the_file_itself_is_told_and_its_default_taken(model) -> None:
+    document = model(BODY + "gravity: {x: 0, y: 0}\nignore inter-collision: maybe\n")
+    assert len(document.elements("bodies")) == 1
+    assert not document.top.has("gravity") and document.top.flag("ignore inter-collision") is False
+    assert [text.split(": ", 2)[1] for text in messages(document)] == ["error", "error"]
+
+
 def test_objects_exist_only_when_listed(model) -> None:
     assert len(model(BODY + "BODY b:\n  name: b\n").elements("bodies")) == 1
 

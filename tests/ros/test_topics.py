@@ -180,7 +180,7 @@ def test_resets_put_bodies_back_and_time_goes_on(listen: Callable[..., Any], pub
     time.sleep(0.7)
     time_before = needle.messages[-1].sim_time
     publish(f"{WORLD}/Command/Reset/Bodies", Empty).publish(Empty())
-    needle.wait(lambda m: abs(m.pose.position.x - 0.03) < 1e-3 and m.pose.position.z < 0.7165, 5.0)
+    needle.wait(lambda m: abs(m.pose.position.x - 0.005) < 1e-3 and m.pose.position.z < 0.7165, 5.0)
     assert needle.messages[-1].sim_time > time_before
 
 

@@ -101,9 +101,11 @@ def _read(path: Path, kind: str, resolver: Resolver, strict: bool) -> Document:
     real = resolver.allow(Path(path))
     text = resolver.read_text(real, MAX_TEXT)
     root = parse(text, real)
-    top = Element(kind, real.name, _own_keys(root, kind))
+    own = _own_keys(root, kind)
+    found = problems(Element(kind, real.name, own))
+    top = Element(kind, real.name, _usable(own, found))
     document = Document(real, kind, text, top)
-    document.diagnostics += problems(top)
+    document.diagnostics += found
     document.diagnostics += _version(top)
     for name, object_kind in LISTS.items():
         if name in BY_PATH[kind]:
@@ -118,6 +120,17 @@ def _own_keys(root: Mapping, kind: str) -> Mapping:
     """The root with the keys of the schema only; all others define objects or hold anchors."""
     known = BY_PATH[kind]
     return replace(root, entries={name: entry for name, entry in root.entries.items() if name in known})
+
+
+def _usable(own: Mapping, found: list[Diagnostic]) -> Mapping:
+    """The file's own keys without those that hold an error: their defaults are taken."""
+    errors = [d.mark for d in found if d.severity >= Severity.ERROR and d.mark is not None and d.mark != own.mark]
+
+    def sound(value: Node) -> bool:
+        start = (value.mark.line, value.mark.column)
+        return not any(start <= (mark.line, mark.column) <= value.end for mark in errors)
+
+    return replace(own, entries={name: entry for name, entry in own.entries.items() if sound(entry[1])})
 
 
 def _listed_names(root: Mapping, kind: str) -> set[str]:

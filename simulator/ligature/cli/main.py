@@ -79,6 +79,25 @@ def bench(
 
 
 @app.command()
+def render(
+    launch: Launch,
+    camera: Annotated[str, typer.Option(help="Camera, by name or a part of it.")],
+    out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("out"),
+    models: Models = None,
+    seconds: Annotated[float, typer.Option(help="Simulated seconds before the picture.", min=0)] = 0.0,
+    width: Annotated[int, typer.Option(help="Width in pixels; 0 for the camera's own.", min=0)] = 0,
+    height: Annotated[int, typer.Option(help="Height in pixels; 0 for the camera's own.", min=0)] = 0,
+    root: Roots = None,
+) -> None:
+    """Draw one moment as a camera sees it, headless: colour, depth and ids."""
+    from ligature.cli.render import render as run_render
+
+    resolution = (width, height) if width and height else None
+    console = Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_render(launch, indices(models), root or [], camera, out, seconds, resolution, console))
+
+
+@app.command()
 def decompose(
     mesh: Launch,
     out: Annotated[Optional[Path], typer.Option("-o", help="OBJ file to write.")] = None,  # noqa: UP045

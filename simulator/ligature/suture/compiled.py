@@ -17,7 +17,9 @@ import numba
 
 from ligature.mesh import distance
 
-SOURCES = ("chain", "contacts", "coupling", "layout", "placing", "reactions", "rotations", "tick")
+SOURCES = (
+    "bonds", "chain", "contacts", "coupling", "layout", "placing", "reactions", "rotations", "step", "substeps",
+)  # fmt: skip
 """Modules of this room that hold kernels."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -299,11 +299,8 @@ def _moved(nodes, work, touches, c, side):
 
 
 @kernel
-def settle_contacts(nodes, touches, work, stiffness, dt, last):
-    """Forces of the contacts as solved, and which of them touch and stick; True if the solve assumed otherwise.
-
-    The ``last`` solve of a tick decides nothing any more.
-    """
+def settle_contacts(nodes, touches, work, stiffness, dt):
+    """Forces of the contacts as solved, and which of them touch and stick; True if the solve assumed otherwise."""
     changed = False
     per_dt2 = 1.0 / (dt * dt)
     for c in range(touches.count[0]):
@@ -319,9 +316,7 @@ def settle_contacts(nodes, touches, work, stiffness, dt, last):
         begun = touches.begun[c]
         w[0], w[1], w[2] = begun[0] + ux - un * n[0], begun[1] + uy - un * n[1], begun[2] + uz - un * n[2]
         press = force[0] * n[0] + force[1] * n[1] + force[2] * n[2]
-        if last:
-            touches.press[c] = max(press, 0.0)
-        elif touches.closed[c] and press >= 0.0:
+        if touches.closed[c] and press >= 0.0:
             changed = _settle_friction(touches, c, w, press, stiffness) or changed
         elif touches.closed[c]:
             touches.closed[c] = False

@@ -112,6 +112,13 @@ class Work(NamedTuple):
     zero: Array  # (n - 1, 6)
     K: Array  # (C, 3, 3) contact stiffness times dt²
     six: Array  # (6, 6)
+    sum6: Array  # (6,)
+    kept_x: Array  # (N, 3) state at the start of the tick, and so on
+    kept_q: Array  # (N, 4)
+    kept_v: Array  # (N, 3)
+    kept_w: Array  # (N, 3)
+    kept_angle: Array  # (n - 1, 3)
+    kept_load: Array  # (n - 1, 6)
     three: Array  # (3, 3)
     segment: Array  # (elements, 2, 3) of each capsule, world
     ahead: Array  # (elements, 2, 3) where it would be after the tick
@@ -130,6 +137,8 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
         Y=z((total, 6, 6)), Z=z((j, 6, 6)), g=z((total, 6)), d=z((total, 6)), load=z((j, 6)),
         cg=z((4, total, 6)), cg_load=z((2, j, 6)), zero=z((j, 6)), K=z((contacts, 3, 3)), six=z((6, 6)),
+        sum6=z(6), kept_x=z((total, 3)), kept_q=z((total, 4)), kept_v=z((total, 3)), kept_w=z((total, 3)),
+        kept_angle=z((j, 3)), kept_load=z((j, 6)),
         three=z((3, 3)), segment=z((elements, 2, 3)), ahead=z((elements, 2, 3)), reach=z(elements),
         clear=z(elements), box=z((elements, 2, 3)), group_box=z((elements, 2, 3)),
     )  # fmt: skip

@@ -19,7 +19,7 @@ from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
 from ligature.suture.placing import bounds
-from ligature.suture.reactions import bond, run_tick
+from ligature.suture.substeps import run_tick
 
 Array = NDArray[np.float64]
 
@@ -109,8 +109,9 @@ class Rod:
         self._shapes = shapes or _no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
         self._work = layout.work(self._chain, self._total, n, capacity)
-        self._touches = (layout.touches(capacity), layout.touches(capacity))
-        self._counts = np.zeros(2, np.int64)
+        self._touches = tuple(layout.touches(capacity) for _ in range(3))
+        self._shape_poses = np.zeros_like(self._shapes.pose)
+        self._counts = np.zeros(4, np.int64)
         self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
@@ -169,6 +170,7 @@ class Rod:
         self._nodes.v[:], self._nodes.w[:] = 0.0, 0.0
         self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
         self.grips = []
+        self._bonds = self._gather_bonds()
         self.tension[:], self.impulse[:] = 0.0, 0.0
         for touches in self._touches:
             touches.count[0] = 0
@@ -195,6 +197,7 @@ class Rod:
         for name in TOUCH_MEMORY:
             getattr(touches, name)[:n] = memory[f"touch_{name}"]
         self.grips = [Grip(int(g[0]), int(g[1]), g[2:].reshape(3, 2, 3)) for g in memory["grips"]]
+        self._bonds = self._gather_bonds()
 
     def finite(self) -> bool:
         """Whether the state is usable."""
@@ -279,10 +282,18 @@ class Rod:
         T_b = inverse(partner.T_body_inertial) @ T_body_b
         none = np.zeros(3)
         self.grips.append(self._grip_of(Tie(element, body, T_a, T_b, none, none, none, none, none)))
+        self._bonds = self._gather_bonds()
 
     def release(self, element: int, body: int) -> None:
         """Let go of a grip."""
         self.grips = [g for g in self.grips if (g.element, g.body) != (element, body)]
+        self._bonds = self._gather_bonds()
+
+    def _gather_bonds(self) -> tuple[NDArray[np.int64], Array]:
+        """Nodes (g, 2) and points (g, 3, 2, 3) of all bonds."""
+        held = (*self._permanent, *self.grips)
+        nodes = np.array([(self._first + g.element, self.node_of[g.body]) for g in held], dtype=np.int64)
+        return nodes.reshape(-1, 2), np.array([g.points for g in held]).reshape(-1, 3, 2, 3)
 
     @property
     def _holding(self) -> list[int]:
@@ -297,15 +308,15 @@ class Rod:
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds what each partner receives."""
-        old, new = self._touches
-        new.count[0] = 0
-        for grip in (*self._permanent, *self.grips):
-            bond(self._nodes, self._work, new, self._first + grip.element, self.node_of[grip.body], grip.points)
-        self.newton_steps = run_tick(
-            self._first, self._chain, self._total, self._nodes, self.joints, self._shapes, old, new, self._work,
-            self._counts, self._self_skip, self._stiffness, self.impulse, self.tension, self.dt,
+        a, b, c = self._touches
+        grips, points = self._bonds
+        run_tick(
+            self._first, self._chain, self._total, self._nodes, self.joints, self._shapes, self._shape_poses,
+            a, b, c, self._work, grips, points, self._counts, self._self_skip, self._stiffness,
+            self.impulse, self.tension, self.dt,
         )  # fmt: skip
-        self._touches = new, old
+        self.newton_steps = int(self._counts[2])
+        self._touches = (c, a, b) if self._counts[3] else (b, c, a)
 
     def impulse_on(self, body: int) -> Array:
         """Linear and angular impulse (6,) of the last tick on a partner, about its centre of mass."""

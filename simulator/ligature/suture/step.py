@@ -1,4 +1,4 @@
-"""One tick of a rod: free motion, then Newton steps on joints, contacts and friction at the tick's end.
+"""One step of a rod: free motion, then Newton steps on joints, contacts and friction at the step's end.
 
 Implicit Euler in the form of XPBD (Macklin et al. 2016): with the multipliers scaled by dt², every
 force law is evaluated at the end of the tick, so that stiff springs and heavy pulls stay stable at any
@@ -34,14 +34,18 @@ MAX_SWING = 0.5
 
 
 @kernel
-def predict(n, total, nodes, work, dt):
-    """Free motion: start poses to ``work.x``, predicted poses to ``nodes`` and ``work.xp``."""
+def predict(total, nodes, work, dt, damped):
+    """Free motion: start poses to ``work.x``, predicted poses to ``nodes`` and ``work.xp``.
+
+    Damping of a whole tick is taken off in its ``damped`` step.
+    """
     for i in range(total):
+        slow, still = (nodes.keep[i, 0], nodes.keep[i, 1]) if damped else (1.0, 1.0)
         for a in range(3):
             work.x[i, a] = nodes.x[i, a]
             if not nodes.fixed[i]:
-                nodes.v[i, a] = nodes.v[i, a] * nodes.keep[i, 0] + dt * nodes.gravity[i, a]
-                nodes.w[i, a] *= nodes.keep[i, 1]
+                nodes.v[i, a] = nodes.v[i, a] * slow + dt * nodes.gravity[i, a]
+                nodes.w[i, a] *= still
             nodes.x[i, a] += dt * nodes.v[i, a]
             work.xp[i, a] = nodes.x[i, a]
         for a in range(4):
@@ -209,14 +213,15 @@ def finish(n, total, nodes, joints, work, dt):
 
 
 @kernel
-def advance(n, total, nodes, joints, touches, work, stiffness, dt):
-    """One tick of ``total`` nodes, the first ``n`` of them a chain; returns the Newton steps taken.
+def advance(n, total, nodes, joints, touches, work, stiffness, dt, damped):
+    """One step of ``total`` nodes, the first ``n`` of them a chain.
 
-    Contacts in ``touches`` were found at the poses of the tick's start; ``stiffness`` is theirs (N/m).
+    Returns the Newton steps taken and whether contacts and shape settled. Contacts in ``touches`` were
+    found at the poses of the step's start; ``stiffness`` is theirs (N/m).
     """
-    predict(n, total, nodes, work, dt)
-    steps = 0
-    for _ in range(MAX_NEWTON):
+    predict(total, nodes, work, dt, damped)
+    steps, settled = 0, False
+    while steps < MAX_NEWTON and not settled:
         steps += 1
         linearise(n, total, nodes, joints, work, dt)
         assemble(n, total, nodes, joints, work)
@@ -227,13 +232,12 @@ def advance(n, total, nodes, joints, touches, work, stiffness, dt):
               work.load, work.six)  # fmt: skip
         if coupled:
             couple(n, total, nodes, touches, work)
-        changed = settle_contacts(nodes, touches, work, stiffness, dt, steps == MAX_NEWTON)
+        changed = settle_contacts(nodes, touches, work, stiffness, dt)
         largest = correct(n, total, nodes, work)
         for j in range(n - 1):
             for a in range(6):
                 joints.load[j, a] = work.load[j, a]
-        if largest < LARGE_SWING and not changed:
-            break
+        settled = largest < LARGE_SWING and not changed
     conclude_contacts(touches, stiffness)
     finish(n, total, nodes, joints, work, dt)
-    return steps
+    return steps, settled

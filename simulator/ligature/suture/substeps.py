@@ -1,0 +1,121 @@
+"""A whole tick of a rod in one call: in one step as a rule, in several where contacts do not settle.
+
+A thread that snaps into a new shape, as when a knot closes, changes its contacts faster than one step
+can follow; a tick in which they do not settle is taken back and done again in shorter steps. World
+axes, SI units.
+"""
+
+from __future__ import annotations
+
+from ligature.suture.bonds import place_bonds
+from ligature.suture.compiled import inlined, kernel
+from ligature.suture.contacts import detect
+from ligature.suture.reactions import add_reactions, find_tension
+from ligature.suture.rotations import cross, turn
+from ligature.suture.step import advance
+
+REFINEMENT = 4
+"""Steps of a tick in which contacts did not settle."""
+
+
+@inlined
+def _copy2(a, b):
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            b[i, k] = a[i, k]
+
+
+@inlined
+def _keep(nodes, joints, work):
+    _copy2(nodes.x, work.kept_x)
+    _copy2(nodes.q, work.kept_q)
+    _copy2(nodes.v, work.kept_v)
+    _copy2(nodes.w, work.kept_w)
+    _copy2(joints.angle, work.kept_angle)
+    _copy2(joints.load, work.kept_load)
+
+
+@inlined
+def _take_back(nodes, joints, work):
+    _copy2(work.kept_x, nodes.x)
+    _copy2(work.kept_q, nodes.q)
+    _copy2(work.kept_v, nodes.v)
+    _copy2(work.kept_w, nodes.w)
+    _copy2(work.kept_angle, joints.angle)
+    _copy2(work.kept_load, joints.load)
+
+
+@inlined
+def _move_shapes(nodes, shapes, h):
+    """Move the parts of bodies on by ``h`` seconds, as their nodes move."""
+    for c in range(shapes.node.shape[0]):
+        k = shapes.node[c]
+        if k < 0:
+            continue
+        p, v, w = shapes.pose[c], nodes.v[k], nodes.w[k]
+        ux, uy, uz = cross(w[0], w[1], w[2], p[0] - nodes.x[k, 0], p[1] - nodes.x[k, 1], p[2] - nodes.x[k, 2])
+        p[0], p[1], p[2] = p[0] + h * (v[0] + ux), p[1] + h * (v[1] + uy), p[2] + h * (v[2] + uz)
+        turn(shapes.pose[:, 3:7], c, h * w[0], h * w[1], h * w[2])
+
+
+@inlined
+def _scale_loads(joints, factor):
+    """Loads are kept times the square of the step: bring them to another step."""
+    for j in range(joints.load.shape[0]):
+        for a in range(6):
+            joints.load[j, a] *= factor
+
+
+@inlined
+def _one_step(
+    first, n, total, nodes, joints, shapes, old, new, work, grips, points, counts, self_skip, stiffness, h, damped
+):
+    new.count[0] = 0
+    place_bonds(nodes, work, new, grips, points)
+    detect(first, work.segment.shape[0], nodes, shapes, old, new, work, counts, self_skip, h)
+    return advance(n, total, nodes, joints, new, work, stiffness, h, damped)
+
+
+@kernel
+def run_tick(
+    first, n, total, nodes, joints, shapes, shape_poses, a, b, c, work, grips, points, counts, self_skip,
+    stiffness, impulse, tension, dt,
+):  # fmt: skip
+    """One tick; contacts of the last one are in ``a``, those of this one go to ``b``, or ``c``.
+
+    ``counts`` returns: contacts found, contacts for which there was no room, Newton steps, and whether
+    the contacts lie in ``c``.
+    """
+    _keep(nodes, joints, work)
+    steps, settled = _one_step(
+        first, n, total, nodes, joints, shapes, a, b, work, grips, points, counts, self_skip, stiffness, dt, True
+    )
+    for i in range(total):
+        for k in range(6):
+            impulse[i, k] = 0.0
+    parts = 1
+    if not settled:
+        parts = REFINEMENT
+        _take_back(nodes, joints, work)
+        _copy2(shapes.pose, shape_poses)
+        h = dt / parts
+        _scale_loads(joints, 1.0 / (parts * parts))
+        steps = 0
+        old, new = a, b
+        for part in range(parts):
+            more, settled = _one_step(
+                first, n, total, nodes, joints, shapes, old, new, work, grips, points, counts, self_skip,
+                stiffness, h, part == 0,
+            )  # fmt: skip
+            steps += more
+            add_reactions(n, joints, new, work, impulse, h)
+            _move_shapes(nodes, shapes, h)
+            old = new
+            new = c if part % 2 == 0 else b
+        _scale_loads(joints, float(parts * parts))
+        _copy2(shape_poses, shapes.pose)
+    else:
+        add_reactions(n, joints, b, work, impulse, dt)
+    find_tension(first, n, joints, work, tension, dt)
+    counts[2] = steps
+    counts[3] = 1 if parts % 2 == 0 else 0
