@@ -8,13 +8,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import ligature
 import numpy as np
 import pytest
-from PIL import Image
-
-import ligature
 from ligature import Simulation
 from ligature.render import Renderer, RenderUnavailable, view_of
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"

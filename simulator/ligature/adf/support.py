@@ -17,9 +17,9 @@ Bodies, joints, ghost objects, sensors, actuators, cameras, lights and sutures a
 checked and reported as not simulated.
 
 Where AMBF's behaviour is a defect that no file relies on, ours is the sane one: an unknown sensor type leaves that
-sensor out instead of crashing, one bad value leaves its object out instead of refusing the file (`--strict` refuses it),
-a joint without `type` is revolute with a warning, a lone `enable motor` is accepted, duplicates get topics of their own,
-a missing low-resolution mesh falls back to the high-resolution one with a warning.
+sensor out instead of crashing, one bad value leaves its object out instead of refusing the file (`--strict` refuses
+it), a joint without `type` is revolute with a warning, a lone `enable motor` is accepted, duplicates get topics of
+their own, a missing low-resolution mesh falls back to the high-resolution one with a warning.
 """
 
 

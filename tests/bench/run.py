@@ -1,0 +1,17 @@
+"""Runs every benchmark one after the other: ``python -m tests.bench.run``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+BENCHMARKS = ("scenes", "latency")
+
+
+def main() -> int:
+    """Entry point."""
+    return max(subprocess.run([sys.executable, "-m", f"tests.bench.{name}"]).returncode for name in BENCHMARKS)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
