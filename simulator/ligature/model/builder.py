@@ -37,6 +37,7 @@ from ligature.model.scene import (
     ShaderFiles,
     WorldSettings,
 )
+from ligature.model.sutures import thread
 
 KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
 
@@ -58,7 +59,7 @@ class SceneBuilder:
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
         self.devices: list[InputDevice] = []
-        self._names = {kind: Names(prefix) for kind in KINDS}
+        self._names = {kind: Names(prefix) for kind in (*KINDS, "suture")}
         self._arrivals = Arrivals()
         self._scales: list[float] = []
         self._groups: list[tuple[int, ...]] = []
@@ -82,6 +83,7 @@ class SceneBuilder:
         )  # fmt: skip
         before = {kind: len(self._list(kind)) for kind in KINDS}
         local = self._add_bodies(document, model, context, shaders)
+        self._add_sutures(document, model, local)
         self._add_ghosts(document, model, context)
         self._add_sensors(document, model, local)
         self._add_actuators(document, model, local)
@@ -181,6 +183,29 @@ class SceneBuilder:
                 self._no_rod.add(body.index)
             local.append(body.index)
         return local
+
+    def _add_sutures(self, document: Document, model: Model, local: list[int]) -> None:
+        own = document.top.has("gravity")
+        gravity = np.array(document.top.vector("gravity")) if own else self.world.gravity
+        for element in document.elements("sutures"):
+            parent = self._body(element, "parent", local, "") if element.text("parent") else None
+            if parent is None and element.text("parent"):
+                continue
+            identity = self._names["suture"].identity(element, model.namespace, model.index, passive=True)
+            held = None if parent is None else self.bodies[parent]
+            try:
+                bodies, joints = thread(element, identity, len(self.bodies), len(self.joints), gravity, held)
+            except GeometryError as error:
+                self.report(error.diagnostic)
+                continue
+            self.bodies += bodies
+            self.joints += joints
+            self._scales += [1.0] * len(bodies)
+            self._groups += [()] * len(bodies)
+            self._linked += [(joint.parent, joint.child) for joint in joints]
+            for kind, made in (("body", bodies), ("joint", joints)):
+                self._names[kind].identifiers += [item.identity.identifier for item in made]
+            local += [body.index for body in bodies]
 
     def _valid_groups(self, element: Element) -> tuple[int, ...]:
         groups = [int(g) for g in element.numbers("collision groups")]

@@ -1,0 +1,62 @@
+"""Sutures by physical data: one block of a file is a whole thread."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ligature
+import numpy as np
+import pytest
+from ligature import Scene, Simulation
+from ligature.adf import Severity
+
+NEEDLE = (
+    "bodies: [BODY Needle]\nsutures: [SUTURE silk]\nnamespace: /ambf/env/\n"
+    "BODY Needle: {name: Needle, mass: 0.001, collision shape: SPHERE, collision geometry: {radius: 0.001}, "
+    "location: {position: {x: 0, y: 0, z: 0.5}}}\n"
+)
+SILK = (
+    "SUTURE silk: {name: silk, length: 0.1, USP size: 2-0, youngs modulus: 1.0e+8, density: 1000, elements: 20, "
+    "parent: BODY Needle, location: {position: {x: 0, y: 0, z: -0.001}, orientation: {r: 3.14159265358979, p: 0, y: 0}}}\n"
+)
+
+
+def load(tmp_path: Path, text: str) -> Scene:
+    (tmp_path / "m.yaml").write_text(text)
+    return ligature.load(tmp_path / "m.yaml")
+
+
+def test_one_block_becomes_one_rod_of_the_given_data(tmp_path: Path) -> None:
+    scene = load(tmp_path, NEEDLE + SILK)
+    (rod,) = scene.rods
+    assert len(rod.bodies) == 20 and rod.radius == pytest.approx(0.3195e-3 / 2)
+    assert rod.lengths.sum() == pytest.approx(0.1)
+    mass = sum(scene.bodies[b].mass for b in rod.bodies)
+    assert mass == pytest.approx(1000 * np.pi * rod.radius**2 * 0.1)
+    six = scene.joints[rod.joints[0]].six_dof
+    assert six is not None
+    assert six.stiffness[3] == pytest.approx(1e8 * np.pi * rod.radius**4 / 4 / 0.005)
+    assert scene.bodies[rod.bodies[3]].identity.identifier == "/ambf/env/SUTURE silk_003"
+    assert all(scene.bodies[b].identity.passive for b in rod.bodies)
+
+
+def test_it_hangs_from_its_needle(tmp_path: Path) -> None:
+    simulation = Simulation(load(tmp_path, NEEDLE.replace("mass: 0.001", "mass: 0") + SILK))
+    simulation.step(1000)
+    end = simulation.bodies["SUTURE silk_019"].pose
+    assert end[:3] == pytest.approx([0, 0, 0.5 - 0.001 - 0.0975], abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("USP size: 2-0", "USP size: 99", "has the USP size '99'; give diameter, or one of 10-0"),
+        ("elements: 20", "elements: 2", "has 2 elements; give 4 to 2000"),
+        ("length: 0.1", "length: 0", "has no length; give metres"),
+        ("USP size: 2-0", "diameter: -1", "has the diameter -1; give metres"),
+    ],
+)
+def test_data_that_make_no_thread_are_told(tmp_path: Path, old: str, new: str, text: str) -> None:
+    scene = load(tmp_path, NEEDLE + SILK.replace(old, new))
+    assert scene.rods == ()
+    assert text in "\n".join(str(d) for d in scene.diagnostics if d.severity >= Severity.ERROR)
