@@ -140,7 +140,7 @@ def test_an_actuator_holds_the_needle_and_lets_it_go(sim: Simulation) -> None:
     sim.step(1500)
     assert sim.state["actuator_active"][0, 0]
     assert needle.pose[2] > 0.72
-    assert np.linalg.norm(in_tool() - held_at) < 2e-3
+    assert np.linalg.norm(in_tool() - held_at) < 4e-3  # 0.22 m away from the tool
     sim.apply(Release("actuator", 0))
     sim.step(1000)
     assert not sim.state["actuator_active"][0, 0]

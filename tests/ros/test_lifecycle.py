@@ -99,7 +99,8 @@ def test_a_killed_ros_process_is_back_within_three_seconds_and_physics_never_pau
     assert back[0][0] - killed_at < 3.0
     before = [row for row in seen(client) if row[0] <= killed_at][-1]
     wall, simulated = back[0][0] - before[0], back[0][1] - before[1]
-    assert simulated == pytest.approx(wall, rel=0.15)
+    # a pause would leave it near zero; a busy machine may be slower than the wall clock meanwhile
+    assert simulated > 0.5 * wall
     assert "the ros process ended with status -9; starting it again" in program.output
     assert program.end() == 0
 

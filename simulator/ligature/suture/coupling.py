@@ -29,7 +29,7 @@ STICTION = 1.001
 PRESSURE = 0.1
 """Change of the normal force, as a share of it, that a solve with the old friction limit may leave."""
 
-CG_TOLERANCE = 1e-6
+CG_TOLERANCE = 1e-9
 """Residual energy, relative to the first, at which the coupling is solved."""
 
 
