@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import ligature  # noqa: F401  (imports Bullet without its banner)
 import pybullet
 from ligature.cli.bench import measure
 

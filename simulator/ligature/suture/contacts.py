@@ -372,8 +372,11 @@ def _remember(old, new, bonds):
             continue
         n, slip = new.normal[c], old.slip[o]
         along = n[0] * slip[0] + n[1] * slip[1] + n[2] * slip[2]
+        flat = slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2
+        # A normal that trembles must not wear the slip down: turn it, keep its length.
+        scale = math.sqrt(flat / (flat - along * along)) if flat > 2.0 * along * along else 1.0
         for a in range(3):
-            new.slip[c, a] = slip[a] - along * n[a]
+            new.slip[c, a] = scale * (slip[a] - along * n[a])
         new.press[c] = old.press[o]
         new.closed[c] = old.closed[o]
         new.mode[c] = old.mode[o]
