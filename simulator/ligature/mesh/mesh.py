@@ -19,6 +19,12 @@ MAX_COORDINATE = 1e6
 MAX_TRIANGLES = 4_000_000
 """Most triangles of one file."""
 
+MAX_PARTS = 4096
+"""Most materials of one file, each of which may become a collision hull."""
+
+MAX_FINDINGS = 50
+"""Most findings kept of one file; the first ones tell what is wrong with the rest."""
+
 
 class MeshError(AdfError):
     """A mesh file that cannot be used; ``diagnostics`` say where and why."""
@@ -52,10 +58,11 @@ class MeshPart:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A mesh file: its parts in the order of its materials."""
+    """A mesh file: its parts in the order of its materials, and what was odd but did not prevent reading."""
 
     path: Path
     parts: tuple[MeshPart, ...]
+    diagnostics: tuple[Diagnostic, ...] = ()
 
     @property
     def vertices(self) -> Array:
@@ -63,15 +70,40 @@ class Mesh:
         return np.vstack([p.vertices for p in self.parts]) if self.parts else np.zeros((0, 3))
 
 
+class Findings:
+    """Collects what is odd about a file, each message once, at most `MAX_FINDINGS`."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[Path, str], Diagnostic] = {}
+
+    def add(
+        self, path: Path, message: str, line: int = 1, hint: str = "", severity: Severity = Severity.WARNING
+    ) -> None:
+        """Remember ``message`` about a line of ``path``, unless the same was said of an earlier line."""
+        if len(self._found) < MAX_FINDINGS:
+            self._found.setdefault((path, message), Diagnostic(severity, message, Mark(path, line, 1), hint, "mesh"))
+
+    def all(self) -> tuple[Diagnostic, ...]:
+        """The findings in the order they were made."""
+        return tuple(self._found.values())
+
+
 def failure(path: Path, message: str, line: int = 1, hint: str = "") -> MeshError:
     """A `MeshError` at a line of ``path``."""
     return MeshError(Diagnostic(Severity.ERROR, message, Mark(path, line, 1), hint, "mesh"))
 
 
-def checked(vertices: Array, path: Path) -> Array:
-    """``vertices`` unchanged, if all are finite and of sane size; raises `MeshError`."""
-    if not np.isfinite(vertices).all():
-        raise failure(path, "a vertex is not finite", hint="export the mesh again without nan or inf")
-    if vertices.size and np.abs(vertices).max() > MAX_COORDINATE:
-        raise failure(path, f"a vertex lies farther than {MAX_COORDINATE:g} m from the origin", hint="check the units")
-    return vertices
+def checked(vertices: Array, path: Path, lines: list[int] | None = None) -> Array:
+    """``vertices`` (n, 3) unchanged, if all are finite and of sane size; raises `MeshError`.
+
+    ``lines`` (n,) are the lines of the file that hold them, when the format has lines.
+    """
+    sane = np.abs(vertices) <= MAX_COORDINATE  # False for nan too
+    if sane.all():
+        return vertices
+    row = int(np.argmin(sane.all(axis=1)))
+    line = 1 if lines is None else lines[row]
+    if not np.isfinite(vertices[row]).all():
+        raise failure(path, "a vertex is not finite", line, "export the mesh again without nan or inf")
+    far = f"a vertex lies farther than {MAX_COORDINATE:g} m from the origin"
+    raise failure(path, far, line, "check the units")

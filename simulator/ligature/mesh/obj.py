@@ -1,10 +1,12 @@
-"""Reads Wavefront OBJ and MTL files, one part per material (ADF specification §12.4).
+"""Reads Wavefront OBJ files, one part per material (ADF specification §12.4).
 
 Parts follow the order of ``newmtl`` in the material libraries; ``o`` and ``g`` do not split.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,184 +14,246 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf.resolver import ResolutionError, Resolver
-from ligature.mesh.mesh import MAX_TRIANGLES, Array, Material, Mesh, MeshPart, Triple, checked, failure
+from ligature.mesh.mesh import (
+    MAX_PARTS,
+    MAX_TRIANGLES,
+    Array,
+    Findings,
+    Material,
+    Mesh,
+    MeshPart,
+    checked,
+    failure,
+)
+from ligature.mesh.mtl import read_mtl
 
 MAX_FACE_VERTICES = 256
-_COLOURS = ("Ka", "Kd", "Ks")
+"""Most vertices of one face, the reference's own limit."""
+
+MAX_LIBRARIES = 64
+MAX_INDEX_DIGITS = 32
+"""Longest face corner in characters; converting longer numbers takes quadratic time."""
+
+_IGNORED = frozenset(("o", "g", "s", "l", "p", "vp", "mg"))
+"""Statements that are legal and do not matter for triangles by material."""
+
+_LIBRARY_NAME = re.compile(r"\S.*?\.mtl(?=\s|$)", re.IGNORECASE)
 
 
-class _Faces:
-    """Triangles of one material as rows of (v, vt, vn) indices, -1 for absent."""
-
-    def __init__(self) -> None:
-        self.rows: list[tuple[int, int, int]] = []
+def read_obj(data: bytes, path: Path, resolver: Resolver) -> Mesh:
+    """Read OBJ ``data`` of ``path``; material libraries are looked up next to it. Raises `MeshError`."""
+    return _Reader(path, resolver).read(data.decode("utf-8-sig", "replace"))
 
 
 class _Reader:
-    """State while an OBJ file is read line by line."""
+    """State while an OBJ file is read line by line.
+
+    A face corner is a distinct (vertex, texture coordinate, normal) triple of indices, -1 for absent.
+    Most corners occur several times, so that each spelling is parsed and checked only once.
+    """
 
     def __init__(self, path: Path, resolver: Resolver) -> None:
-        self.path, self.resolver = path, resolver
+        self.path, self.resolver, self.findings = path, resolver, Findings()
         self.points: list[list[float]] = []
+        self.point_lines: list[int] = []
         self.uvs: list[list[float]] = []
         self.normals: list[list[float]] = []
         self.materials: list[Material] = []
-        self.faces: dict[int, _Faces] = {}
+        self.material_index: dict[str, int] = {}
+        self.libraries: set[Path] = set()
+        self.corners: dict[tuple[int, int, int], int] = {}
+        self.spellings: dict[str, int] = {}
+        self.faces: dict[int, list[int]] = {}
         self.current = 0
         self.line = 0
         self.triangles = 0
 
     def read(self, text: str) -> Mesh:
-        handlers = {"v": self._point, "vt": self._uv, "vn": self._normal, "f": self._face}
-        named = {"usemtl": self._use, "mtllib": self._library}
-        for self.line, line in enumerate(text.split("\n"), 1):
-            word, _, rest = line.strip().partition(" ")
-            if word in handlers:
-                handlers[word](rest.split())
-            elif word in named:
-                named[word](rest.strip())
+        for self.line, line in _logical_lines(text):
+            words = line.split()
+            if not words:
+                continue
+            word = words[0]
+            if word == "v":
+                self.points.append(self._numbers(words[1:4], 3))
+                self.point_lines.append(self.line)
+            elif word == "f":
+                self._face(words[1:])
+            elif word == "vt":
+                self.uvs.append((self._numbers(words[1:3], 1) + [0.0])[:2])
+            elif word == "vn":
+                self.normals.append(self._numbers(words[1:4], 3))
+            elif word == "usemtl":
+                self._use(line.strip()[len(word) :].strip())
+            elif word == "mtllib":
+                self._libraries(line.strip()[len(word) :].strip())
+            elif word not in _IGNORED and not word.startswith("#"):
+                self.findings.add(self.path, f"'{word[:40]}' is not a statement that is read", self.line)
         return self._mesh()
 
-    def _numbers(self, words: list[str], least: int, most: int) -> list[float]:
+    def _numbers(self, words: list[str], least: int) -> list[float]:
         if len(words) < least:
             raise failure(self.path, f"{least} numbers were expected, {len(words)} found", self.line)
         try:
-            return [float(word) for word in words[:most]]
+            return list(map(float, words))
         except ValueError:
-            raise failure(self.path, f"'{' '.join(words[:most])}' are not numbers", self.line) from None
-
-    def _point(self, words: list[str]) -> None:
-        self.points.append(self._numbers(words, 3, 3))
-
-    def _uv(self, words: list[str]) -> None:
-        self.uvs.append((self._numbers(words, 1, 2) + [0.0])[:2])
-
-    def _normal(self, words: list[str]) -> None:
-        self.normals.append(self._numbers(words, 3, 3))
+            raise failure(self.path, f"'{' '.join(words)[:80]}' are not numbers", self.line) from None
 
     def _use(self, name: str) -> None:
-        names = [material.name for material in self.materials]
-        if name in names:
-            self.current = names.index(name)
+        index = self.material_index.get(name)
+        if index is not None:
+            self.current = index
+        elif self.materials:
+            kept = self.materials[self.current].name
+            self.findings.add(
+                self.path,
+                f"material '{name[:80]}' is in no material library; '{kept[:80]}' stays in force",
+                self.line,
+                "faces of both are one part",
+            )
 
-    def _library(self, name: str) -> None:
+    def _libraries(self, text: str) -> None:
+        """Read the libraries of one ``mtllib`` line: one name that may hold blanks, or several names."""
+        whole = self._library(text)
+        names = [text] if whole else _LIBRARY_NAME.findall(text) or text.split()
+        for name in names:
+            library = self._library(name)
+            if library is None:
+                self.findings.add(
+                    self.path,
+                    f"material library '{name[:200]}' cannot be read",
+                    self.line,
+                    f"put it next to the mesh, in {self.path.parent}; without it all faces are one part",
+                )
+            elif library not in self.libraries:
+                self._read_library(library)
+
+    def _library(self, name: str) -> Path | None:
         try:
             library = self.resolver.resolve(name, self.path.parent)
-            text = self.resolver.read_bytes(library).decode("utf-8", "replace")
         except ResolutionError:
-            return
-        self.materials += read_mtl(text, library)
+            return None
+        return library if library.is_file() else None
+
+    def _read_library(self, library: Path) -> None:
+        self.libraries.add(library)
+        if len(self.libraries) > MAX_LIBRARIES:
+            raise failure(self.path, f"more than {MAX_LIBRARIES} material libraries are named", self.line)
+        try:
+            text = self.resolver.read_bytes(library).decode("utf-8-sig", "replace")
+        except ResolutionError as error:
+            raise failure(self.path, error.diagnostic.message, self.line, error.diagnostic.hint) from error
+        for material in read_mtl(text, library, self.path.parent, self.resolver, self.findings):
+            self.material_index.setdefault(material.name, len(self.materials))
+            self.materials.append(material)
+        if len(self.materials) > MAX_PARTS:
+            raise failure(self.path, f"the mesh has more than {MAX_PARTS} materials", self.line)
 
     def _face(self, words: list[str]) -> None:
-        if not 3 <= len(words) <= MAX_FACE_VERTICES:
-            raise failure(
-                self.path,
-                f"a face has {len(words)} vertices; 3 to {MAX_FACE_VERTICES} are allowed",
-                self.line,
-            )
-        corners = [self._corner(word) for word in words]
-        rows = self.faces.setdefault(self.current, _Faces()).rows
-        for i in range(1, len(corners) - 1):
-            rows += [corners[0], corners[i], corners[i + 1]]
-        self.triangles += len(corners) - 2
+        count = len(words)
+        if not 3 <= count <= MAX_FACE_VERTICES:
+            allowed = f"3 to {MAX_FACE_VERTICES} are allowed"
+            raise failure(self.path, f"a face has {count} vertices; {allowed}", self.line)
+        known = self.spellings
+        corners = [known[word] if word in known else self._corner(word) for word in words]
+        triangles = self.faces.setdefault(self.current, [])
+        for i in range(1, count - 1):
+            triangles += (corners[0], corners[i], corners[i + 1])
+        self.triangles += count - 2
         if self.triangles > MAX_TRIANGLES:
             raise failure(self.path, f"the mesh has more than {MAX_TRIANGLES} triangles", self.line)
 
-    def _corner(self, word: str) -> tuple[int, int, int]:
-        parts = (word.split("/") + ["", ""])[:3]
+    def _corner(self, word: str) -> int:
+        """Number of the corner that ``word`` spells, seen for the first time."""
+        indices = word.split("/")
         try:
-            v, vt, vn = (int(part) - 1 if part else -1 for part in parts)
+            if len(word) > MAX_INDEX_DIGITS or not 1 <= len(indices) <= 3:
+                raise ValueError
+            v = int(indices[0])
+            vt, vn = (int(text) if text else None for text in (indices[1:] + ["", ""])[:2])
         except ValueError:
             raise failure(
-                self.path, f"'{word}' is not a face corner", self.line, "write v, v/vt, v//vn or v/vt/vn"
+                self.path,
+                f"'{word[:40]}' is not a face corner",
+                self.line,
+                "write v, v/vt, v//vn or v/vt/vn",
             ) from None
-        for index, available, what in (
-            (v, len(self.points), "vertex"),
-            (vt, len(self.uvs), "texture coordinate"),
-            (vn, len(self.normals), "normal"),
-        ):
-            if index >= available or index < -1 or (index == -1 and what == "vertex"):
-                raise failure(
-                    self.path,
-                    f"a face names {what} {index + 1}, but {available} are defined so far",
-                    self.line,
-                    "indices count from 1 and may not be negative",
-                )
-        return v, vt, vn
+        triple = (
+            self._index(v, len(self.points), "vertex"),
+            -1 if vt is None else self._index(vt, len(self.uvs), "texture coordinate"),
+            -1 if vn is None else self._index(vn, len(self.normals), "normal"),
+        )
+        number = self.corners.setdefault(triple, len(self.corners))
+        self.spellings[word] = number
+        return number
+
+    def _index(self, index: int, available: int, what: str) -> int:
+        if 1 <= index <= available:
+            return index - 1
+        raise failure(
+            self.path,
+            f"a face names {what} {index}, but {available} are defined so far",
+            self.line,
+            "indices count from 1 and may not be negative",
+        )
 
     def _mesh(self) -> Mesh:
         if not self.points:
             raise failure(self.path, "the file holds no vertex")
-        points = checked(np.array(self.points, dtype=float), self.path)
-        uvs = checked(np.array(self.uvs, dtype=float).reshape(-1, 2), self.path)
-        normals = checked(np.array(self.normals, dtype=float).reshape(-1, 3), self.path)
-        count = max(len(self.materials), 1)
-        parts = []
-        for index in range(count):
-            material = self.materials[index] if self.materials else None
-            rows = np.array(self.faces[index].rows if index in self.faces else [], dtype=np.int64).reshape(-1, 3)
-            parts.append(_part(material, rows, points, uvs, normals))
+        points = checked(np.array(self.points, dtype=float), self.path, self.point_lines)
+        uvs = self._finite(self.uvs, 2, "texture coordinates")
+        normals = self._finite(self.normals, 3, "normals")
+        corners = np.array(list(self.corners), dtype=np.int64).reshape(-1, 3)
+        materials: list[Material | None] = [*self.materials] or [None]
+        parts = [
+            _part(material, np.array(self.faces.get(index, []), dtype=np.int64), corners, points, uvs, normals)
+            for index, material in enumerate(materials)
+        ]
         if not self.faces:
             parts[0] = replace(parts[0], vertices=points)
-        return Mesh(self.path, tuple(parts))
+        return Mesh(self.path, tuple(parts), self.findings.all())
+
+    def _finite(self, rows: list[list[float]], columns: int, what: str) -> Array | None:
+        """Rows as an array (n, columns), or None when there are none or some are not finite."""
+        values = np.array(rows, dtype=float).reshape(-1, columns)
+        if not np.isfinite(values).all():
+            self.findings.add(self.path, f"the {what} hold nan or inf and are left out", 1, "export the mesh again")
+            return None
+        return values if len(values) else None
 
 
-def _part(material: Material | None, rows: NDArray[np.int64], points: Array, uvs: Array, normals: Array) -> MeshPart:
-    """One part from its corner rows (3 a triangle); vertices are the distinct corners."""
-    distinct, inverse = np.unique(rows, axis=0, return_inverse=True)
-    faces = inverse.reshape(-1, 3).astype(np.int32)
-    has_uv = bool(len(uvs)) and bool(len(distinct)) and bool((distinct[:, 1] >= 0).all())
-    has_normal = bool(len(normals)) and bool(len(distinct)) and bool((distinct[:, 2] >= 0).all())
+def _logical_lines(text: str) -> Iterator[tuple[int, str]]:
+    """Number and text of each line; a line that ends in a backslash goes on in the next one."""
+    lines = text.split("\n" if "\n" in text else "\r")
+    if "\\" not in text:
+        yield from enumerate(lines, 1)
+        return
+    begun: list[str] = []
+    for number, line in enumerate(lines, 1):
+        stripped = line.rstrip()
+        if stripped.endswith("\\"):
+            begun.append(stripped[:-1])
+        else:
+            yield number - len(begun), " ".join([*begun, line]) if begun else line
+            begun = []
+
+
+def _part(
+    material: Material | None,
+    rows: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    points: Array,
+    uvs: Array | None,
+    normals: Array | None,
+) -> MeshPart:
+    """One part from its corner numbers (3 a triangle); vertices are the distinct corners."""
+    used, inverse = np.unique(rows, return_inverse=True)
+    v, vt, vn = corners[used].T
     return MeshPart(
         material.name if material else "",
-        points[distinct[:, 0]] if len(distinct) else np.zeros((0, 3)),
-        faces,
-        normals[distinct[:, 2]] if has_normal else None,
-        uvs[distinct[:, 1]] if has_uv else None,
+        points[v],
+        inverse.reshape(-1, 3).astype(np.int32),
+        normals[vn] if normals is not None and len(vn) and vn.min() >= 0 else None,
+        uvs[vt] if uvs is not None and len(vt) and vt.min() >= 0 else None,
         material,
     )
-
-
-def read_obj(data: bytes, path: Path, resolver: Resolver) -> Mesh:
-    """Read OBJ ``data`` of ``path``; material libraries are looked up next to it. Raises `MeshError`."""
-    return _Reader(path, resolver).read(data.decode("utf-8", "replace"))
-
-
-def read_mtl(text: str, path: Path) -> list[Material]:
-    """The materials of an MTL file, in order; unknown and unreadable lines have no effect, as in AMBF."""
-    materials: list[Material] = []
-    for line in text.split("\n"):
-        word, _, rest = line.strip().partition(" ")
-        rest = rest.strip()
-        if word == "newmtl":
-            materials.append(Material(rest))
-        elif materials:
-            materials[-1] = _with(materials[-1], word, rest, path)
-    return materials
-
-
-def _with(material: Material, word: str, rest: str, path: Path) -> Material:
-    if word in ("map_Kd", "map_Bump") and rest and "\0" not in rest:
-        texture = path.parent / rest
-        return replace(material, texture=texture) if word == "map_Kd" else replace(material, normal_map=texture)
-    try:
-        values = [float(v) for v in rest.split()]
-    except ValueError:
-        return material
-    if not values or not np.isfinite(values).all():
-        return material
-    if word in _COLOURS and len(values) >= 3:
-        return _coloured(material, word, (values[0], values[1], values[2]))
-    if word == "Ns":
-        return replace(material, shininess=values[0])
-    if word in ("d", "Tr"):
-        return replace(material, alpha=values[0])
-    return material
-
-
-def _coloured(material: Material, word: str, colour: Triple) -> Material:
-    if word == "Ka":
-        return replace(material, ambient=colour)
-    if word == "Kd":
-        return replace(material, diffuse=colour)
-    return replace(material, specular=colour)
