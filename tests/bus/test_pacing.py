@@ -76,3 +76,32 @@ def test_a_watchdog_tells_each_silence_once() -> None:
     assert dog.alive("needle") and dog.expired(10.5) == []
     assert dog.expired(10.51) == ["needle"]
     assert not dog.alive("needle") and dog.expired(99.0) == []
+
+
+def test_world_commands_that_ask_for_nothing_change_nothing() -> None:
+    pacer = Pacer(0.01)
+    assert pacer.wait(0.0) == 0.0
+    pacer.done(0.0)
+    for i in range(8):
+        pacer.throttle(Throttle(False, False, 0))
+        assert pacer.wait(0.001 * i) == pytest.approx(0.01 - 0.001 * i)
+    pacer.throttle(Throttle(False, False, 0))
+    pacer.done(0.01)
+    assert pacer.wait(0.01) == pytest.approx(0.01)
+
+
+def test_throttling_that_begins_just_before_an_update_holds_it_back() -> None:
+    pacer = Pacer(0.01)
+    pacer.wait(0.0)
+    pacer.throttle(Throttle(True, False, 4))
+    assert pacer.wait(0.0) == math.inf
+    pacer.throttle(Throttle(True, True, 4))
+    assert updates(pacer) == 4
+
+
+def test_an_edge_during_a_batch_does_not_lengthen_it() -> None:
+    pacer = Pacer(0.01)
+    pacer.throttle(Throttle(True, True, 4))
+    pacer.done(0.0)
+    pacer.throttle(Throttle(True, False, 4))
+    assert updates(pacer) == 3

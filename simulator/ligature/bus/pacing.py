@@ -34,19 +34,23 @@ class Pacer:
         self._budget = 0
 
     def throttle(self, command: Throttle) -> None:
-        """Take a world command; an edge of its clock allows ``skip`` more updates."""
+        """Take a world command; an edge of its clock allows ``skip`` more updates.
+
+        Clients repeat a world command at 120 Hz without meaning to change anything: only what differs from the
+        last one has an effect.
+        """
         if command.skip > 0:
             self._skip = command.skip
-        if not command.enabled:
-            self._throttled, self._budget, self._next = False, 0, None
-            self._clock = command.clock
-            return
         edge = command.clock != self._clock
+        self._clock = command.clock
+        if not command.enabled:
+            if self._throttled:
+                self._throttled, self._budget, self._next = False, 0, None
+            return
         if not self._throttled:
             self._throttled, self._budget = True, 0
         if edge and self._budget == 0:
             self._budget = self._skip
-        self._clock = command.clock
 
     def wait(self, now: float) -> float:
         """Seconds until the next update may run: 0 for now, infinity while a client's clock rests."""
@@ -57,12 +61,11 @@ class Pacer:
         return max(self._next - now, 0.0)
 
     def done(self, now: float) -> None:
-        """An update was run."""
+        """An update was run, after `wait` had told that it may."""
         if self._throttled:
             self._budget -= 1
             return
-        assert self._next is not None
-        self._next += self._wall_period
+        self._next = (now if self._next is None else self._next) + self._wall_period
         if now - self._next > BACKLOG:
             self.lost += now - self._next - BACKLOG
             self._next = now - BACKLOG

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import sys
 import time
 from collections.abc import Iterable
@@ -19,7 +20,10 @@ from ligature.simulation import Simulation
 
 TICK = 1e-3
 LONGEST_NAP = 0.01
-"""Longest sleep in seconds, so that commands and signals are seen while a client's clock rests."""
+"""Longest sleep in seconds between two looks at commands and signals."""
+
+CLOCK_NAP = 1e-3
+"""Sleep in seconds while the clock of a client rests: its next edge is answered that soon."""
 
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
@@ -42,9 +46,12 @@ def main() -> None:
     simulation = Simulation(scene, TICK, 1.0 / options.rate)
     block = Block.create(options.bus, simulation.state.dtype)
     try:
-        loop = _Loop(simulation, block, options)
+        loop = Loop(simulation, block, options)
         simulation.step(simulation.ticks_per_update)
         loop.publish()
+        gc.collect()
+        gc.freeze()
+        gc.disable()
         tell("ready", f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.rods)} rods")
         while not stop.is_set():
             loop.turn()
@@ -52,7 +59,7 @@ def main() -> None:
         block.close()
 
 
-class _Loop:
+class Loop:
     """One turn takes commands, waits for its time, and advances one update."""
 
     def __init__(self, simulation: Simulation, block: Block, options: RunOptions) -> None:
@@ -66,21 +73,19 @@ class _Loop:
         self._updates = 0
         self._mark_updates = 0
         self._warned = 0
-        gc.collect()
-        gc.freeze()
-        gc.disable()
 
     def turn(self) -> None:
-        """Take commands and run an update when it is due."""
+        """Sleep, take commands, and run an update when it is due; the commands may say that it is not."""
         self._block.beat()
         nap = self._pacer.wait(time.monotonic())
         if nap > 0.0:
-            time.sleep(min(nap, LONGEST_NAP))
-            if nap > LONGEST_NAP:
-                self._obey(self._mailbox.take())
-                self._figures()
-                return
+            time.sleep(min(nap, CLOCK_NAP if math.isinf(nap) else LONGEST_NAP))
         self._obey(self._mailbox.take())
+        if self._pacer.wait(time.monotonic()) <= 0.0:
+            self._update()
+        self._figures()
+
+    def _update(self) -> None:
         before = time.perf_counter()
         self._simulation.step(self._ticks)
         self.publish()
@@ -89,7 +94,6 @@ class _Loop:
         self._pacer.done(time.monotonic())
         if self._updates % WINDOW == 0:
             gc.collect(0)
-        self._figures()
 
     def publish(self) -> None:
         """Write the newest state to the bus."""
