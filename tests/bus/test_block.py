@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ligature.bus import Block, BusError
-from ligature.bus.block import FOLDER, remove_leftovers
+from ligature.bus.block import FOLDER, RETRIES, remove_leftovers
 
 DTYPE = np.dtype([("tick", "u8"), ("values", "f8", (5000,))])
 NAME = f"ligature-{os.getpid()}-0a0b0c0d"
@@ -69,18 +72,78 @@ def test_nobody_to_attach_to_is_said() -> None:
         Block.attach("ligature-1-none", DTYPE, patience=0.05)
 
 
+def test_waiting_for_a_simulator_can_be_given_up() -> None:
+    begin = time.monotonic()
+    with pytest.raises(BusError, match="no simulator writes"):
+        Block.attach("ligature-1-none", DTYPE, cancelled=lambda: time.monotonic() - begin > 0.1)
+    assert time.monotonic() - begin < 2.0
+
+
+def test_a_block_without_a_state_is_waited_for(block: Block) -> None:
+    with pytest.raises(BusError, match="no simulator writes"):
+        Block.attach(NAME, DTYPE, patience=0.05)
+    threading.Timer(0.2, lambda: block.write(np.ones(1, DTYPE))).start()
+    reader, into = Block.attach(NAME, DTYPE, patience=5.0), np.zeros(1, DTYPE)
+    assert reader.read(into) and into["tick"][0] == 1
+    reader.close()
+
+
+def test_a_block_that_is_just_being_made_is_not_mistaken_for_another() -> None:
+    empty = FOLDER / f"ligature-{os.getpid()}-00000001"
+    empty.touch()
+    with pytest.raises(BusError, match="no simulator writes"):
+        Block.attach(empty.name, DTYPE, patience=0.05)
+    empty.unlink()
+
+
+def test_a_reader_gives_up_on_a_writer_that_died_while_writing(block: Block) -> None:
+    block.write(np.ones(1, DTYPE))
+    reader = Block.attach(NAME, DTYPE)
+    block.figures["sequence"] += 1
+    assert not reader.read(np.zeros(1, DTYPE))
+    assert reader.retried == RETRIES
+    reader.close()
+
+
+def test_too_little_shared_memory_is_told_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with pytest.raises(BusError, match=r"no 5 MB of shared memory for '/dev/shm/ligature-\d+-0+2': No space left"):
+        Block.create(f"ligature-{os.getpid()}-00000002", DTYPE)
+    assert not (FOLDER / f"ligature-{os.getpid()}-00000002").exists()
+
+
 def test_another_layout_is_refused(block: Block) -> None:
     with pytest.raises(BusError, match="belongs to another scene or version"):
         Block.attach(NAME, np.dtype([("tick", "u8"), ("values", "f8", (99999,))]), patience=0.05)
 
 
-def test_blocks_of_dead_runs_are_removed() -> None:
+def dead_pid() -> int:
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    leftover = FOLDER / f"ligature-{dead.pid}-12345678"
+    return dead.pid
+
+
+def test_blocks_of_dead_runs_are_removed() -> None:
+    leftover = FOLDER / f"ligature-{dead_pid()}-12345678"
     leftover.write_bytes(b"x")
     mine = FOLDER / f"ligature-{os.getpid()}-12345678"
     mine.write_bytes(b"x")
     assert leftover.name in remove_leftovers()
     assert not leftover.exists() and mine.exists()
     mine.unlink()
+
+
+def test_leftovers_of_another_user_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    leftover = FOLDER / f"ligature-{dead_pid()}-87654321"
+    leftover.touch()
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", refuse)
+        assert leftover.name not in remove_leftovers()
+    leftover.unlink()

@@ -1,8 +1,9 @@
 """The shared memory block: newest state under a sequence lock, figures, and command rings.
 
 The writer never waits. A reader copies the state and tries again when the writer was at it
-meanwhile. Files live in ``/dev/shm`` and carry the supervisor's process id, so that the leftovers
-of a killed run are found and removed by the next one.
+meanwhile. That rests on stores and loads being seen in program order, as on x86-64. Files live in
+``/dev/shm`` and carry the supervisor's process id, so that the leftovers of a killed run are found
+and removed by the next one. Times are seconds on the monotonic clock.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import mmap
 import os
 import re
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +52,10 @@ FIGURES = np.dtype(
 
 _STATE_AT = 4096
 RETRIES = 1000
+"""Attempts of one reading; the writer is at it for a microsecond of every update."""
+
+PATIENCE = 120.0
+"""Seconds to wait for the first state: the first start of all compiles the solvers."""
 
 
 class BusError(RuntimeError):
@@ -67,14 +74,18 @@ class Block:
         descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if owner else 0), 0o600)
         try:
             if owner:
-                os.ftruncate(descriptor, size)
-            elif os.fstat(descriptor).st_size != size:
+                _reserve(descriptor, path, size)
+            found = os.fstat(descriptor).st_size
+            if found == 0:
+                raise FileNotFoundError(path)
+            if found != size:
                 raise BusError(f"shared memory '{path}' belongs to another scene or version")
             self._map = mmap.mmap(descriptor, size)
         finally:
             os.close(descriptor)
         self.figures: NDArray[np.void] = np.ndarray(1, FIGURES, self._map, 0)
-        self._state: StateRecord = np.ndarray(1, dtype, self._map, _STATE_AT)
+        self._state: NDArray[np.uint8] = np.ndarray(dtype.itemsize, "u1", self._map, _STATE_AT)
+        self.retried = 0
         self.rings = {
             name: Ring(memoryview(self._map)[ring_at + i * RING_BYTES : ring_at + (i + 1) * RING_BYTES])
             for i, name in enumerate(PRODUCERS)
@@ -88,36 +99,44 @@ class Block:
         return cls(FOLDER / name, dtype, True)
 
     @classmethod
-    def attach(cls, name: str, dtype: StateDtype, patience: float = 10.0) -> Block:
-        """Map the block ``name``, waiting up to ``patience`` seconds for it; raises `BusError`."""
+    def attach(
+        cls, name: str, dtype: StateDtype, patience: float = PATIENCE, cancelled: Callable[[], bool] = lambda: False
+    ) -> Block:
+        """Map the block ``name`` once it holds a state.
+
+        Raises `BusError` when it does not within ``patience`` seconds, when ``cancelled`` says to stop
+        waiting, or when the block is of another layout.
+        """
         deadline = time.monotonic() + patience
         while True:
-            try:
+            with suppress(FileNotFoundError):
                 block = cls(FOLDER / name, dtype, False)
-                if int(block.figures["sequence"][0]) > 0:
+                if int(block.figures["sequence"][0]) >= 2:
                     return block
                 block.close()
-            except (FileNotFoundError, ValueError):
-                pass
-            if time.monotonic() > deadline:
+            if cancelled() or time.monotonic() > deadline:
                 raise BusError(f"no simulator writes to shared memory '{name}'")
             time.sleep(0.01)
 
     def write(self, state: StateRecord) -> None:
-        """Publish ``state`` as the newest."""
+        """Publish ``state`` (1,) as the newest."""
         self.figures["sequence"] += 1
-        self._state[:] = state
+        self._state[:] = state.view("u1")
         self.figures["sequence"] += 1
 
     def read(self, into: StateRecord) -> bool:
-        """Copy the newest state; False when the writer was too busy `RETRIES` times in a row."""
-        sequence = self.figures["sequence"]
+        """Copy the newest state into ``into`` (1,); False when the writer was at it `RETRIES` times in a row.
+
+        ``retried`` counts the attempts that met the writer.
+        """
+        sequence, target = self.figures["sequence"], into.view("u1")
         for _ in range(RETRIES):
             before = int(sequence[0])
             if before % 2 == 0:
-                into[:] = self._state
+                target[:] = self._state
                 if int(sequence[0]) == before:
                     return True
+            self.retried += 1
             time.sleep(0)
         return False
 
@@ -140,12 +159,27 @@ class Block:
             self.path.unlink(missing_ok=True)
 
 
+def _reserve(descriptor: int, path: Path, size: int) -> None:
+    """Take memory now: a page that cannot be had later would kill the process that writes to it."""
+    try:
+        os.posix_fallocate(descriptor, 0, size)
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise BusError(f"no {size / 1e6:.0f} MB of shared memory for '{path}': {error.strerror}") from error
+
+
+def remove(name: str) -> None:
+    """Remove the block ``name``, should its owner have died without doing so."""
+    (FOLDER / name).unlink(missing_ok=True)
+
+
 def remove_leftovers() -> list[str]:
-    """Remove blocks whose supervisor no longer lives; returns their names."""
+    """Remove blocks of this user whose supervisor no longer lives; returns their names."""
     removed = []
     for path in FOLDER.glob("ligature-*"):
         match = _NAME.match(path.name)
         if match and not Path(f"/proc/{match.group(1)}").exists():
-            path.unlink(missing_ok=True)
-            removed.append(path.name)
+            with suppress(PermissionError, FileNotFoundError):
+                path.unlink()
+                removed.append(path.name)
     return removed

@@ -12,7 +12,7 @@ import numpy as np
 
 import ligature
 from ligature.adf import Severity
-from ligature.bus import Block, Mailbox, Pacer, Throttle
+from ligature.bus import Block, BusError, Mailbox, Pacer, Throttle
 from ligature.bus.codec import Message
 from ligature.bus.process import end_with_parent, stop_on_signal, tell
 from ligature.cli.options import RunOptions
@@ -44,7 +44,11 @@ def main() -> None:
         if diagnostic.severity >= Severity.INFO:
             tell("finding", str(diagnostic))
     simulation = Simulation(scene, TICK, 1.0 / options.rate)
-    block = Block.create(options.bus, simulation.state.dtype)
+    try:
+        block = Block.create(options.bus, simulation.state.dtype)
+    except BusError as error:
+        tell("error", str(error))
+        sys.exit(1)
     try:
         loop = Loop(simulation, block, options)
         simulation.step(simulation.ticks_per_update)
@@ -96,7 +100,8 @@ class Loop:
             gc.collect(0)
 
     def publish(self) -> None:
-        """Write the newest state to the bus."""
+        """Write the newest state to the bus, with a sign of life."""
+        self._block.beat()
         state = self._simulation.state
         state["wall_time"] = time.monotonic() - self._start
         state["stamp"] = time.time()

@@ -5,8 +5,10 @@ from __future__ import annotations
 import sys
 
 import ligature
+from ligature.bus import Block, BusError
 from ligature.bus.process import end_with_parent, stop_on_signal, tell
 from ligature.cli.options import RunOptions
+from ligature.model.state import state_dtype
 
 
 def main() -> None:
@@ -16,8 +18,12 @@ def main() -> None:
     options = RunOptions.from_text(sys.argv[1])
     try:
         scene = options.load()
+        Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set).close()
     except ligature.SceneError:
         sys.exit(2)
+    except BusError as error:
+        tell("warning", str(error))
+        sys.exit(0 if stop.is_set() else 1)
     from ligature.ros.node import Node
 
     node = Node(scene, options.bus, options.min_hz, options.max_hz, options.names)
