@@ -1,93 +1,146 @@
 """Sanitised collision files by content: what Bullet is given instead of a user's file.
 
 One OBJ file holds one ``o`` group per hull, or one triangle mesh. Files are named by the hash of
-their text and written atomically, so that processes may share the folder.
+their text and written atomically, so that processes may share the folder. Metres.
 """
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import logging
 import os
+import shutil
 import tempfile
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+
+from ligature.mesh.surface import convex_surface
 
 Array = NDArray[np.float64]
 
 VARIABLE = "LIGATURE_CACHE"
 
+_log = logging.getLogger(__name__)
+
+
+class CacheError(OSError):
+    """No collision file can be written, neither in the cache nor in the system's temporary folder."""
+
 
 def cache_folder() -> Path:
     """``LIGATURE_CACHE``, else ``ligature`` in the user's cache folder."""
-    if VARIABLE in os.environ:
+    if os.environ.get(VARIABLE):
         return Path(os.environ[VARIABLE])
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     return Path(base) / "ligature"
 
 
+def write_atomically(path: Path, data: bytes) -> None:
+    """Make ``path`` hold ``data``; other processes see the old file or the whole new one. Raises OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except OSError:
+        os.unlink(name)
+        raise
+
+
 class CollisionCache:
-    """The folder of sanitised collision files; a temporary one when it cannot be written."""
+    """The folder of sanitised collision files.
+
+    When it cannot be written (read-only, full), a temporary folder takes its place until the
+    process ends, and a warning is logged once.
+    """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self.folder = _writable((folder or cache_folder()) / "collision")
+        self.folder = (folder or cache_folder()) / "collision"
 
     def hulls(self, hulls: Sequence[Array]) -> Path:
-        """File with one group per convex hull of the points (n, 3) of ``hulls``."""
+        """File with one group per convex hull of the points (n, 3) of ``hulls``; raises `CacheError`."""
         lines: list[str] = []
         first = 1
         for number, points in enumerate(hulls):
+            corners, faces = _surface(_finite(points))
             lines.append(f"o hull{number}")
-            lines += _vertex_lines(points)
-            lines += _face_lines(_surface(points), first)
-            first += len(points)
-        return self._store("\n".join(lines) + "\n")
+            lines += _vertex_lines(corners)
+            lines += _face_lines(faces, first)
+            first += len(corners)
+        return self._store(lines)
 
     def triangles(self, vertices: Array, faces: NDArray[np.int32]) -> Path:
-        """File with one triangle mesh of ``vertices`` (n, 3) and ``faces`` (m, 3)."""
-        return self._store("\n".join(["o mesh", *_vertex_lines(vertices), *_face_lines(faces, 1)]) + "\n")
+        """File with one triangle mesh of ``vertices`` (n, 3) and ``faces`` (m, 3); raises `CacheError`.
 
-    def _store(self, text: str) -> Path:
-        data = text.encode("ascii")
-        path = self.folder / f"{hashlib.sha256(data).hexdigest()[:32]}.obj"
-        if not path.exists():
-            handle, name = tempfile.mkstemp(dir=self.folder, suffix=".part")
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            os.replace(name, path)
-        return path
+        Triangles without area are left out: Bullet would divide by it.
+        """
+        a, b, c = (_finite(vertices)[faces[:, i]] for i in range(3))
+        solid = np.any(np.cross(b - a, c - a) != 0.0, axis=1)
+        return self._store(["o mesh", *_vertex_lines(vertices), *_face_lines(faces[solid], 1)])
+
+    def _store(self, lines: list[str]) -> Path:
+        data = ("\n".join(lines) + "\n").encode("ascii")
+        name = f"{hashlib.sha256(data).hexdigest()[:32]}.obj"
+        try:
+            return _kept(self.folder / name, data)
+        except OSError as error:
+            failed = self.folder
+            try:
+                self.folder = _temporary_folder()
+                path = _kept(self.folder / name, data)
+            except OSError as second:
+                raise CacheError(
+                    f"collision files cannot be written to {failed} ({error.strerror}) nor to "
+                    f"{tempfile.gettempdir()} ({second.strerror}); free some space or set {VARIABLE}"
+                ) from second
+            _log.warning("%s cannot be written (%s); %s is used until the end", failed, error.strerror, self.folder)
+            return path
 
 
-def _writable(folder: Path) -> Path:
+def _kept(path: Path, data: bytes) -> Path:
+    """``path`` holding ``data``, written unless it does already; a damaged file is replaced."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="ligature-collision-"))
+        if path.read_bytes() == data:
+            return path
+    except FileNotFoundError:
+        pass
+    write_atomically(path, data)
+    return path
+
+
+@lru_cache(maxsize=1)
+def _temporary_folder() -> Path:
+    folder = tempfile.mkdtemp(prefix="ligature-collision-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+def _finite(points: Array) -> Array:
+    """``points``, which must be finite: Bullet hangs on what is not."""
+    if not np.isfinite(points).all():
+        raise ValueError("a collision vertex is not finite")
+    return points
 
 
 def _vertex_lines(points: Array) -> list[str]:
-    return [f"v {float(x)!r} {float(y)!r} {float(z)!r}" for x, y, z in points]
+    return [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
 
 
 def _face_lines(faces: NDArray[np.int32], first: int) -> list[str]:
-    return [f"f {a} {b} {c}" for a, b, c in np.asarray(faces) + first]
+    return [f"f {a} {b} {c}" for a, b, c in (faces + first).tolist()]
 
 
-def _surface(points: Array) -> NDArray[np.int32]:
-    """Triangles that mention every point: Bullet takes the points that faces name and hulls them."""
-    n = len(points)
+def _surface(points: Array) -> tuple[Array, NDArray[np.int32]]:
+    """Corners, and triangles that mention each: Bullet takes the points that faces name and hulls them."""
     try:
-        if n >= 4:
-            hull = ConvexHull(points)
-            if len(hull.vertices) == n:
-                return hull.simplices.astype(np.int32)
-    except QhullError:
-        pass
-    fan = np.arange(n)
-    rows = np.column_stack([np.zeros(n, dtype=int), fan, np.roll(fan, -1)])
-    return rows.astype(np.int32)
+        return convex_surface(points)
+    except ValueError:
+        fan = np.arange(len(points))
+        return points, np.column_stack([np.zeros_like(fan), fan, np.roll(fan, -1)]).astype(np.int32)

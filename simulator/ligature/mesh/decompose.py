@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ligature.mesh.cache import cache_folder
-from ligature.mesh.collision import TrianglePart, collision_parts, hull_vertices
+from ligature.mesh.collision import TrianglePart, collision_parts
 from ligature.mesh.mesh import Mesh
+from ligature.mesh.surface import hull_vertices
 
 Array = NDArray[np.float64]
 
