@@ -23,10 +23,10 @@ from ligature.suture.rotations import (
     turn,
 )
 
-MAX_NEWTON = 20
+MAX_NEWTON = 8
 """Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
 
-LARGE_SWING = 1e-4
+LARGE_SWING = 5e-3
 """Swing of an element in radians, in one Newton step, after which another follows."""
 
 MAX_SWING = 0.5

@@ -14,8 +14,8 @@ from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
 
-REFINEMENT = 4
-"""Steps of a tick in which contacts did not settle."""
+REFINEMENT, MAX_PARTS = 4, 16
+"""How many steps take the place of one that did not settle, and the most in a tick."""
 
 
 @inlined
@@ -87,35 +87,37 @@ def run_tick(
     the contacts lie in ``c``.
     """
     _keep(nodes, joints, work)
-    steps, settled = _one_step(
-        first, n, total, nodes, joints, shapes, a, b, work, grips, points, counts, self_skip, stiffness, dt, True
-    )
-    for i in range(total):
-        for k in range(6):
-            impulse[i, k] = 0.0
-    parts = 1
-    if not settled:
-        parts = REFINEMENT
-        _take_back(nodes, joints, work)
-        _copy2(shapes.pose, shape_poses)
+    _copy2(shapes.pose, shape_poses)
+    parts, steps, settled, in_c = 1, 0, False, False
+    while True:
+        for i in range(total):
+            for k in range(6):
+                impulse[i, k] = 0.0
         h = dt / parts
         _scale_loads(joints, 1.0 / (parts * parts))
-        steps = 0
+        steps, settled = 0, True
         old, new = a, b
         for part in range(parts):
-            more, settled = _one_step(
+            more, fine = _one_step(
                 first, n, total, nodes, joints, shapes, old, new, work, grips, points, counts, self_skip,
                 stiffness, h, part == 0,
             )  # fmt: skip
             steps += more
+            settled = settled and fine
+            if not settled and parts < MAX_PARTS:
+                break
             add_reactions(n, joints, new, work, impulse, h)
-            _move_shapes(nodes, shapes, h)
+            if parts > 1:
+                _move_shapes(nodes, shapes, h)
+            in_c = part % 2 == 1
             old = new
-            new = c if part % 2 == 0 else b
-        _scale_loads(joints, float(parts * parts))
+            new = b if in_c else c
+        if settled or parts == MAX_PARTS:
+            break
+        _take_back(nodes, joints, work)
         _copy2(shape_poses, shapes.pose)
-    else:
-        add_reactions(n, joints, b, work, impulse, dt)
+        parts *= REFINEMENT
+    _copy2(shape_poses, shapes.pose)
+    _scale_loads(joints, float(parts * parts))
     find_tension(first, n, joints, work, tension, dt)
-    counts[2] = steps
-    counts[3] = 1 if parts % 2 == 0 else 0
+    counts[2], counts[3] = steps, 1 if in_c else 0
