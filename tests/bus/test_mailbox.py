@@ -75,22 +75,36 @@ def test_bytes_that_are_no_command_are_rejected(scene: Scene, ring: Ring) -> Non
     assert box.take() == [] and box.rejected == 1
 
 
-def test_a_full_ring_refuses_and_counts(ring: Ring) -> None:
-    for i in range(SLOTS + 7):
-        ring.push(bytes([i % 256]))
-    assert ring.refused == 7
+def test_a_full_ring_takes_nothing_more(ring: Ring) -> None:
+    assert all(ring.push(bytes([i % 256])) for i in range(SLOTS))
+    assert not ring.push(b"x")
     assert len(list(ring.drain())) == SLOTS
+    assert ring.push(b"x")
 
 
-def test_a_silent_front_end_has_its_commands_released(
-    scene: Scene, ring: Ring, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_silent_front_end_has_its_commands_released(scene: Scene, ring: Ring) -> None:
     box = Mailbox(scene, {"ros": ring})
     ring.beat()
-    push(ring, force(3, 1.0), ActuatorCommand(1, True, "Needle"))
+    push(ring, force(3, 1.0), ActuatorCommand(1, True, "Needle"), Throttle(True, False, 5))
     box.take()
     ring._beat[0] -= 1.0
-    released = box.take()
-    assert Release("body", 3) in released and Release("actuator", 1) in released
-    assert Throttle(False, False, 0) in released
+    assert box.take() == [Release("actuator", 1), Release("body", 3), Throttle(False, False, 0)]
     assert box.take() == []
+
+
+def test_a_silent_front_end_that_commands_nothing_any_more_changes_nothing(scene: Scene, ring: Ring) -> None:
+    box = Mailbox(scene, {"ros": ring})
+    ring.beat()
+    push(ring, force(3, 1.0), Throttle(True, False, 5), Throttle(False, False, 5), Release("body", 3))
+    box.take()
+    ring._beat[0] -= 1.0
+    assert box.take() == []
+
+
+def test_a_paused_world_runs_again_when_its_front_end_dies(scene: Scene, ring: Ring) -> None:
+    box = Mailbox(scene, {"ros": ring})
+    ring.beat()
+    push(ring, Throttle(True, False, 5))
+    box.take()
+    ring._beat[0] -= 1.0
+    assert box.take() == [Throttle(False, False, 0)]

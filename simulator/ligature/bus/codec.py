@@ -17,6 +17,7 @@ from ligature.model.commands import (
 
 MAX_JOINTS = 64
 MAX_TEXT = 200
+_TYPES = tuple(sorted(CommandType))
 _KINDS = ("body", "camera", "light", "actuator", "sensor", "ghost", "world")
 
 Message = Command | Throttle
@@ -84,8 +85,8 @@ def _decode(data: bytes) -> Message:
     if kind == 1:
         _, body, type_, n, m, t = struct.unpack_from("<BiBBBB", data)
         values = struct.unpack_from(f"<{n}d{m}d{t}B", data, 9)
-        types = tuple(CommandType(int(v)) for v in values[n + m :])
-        return BodyCommand(body, CommandType(type_), values[:n], types, values[n : n + m])
+        types = tuple([_TYPES[v] for v in values[n + m :]])
+        return BodyCommand(body, _TYPES[type_], values[:n], types, values[n : n + m])
     if kind == 2:
         _, actuator, actuate, n, by_sensor = struct.unpack_from("<BiBBB", data)
         offset = struct.unpack_from(f"<{n}d", data, 8)

@@ -10,13 +10,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ligature.bus.codec import CodecError, Message, decode
+from ligature.bus.newest import Newest, object_of
 from ligature.bus.pacing import Throttle
 from ligature.bus.ring import Ring
-from ligature.model.commands import ActuatorCommand, BodyCommand, PlaceCommand, Release, check
+from ligature.model.commands import Release, check
 from ligature.model.scene import Scene
 
 SILENCE = 0.5
 """Seconds without a sign of life after which a front end counts as dead."""
+
+
+WORLD = ("world", 0)
 
 
 class Mailbox:
@@ -36,7 +40,7 @@ class Mailbox:
 
     def take(self) -> list[Message]:
         """All commands of this update, the newest of each object, events in their order."""
-        box: dict[object, Message] = {}
+        box = Newest()
         for name, ring in self._rings.items():
             for data in ring.drain():
                 self.received += 1
@@ -49,27 +53,21 @@ class Mailbox:
                     continue
                 self._put(box, name, message)
             self._bury(box, name, ring)
-        return list(box.values())
+        return box.messages()
 
-    def _put(self, box: dict[object, Message], producer: str, message: Message) -> None:
-        key = _object(message)
-        if key is None:
-            box[len(box), "event"] = message
-            return
-        kind, index = key
+    def _put(self, box: Newest, producer: str, message: Message) -> None:
         owned = self._owned[producer]
-        owned.discard(key) if isinstance(message, Release) else owned.add(key)
-        slot: object = (kind, index, message.actuate) if isinstance(message, ActuatorCommand) else key
-        if box.pop(slot, None) is not None:
-            self.coalesced += 1
-        box[slot] = message
+        item = WORLD if isinstance(message, Throttle) else object_of(message)
+        if item is not None:
+            free = isinstance(message, Release) or (isinstance(message, Throttle) and not message.enabled)
+            owned.discard(item) if free else owned.add(item)
+        self.coalesced += box.put(message)
 
-    def _bury(self, box: dict[object, Message], producer: str, ring: Ring) -> None:
+    def _bury(self, box: Newest, producer: str, ring: Ring) -> None:
         """Release what a dead front end commanded."""
         if self._owned[producer] and ring.silence > SILENCE:
-            for kind, index in sorted(self._owned[producer]):
-                box[kind, index] = Release(kind, index)
-            box["throttle", producer] = Throttle(False, False, 0)
+            for item in sorted(self._owned[producer]):
+                box.put(Throttle(False, False, 0) if item == WORLD else Release(*item))
             self._owned[producer].clear()
             ring.forget()
 
@@ -77,17 +75,6 @@ class Mailbox:
         if isinstance(message, Throttle):
             return
         check(message)
-        key = _object(message)
-        if key is not None and not 0 <= key[1] < self._limits.get(key[0], 0):
-            raise ValueError(f"there is no {key[0]} number {key[1]}")
-
-
-def _object(message: Message) -> tuple[str, int] | None:
-    """Kind and index of the object that a command is for; None for events."""
-    if isinstance(message, BodyCommand):
-        return "body", message.body
-    if isinstance(message, ActuatorCommand):
-        return "actuator", message.actuator
-    if isinstance(message, PlaceCommand | Release):
-        return message.kind, message.index
-    return None
+        item = object_of(message)
+        if item is not None and not 0 <= item[1] < self._limits.get(item[0], 0):
+            raise ValueError(f"there is no {item[0]} number {item[1]}")

@@ -1,7 +1,7 @@
 """A ring of messages in shared memory with one producer and one consumer.
 
-Each side moves only its own counter. A full ring refuses the newest message and counts it: the
-consumer empties it every update, so that only a dead or flooded consumer fills it.
+Each side moves only its own counter. A full ring refuses the newest message; `Outbox` keeps it until
+there is room.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SLOT_BYTES = 1280
+MOST_BYTES = SLOT_BYTES - 4
 SLOTS = 1024
 _HEADER = 64
 RING_BYTES = _HEADER + SLOTS * SLOT_BYTES
@@ -28,10 +29,9 @@ class Ring:
         self._beat: NDArray[np.float64] = np.ndarray(1, "f8", memory[32:40])
 
     def push(self, data: bytes) -> bool:
-        """Append a message; False, counted, when the ring is full or the message too large."""
+        """Append a message of at most `MOST_BYTES`; False when the ring is full."""
         head, tail = int(self._counters[0]), int(self._counters[1])
-        if head - tail >= SLOTS or len(data) > SLOT_BYTES - 4:
-            self._counters[2] += 1
+        if head - tail >= SLOTS:
             return False
         at = _HEADER + (head % SLOTS) * SLOT_BYTES
         self._memory[at : at + 4 + len(data)] = struct.pack("<I", len(data)) + data
@@ -39,20 +39,22 @@ class Ring:
         return True
 
     def drain(self) -> Iterator[bytes]:
-        """Take all messages that wait."""
-        while True:
-            head, tail = int(self._counters[0]), int(self._counters[1])
-            if tail == head:
-                return
+        """Take the messages that wait now; what a flood adds meanwhile is left for the next time."""
+        first = int(self._counters[1])
+        for tail in range(first, min(int(self._counters[0]), first + SLOTS)):
             at = _HEADER + (tail % SLOTS) * SLOT_BYTES
             (size,) = struct.unpack_from("<I", self._memory, at)
-            data = bytes(self._memory[at + 4 : at + 4 + min(size, SLOT_BYTES - 4)])
+            data = bytes(self._memory[at + 4 : at + 4 + min(size, MOST_BYTES)])
             self._counters[1] = tail + 1
             yield data
 
+    def drop(self) -> None:
+        """Count a message that the producer gave up because the ring was full."""
+        self._counters[2] += 1
+
     @property
     def refused(self) -> int:
-        """Messages that did not fit."""
+        """Messages that the producer gave up."""
         return int(self._counters[2])
 
     def beat(self) -> None:

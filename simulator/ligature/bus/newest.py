@@ -1,0 +1,54 @@
+"""Commands in the order of their arrival, the newest of each object alone; events keep their place."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+from ligature.bus.codec import Message
+from ligature.model.commands import ActuatorCommand, BodyCommand, PlaceCommand, Release
+
+
+def object_of(message: Message) -> tuple[str, int] | None:
+    """Kind and index of the object that a command is for; None for events."""
+    if isinstance(message, BodyCommand):
+        return "body", message.body
+    if isinstance(message, ActuatorCommand):
+        return "actuator", message.actuator
+    if isinstance(message, PlaceCommand | Release):
+        return message.kind, message.index
+    return None
+
+
+class Newest:
+    """A box of commands; `put` replaces an older command of the same object."""
+
+    def __init__(self) -> None:
+        self._box: dict[Hashable, Message] = {}
+        self.events = 0
+
+    def __len__(self) -> int:
+        return len(self._box)
+
+    def put(self, message: Message) -> bool:
+        """Add a command; True when it takes the place of an older one.
+
+        Grasping and letting go are different things to do with one actuator: neither replaces the other.
+        """
+        item = object_of(message)
+        if item is None:
+            self.events += 1
+            self._box["event", self.events] = message
+            return False
+        slot = (*item, message.actuate) if isinstance(message, ActuatorCommand) else item
+        replaced = self._box.pop(slot, None) is not None
+        self._box[slot] = message
+        return replaced
+
+    def messages(self) -> list[Message]:
+        """The commands, oldest first."""
+        return list(self._box.values())
+
+    def clear(self) -> None:
+        """Empty the box."""
+        self._box.clear()
+        self.events = 0
