@@ -26,8 +26,8 @@ from ambf_msgs.msg import (
 )
 from std_msgs.msg import Empty
 
-from ligature.bus import Block, Throttle, Watchdog
-from ligature.bus.codec import CodecError, Message, encode
+from ligature.bus import Block, Outbox, Throttle, Watchdog
+from ligature.bus.codec import CodecError, Message
 from ligature.model.commands import Release, Reset
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
@@ -73,7 +73,7 @@ class Node:
         self._state = new_state(scene)
         self._block = Block.attach(bus, self._state.dtype)
         self._ring = self._block.rings["ros"]
-        self._lock = threading.Lock()
+        self._outbox = Outbox(self._ring)
         self._watchdog: Watchdog[tuple[str, int]] = Watchdog()
         self._malformed = 0
         self._hurry: list[_Outlet] = []
@@ -91,10 +91,12 @@ class Node:
 
     def _advertise(self, min_hz: int | None, max_hz: int | None, policy: str) -> list[_Outlet]:
         outlets = [_Outlet(self._world, self._scene.world.topic, min_hz or DEFAULT_LOW, max_hz or DEFAULT_HIGH)]
-        for template in conversion.templates(self._scene):
+        templates = conversion.templates(self._scene)
+        objects = [(template.kind, template.identity) for template in templates]
+        for template, topic in zip(templates, names.topics(objects, policy, self._scene.world.topic), strict=True):
             identity = template.identity
-            topic = names.topic(identity, template.kind, policy)
             if topic is None:
+                rospy.loginfo(f"{identity.topic} is not advertised: its name is ambiguous for the suturing challenge")
                 continue
             low = min_hz or max(identity.publish_low, 1)
             high = max_hz or max(identity.publish_high, 1)
@@ -155,13 +157,10 @@ class Node:
 
     def _push(self, message: Message) -> None:
         try:
-            data = encode(message)
+            self._outbox.push(message)
         except CodecError as error:
             self._malformed += 1
             rospy.logwarn_throttle(2.0, str(error))
-            return
-        with self._lock:
-            self._ring.push(data)
 
     def _wake(self, key: tuple[str, int]) -> None:
         """Publish an object at its higher rate from now on, and with its new lists soon."""
@@ -232,6 +231,7 @@ class Node:
     def _keep_house(self, now: float) -> bool:
         """Watchdogs, diagnostics, parameters, the master; False when the physics process is gone."""
         self._ring.beat()
+        self._outbox.flush()
         for kind, index in self._watchdog.expired(now):
             if kind == "world":
                 self._push(Throttle(False, False, 0))
