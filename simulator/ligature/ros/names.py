@@ -1,27 +1,41 @@
 """Which name an object has on ROS (interface reference §2.10).
 
-``ambf`` gives every object AMBF's own name. ``src`` gives the needle and the camera body the short
-names that the suturing challenge's scripts look for, and leaves the ghosts of holes unadvertised,
-so that every look-up by substring that those scripts make is unambiguous.
+``ambf`` gives every object AMBF's own name. ``src`` is for the suturing challenge's scripts, which look objects up
+by a part of their name and give up when several match: the needle and the camera body stand directly below the
+world's namespace, the holes keep their names, and nothing else whose name contains one of these words is advertised.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from ligature.model.scene import Identity
 
 POLICIES = ("ambf", "src")
-_SHORT = {"Needle": "/ambf/env/Needle", "CameraFrame": "/ambf/env/CameraFrame"}
-_HOLE_GHOST = re.compile(r"(?i)(entry|exit|needle|cameraframe)")
+
+_AT_THE_TOP = ("Needle", "CameraFrame")
+_HOLE = re.compile(r"(Entry|Exit)\d+\Z")
+_LOOKED_UP = ("Needle", "CameraFrame", "Entry", "Exit")
 
 
-def topic(identity: Identity, kind: str, policy: str) -> str | None:
-    """The ROS name of an object under a policy; None when it is not advertised."""
+def topics(objects: Iterable[tuple[str, Identity]], policy: str, world: str) -> list[str | None]:
+    """The ROS name of each of ``objects`` (kind, identity); None for one that is not advertised.
+
+    ``world`` is the ROS name of the world, such as ``/ambf/env/World``.
+    """
     if policy == "ambf":
-        return identity.topic
-    if kind == "body":
-        return _SHORT.get(identity.name, identity.topic)
-    if kind == "ghost" and _HOLE_GHOST.search(identity.topic):
-        return None
-    return identity.topic
+        return [identity.topic for _, identity in objects]
+    base = world.rpartition("/")[0]
+    taken: set[str] = set()
+    return [_for_the_challenge(kind, identity, base, taken) for kind, identity in objects]
+
+
+def _for_the_challenge(kind: str, identity: Identity, base: str, taken: set[str]) -> str | None:
+    """The name under ``src``; ``taken`` are the words that already mean one body."""
+    word = identity.topic.rpartition("/")[2]
+    wanted = word in _AT_THE_TOP or _HOLE.match(word) is not None
+    if kind == "body" and wanted and word not in taken:
+        taken.add(word)
+        return f"{base}/{word}" if word in _AT_THE_TOP else identity.topic
+    return None if any(part in identity.topic for part in _LOOKED_UP) else identity.topic

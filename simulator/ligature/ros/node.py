@@ -91,17 +91,19 @@ class Node:
 
     def _advertise(self, min_hz: int | None, max_hz: int | None, policy: str) -> list[_Outlet]:
         outlets = [_Outlet(self._world, self._scene.world.topic, min_hz or DEFAULT_LOW, max_hz or DEFAULT_HIGH)]
-        templates = conversion.templates(self._scene)
+        templates, hidden = conversion.templates(self._scene), []
         objects = [(template.kind, template.identity) for template in templates]
         for template, topic in zip(templates, names.topics(objects, policy, self._scene.world.topic), strict=True):
             identity = template.identity
             if topic is None:
-                rospy.loginfo(f"{identity.topic} is not advertised: its name is ambiguous for the suturing challenge")
+                hidden.append(identity.topic)
                 continue
             low = min_hz or max(identity.publish_low, 1)
             high = max_hz or max(identity.publish_high, 1)
             outlets.append(_Outlet(template, topic, low, high))
             self._subscribe(template, topic)
+        if hidden:
+            rospy.loginfo(f"not advertised under the name policy '{policy}': {', '.join(hidden)}")
         return outlets
 
     def _subscribe(self, template: Any, topic: str) -> None:
