@@ -1,57 +1,81 @@
-"""Convex decomposition of a concave mesh with CoACD, as an ADF-ready collision mesh.
+"""Convex decomposition of concave meshes with CoACD: for ADF collision meshes, and for moving triangle meshes.
 
-The result is one OBJ with one material per convex part, which is how the format says that a
-collision mesh is made of hulls (ADF specification §12.5). Metres.
+The ADF form is one OBJ file with one material per convex piece, which is how the format says that
+a collision mesh is made of hulls (ADF specification §12.5). Metres. Method: Wei et al.,
+"Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and Tree Search", 2022.
 """
 
 from __future__ import annotations
 
 import hashlib
+import io
+import json
+import logging
+import subprocess
+import sys
+import tempfile
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import coacd
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from ligature.mesh.cache import cache_folder
-from ligature.mesh.collision import TrianglePart, collision_parts
-from ligature.mesh.mesh import Mesh
-from ligature.mesh.surface import hull_vertices
+from ligature.mesh.cache import cache_folder, write_atomically
+from ligature.mesh.inertia import hull_properties, mass_properties
+from ligature.mesh.mesh import Array, Mesh
+from ligature.mesh.quality import hausdorff_distance, volume_error
+from ligature.mesh.surface import convex_surface, hull_vertices, joined
 
-Array = NDArray[np.float64]
+CONVEX_ENOUGH = 0.02
+"""Largest part of its hull's volume by which a solid may fall short of it and still count as convex."""
 
-SAMPLES = 4000
-"""Surface points for the distance figure."""
+QUICK: dict[str, Any] = {
+    "threshold": 0.15, "max_convex_hull": 16, "resolution": 200, "mcts_iterations": 6, "mcts_max_depth": 1,
+    "mcts_nodes": 5, "seed": 0,
+}  # fmt: skip
+"""Coarse settings for meshes that a scene never decomposed: 4158 triangles in 6 s, CoACD's own take minutes."""
+
+QUICK_LIMIT = 120.0
+AUTHORING_LIMIT = 3600.0
+"""Seconds after which CoACD is given up."""
+
+_log = logging.getLogger(__name__)
+
+
+class DecompositionError(ValueError):
+    """A mesh that cannot be decomposed; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
 class Decomposition:
-    """Convex parts, each (n, 3), and how well they fill the mesh.
+    """Convex pieces, each (n, 3), and how well they fill the mesh.
 
-    ``volume_error`` is |sum of hulls − mesh| / mesh volume; ``distance`` the largest distance in
-    metres from sampled surface points of the hulls to the mesh's surface, relative figures by the
-    caller.
+    ``volume_error`` is |sum of hulls − mesh| / mesh by volume, None for a mesh that is not closed;
+    ``distance`` the Hausdorff distance in metres (see `hausdorff_distance`).
     """
 
     hulls: tuple[Array, ...]
-    volume_error: float
+    volume_error: float | None
     distance: float
 
 
 def decompose(mesh: Mesh, threshold: float = 0.05, max_hulls: int = -1, seed: int = 0) -> Decomposition:
-    """Decompose all triangles of ``mesh``; lower ``threshold`` (0.01 to 1) follows the shape closer."""
-    pieces = [p for p in collision_parts(mesh, "trimesh") if isinstance(p, TrianglePart)]
-    if not pieces:
-        raise ValueError("the mesh holds no triangle")
-    offsets = np.cumsum([0] + [len(p.vertices) for p in pieces[:-1]])
-    vertices = np.vstack([p.vertices for p in pieces])
-    faces = np.vstack([p.faces + o for p, o in zip(pieces, offsets, strict=True)]).astype(np.int32)
-    hulls = _cached_hulls(vertices, faces, threshold, max_hulls, seed)
-    return Decomposition(hulls, *_quality(vertices, faces, hulls, seed))
+    """Decompose all triangles of ``mesh``.
+
+    Lower ``threshold`` (0.01 to 1) follows the shape closer; ``max_hulls`` below 1 sets no limit;
+    equal arguments give equal pieces. Raises `DecompositionError`.
+    """
+    if not 0.01 <= threshold <= 1.0:
+        raise DecompositionError(f"threshold is {threshold:g}; it must be from 0.01 to 1")
+    vertices, faces = joined(mesh.parts)
+    if not len(faces):
+        raise DecompositionError("the mesh holds no triangle")
+    settings = {"threshold": threshold, "max_convex_hull": max(max_hulls, 0) or -1, "seed": seed}
+    hulls = _cached_hulls(vertices, faces, settings, AUTHORING_LIMIT)
+    return Decomposition(hulls, volume_error(vertices, faces, hulls), hausdorff_distance(vertices, faces, hulls, seed))
 
 
 def obj_text(hulls: Sequence[Array], library: str) -> tuple[str, str]:
@@ -60,63 +84,103 @@ def obj_text(hulls: Sequence[Array], library: str) -> tuple[str, str]:
     materials = []
     first = 1
     for number, points in enumerate(hulls):
-        surface = trimesh.convex.convex_hull(points)
+        corners, faces = convex_surface(points)
         name = f"part_{number:03d}"
         shade = 0.3 + 0.6 * np.random.default_rng(number).random(3)
         materials.append(f"newmtl {name}\nKd {shade[0]:.3f} {shade[1]:.3f} {shade[2]:.3f}\n")
-        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in surface.vertices.tolist()]
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
         lines.append(f"usemtl {name}")
-        lines += [f"f {a} {b} {c}" for a, b, c in (surface.faces + first).tolist()]
-        first += len(surface.vertices)
+        lines += [f"f {a} {b} {c}" for a, b, c in (faces + first).tolist()]
+        first += len(corners)
     return "\n".join(lines) + "\n", "\n".join(materials)
 
 
-def _cached_hulls(
-    vertices: Array, faces: NDArray[np.int32], threshold: float, max_hulls: int, seed: int
-) -> tuple[Array, ...]:
-    key = hashlib.sha256(vertices.tobytes() + faces.tobytes() + repr((threshold, max_hulls, seed)).encode())
-    path: Path = cache_folder() / "decomposition" / f"{key.hexdigest()[:32]}.npz"
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return tuple(stored[name] for name in sorted(stored.files))
-    except (OSError, ValueError, KeyError):
-        pass
-    coacd.set_log_level("error")
-    parts = coacd.run_coacd(coacd.Mesh(vertices, faces), threshold=threshold, max_convex_hull=max_hulls, seed=seed)
-    hulls = tuple(hull_vertices(np.asarray(v, dtype=float)) for v, _ in parts)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(path.name + ".part.npz")
-        np.savez(part, **{f"{i:05d}": hull for i, hull in enumerate(hulls)})
-        part.replace(path)
-    except OSError:
-        pass
-    return hulls
-
-
-def _quality(vertices: Array, faces: NDArray[np.int32], hulls: Sequence[Array], seed: int) -> tuple[float, float]:
-    whole = trimesh.Trimesh(vertices, faces, process=False)
-    solids = [trimesh.convex.convex_hull(h) for h in hulls]
-    volume = abs(float(whole.volume))
-    filled = sum(abs(float(s.volume)) for s in solids)
-    error = abs(filled - volume) / volume if volume > 0 else float("inf")
-    surface = trimesh.sample.sample_surface(whole, 4 * SAMPLES, seed=seed)[0]
-    probe = trimesh.sample.sample_surface(trimesh.util.concatenate(solids), SAMPLES, seed=seed)[0]
-    return error, float(cKDTree(surface).query(probe)[0].max())
-
-
-CONVEX_ENOUGH = 0.02
-"""Largest part of its hull's volume by which a solid may fall short of it and still count as convex."""
-
-
 def convex_pieces(vertices: Array, faces: NDArray[np.int32]) -> list[Array]:
-    """Convex pieces (n, 3) of a triangle mesh that moves: its hull when that is close, else a decomposition."""
-    points = hull_vertices(vertices)
+    """Convex pieces (n, 3) of a triangle mesh that moves: its hull when that is close, else a decomposition.
+
+    When CoACD gives up, the hull stands for the mesh and a warning is logged.
+    """
+    whole = hull_vertices(vertices)
+    if _convex_enough(vertices, faces):
+        return [whole]
     try:
-        hull = trimesh.convex.convex_hull(points)
-    except Exception:
-        return [points]
-    solid = trimesh.Trimesh(vertices, faces, process=True)
-    if not solid.is_watertight or abs(hull.volume - abs(solid.volume)) <= CONVEX_ENOUGH * hull.volume:
-        return [points]
-    return list(_cached_hulls(vertices, faces, 0.1, 32, 0))
+        return list(_cached_hulls(vertices, faces, QUICK, QUICK_LIMIT))
+    except DecompositionError as error:
+        _log.warning(
+            "a moving mesh of %d triangles collides as its convex hull: %s; run 'ligature decompose' on it",
+            len(faces),
+            error,
+        )
+        return [whole]
+
+
+def _convex_enough(vertices: Array, faces: NDArray[np.int32]) -> bool:
+    """Whether a mesh fills its hull, or has none to fill."""
+    try:
+        hull = hull_properties(vertices).volume
+    except ValueError:
+        return True
+    try:
+        return hull - mass_properties(vertices, faces).volume <= CONVEX_ENOUGH * hull
+    except ValueError:  # open: its volume is unknown
+        return False
+
+
+def _cached_hulls(
+    vertices: Array, faces: NDArray[np.int32], settings: dict[str, Any], limit: float
+) -> tuple[Array, ...]:
+    """The pieces of an earlier run of CoACD with the same arguments, else of a new one."""
+    stored = io.BytesIO()
+    np.savez(stored, vertices=vertices, faces=faces)
+    words = json.dumps(settings, sort_keys=True)
+    key = hashlib.sha256(vertices.tobytes() + faces.astype(np.int32).tobytes() + words.encode()).hexdigest()
+    path = cache_folder() / "decomposition" / f"{key[:32]}.npz"
+    hulls = _stored_hulls(path)
+    if hulls:
+        return hulls
+    _log.info("decomposing a mesh of %d triangles; the result is kept in %s", len(faces), path)
+    data = _run_coacd(stored.getvalue(), words, limit)
+    try:
+        write_atomically(path, data)
+    except OSError as error:
+        _log.warning("%s cannot be written (%s): the mesh will be decomposed again next time", path, error.strerror)
+    return _solid_hulls(data)
+
+
+def _stored_hulls(path: Path) -> tuple[Array, ...]:
+    """The pieces of a cache file; none when it is absent or damaged."""
+    try:
+        return _solid_hulls(path.read_bytes())
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return ()
+
+
+def _solid_hulls(data: bytes) -> tuple[Array, ...]:
+    """Corners of the pieces of an npz file, without those that are flat; raises ValueError."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        pieces = [np.asarray(arrays[name], dtype=float).reshape(-1, 3) for name in sorted(arrays.files)]
+    hulls = []
+    for piece in pieces:
+        try:
+            hulls.append(convex_surface(piece)[0])
+        except ValueError:
+            continue
+    if not hulls:
+        raise DecompositionError("CoACD found no piece with a volume")
+    return tuple(hulls)
+
+
+def _run_coacd(mesh: bytes, settings: str, limit: float) -> bytes:
+    """Content of the npz file of pieces that CoACD makes of the npz file ``mesh``; raises `DecompositionError`."""
+    with tempfile.TemporaryDirectory(prefix="ligature-coacd-") as folder:
+        source, target = Path(folder, "mesh.npz"), Path(folder, "pieces.npz")
+        source.write_bytes(mesh)
+        command = [sys.executable, "-m", "ligature.mesh.coacd_process", str(source), str(target), settings]
+        try:
+            done = subprocess.run(command, capture_output=True, timeout=limit, check=False)
+        except subprocess.TimeoutExpired:
+            raise DecompositionError(f"CoACD took longer than {limit:g} s") from None
+        if done.returncode or not target.is_file():
+            words = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
+            raise DecompositionError(f"CoACD ended with status {done.returncode}: {' '.join(words)}")
+        return target.read_bytes()

@@ -1,0 +1,28 @@
+"""Runs CoACD in a process of its own, so that a crash, a hang or Ctrl-C in its native code harms nobody else.
+
+``python -m ligature.mesh.coacd_process INPUT OUTPUT SETTINGS``: INPUT is an npz file of ``vertices`` (n, 3) and
+``faces`` (m, 3), OUTPUT gets one array (k, 3) of vertices per convex piece, SETTINGS is a JSON
+object of keyword arguments of ``coacd.run_coacd``. Any length unit.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+
+
+def main(source: str, target: str, settings: str) -> None:
+    """Decompose the mesh of ``source`` into ``target``."""
+    import coacd
+
+    coacd.set_log_level("error")
+    with np.load(source, allow_pickle=False) as stored:
+        mesh = coacd.Mesh(stored["vertices"], stored["faces"])
+    pieces = coacd.run_coacd(mesh, **json.loads(settings))
+    np.savez(target, **{f"{number:05d}": vertices for number, (vertices, _) in enumerate(pieces)})
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
