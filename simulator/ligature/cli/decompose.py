@@ -27,9 +27,10 @@ def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, co
     except (ValueError, OSError) as error:
         console.print(f"{mesh}: {error}", style="red", markup=False)
         return 1
+    share = result.volume_error
+    volume = "volume unknown (the mesh is not closed)" if share is None else f"volume error {100 * share:.2f} %"
     console.print(
-        f"{target}: {len(result.hulls)} hulls, volume error {100 * result.volume_error:.2f} %, "
-        f"largest distance {1e3 * result.distance:.3f} mm",
+        f"{target}: {len(result.hulls)} hulls, {volume}, Hausdorff distance {1e3 * result.distance:.3f} mm",
         markup=False,
     )
     console.print("use it with 'collision mesh' and 'collision mesh type: CONVEX_HULL'", style="dim")
