@@ -9,11 +9,12 @@ import os
 import statistics
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
-import ligature  # noqa: F401  (imports Bullet without its banner)
-import pybullet
+import ligature  # imports Bullet without its banner
 from ligature.cli.bench import measure
+from ligature.model.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
 ROUNDS = 3
@@ -22,6 +23,8 @@ SECONDS = 2.0
 
 def chain_step_us() -> float:
     """Microseconds of one step of the reference: 40 bodies and point joints hanging in Bullet."""
+    import pybullet
+
     client = pybullet.connect(pybullet.DIRECT)
     pybullet.setGravity(0, 0, -9.8, physicsClientId=client)
     pybullet.setPhysicsEngineParameter(fixedTimeStep=1e-3, numSolverIterations=50, physicsClientId=client)
@@ -41,16 +44,18 @@ def chain_step_us() -> float:
     return (time.perf_counter() - begin) * 1e3
 
 
-def scenes() -> list[tuple[str, Path, tuple[int, ...] | None]]:
-    """Name, launch file and models of what is measured."""
+def scenes() -> list[tuple[str, Scene]]:
+    """Name and scene of what is measured."""
     corpus = (
         Path(os.environ.get("LIGATURE_CORPUS", ROOT.parent / "shared" / "corpus")) / "suturing_scene" / "launch.yaml"
     )
-    found = [("suturing_small", ROOT / "scenes" / "suturing_small" / "launch.yaml", None)]
+    found = [("suturing_small", ligature.load(ROOT / "scenes" / "suturing_small" / "launch.yaml"))]
     if corpus.exists():
+        lab = ligature.load(corpus, (10, 11, 6, 7, 8, 9))
         found += [
-            ("corpus: phantom, needle, thread, 2 PSMs", corpus, (10, 11, 6, 7, 8, 9)),
-            ("corpus: 2 PSMs", corpus, (6, 7, 8, 9)),
+            ("corpus: phantom, needle, thread, 2 PSMs", lab),
+            ("corpus: phantom, needle, 2 PSMs, no thread", replace(lab, rods=())),
+            ("corpus: 2 PSMs", ligature.load(corpus, (6, 7, 8, 9))),
         ]
     return found
 
@@ -59,9 +64,9 @@ def main() -> int:
     """Entry point."""
     reference = statistics.median(chain_step_us() for _ in range(ROUNDS))
     sys.stdout.write(f"reference, 40 Bullet bodies with point joints: {reference:.0f} us a step\n")
-    for name, launch, models in scenes():
+    for name, scene in scenes():
         for rate in (200.0, 1000.0):
-            runs = [measure(launch, models, (), SECONDS, rate) for _ in range(ROUNDS)]
+            runs = [measure(scene, SECONDS, rate) for _ in range(ROUNDS)]
             figures = sorted(runs, key=lambda r: r["ticks_per_second"])[ROUNDS // 2]
             tick = 1e6 / figures["ticks_per_second"]
             phases = ", ".join(f"{k} {v:.0f}" for k, v in figures["phases_us"].items())

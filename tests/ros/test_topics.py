@@ -133,6 +133,29 @@ def test_numbers_that_are_not_finite_are_rejected_and_counted(
     assert math.isfinite(message.pose.position.x) and abs(message.pose.position.x) < 1
 
 
+def test_bad_numbers_on_every_kind_of_command_topic_are_counted(
+    listen: Callable[..., Any], publish: Callable[..., Any]
+) -> None:
+    from ambf_msgs.msg import ActuatorCmd, CameraCmd, LightCmd, RigidBodyState, WorldCmd
+
+    before = int(diagnostics(listen)["commands rejected"])
+    camera, light = CameraCmd(enable_position_controller=True), LightCmd(enable_position_controller=True)
+    actuator = ActuatorCmd(actuate=True, use_offset=True)
+    for pose in (camera.pose, light.pose, actuator.body_offset):
+        pose.position.y, pose.orientation.w = math.nan, 1.0
+    joints = body_command(joint_cmds=[math.nan] * 3, joint_cmds_types=[1, 1, 1])
+    publish("/ambf/env/cameras/cameraL/Command", CameraCmd).publish(camera)
+    publish("/ambf/env/lights/light2/Command", LightCmd).publish(light)
+    publish("/ambf/env/ghosts/psm2/Actuator0/Command", ActuatorCmd).publish(actuator)
+    publish(f"{BASE}/Command", type(joints)).publish(joints)
+    publish(f"{WORLD}/Command", WorldCmd).publish(WorldCmd(enable_step_throttling=False, n_skip_steps=255))
+    deadline = time.monotonic() + 5
+    while int(diagnostics(listen)["commands rejected"]) < before + 4:
+        assert time.monotonic() < deadline
+    message = listen(f"{NEEDLE}/State", RigidBodyState).wait()
+    assert math.isfinite(message.pose.position.x)
+
+
 def test_an_unknown_command_type_is_rejected_and_nothing_else_stops(
     listen: Callable[..., Any], publish: Callable[..., Any]
 ) -> None:
