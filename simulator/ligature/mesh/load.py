@@ -23,4 +23,4 @@ def load_mesh(path: Path, resolver: Resolver) -> Mesh:
         return read_obj(data, path, resolver)
     if extension == ".stl":
         return read_stl(data, path)
-    return read_3ds(data, path)
+    return read_3ds(data, path, resolver)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 from ligature.adf.diagnostics import Severity
-from ligature.adf.resolver import ResolutionError, Resolver
+from ligature.adf.resolver import Resolver
 from ligature.mesh.mesh import MAX_PARTS, Findings, Material, Triple, failure
+from ligature.mesh.texture import texture_file
 
 _COLOURS = ("Ka", "Kd", "Ks")
 _SCALARS = ("Ns", "d", "Tr")
@@ -74,7 +75,8 @@ def read_mtl(text: str, path: Path, folder: Path, resolver: Resolver, findings: 
         elif not drafts:
             findings.add(path, f"'{word[:40]}' stands before the first newmtl and has no effect", number)
         elif word in _TEXTURES:
-            found = _texture(rest, path, number, folder, resolver, findings)
+            name = _without_options(rest)
+            found = texture_file(name, path, number, folder, resolver, findings) if name else None
             if found is not None:
                 drafts[-1].textures[word] = found
         else:
@@ -102,33 +104,6 @@ def _value(draft: _Draft, word: str, rest: str, path: Path, number: int, finding
 
 def _unit(value: float) -> float:
     return min(max(value, 0.0), 1.0)
-
-
-def _texture(rest: str, path: Path, number: int, folder: Path, resolver: Resolver, findings: Findings) -> Path | None:
-    """The file of a ``map_`` line: as written, else by its bare name, next to the OBJ.
-
-    Exporters often write the absolute path of the author's machine, so that only the name is of use.
-    """
-    name = _without_options(rest)
-    if not name:
-        findings.add(path, "a texture has no file name", number)
-        return None
-    bare = PureWindowsPath(name).name
-    refusal: ResolutionError | None = None
-    allowed: list[Path] = []
-    for reference in (name, bare):
-        try:
-            allowed.append(resolver.resolve(reference, folder))
-        except ResolutionError as error:
-            refusal = refusal or error
-    for candidate in allowed:
-        if candidate.is_file():
-            return candidate
-    if refusal is not None:
-        findings.add(path, f"texture: {refusal.diagnostic.message}", number, refusal.diagnostic.hint)
-    else:
-        findings.add(path, f"texture '{name[:200]}' does not exist", number, f"looked for {allowed[0]}")
-    return allowed[0] if allowed else None
 
 
 def _without_options(rest: str) -> str:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ligature.mesh.mesh import MAX_TRIANGLES, Array, Mesh, MeshPart, checked, failure
+from ligature.adf.diagnostics import Severity
+from ligature.mesh.mesh import MAX_TRIANGLES, Array, Findings, Mesh, MeshPart, checked, failure
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER = 84
@@ -14,52 +15,57 @@ _HEADER = 84
 
 def read_stl(data: bytes, path: Path) -> Mesh:
     """Read STL ``data`` of ``path``; raises `MeshError`."""
-    if len(data) >= _HEADER:
-        count = int.from_bytes(data[80:84], "little")
-        if len(data) == _HEADER + _RECORD.itemsize * count:
-            return _mesh(_binary(data, count, path), path)
-    if data.lstrip()[:5].lower() == b"solid":
-        return _mesh(_ascii(data.decode("ascii", "replace"), path), path)
+    count = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
+    whole = len(data) >= _HEADER and len(data) == _HEADER + _RECORD.itemsize * count
+    if not whole and data.lstrip()[:5].lower() == b"solid":
+        return _ascii(data.decode("ascii", "replace"), path)
     if len(data) < _HEADER:
         raise failure(path, f"the file ends after {len(data)} bytes", hint="a binary STL has at least 84")
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) < _HEADER + _RECORD.itemsize * count:
-        there = (len(data) - _HEADER) // _RECORD.itemsize
+    there = (len(data) - _HEADER) // _RECORD.itemsize
+    if there < count:
         raise failure(path, f"the file announces {count} triangles but holds {there}", hint="it was cut short")
-    return _mesh(_binary(data, count, path), path)
+    return _binary(data, count, path)
 
 
-def _binary(data: bytes, count: int, path: Path) -> Array:
+def _binary(data: bytes, count: int, path: Path) -> Mesh:
     if count > MAX_TRIANGLES:
         raise failure(path, f"the mesh has more than {MAX_TRIANGLES} triangles")
     records = np.frombuffer(data, dtype=_RECORD, count=count, offset=_HEADER)
-    if not np.isfinite(records["corners"]).all():
-        raise failure(path, "a vertex is not finite", hint="export the mesh again without nan or inf")
-    return records["corners"].astype(float)
+    with np.errstate(invalid="ignore"):  # what is not a number is refused below
+        corners = records["corners"].astype(float).reshape(-1, 3)
+    return _mesh(checked(corners, path), path, Findings())
 
 
-def _ascii(text: str, path: Path) -> Array:
+def _ascii(text: str, path: Path) -> Mesh:
+    findings = Findings()
+    findings.add(path, "the STL file is ASCII; the reference reads binary files only", severity=Severity.INFO)
     corners: list[list[float]] = []
+    lines: list[int] = []
     for number, line in enumerate(text.split("\n"), 1):
         words = line.split()
-        if words[:1] != ["vertex"]:
+        if not words or words[0] != "vertex":
             continue
         try:
-            x, y, z = (float(word) for word in words[1:4])
+            x, y, z = words[1:4]
+            corners.append([float(x), float(y), float(z)])
         except ValueError:
             raise failure(path, "a vertex needs three numbers", number) from None
-        corners.append([x, y, z])
+        lines.append(number)
     if len(corners) % 3:
-        raise failure(path, f"{len(corners)} vertices do not make whole triangles")
-    return np.array(corners, dtype=float).reshape(-1, 3, 3)
+        raise failure(path, f"{len(corners)} vertices do not make whole triangles", lines[-1])
+    if len(corners) > 3 * MAX_TRIANGLES:
+        raise failure(path, f"the mesh has more than {MAX_TRIANGLES} triangles", lines[3 * MAX_TRIANGLES])
+    return _mesh(checked(np.array(corners, dtype=float).reshape(-1, 3), path, lines), path, findings)
 
 
-def _mesh(corners: Array, path: Path) -> Mesh:
-    if not len(corners):
-        return Mesh(path, ())
-    vertices = checked(corners.reshape(-1, 3), path)
-    faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+def _mesh(vertices: Array, path: Path, findings: Findings) -> Mesh:
+    """A mesh of the triangles that each three of ``vertices`` (3 m, 3) make, with their normals."""
+    if not len(vertices):
+        findings.add(path, "the file holds no triangle")
+        return Mesh(path, (), findings.all())
+    corners = vertices.reshape(-1, 3, 3)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    return Mesh(path, (MeshPart("", vertices, faces, np.repeat(normal, 3, axis=0)),))
+    faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+    return Mesh(path, (MeshPart("", vertices, faces, np.repeat(normal, 3, axis=0)),), findings.all())
