@@ -207,11 +207,14 @@ def _compound(element: Element, key: str) -> tuple[Collider, ...]:
 
 def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[Collider, ...]:
     path = _mesh_path(element, name, "collision mesh", context, context.low, _body_low(element))
+    kind = _MESH_KINDS[element.text("collision mesh type")]
     try:
         mesh = load_mesh(path, context.resolver)
+        pieces = collision_parts(mesh, kind, element.number("scale"), context.report)
     except AdfError as error:
         raise GeometryError(error.diagnostics[0]) from error
-    pieces = collision_parts(mesh, _MESH_KINDS[element.text("collision mesh type")], element.number("scale"))
+    for diagnostic in mesh.diagnostics:
+        context.report(diagnostic)
     identity = np.eye(4)
     shapes: list[Shape] = []
     for piece in pieces:
