@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.adf.diagnostics import Diagnostic
+from ligature.adf.diagnostics import Diagnostic, Severity
 from ligature.mesh.mesh import Array, Findings, Mesh, MeshPart, checked, failure
 from ligature.mesh.surface import extent_rank, hull_vertices, weld
 
@@ -102,7 +102,7 @@ def _hull(mesh: Mesh, part: MeshPart, scale: float, findings: Findings) -> Conve
     rank = extent_rank(vertices)
     if rank < 3:
         message = f"all vertices of {_called(part)} lie in {_EXTENT[rank]}"
-        findings.add(mesh.path, message, hint="its hull is as thick as the collision margin")
+        findings.add(mesh.path, message, 1, "its hull is as thick as the collision margin", Severity.INFO)
     return ConvexPart(part.name, hull_vertices(vertices))
 
 
