@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from ligature.cli.supervisor import master_answers
+from ligature.cli.master import master_answers
 
 ROOT = Path(__file__).resolve().parents[2]
 BODY = "/ambf/env/phantom/CameraFrame"

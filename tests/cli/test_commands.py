@@ -1,4 +1,4 @@
-"""The commands as a user types them: check, bench, decompose, AMBF's flags, and errors that help."""
+"""The commands as a user types them: check, bench, decompose, run of bad files, and errors that help."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-
-import pytest
-from ligature.cli.ambf_simulator import options_of
 
 BIN = Path(sys.executable).parent
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -86,28 +83,3 @@ def test_decompose_of_nonsense_says_where(tmp_path: Path) -> None:
     (tmp_path / "bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
     done = ligature("decompose", tmp_path / "bad.obj")
     assert done.returncode == 1 and "bad.obj:2:1: error: a face names vertex 2, but 1 are defined" in done.stdout
-
-
-def test_ambfs_own_flags_are_understood() -> None:
-    words = (
-        "--launch_file launch.yaml -l 10,11, 6 -p 200 -t1 -g 0 -s 0.5 --ns /lab --override_max_comm_freq 100 "
-        "--override_min_comm_freq 90 -d 500 -n 0 -i 0,1"
-    )
-    flags = words.replace("10,11, 6", "10,11,6").split()
-    flags[flags.index("10,11,6")] = "10,11, 6"
-    options = options_of([*flags, "--plugins", "a, b"])
-    assert options.models == (10, 11, 6) and options.rate == 200 and options.speed == 0.5
-    assert (options.min_hz, options.max_hz, options.prefix) == (90, 100, "/lab")
-
-
-def test_without_l_or_a_the_second_entry_is_loaded_as_in_ambf() -> None:
-    assert options_of(["--launch_file", "x"]).models == (1,)
-    only_files = options_of(["--launch_file", "x", "-a", "one.yaml,two.yaml"])
-    assert only_files.models == () and only_files.files == ("one.yaml", "two.yaml")
-
-
-@pytest.mark.parametrize("bad", [["-l", "a"], ["-p", "0"], ["--no_such_flag"]])
-def test_bad_flags_end_with_two(bad: list[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        options_of(["--launch_file", "x", *bad])
-    assert ended.value.code == 2

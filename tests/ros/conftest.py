@@ -93,7 +93,7 @@ def ros_env() -> Iterator[dict[str, str]]:
 
 def start_master(port: int, env: dict[str, str]) -> subprocess.Popen[bytes]:
     """A ROS master on ``port``, answering."""
-    from ligature.cli.supervisor import master_answers
+    from ligature.cli.master import master_answers
 
     master = subprocess.Popen(
         ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(port)], env=env,

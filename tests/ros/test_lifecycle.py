@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ligature.cli.supervisor import master_answers
+from ligature.cli.master import master_answers
 
 from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
 

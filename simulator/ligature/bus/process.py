@@ -12,12 +12,16 @@ import sys
 import threading
 
 _PR_SET_PDEATHSIG = 1
+_prctl = ctypes.CDLL(None).prctl
 
 
 def end_with_parent() -> None:
-    """Ask Linux to terminate this process when its parent dies, also by ``kill -9``."""
+    """Ask Linux to terminate this process when its parent dies, also by ``kill -9``.
+
+    Runs between fork and exec too, where nothing may be loaded any more: other threads may have held locks.
+    """
     parent = os.getppid()
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:
         sys.exit(0)
 

@@ -5,36 +5,41 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ligature.cli.options import RunOptions
+from ligature.cli.options import RunOptions, model_indices, rate_notes
 from ligature.cli.supervisor import Supervisor
 
-_NOT_SIMULATED = {
-    "d": "haptic rate",
-    "f": "fixed haptic step",
-    "e": "force feedback",
-    "n": "input devices",
-    "i": "input devices",
-    "plugins": "plug-ins",
+FASTEST = 1000.0
+"""Updates per second of one tick each: no update can be shorter."""
+
+_WITHOUT_EFFECT = {
+    ("-d", "--htx_frequency"): "haptic rate",
+    ("-f", "--fixed_htx_timestep"): "fixed haptic step",
+    ("-e", "--enableforces"): "force feedback of devices",
+    ("-n", "--ndevs"): "number of input devices",
+    ("-i", "--load_devices"): "indices of input devices",
+    ("--plugins",): "simulator plug-ins",
 }
 
 
 def parser() -> argparse.ArgumentParser:
-    """The flags of AMBF 2.0 (ADF specification §5)."""
+    """The flags of AMBF 2.0 (ADF specification §5), with their long names."""
     flags = argparse.ArgumentParser("ambf_simulator", description="Run AMBF launch files on Ligature.")
     flags.add_argument("--launch_file", required=True, help="launch file")
-    flags.add_argument("-l", help="indices of multibody configs, such as 10,11,6 (default 1 without -a)")
-    flags.add_argument("-a", help="model files, separated by commas")
-    flags.add_argument("-p", type=float, default=1000.0, help="updates per second")
-    flags.add_argument("-t", default="1", help="fixed step; the step is always fixed here")
-    flags.add_argument("-s", type=float, default=1.0, help="simulation speed factor")
-    flags.add_argument("-g", default="1", help="graphics")
+    flags.add_argument(
+        "-l", "--load_multibodies", dest="l", help="indices of multibody configs, as 10,11,6 (default 1 without -a)"
+    )
+    flags.add_argument("-a", "--load_multibody_files", dest="a", help="model files, separated by commas")
+    flags.add_argument("-p", "--phx_frequency", dest="p", type=float, default=1000.0, help="updates per second")
+    flags.add_argument("-t", "--fixed_phx_timestep", dest="t", type=_switch, help="the step is always fixed here")
+    flags.add_argument("-s", "--sim_speed_factor", dest="s", type=float, default=1.0, help="simulated over wall time")
+    flags.add_argument("-g", "--show_gui", dest="g", type=_switch, help="graphics; no window is shown here")
     flags.add_argument("--ns", default="", help="prefix of every namespace")
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
     flags.add_argument("--override_min_comm_freq", type=int, help="publishing rate without commands")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument("--root", action="append", default=[], help="further folder of scene files (not an AMBF flag)")
-    for name, what in _NOT_SIMULATED.items():
-        flags.add_argument(f"-{name}" if len(name) == 1 else f"--{name}", help=f"{what}; accepted, without effect")
+    for words, what in _WITHOUT_EFFECT.items():
+        flags.add_argument(*words, dest=words[0].lstrip("-"), help=f"{what}; accepted, without effect")
     return flags
 
 
@@ -42,23 +47,53 @@ def options_of(arguments: list[str]) -> RunOptions:
     """The run that AMBF's flags describe; exits with status 2 and a message on bad ones."""
     flags = parser()
     given = flags.parse_args(arguments)
-    text = given.l if given.l is not None else (None if given.a else "1")
+    text = given.l if given.l is not None else ("" if given.a else "1")
     try:
-        models = tuple(int(part) for part in text.split(",") if part.strip()) if text is not None else ()
-    except ValueError:
-        flags.error(f"-l '{text}' is not a list of whole numbers such as 10,11,6")
-    if not 1 <= given.p <= 1000 or given.s <= 0:
-        flags.error("-p must be 1 to 1000 updates per second and -s larger than 0")
+        models = model_indices(text)
+    except ValueError as error:
+        flags.error(f"-l {error}")
+    if not given.p >= 1 or not 0 < given.s < float("inf"):
+        flags.error("-p must be at least 1 update per second, and -s larger than 0")
+    for name in ("override_min_comm_freq", "override_max_comm_freq"):
+        frequency = getattr(given, name)
+        if frequency is not None and frequency < 1:
+            flags.error(f"--{name} must be at least 1 Hz, not {frequency}")
     return RunOptions(
         given.launch_file, models, tuple(f for f in (given.a or "").split(",") if f), tuple(given.root), given.ns,
-        given.p, given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
-        names=given.names,
+        min(given.p, FASTEST), given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
+        names=given.names, notes=_notes(given),
     )  # fmt: skip
 
 
 def main() -> None:
     """Entry point of the command."""
     sys.exit(Supervisor(options_of(sys.argv[1:])).run())
+
+
+def _switch(text: str) -> bool:
+    """A flag as AMBF takes it: 1 or 0, true or false, yes or no, on or off."""
+    if text.lower() in ("1", "true", "yes", "on"):
+        return True
+    if text.lower() in ("0", "false", "no", "off"):
+        return False
+    raise argparse.ArgumentTypeError(f"'{text}' is neither 1 nor 0")
+
+
+def _notes(given: argparse.Namespace) -> tuple[str, ...]:
+    """What the flags ask for and do not get."""
+    notes = [
+        f"{words[0]} ({what}) has no effect here"
+        for words, what in _WITHOUT_EFFECT.items()
+        if getattr(given, words[0].lstrip("-")) is not None
+    ]
+    if given.t is False:
+        notes.append("-t 0: the step is fixed all the same; simulated time falls behind on a machine that is too slow")
+    if given.g:
+        notes.append("-g 1: no window is shown")
+    if given.p > FASTEST:
+        notes.append(f"-p {given.p:g}: a tick has 1 ms; {FASTEST:g} updates per second are made")
+        return tuple(notes)
+    return (*notes, *rate_notes(given.p))
 
 
 if __name__ == "__main__":

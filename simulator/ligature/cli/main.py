@@ -10,10 +10,15 @@ from rich.console import Console
 
 from ligature.cli.bench import bench as run_bench
 from ligature.cli.check import check as run_check
-from ligature.cli.options import RunOptions
+from ligature.cli.options import RunOptions, model_indices, rate_notes
 from ligature.cli.supervisor import Supervisor
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, help="Simulator for robot-assisted suturing.")
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Simulator for robot-assisted suturing.",
+)
 
 Launch = Annotated[Path, typer.Argument(help="Launch file, or one model file.")]
 Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
@@ -25,9 +30,9 @@ def indices(text: str | None) -> tuple[int, ...] | None:
     if text is None:
         return None
     try:
-        return tuple(int(part) for part in text.split(",") if part.strip())
-    except ValueError:
-        raise typer.BadParameter(f"'{text}' is not a list of whole numbers such as 10,11,6") from None
+        return model_indices(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 @app.command()
@@ -49,7 +54,7 @@ def run(
         raise typer.BadParameter("--names is 'ambf' or 'src'")
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
-        min_hz=min_hz, max_hz=max_hz, names=names,
+        min_hz=min_hz, max_hz=max_hz, names=names, notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 
 import ligature
 from ligature.model.scene import Scene
@@ -15,7 +15,8 @@ class RunOptions:
 
     ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second,
     ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
-    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy.
+    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy, ``notes`` are
+    lines to tell the user at the start.
     """
 
     scene: str
@@ -29,7 +30,7 @@ class RunOptions:
     min_hz: int | None = None
     max_hz: int | None = None
     names: str = "ambf"
-    extra: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
@@ -43,7 +44,26 @@ class RunOptions:
     def from_text(cls, text: str) -> RunOptions:
         """The options of `to_text`."""
         values = json.loads(text)
-        for name in ("models", "files", "roots"):
+        for name in ("models", "files", "roots", "notes"):
             if values[name] is not None:
                 values[name] = tuple(values[name])
         return cls(**values)
+
+
+def model_indices(text: str) -> tuple[int, ...]:
+    """Indices of a list such as ``10, 11,6``; raises ValueError."""
+    try:
+        found = tuple(int(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        found = (-1,)
+    if min(found, default=0) < 0:
+        raise ValueError(f"'{text}' is not a list of whole numbers such as 10,11,6")
+    return found
+
+
+def rate_notes(rate: float) -> tuple[str, ...]:
+    """What to tell the user about a rate of updates that is no whole number of ticks."""
+    ticks = max(1, round(1000.0 / rate))
+    if abs(1000.0 / rate - ticks) < 1e-6:
+        return ()
+    return (f"-p {rate:g}: an update has whole ticks of 1 ms: {ticks} ms, {1000.0 / ticks:.4g} a second",)

@@ -25,6 +25,8 @@ LONGEST_NAP = 0.01
 CLOCK_NAP = 1e-3
 """Sleep in seconds while the clock of a client rests: its next edge is answered that soon."""
 
+_EVENTS = {Severity.INFO: "finding", Severity.WARNING: "warning", Severity.ERROR: "problem"}
+
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
 
@@ -42,7 +44,7 @@ def main() -> None:
         sys.exit(2)
     for diagnostic in scene.diagnostics:
         if diagnostic.severity >= Severity.INFO:
-            tell("finding", str(diagnostic))
+            tell(_EVENTS[diagnostic.severity], str(diagnostic))
     simulation = Simulation(scene, TICK, 1.0 / options.rate)
     try:
         block = Block.create(options.bus, simulation.state.dtype)

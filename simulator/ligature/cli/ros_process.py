@@ -10,6 +10,9 @@ from ligature.bus.process import end_with_parent, stop_on_signal, tell
 from ligature.cli.options import RunOptions
 from ligature.model.state import state_dtype
 
+SCENE_PATIENCE = 10.0
+"""Seconds to wait for the end of the run, for which the physics process gives the reasons."""
+
 
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
@@ -20,6 +23,7 @@ def main() -> None:
         scene = options.load()
         Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set).close()
     except ligature.SceneError:
+        stop.wait(SCENE_PATIENCE)
         sys.exit(2)
     except BusError as error:
         tell("warning", str(error))

@@ -5,30 +5,36 @@ from __future__ import annotations
 import os
 import secrets
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
-import xmlrpc.client
 from collections.abc import Sequence
 from dataclasses import replace
 from queue import Empty, Queue
-from urllib.parse import urlparse
 
 from rich.console import Console
+from rich.markup import escape
 
-from ligature.bus.block import remove_leftovers
+from ligature.bus.block import remove, remove_leftovers
 from ligature.bus.process import end_with_parent
+from ligature.cli import master
 from ligature.cli.options import RunOptions
 
-DEFAULT_MASTER = "http://127.0.0.1:11311"
 MASTER_PATIENCE = 15.0
 END_PATIENCE = 1.5
 """Seconds that processes are given to end before they are killed."""
 
 RESTART_PAUSE = 0.3
 QUICK_DEATH, MAX_QUICK_DEATHS = 5.0, 5
+
+_ENVIRONMENT = {
+    "PYTHONUNBUFFERED": "1",
+    "PYTHONIOENCODING": "utf-8",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+}
+_STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
 Event = tuple[str, str, str]
 """Process, event, text."""
@@ -46,8 +52,8 @@ class Child:
         """Start the process, again after it died."""
         self.started = time.monotonic()
         self.process = subprocess.Popen(
-            self._command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1, env=self._env,
-            preexec_fn=end_with_parent, start_new_session=True,
+            self._command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", errors="replace",
+            bufsize=1, env=self._env, preexec_fn=end_with_parent, start_new_session=True,
         )  # fmt: skip
         threading.Thread(target=self._listen, args=(self.process,), daemon=True).start()
 
@@ -79,12 +85,13 @@ class Supervisor:
         remove_leftovers()
         self._options = replace(options, bus=f"ligature-{os.getpid()}-{secrets.token_hex(4)}")
         self._console = console or Console(highlight=False, soft_wrap=True)
+        self._progress = self._console.status("loading the scene")
         self._events: Queue[Event] = Queue()
         self._children: dict[str, Child] = {}
         self._begin = time.monotonic()
-        self._stop = False
+        self._published = self._stop = False
         self._status = 0
-        self._env = dict(os.environ, PYTHONUNBUFFERED="1", OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+        self._env = dict(os.environ, **_ENVIRONMENT)
 
     def run(self) -> int:
         """Run until Ctrl-C, a signal, or the end of the physics process."""
@@ -102,7 +109,10 @@ class Supervisor:
         return self._status
 
     def _start(self) -> None:
-        self._say(f"loading [bold]{self._options.scene}[/bold]")
+        self._say(f"loading [bold]{escape(self._options.scene)}[/bold]")
+        for note in self._options.notes:
+            self._console.print(note, style="dim", markup=False)
+        self._progress.start()
         text = self._options.to_text()
         self._children["physics"] = Child(
             "physics", [sys.executable, "-m", "ligature.cli.physics", text], self._events, self._env
@@ -111,36 +121,39 @@ class Supervisor:
             self._children["ros"] = Child(
                 "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
             )
-        else:
-            self._fail("no ROS master could be started; set ROS_MASTER_URI to one that answers")
 
     def _master_ready(self) -> bool:
-        uri = self._env.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
-        if master_answers(uri):
+        """Whether a ROS master answers, after one was started where there was none."""
+        uri = self._env["ROS_MASTER_URI"] = self._env.get("ROS_MASTER_URI") or master.DEFAULT_MASTER
+        if master.master_answers(uri):
             self._say(f"using the ROS master at {uri}")
             return True
-        where = urlparse(uri)
-        if where.hostname not in ("localhost", "127.0.0.1", socket.gethostname()):
-            self._say(f"the ROS master at {uri} does not answer, and it is not on this machine")
+        problem = master.obstacle(uri)
+        if problem:
+            self._fail(problem)
             return False
         self._say(f"no ROS master answers at {uri}: starting one")
-        command = ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(where.port or 11311)]
-        self._children["master"] = Child("master", command, self._events, self._env)
+        child = self._children["master"] = Child("master", master.command(uri), self._events, self._env)
         deadline = time.monotonic() + MASTER_PATIENCE
-        while time.monotonic() < deadline and not self._stop:
-            if master_answers(uri):
+        while time.monotonic() < deadline and not self._stop and child.process.poll() is None:
+            if master.master_answers(uri):
                 return True
             time.sleep(0.05)
+        if not self._stop:
+            self._fail(f"the ROS master that was started for {uri} does not answer; start 'roscore' and try again")
         return False
 
     def _handle(self, process: str, event: str, text: str) -> None:
         if event == "ready":
             self._say(f"{process} ready: {text}")
+            self._progress.update("connecting to ROS")
         elif event == "first-state":
-            self._say(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
-        elif event in ("error", "warning", "finding"):
-            style = {"error": "red", "warning": "yellow"}.get(event, "dim")
-            self._console.print(text, style=style, markup=False)
+            self._progress.stop()
+            if not self._published:
+                self._say(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
+            self._published = True
+        elif event in _STYLES:
+            self._console.print(text, style=_STYLES[event], markup=False)
             if event == "error":
                 self._status = 2
         elif event == "ended":
@@ -171,6 +184,7 @@ class Supervisor:
 
     def _end_all(self) -> None:
         self._stop = True
+        self._progress.stop()
         deadline = time.monotonic() + END_PATIENCE
         order = [self._children[n] for n in ("ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
@@ -178,19 +192,8 @@ class Supervisor:
                 child.process.terminate()
         for child in order:
             child.end(deadline - time.monotonic())
+        remove(self._options.bus)
         self._say("ended")
 
     def _say(self, text: str) -> None:
         self._console.print(text)
-
-
-def master_answers(uri: str) -> bool:
-    """Whether a ROS master answers at ``uri`` within a second."""
-    where = urlparse(uri)
-    try:
-        with socket.create_connection((where.hostname or "localhost", where.port or 11311), 1.0):
-            pass
-        code, _, _ = xmlrpc.client.ServerProxy(uri).getPid("/ligature")  # type: ignore[misc]
-    except (OSError, xmlrpc.client.Error, ValueError):
-        return False
-    return bool(code == 1)

@@ -1,0 +1,76 @@
+"""The ROS master of a run: whether one answers at an address, and whether and how one can be started there."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+import socket
+import xmlrpc.client
+from http.client import HTTPConnection, HTTPException
+from urllib.parse import urlparse
+
+DEFAULT_MASTER = "http://127.0.0.1:11311"
+DEFAULT_PORT = 11311
+ANSWER_PATIENCE = 1.0
+"""Seconds that a master is given to answer."""
+
+
+class _Transport(xmlrpc.client.Transport):
+    """A transport that does not wait for ever for a program that listens and says nothing."""
+
+    def make_connection(self, host: object) -> HTTPConnection:
+        connection = super().make_connection(host)  # type: ignore[arg-type]
+        connection.timeout = ANSWER_PATIENCE
+        return connection
+
+
+def master_answers(uri: str) -> bool:
+    """Whether a ROS master answers at ``uri`` within `ANSWER_PATIENCE`."""
+    try:
+        code, _, _ = xmlrpc.client.ServerProxy(uri, _Transport()).getPid("/ligature")  # type: ignore[misc]
+    except (OSError, HTTPException, xmlrpc.client.Error, ValueError, TypeError):
+        return False
+    return bool(code == 1)
+
+
+def obstacle(uri: str) -> str:
+    """Why no master can be started for ``uri``; empty when nothing stands in the way."""
+    where = urlparse(uri)
+    try:
+        port = where.port or DEFAULT_PORT
+    except ValueError:
+        port = 0
+    if where.scheme != "http" or not where.hostname or not port:
+        return f"ROS_MASTER_URI '{uri}' is no address such as {DEFAULT_MASTER}"
+    if not _is_here(where.hostname):
+        return f"the ROS master at {uri} does not answer, and '{where.hostname}' is not this machine"
+    if _taken(port):
+        return f"port {port} is taken by another program that is no ROS master; set ROS_MASTER_URI to a free port"
+    if shutil.which("rosmaster") is None:
+        return "there is no program 'rosmaster' (Debian package python3-rosmaster) to start a ROS master with"
+    return ""
+
+
+def command(uri: str) -> list[str]:
+    """The command that serves ``uri``, which has no `obstacle`."""
+    return [shutil.which("rosmaster") or "rosmaster", "--core", "-p", str(urlparse(uri).port or DEFAULT_PORT)]
+
+
+def _is_here(host: str) -> bool:
+    """Whether ``host`` is an address of this machine: only then a socket can be bound to it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((host, 0))
+        except OSError:
+            return False
+    return True
+
+
+def _taken(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("", port))
+        except OSError as error:
+            return error.errno == errno.EADDRINUSE
+    return False

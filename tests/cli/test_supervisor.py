@@ -1,0 +1,79 @@
+"""One process of a run: what it says arrives, and it ends when told, or is killed."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from queue import Queue
+
+import pytest
+from ligature.bus.block import FOLDER
+from ligature.cli.options import RunOptions
+from ligature.cli.supervisor import Child, Event, Supervisor
+from rich.console import Console
+
+
+def child(code: str) -> tuple[Child, Queue[Event]]:
+    events: Queue[Event] = Queue()
+    return Child("tester", [sys.executable, "-u", "-c", code], events, dict(os.environ)), events
+
+
+def next_of(events: Queue[Event]) -> Event:
+    return events.get(timeout=10)
+
+
+def test_events_and_log_lines_are_told_apart() -> None:
+    _, events = child("print('@ready 3 bodies'); print('hello'); print('@beat')")
+    assert next_of(events) == ("tester", "ready", "3 bodies")
+    assert next_of(events) == ("tester", "log", "hello")
+    assert next_of(events) == ("tester", "beat", "")
+    assert next_of(events) == ("tester", "ended", "0")
+
+
+def test_bytes_that_are_no_text_do_not_hide_the_end() -> None:
+    _, events = child("import os; os.write(1, bytes([0xff, 0xfe, 10])); raise SystemExit(3)")
+    assert next_of(events) == ("tester", "log", "\ufffd\ufffd")
+    assert next_of(events) == ("tester", "ended", "3")
+
+
+def test_a_process_that_does_not_want_to_end_is_killed() -> None:
+    process, events = child("import signal, time; signal.signal(15, signal.SIG_IGN); print('up'); time.sleep(60)")
+    assert next_of(events) == ("tester", "log", "up")
+    begin = time.monotonic()
+    process.end(0.2)
+    assert time.monotonic() - begin < 2.0
+    assert next_of(events) == ("tester", "ended", "-9")
+
+
+def test_a_process_starts_again() -> None:
+    process, events = child("print('once')")
+    assert [next_of(events)[1] for _ in range(2)] == ["log", "ended"]
+    process.start()
+    assert [next_of(events)[1] for _ in range(2)] == ["log", "ended"]
+
+
+def test_a_run_that_cannot_have_a_master_says_why_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "foo")
+    text = io.StringIO()
+    options = RunOptions(str(tmp_path / "[red]launch.yaml"), notes=("-g 1: no window is shown",))
+    supervisor = Supervisor(options, Console(file=text, soft_wrap=True))
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        assert supervisor.run() == 1
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    lines = text.getvalue().splitlines()
+    assert lines == [
+        f"loading {tmp_path}/[red]launch.yaml",
+        "-g 1: no window is shown",
+        "ROS_MASTER_URI 'foo' is no address such as http://127.0.0.1:11311",
+        "ended",
+    ]
+    assert not list(FOLDER.glob(f"ligature-{os.getpid()}-*"))
