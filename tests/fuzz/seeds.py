@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from pathlib import Path
 
-SCENES = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small"
+SCENE = Path(__file__).resolve().parent / "scene"
+SMALL_SCENE = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small"
+
+ENTRIES = {
+    "world.yaml": "launch.yaml", "environment.yaml": "launch.yaml", "colours.yaml": "launch.yaml",
+    "devices.yaml": "launch.yaml", "part.mtl": "part.obj",
+}  # fmt: skip
+"""The file to load for those that are not loaded by themselves."""
 
 OBJ = """mtllib part.mtl
 o cube
@@ -31,44 +39,6 @@ MTL = "newmtl red\nKa 1 1 1\nKd 0.8 0.1 0.1\nKs 0.5 0.5 0.5\nNs 32\nd 1.0\nmap_K
 ASCII_STL = (
     "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"
 )
-ADF = """bodies: [BODY a, BODY b]
-joints: [J]
-ghost objects: [G]
-sensors: [S]
-actuators: [A]
-namespace: /ambf/env/
-gravity: {x: 0, y: 0, z: -9.8}
-BODY a: &a
-  name: a
-  mass: 1.0
-  inertia: {ix: 0.1, iy: 0.1, iz: 0.1}
-  inertial offset: {position: {x: 0, y: 0, z: 0.1}, orientation: {r: 0, p: 0, y: 0}}
-  collision shape: CAPSULE
-  collision geometry: {radius: 0.1, height: 0.5, axis: y}
-  collision groups: [1, 2]
-  location: {position: {x: 0, y: 0, z: 1}, orientation: {r: 0.1, p: 0.2, y: 0.3}}
-BODY b:
-  name: b
-  mass: 0.5
-  compound collision shape:
-  - {shape: BOX, geometry: {x: 1, y: 1, z: 1}, offset: {position: {x: 0, y: 0, z: 0}, orientation: {r: 0, p: 0, y: 0}}}
-  - {shape: SPHERE, geometry: {radius: 0.2}}
-J:
-  name: a-b
-  type: six dof spring
-  parent: BODY a
-  child: BODY b
-  parent pivot: {x: 0, y: 0, z: 0}
-  child pivot: {x: 0, y: 0, z: 1}
-  parent axis: {x: 0, y: 0, z: 1}
-  child axis: {x: 0, y: 0, z: 1}
-  offset: 0.3
-  joint limits: {linear: {low: {x: 0, y: 0, z: 0}, high: {x: 0, y: 0, z: 0.1}}, angular: {low: {x: 0, y: 0, z: -1}, high: {x: 0, y: 0, z: 1}}}
-  stiffness: {linear: {x: 1, y: 1, z: 1}, angular: {x: 1, y: 1, z: 1}}
-G: {name: g, parent: BODY a, collision shape: SPHERE, collision geometry: {radius: 0.1}}
-S: {name: s, type: Proximity, parent: BODY a, array: [{offset: {x: 0, y: 0, z: 0}, direction: {x: 1, y: 0, z: 0}}]}
-A: {name: act, type: Constraint, parent: BODY b}
-"""
 
 
 def binary_stl() -> bytes:
@@ -84,22 +54,47 @@ def chunk(kind: int, content: bytes) -> bytes:
 
 def tds() -> bytes:
     """A 3DS file of one triangle with a material."""
+    colour = chunk(0x0011, bytes((255, 0, 0)))
+    look = chunk(0xA000, b"red\0") + chunk(0xA020, colour) + chunk(0xA050, chunk(0x0030, struct.pack("<H", 25)))
+    look += chunk(0xA040, chunk(0x0031, struct.pack("<f", 50.0))) + chunk(0xA200, chunk(0xA300, b"red.png\0"))
     vertices = struct.pack("<H9f", 3, 0, 0, 0, 1, 0, 0, 0, 1, 0)
     group = chunk(0x4130, b"red\0" + struct.pack("<HH", 1, 0))
     faces = chunk(0x4120, struct.pack("<H4H", 1, 0, 1, 2, 0) + group)
-    mesh = chunk(0x4100, chunk(0x4110, vertices) + faces)
-    return chunk(0x4D4D, chunk(0x3D3D, chunk(0x4000, b"cube\0" + mesh)))
+    uvs = chunk(0x4140, struct.pack("<H6f", 3, 0, 0, 1, 0, 0, 1))
+    mesh = chunk(0x4100, chunk(0x4110, vertices) + uvs + faces)
+    return chunk(0x4D4D, chunk(0x3D3D, chunk(0xAFFF, look) + chunk(0x4000, b"cube\0" + mesh)))
 
 
-def seeds() -> list[tuple[str, bytes]]:
-    """File name and content of every seed."""
-    launch = [(path.name, path.read_bytes()) for path in sorted(SCENES.glob("*.yaml")) if path.stat().st_size < 20_000]
-    return [
-        ("model.yaml", ADF.encode()),
-        *launch,
-        ("part.obj", OBJ.encode()),
-        ("part.mtl", MTL.encode()),
-        ("ascii.stl", ASCII_STL.encode()),
-        ("binary.stl", binary_stl()),
-        ("part.3ds", tds()),
-    ]
+@dataclass(frozen=True)
+class Seed:
+    """A valid file of the scene that is mutated; ``entry`` is the file that a user would load with it."""
+
+    name: str
+    data: bytes
+    entry: str
+
+    @property
+    def binary(self) -> bool:
+        """Whether the file is no text."""
+        return self.name in ("binary.stl", "part.3ds")
+
+    @property
+    def yaml(self) -> bool:
+        """Whether the file is a scene file."""
+        return self.name.endswith(".yaml")
+
+
+def seeds() -> list[Seed]:
+    """All files of one valid scene: every kind of scene file, object and mesh."""
+    found = [(path.name, path.read_bytes()) for path in sorted(SCENE.glob("*.yaml"))]
+    found += [("arm.yaml", (SMALL_SCENE / "psm1.yaml").read_bytes())]
+    found += [("part.obj", OBJ.encode()), ("part.mtl", MTL.encode()), ("ascii.stl", ASCII_STL.encode())]
+    found += [("binary.stl", binary_stl()), ("part.3ds", tds())]
+    return [Seed(name, data, ENTRIES.get(name, name)) for name, data in found]
+
+
+def write_scene(folder: Path) -> None:
+    """Write all seeds, and the picture that a material names, to ``folder``."""
+    for seed in seeds():
+        (folder / seed.name).write_bytes(seed.data)
+    (folder / "red.png").touch()

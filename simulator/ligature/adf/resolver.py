@@ -101,11 +101,16 @@ class Resolver:
             raise self._refusal(f"'{real}' cannot be read: {error.strerror}", mark) from error
 
     def read_text(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> str:
-        """The content of ``path`` as UTF-8 text; raises `ResolutionError`."""
+        """The content of ``path`` as UTF-8 text; raises `ResolutionError`, which names the byte's own place."""
+        data = self.read_bytes(path, limit, mark)
         try:
-            return self.read_bytes(path, limit, mark).decode("utf-8-sig")
+            return data.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            raise self._refusal(f"'{path}' is not UTF-8 text (byte {error.start})", mark) from error
+            before = data[: error.start].split(b"\n")
+            place = Mark(Path(path), len(before), len(before[-1].decode("utf-8", "replace")) + 1)
+            raise self._refusal(
+                f"'{path}' is not UTF-8 text (byte {error.start})", place, "save it as UTF-8"
+            ) from error
 
     @staticmethod
     def _refusal(message: str, mark: Mark | None, hint: str = "") -> ResolutionError:

@@ -79,7 +79,7 @@ def load(
         raise SceneError(Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file"))
     if not scene.bodies:
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
-        raise SceneError(Diagnostic(Severity.ERROR, f"'{start}' yields no body to simulate"), *errors)
+        raise SceneError(Diagnostic(Severity.ERROR, "the file yields no body to simulate", document.top.mark), *errors)
     return scene
 
 

@@ -93,16 +93,17 @@ class BodyTemplate(Template):
         self._joints = np.array(body.joints, dtype=np.int64)
         self._joint_names = [scene.joints[j].identity.name for j in body.joints]
         self._children = [scene.bodies[c].identity.name for c in body.children]
-        self._positions = body.publish_joint_positions
-        self.ask(body.publish_children_names, body.publish_joint_names, body.publish_joint_positions)
+        self._wanted = (body.publish_children_names, body.publish_joint_names, body.publish_joint_positions)
 
-    def ask(self, children: bool, names: bool, positions: bool) -> None:
-        """Switch lists on; a command cannot switch them off (ADF specification §23)."""
-        if children:
-            self.message.children_names = self._children
-        if names:
-            self.message.joint_names = self._joint_names
-        self._positions = self._positions or positions
+    def ask(self, children: bool, names: bool, positions: bool) -> bool:
+        """Switch lists on; a command cannot switch them off (ADF specification §23). Whether there are more now.
+
+        Commands come in on other threads: the message itself is written in `content` alone, so that no client sees
+        names without positions.
+        """
+        before = self._wanted
+        self._wanted = (before[0] or children, before[1] or names, before[2] or positions)
+        return self._wanted != before
 
     def content(self, message: RigidBodyState, state: Record) -> None:
         """Pose, twist, wrench and joints."""
@@ -112,7 +113,12 @@ class BodyTemplate(Template):
         v.x, v.y, v.z, w.x, w.y, w.z = state["body_twist"][self.index].tolist()
         f, t = wrench.force, wrench.torque
         f.x, f.y, f.z, t.x, t.y, t.z = state["body_wrench"][self.index].tolist()
-        if self._positions and len(self._joints):
+        children, names, positions = self._wanted
+        if children:
+            message.children_names = self._children
+        if names:
+            message.joint_names = self._joint_names
+        if positions and len(self._joints):
             message.joint_positions = state["joint_position"][self._joints].tolist()
             message.joint_velocities = state["joint_velocity"][self._joints].tolist()
             message.joint_efforts = state["joint_effort"][self._joints].tolist()
@@ -293,6 +299,11 @@ def body_command(message: RigidBodyCmd, body: Body) -> BodyCommand:
     return BodyCommand(
         body.index, kind, target, tuple(CommandType(t) for t in types), tuple(message.joint_cmds[:count])
     )
+
+
+def wishes(message: RigidBodyCmd) -> tuple[bool, bool, bool]:
+    """Which lists a command asks for: children names, joint names, joint positions."""
+    return message.publish_children_names, message.publish_joint_names, message.publish_joint_positions
 
 
 def actuator_command(message: ActuatorCmd, index: int) -> ActuatorCommand:

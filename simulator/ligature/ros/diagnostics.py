@@ -13,12 +13,13 @@ SLOW = 0.95
 
 
 class Diagnostics:
-    """Publishes the figures of the bus once a second."""
+    """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take."""
 
     def __init__(self, block: Block) -> None:
         self._block = block
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
         self._next = 0.0
+        self.missed = 0
 
     def publish(self, now: float) -> None:
         """Publish when a second has passed; ``now`` on the monotonic clock."""
@@ -43,6 +44,7 @@ class Diagnostics:
             "commands dropped": str(sum(ring.refused for ring in self._block.rings.values())),
             "messages published": str(figures["published"]),
             "publications dropped": str(figures["publish_late"]),
+            "messages missed by slow clients": str(self.missed),
         }
         status.values = [KeyValue(key=k, value=v) for k, v in rows.items()]
         array = DiagnosticArray(status=[status])

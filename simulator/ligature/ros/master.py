@@ -1,53 +1,98 @@
-"""Notices a restarted ROS master and registers everything again, keeping open connections."""
+"""The ROS master: is the name free, and does it still know this node.
+
+A master that hangs or restarts must not hold up publishing, so it is watched on a thread of its own.
+"""
 
 from __future__ import annotations
 
+import http.client
+import threading
 import xmlrpc.client
+from collections.abc import Callable
+from typing import Any
 
+import rosgraph
 import rospy
-from rospy.impl.registration import Registration, get_topic_manager
+from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager
 
 PERIOD = 1.0
+"""Seconds between looks at the master."""
+
+NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
+PATIENCE = 2.0
+"""Seconds that another simulator is given to answer."""
 
 
-class MasterWatch:
-    """Looks at the master once a second."""
+class NameTaken(RuntimeError):
+    """Another simulator of the same world runs on this master; the message says what to do."""
 
-    def __init__(self) -> None:
-        self._pid = self._ask()
-        self._next = 0.0
 
-    def check(self, now: float) -> None:
-        """Register again when the master is another process than before."""
-        if now < self._next:
-            return
-        self._next = now + PERIOD
-        pid = self._ask()
-        if pid is None or pid == self._pid:
-            return
-        self._pid = pid
-        rospy.logwarn("the ROS master was restarted; registering again")
-        register_again()
+def require_free(name: str) -> None:
+    """Raise `NameTaken` when a living node has ``name``; ROS would let the two end each other in turns."""
+    try:
+        uri = rosgraph.Master("/ligature_start").lookupNode(name)
+    except NO_ANSWER:
+        return
+    if _lives(uri):
+        raise NameTaken(
+            f"another simulator runs on this ROS master (node {name} at {uri}); end it, give this one a prefix"
+            " with '--ns', or set ROS_MASTER_URI to another master"
+        )
 
-    @staticmethod
-    def _ask() -> int | None:
-        try:
-            code, _, pid = rospy.get_master().getPid()
-        except (OSError, xmlrpc.client.Error):
-            return None
-        return int(pid) if code == 1 else None
+
+class _Hasty(xmlrpc.client.Transport):
+    """A transport that gives up after `PATIENCE`."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        """A connection with a time limit."""
+        connection = super().make_connection(host)
+        connection.timeout = PATIENCE
+        return connection
+
+
+def _lives(uri: str) -> bool:
+    try:
+        code, _, _ = xmlrpc.client.ServerProxy(uri, _Hasty()).getPid("/ligature_start")  # type: ignore[misc]
+    except (*NO_ANSWER, ValueError):
+        return False
+    return bool(code == 1)
+
+
+class MasterWatch(threading.Thread):
+    """Registers everything again with a master that has forgotten this node; ``also`` runs at every look."""
+
+    def __init__(self, also: Callable[[], None]) -> None:
+        super().__init__(name="master watch", daemon=True)
+        self._also = also
+        self._answers = True
+
+    def run(self) -> None:
+        """Look once a second until the node ends."""
+        while not rospy.core.is_shutdown_requested():
+            rospy.rostime.wallsleep(PERIOD)
+            try:
+                self.look()
+            except NO_ANSWER:
+                if self._answers:
+                    rospy.logwarn("the ROS master does not answer; clients that are connected stay so")
+                self._answers = False
+
+    def look(self) -> None:
+        """Look once; raises one of `NO_ANSWER` when the master does not answer."""
+        code, _, _ = rospy.get_master().lookupNode(rospy.get_name())
+        if code != 1 or not self._answers:
+            register_again()
+            rospy.logwarn("the ROS master answers again; everything is registered with it")
+            self._answers = True
+        self._also()
 
 
 def register_again() -> None:
-    """Tell the master about every publication and subscription of this node."""
-    manager = get_topic_manager()
-    master, uri = rospy.get_master(), rospy.get_node_uri()
-    for name, type_ in manager.get_publications():
-        master.registerPublisher(name, type_, uri)
-    for name, type_ in manager.get_subscriptions():
-        code, _, publishers = master.registerSubscriber(name, type_, uri)
-        if code == 1:
-            subscriber = manager.get_subscriber_impl(name)
-            for publisher in publishers:
-                if subscriber is not None and publisher != uri:
-                    rospy.impl.registration.get_registration_listeners().notify_added(name, publisher, Registration.SUB)
+    """Tell the master about every publication, subscription and service of this node; connections stay."""
+    topics, listeners = get_topic_manager(), get_registration_listeners()
+    for name, type_ in topics.get_publications():
+        listeners.notify_added(name, type_, Registration.PUB)
+    for name, type_ in topics.get_subscriptions():
+        listeners.notify_added(name, type_, Registration.SUB)
+    for name, address in get_service_manager().get_services():
+        listeners.notify_added(name, address, Registration.SRV)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from typing import Any
 
 import rospy
 
@@ -54,24 +55,32 @@ class Parameters:
         for light in scene.lights:
             self._add(light.identity.topic, light_parameters(light))
         self._next = 0.0
-        self._write()
+        for name, value in self._values.items():
+            rospy.set_param(name, value)
 
-    def poll(self, now: float, push: Callable[..., None]) -> None:
-        """Every two seconds: write parameters that a restarted master has lost."""
-        del push
+    def poll(self) -> None:
+        """Every two seconds: write what a restarted master has lost, tell what a user changed in vain."""
+        now = time.monotonic()
         if now < self._next:
             return
         self._next = now + PERIOD
-        try:
-            lost = [name for name in self._values if not rospy.has_param(name)]
-            for name in lost:
-                rospy.set_param(name, self._values[name])
-        except (OSError, rospy.ROSException):
-            return
+        tree = rospy.get_param("/")
+        for name, value in self._values.items():
+            found = _look_up(tree, name)
+            if found is None:
+                rospy.set_param(name, value)
+            elif found != value:
+                rospy.logwarn(f"{name} was set to {found!r}: a running scene does not follow its parameters yet")
+                self._values[name] = found
 
     def _add(self, topic: str, values: dict[str, Value]) -> None:
         self._values.update({f"{topic}/{name}": value for name, value in values.items()})
 
-    def _write(self) -> None:
-        for name, value in self._values.items():
-            rospy.set_param(name, value)
+
+def _look_up(tree: Any, name: str) -> Any:
+    """The value of a parameter in the tree of all; None when it is not there."""
+    for part in name.strip("/").split("/"):
+        if not isinstance(tree, dict):
+            return None
+        tree = tree.get(part)
+    return tree
