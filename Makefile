@@ -19,8 +19,10 @@ $(STAMPS)/debian: debian-packages.txt
 	@sh .ci/install_debian_packages.sh debian-packages.txt
 	@touch $@
 
-$(STAMPS)/python: requirements.txt requirements-dev.txt $(STAMPS)/debian
-	test -x $(PYTHON) || /usr/bin/python3 -m venv --system-site-packages .venv
+.venv/pyvenv.cfg: $(STAMPS)/debian
+	/usr/bin/python3 -m venv --system-site-packages .venv
+
+$(STAMPS)/python: requirements.txt requirements-dev.txt .venv/pyvenv.cfg
 	.venv/bin/pip install --quiet --disable-pip-version-check -r requirements.txt -r requirements-dev.txt
 	@touch $@
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import random
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,11 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ligature import Simulation, load
-from ligature.bus import Block, Throttle
+from ligature.bus import Block, Mailbox, Throttle
+from ligature.bus.bounds import FARTHEST, FASTEST, STRONGEST
 from ligature.bus.codec import Message, encode
 from ligature.cli.options import RunOptions
 from ligature.cli.physics import Loop
-from ligature.model.commands import BodyCommand, CommandType, Reset
+from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, PlaceCommand, Release, Reset
+from ligature.model.scene import Scene
+
+SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
 
 
 class Run:
@@ -92,3 +98,47 @@ def test_figures_tell_rate_and_rejections_once_a_second(run: Run, capsys: pytest
     assert figures["real_time_factor"] == pytest.approx(1.0, rel=0.15)
     assert figures["tick_p50"] <= figures["tick_p99"] <= figures["tick_max"] < 0.1
     assert "@warning 2 commands rejected: the command must be finite" in capsys.readouterr().out
+
+
+def random_commands(scene: Scene, rng: random.Random) -> Iterator[Message]:
+    """Commands of all kinds with good, absurd and impossible numbers."""
+
+    def number(bound: float) -> float:
+        return rng.choice([0.0, bound, -bound, 5e-324, math.nan, math.inf, 1e300, *(rng.gauss(0, 1),) * 20])
+
+    def pose() -> tuple[float, ...]:
+        quaternion = [rng.gauss(0, 1) for _ in range(4)]
+        length = math.hypot(*quaternion) * rng.choice([1.0, 1.0, 1.05, 0.5])
+        return (*(number(FARTHEST) for _ in range(3)), *(v / length for v in quaternion))
+
+    names = [body.identity.identifier for body in scene.bodies]
+    while True:
+        type_, count = rng.choice(list(CommandType)), rng.choice([0, 8, 64])
+        bound = FASTEST if type_ is CommandType.VELOCITY else STRONGEST
+        target = pose() if type_ is CommandType.POSITION else tuple(number(bound) for _ in range(6))
+        types = tuple(rng.choice(list(CommandType)) for _ in range(count))
+        values = tuple(number(STRONGEST) for _ in range(count))
+        yield BodyCommand(rng.randrange(len(scene.bodies) + 1), type_, target, types, values)
+        yield ActuatorCommand(rng.randrange(3), rng.random() < 0.6, rng.choice(names), rng.choice([None, pose()]))
+        yield PlaceCommand(rng.choice(["camera", "light"]), rng.randrange(2), rng.choice([None, pose()]))
+        yield Release(rng.choice(["body", "actuator", "camera"]), rng.randrange(3))
+        if rng.random() < 0.02:
+            yield Reset(rng.random() < 0.5)
+
+
+def test_no_command_makes_the_state_anything_but_finite() -> None:
+    simulation = Simulation(load(SMALL))
+    block = Block.create(f"ligature-{os.getpid()}-f0", simulation.state.dtype)
+    mailbox = Mailbox(simulation.scene, block.rings)
+    commands = random_commands(simulation.scene, random.Random(5))
+    for _ in range(600):
+        for _ in range(3):
+            block.rings["ros"].push(encode(next(commands)))
+        for message in mailbox.take():
+            simulation.apply(message)  # type: ignore[arg-type]
+        simulation.step()
+        for name in ("body_pose", "body_twist", "joint_position", "joint_velocity", "camera_world"):
+            assert np.isfinite(simulation.state[name]).all(), name
+    assert mailbox.rejected > 100
+    block.close()
+    simulation.close()

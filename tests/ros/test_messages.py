@@ -1,10 +1,12 @@
-"""Message definitions: every MD5 sum of the interface reference §1.1 and §1.5."""
+"""Message definitions: every MD5 sum of the interface reference §1.1, §1.5 and §1.6."""
 
 from __future__ import annotations
 
 import importlib
 
 import pytest
+
+from tests.ros.conftest import ROOT
 
 AMBF = """
 ActuatorCmd 95500dea47e70fe03427341c7d1aa9f0
@@ -47,13 +49,67 @@ TriggerOperatingState d941a2d049e2c9ac5773fc4a3a8a892d
 """
 
 
+CISST = """
+IntervalStatistics 25eabfa93979fc6d9ab895c84674476c
+BoolStamped 542e22b190dc8e6eb476d50dda88feb7
+DoubleVec fb60495edd59d3fcf90e173153ae8a9a
+"""
+CISST_SERVICES = "ConvertFloat64Array cfaed3f0a946c7fe3a617e0ff7c368ec"
+STD = """
+String 992ce8a1687cec8c8bd883ec73ca41d1
+Header 2176decaecbce78abc3b96ef049fabed
+Empty d41d8cd98f00b204e9800998ecf8427e
+Bool 8b94c1b53db61fb6aed406028ad6332a
+Float32 73fcbf46b49191e672908e50842a83d4
+Float64 fdb28210bfa9d7c91146260178d9a584
+Float64MultiArray 4b7d974086d4060e7db4613a7e6c3ba4
+UInt64 1b2a79973e8bf53d7b53acb71299cb57
+"""
+GEOMETRY = """
+Point 4a842b65f413084dc2b10fb484ea7f17
+Vector3 4a842b65f413084dc2b10fb484ea7f17
+Quaternion a779879fadf0160734f906b8c19c7004
+Pose e45d45a5a1ce597b249e23fb30fc871f
+PoseStamped d3812c3cbc69362b77dc0b19b345f8f5
+PoseArray 916c28c5764443f268b296bb671b9d97
+TransformStamped b5764a33bfeb3588febc2682852579b0
+Twist 9f195f881246fdfa2798d1d3eebca84a
+TwistStamped 98d34b0043a2093cf9d9345ab6eef12e
+Wrench 4f539cf138b23283b520fd271b567936
+WrenchStamped d78d3cb249ce23087ade7e7d0c40cfa7
+QuaternionStamped e57f1e547e0e1fd13504588ffc8334e2
+"""
+SENSOR = """
+JointState 3066dcd76a6cfaef579bd0f34173e9fd
+Joy 5a9ea5f83505693b71e785041e67a8bb
+Image 060021388200f6f0f447d0fcd9c64743
+CameraInfo c9a58c1b0b154e0e6da7578cb991d214
+PointCloud d8e9c3f5afbdd8a130fd1d2763945fca
+PointCloud2 1158d486dd51d683ce2f1be655c3c181
+ChannelFloat32 3d40139cdd33dfedcb71ffeeeb42ae7f
+"""
+
+
 def rows(module: str, text: str) -> list[tuple[str, str, str]]:
     return [(module, *line.split()) for line in text.strip().splitlines()]  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
     ("module", "name", "md5"),
-    [*rows("ambf_msgs.msg", AMBF), *rows("crtk_msgs.msg", CRTK), *rows("crtk_msgs.srv", SERVICES)],
+    [
+        *rows("ambf_msgs.msg", AMBF),
+        *rows("crtk_msgs.msg", CRTK),
+        *rows("crtk_msgs.srv", SERVICES),
+        *rows("cisst_msgs.msg", CISST),
+        *rows("cisst_msgs.srv", CISST_SERVICES),
+        *rows("std_msgs.msg", STD),
+        *rows("geometry_msgs.msg", GEOMETRY),
+        *rows("sensor_msgs.msg", SENSOR),
+        *rows("std_srvs.srv", "Trigger 937c9679a518e3a18d831e57125ea522"),
+        *rows("diagnostic_msgs.msg", "KeyValue cf57fdc6617a881a88c16e768132149c"),
+        *rows("tf2_msgs.msg", "TFMessage 94810edda583a504dfda3829e70d7eec"),
+        *rows("rosgraph_msgs.msg", "Clock a9c97c1d230cfc112e270351a944ee47"),
+    ],
 )
 def test_definitions_match_the_originals_byte_for_byte(module: str, name: str, md5: str) -> None:
     assert getattr(importlib.import_module(module), name)._md5sum == md5
@@ -63,3 +119,19 @@ def test_constants_of_rigid_body_commands() -> None:
     from ambf_msgs.msg import RigidBodyCmd
 
     assert (RigidBodyCmd.TYPE_FORCE, RigidBodyCmd.TYPE_POSITION, RigidBodyCmd.TYPE_VELOCITY) == (0, 1, 2)
+
+
+def test_what_another_tool_computes_from_the_definitions_agrees() -> None:
+    """genmsg itself, from the files that catkin builds, beside the sums in the generated modules."""
+    from genmsg.gentools import compute_md5
+    from genmsg.msg_loader import MsgContext, load_depends, load_msg_from_file
+
+    search = {package.name: [str(package / "msg")] for package in (ROOT / "ros_msgs").iterdir() if package.is_dir()}
+    for package in ("std_msgs", "geometry_msgs"):
+        search[package] = [f"/usr/share/{package}/msg"]
+    context = MsgContext.create_default()
+    for name, md5 in (line.split() for line in AMBF.strip().splitlines()):
+        path = ROOT / "ros_msgs" / "ambf_msgs" / "msg" / f"{name}.msg"
+        spec = load_msg_from_file(context, str(path), f"ambf_msgs/{name}")
+        load_depends(context, spec, search)
+        assert compute_md5(context, spec) == md5

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.ros
 def test_message_packages_and_the_simulator_build_under_catkin(tmp_path: Path) -> None:
     source = tmp_path / "src"
     (source / "ligature").mkdir(parents=True)
-    for name in ("ambf_msgs", "crtk_msgs"):
+    for name in ("ambf_msgs", "cisst_msgs", "crtk_msgs"):
         (source / name).symlink_to(ROOT / "ros_msgs" / name)
     for name in ("package.xml", "CMakeLists.txt", "setup.py", "simulator", "launch", "scenes"):
         (source / "ligature" / name).symlink_to(ROOT / name)
@@ -29,7 +29,7 @@ def test_message_packages_and_the_simulator_build_under_catkin(tmp_path: Path) -
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     (packages,) = (tmp_path / "devel" / "lib").glob("python3*/*-packages")
-    assert {"ambf_msgs", "crtk_msgs", "ligature"} <= {path.name for path in packages.iterdir()}
+    assert {"ambf_msgs", "cisst_msgs", "crtk_msgs", "ligature"} <= {path.name for path in packages.iterdir()}
     generated = (packages / "ambf_msgs" / "msg" / "_RigidBodyState.py").read_text()
     assert "c0ba0eb38f2481828a038f3b17ce0623" in generated
 

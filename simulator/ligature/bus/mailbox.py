@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError, Message, decode
 from ligature.bus.newest import Newest, object_of
 from ligature.bus.pacing import Throttle
@@ -75,6 +76,7 @@ class Mailbox:
         if isinstance(message, Throttle):
             return
         check(message)
+        check_bounds(message)
         item = object_of(message)
         if item is not None and not 0 <= item[1] < self._limits.get(item[0], 0):
             raise ValueError(f"there is no {item[0]} number {item[1]}")

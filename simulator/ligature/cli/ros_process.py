@@ -28,9 +28,15 @@ def main() -> None:
     except BusError as error:
         tell("warning", str(error))
         sys.exit(0 if stop.is_set() else 1)
+    from ligature.ros.master import NameTaken
     from ligature.ros.node import Node
 
-    node = Node(scene, options.bus, options.min_hz, options.max_hz, options.names)
+    try:
+        node = Node(scene, options.bus, options.min_hz, options.max_hz, options.names)
+    except NameTaken as error:
+        tell("fatal", str(error))
+        stop.wait(SCENE_PATIENCE)
+        sys.exit(2)
     tell("ready", f"{node.topics} topics")
     node.run(stop, lambda: tell("first-state"))
 

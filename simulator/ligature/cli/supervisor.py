@@ -156,6 +156,8 @@ class Supervisor:
             self._console.print(text, style=_STYLES[event], markup=False)
             if event == "error":
                 self._status = 2
+        elif event == "fatal":
+            self._fail(text)
         elif event == "ended":
             self._ended(process, int(text))
         elif process != "master" and text:

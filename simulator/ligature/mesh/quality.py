@@ -16,8 +16,8 @@ from ligature.mesh.surface import Faces, convex_surface
 SAMPLES = 4000
 """Points on each surface from which distances are measured."""
 
-_INSIDE = 1e-9
-"""Depth below all planes of a hull, over its extent, at which a point counts as inside."""
+_NUDGE = 1e-6
+"""Step outwards, over the extent, that tells whether a face of a hull is covered by another hull."""
 
 
 def volume_error(vertices: Array, faces: Faces, hulls: Sequence[Array]) -> float | None:
@@ -41,44 +41,51 @@ def hausdorff_distance(vertices: Array, faces: Faces, hulls: Sequence[Array], se
     surfaces = [convex_surface(hull) for hull in hulls]
     planes = [_planes(*surface) for surface in surfaces]
     skin = _concatenated(surfaces)
-    outside = sample_surface(*skin, SAMPLES, rng)
-    outside = outside[~_inside(outside, planes)]
-    on_mesh = sample_surface(vertices, faces, SAMPLES, rng)
-    feet = nearest_points(on_mesh, *skin)
+    outwards = _NUDGE * float(np.ptp(skin[0], axis=0).max()) * _normals(*skin)
+    outside, face = sample_surface(*skin, SAMPLES, rng)
+    outside = outside[~_inside(outside + outwards[face], planes)]
+    on_mesh, _ = sample_surface(vertices, faces, SAMPLES, rng)
+    feet, face = nearest_points(on_mesh, *skin)
     gaps = np.linalg.norm(on_mesh - feet, axis=1)
-    inner = _inside(feet, planes)
+    inner = _inside(feet + outwards[face], planes)
     gaps[inner] = cKDTree(outside).query(on_mesh[inner])[0]
-    sticking_out = np.linalg.norm(outside - nearest_points(outside, vertices, faces), axis=1)
+    sticking_out = np.linalg.norm(outside - nearest_points(outside, vertices, faces)[0], axis=1)
     return float(max(gaps.max(), sticking_out.max()))
 
 
-def sample_surface(vertices: Array, faces: Faces, count: int, rng: np.random.Generator) -> Array:
-    """Points (count, 3) spread evenly over the triangles by area."""
+def sample_surface(
+    vertices: Array, faces: Faces, count: int, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.int64]]:
+    """Points (count, 3) spread evenly over the triangles by area, and the triangle (count,) of each."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     chosen = rng.choice(len(faces), size=count, p=area / area.sum())
     u, v = rng.random((2, count, 1))
     over = u + v > 1.0
     u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
-    return a[chosen] + u * (b - a)[chosen] + v * (c - a)[chosen]
+    return a[chosen] + u * (b - a)[chosen] + v * (c - a)[chosen], chosen
 
 
-def nearest_points(points: Array, vertices: Array, faces: Faces) -> Array:
-    """The exact nearest point (n, 3) of a surface to each of ``points`` (n, 3)."""
+def nearest_points(points: Array, vertices: Array, faces: Faces) -> tuple[Array, NDArray[np.int64]]:
+    """The exact nearest point (n, 3) of a surface to each of ``points`` (n, 3), and its triangle (n,)."""
     corners = vertices[faces]
     centres = corners.mean(axis=1)
     radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
-    first = vertices[cKDTree(vertices).query(points)[1]]
-    return np.asarray(_nearest(points, np.ascontiguousarray(corners), centres, radii, first))
+    first = cKDTree(centres).query(points)[1]
+    found: tuple[Array, NDArray[np.int64]] = _nearest(points, np.ascontiguousarray(corners), centres, radii, first)
+    return found
 
 
 @njit(cache=True)
-def _nearest(points: Array, corners: Array, centres: Array, radii: Array, first: Array) -> Array:
-    """Improves on the points ``first`` (n, 3); triangles whose bounding ball is farther are passed over."""
-    found = first.copy()
+def _nearest(
+    points: Array, corners: Array, centres: Array, radii: Array, first: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Starts at triangles ``first`` (n,); passes over triangles whose bounding ball is farther."""
+    found, triangle = np.empty_like(points), first.copy()
     foot = np.empty(3)
     for i in range(points.shape[0]):
-        p = points[i]
+        p, k = points[i], first[i]
+        _foot(p, corners[k, 0], corners[k, 1], corners[k, 2], found[i])
         best = _distance(p, found[i])
         for k in range(corners.shape[0]):
             if _distance(p, centres[k]) < best + radii[k]:
@@ -86,8 +93,9 @@ def _nearest(points: Array, corners: Array, centres: Array, radii: Array, first:
                 gap = _distance(p, foot)
                 if gap < best:
                     best = gap
+                    triangle[i] = k
                     found[i] = foot
-    return found
+    return found, triangle
 
 
 @njit(cache=True)
@@ -124,14 +132,19 @@ def _volume(hull: Array) -> float:
     return hull_properties(hull).volume
 
 
-def _planes(corners: Array, faces: Faces) -> NDArray[np.float64]:
-    """Outward unit normal and offset (m, 4) of each triangle of a hull, moved inwards by a hair."""
-    a, b, c = (corners[faces[:, i]] for i in range(3))
+def _normals(vertices: Array, faces: Faces) -> Array:
+    """Unit normal (m, 3) of each triangle, zero for one without area."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1)
-    normal = normal[length > 0] / length[length > 0, None]
-    offset = np.einsum("ij,ij->i", normal, a[length > 0]) - _INSIDE * np.ptp(corners, axis=0).max()
-    return np.column_stack([normal, offset])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+
+
+def _planes(corners: Array, faces: Faces) -> Array:
+    """Outward unit normal and offset (k, 4) of each face of a hull."""
+    normal = _normals(corners, faces)
+    solid = normal.any(axis=1)
+    return np.column_stack([normal[solid], np.einsum("ij,ij->i", normal, corners[faces[:, 0]])[solid]])
 
 
 def _inside(points: Array, planes: Sequence[Array]) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
 from ligature.mesh import ConvexPart, collision_parts, load_mesh
 from ligature.mesh.load import EXTENSIONS
-from ligature.model.frames import Array, frame, pose_matrix, rpy_matrix
+from ligature.model.frames import Array, frame, inverse, pose_matrix, rpy_matrix
 from ligature.model.scene import (
     Box,
     Capsule,
@@ -169,32 +169,52 @@ def primitive(element: Element, shape_key: str, geometry: str, T: Array) -> Coll
 
 
 def estimate_size(parts: tuple[Collider, ...], T_body_inertial: Array, margin: float) -> Array | None:
-    """Edge lengths (3,) of the box around all shapes along the axes of I; None without a shape (§12.6)."""
+    """Edge lengths (3,) of the box around all shapes along the axes of I; None without a finite shape.
+
+    The boxes are Bullet's, which the reference takes (§12.6): that of a turned shape is the box around
+    its own box, except for spheres and cones.
+    """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    to_inertial = np.linalg.inv(T_body_inertial)
+    to_inertial = inverse(T_body_inertial)
     for part in parts:
-        centre, half = _bounds(part.shape, to_inertial @ part.T_body_shape, margin)
-        low, high = np.minimum(low, centre - half), np.maximum(high, centre + half)
-    return None if not np.isfinite(low).all() else high - low
+        T = to_inertial @ part.T_body_shape
+        below, above = _cone_bounds(part.shape, T, margin) if isinstance(part.shape, Cone) else _bounds(part, T, margin)
+        low, high = np.minimum(low, below), np.maximum(high, above)
+    return high - low if np.isfinite(high - low).all() else None
 
 
-def _bounds(shape: Shape, T: Array, margin: float) -> tuple[Array, Array]:
-    """Centre and half extents, each (3,), of the axis-aligned box of a shape at ``T`` (4, 4)."""
-    R, p = T[:3, :3], T[:3, 3]
-    if isinstance(shape, Box):
-        return p, np.abs(R) @ (shape.size / 2)
+def mesh_centroid(parts: tuple[Collider, ...]) -> Array | None:
+    """Mean (3,) in B of the vertices of all meshes among the shapes; None without a mesh."""
+    vertices = [part.shape.vertices for part in parts if isinstance(part.shape, Hull | TriMesh)]
+    return np.concatenate(vertices).mean(axis=0) if vertices else None
+
+
+def _bounds(part: Collider, T: Array, margin: float) -> tuple[Array, Array]:
+    """Corners, each (3,), of the axis-aligned box around the own box of a shape at ``T`` (4, 4)."""
+    shape = part.shape
+    centre = np.zeros(3)
     if isinstance(shape, Sphere):
-        return p, np.full(3, shape.radius)
-    if isinstance(shape, Capsule):
-        return p, np.abs(R[:, 2]) * max(shape.height / 2 - shape.radius, 0.0) + shape.radius
-    if isinstance(shape, Cylinder | Cone):
-        return p, np.abs(R) @ np.array([shape.radius, shape.radius, shape.height / 2])
-    if isinstance(shape, Hull | TriMesh):
-        points = shape.vertices @ R.T + p
-        low, high = points.min(axis=0), points.max(axis=0)
+        return T[:3, 3] - shape.radius, T[:3, 3] + shape.radius
+    if isinstance(shape, Box):
+        half = shape.size / 2
+    elif isinstance(shape, Capsule | Cylinder):
+        half = np.array([shape.radius, shape.radius, shape.height / 2])
+    elif isinstance(shape, Hull | TriMesh):
+        below, above = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         extra = margin + (HULL_MARGIN_OF_ESTIMATE if isinstance(shape, Hull) else 0.0)
-        return (low + high) / 2, (high - low) / 2 + extra
-    return p, np.full(3, np.inf)
+        centre, half = (below + above) / 2, (above - below) / 2 + extra
+    else:
+        return np.full(3, -np.inf), np.full(3, np.inf)
+    centre, half = T[:3, :3] @ centre + T[:3, 3], np.abs(T[:3, :3]) @ half
+    return centre - half, centre + half
+
+
+def _cone_bounds(shape: Cone, T: Array, margin: float) -> tuple[Array, Array]:
+    """Corners, each (3,), of the box around a cone; Bullet adds the margin twice."""
+    axis = T[:3, 2]
+    apex, base = T[:3, 3] + axis * shape.height / 2, T[:3, 3] - axis * shape.height / 2
+    rim = shape.radius * np.sqrt(np.maximum(1.0 - axis**2, 0.0))
+    return np.minimum(apex, base - rim) - 2 * margin, np.maximum(apex, base + rim) + 2 * margin
 
 
 def _compound(element: Element, key: str) -> tuple[Collider, ...]:

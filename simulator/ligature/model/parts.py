@@ -10,10 +10,11 @@ import numpy as np
 from ligature.adf import Diagnostic, Element, Severity
 from ligature.mesh import box_inertia
 from ligature.model.frames import Array, frame, joint_frames, pose_matrix
-from ligature.model.geometry import FileContext, colliders, estimate_size, visual
+from ligature.model.geometry import FileContext, colliders, estimate_size, mesh_centroid, visual
 from ligature.model.scene import (
     Body,
     CartesianController,
+    Collider,
     Gains,
     Identity,
     Joint,
@@ -42,10 +43,9 @@ def body_of(
     inertial_block = element.has("mass")
     if not inertial_block:
         _warn_no_mass(element, context)
-    offset = element.pose("inertial offset") if element.has("inertial offset") else None
-    T_body_inertial = pose_matrix(*offset) if offset is not None and inertial_block else np.eye(4)
-    default_offset = pose_matrix(*offset) if offset is not None else np.eye(4)
-    shapes = colliders(element, context, default_offset)
+    offset = pose_matrix(*element.pose("inertial offset")) if element.has("inertial offset") else None
+    shapes = colliders(element, context, np.eye(4) if offset is None else offset)
+    T_body_inertial = offset if offset is not None and inertial_block else _estimated_offset(shapes)
     mass = element.number("mass")
     margin = element.number("collision margin")
     if inertial_block and element.has("inertia"):
@@ -75,6 +75,12 @@ def body_of(
         publish_joint_names=element.flag("publish joint names"),
         publish_joint_positions=element.flag("publish joint positions"),
     )
+
+
+def _estimated_offset(shapes: tuple[Collider, ...]) -> Array:
+    """Inertial frame (4, 4) in B of a body that gives none: at the centroid of its collision mesh (§12.6)."""
+    centroid = mesh_centroid(shapes)
+    return np.eye(4) if centroid is None else frame(np.eye(3), centroid)
 
 
 def _warn_no_mass(element: Element, context: FileContext) -> None:

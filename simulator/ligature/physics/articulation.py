@@ -98,7 +98,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         linkParentIndices=plan.parents,
         linkJointTypes=plan.types,
         linkJointAxis=plan.directions,
-        flags=pybullet.URDF_USE_SELF_COLLISION,
+        flags=pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_MAINTAIN_LINK_ORDER,
         physicsClientId=client,
     )
     tree = Tree(uid, root.index, link_of, axes, root.static)

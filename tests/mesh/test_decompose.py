@@ -1,0 +1,111 @@
+"""Convex decomposition: pieces that fill the solid, the same in every run, kept, and given up in time."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ligature.adf import Resolver
+from ligature.mesh import Mesh, MeshPart, collision_parts, combined, hull_properties, load_mesh
+from ligature.mesh import decompose as module
+from ligature.mesh.decompose import DecompositionError, convex_pieces, decompose, obj_text
+
+from tests.mesh.shapes import CUBE, ell
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("LIGATURE_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def mesh() -> Mesh:
+    return Mesh(Path("/ell.obj"), (MeshPart("", *ell()),))
+
+
+def test_an_ell_is_two_boxes(mesh: Mesh) -> None:
+    found = decompose(mesh)
+    assert len(found.hulls) == 2
+    assert found.volume_error is not None and found.volume_error < 1e-3
+    assert found.distance < 1e-5  # of 2 cm
+    assert combined([hull_properties(hull) for hull in found.hulls]).volume == pytest.approx(3e-6, rel=1e-3)
+
+
+def test_the_same_mesh_gives_the_same_pieces_without_the_cache(
+    mesh: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = decompose(mesh)
+    monkeypatch.setenv("LIGATURE_CACHE", str(tmp_path / "another"))
+    second = decompose(mesh)
+    assert [h.tobytes() for h in first.hulls] == [h.tobytes() for h in second.hulls]
+    assert (first.volume_error, first.distance) == (second.volume_error, second.distance)
+
+
+def test_pieces_are_kept_and_a_damaged_file_is_made_again(
+    mesh: Mesh, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs: list[float] = []
+    run = module._run_coacd
+    monkeypatch.setattr(module, "_run_coacd", lambda *a: (runs.append(a[2]), run(*a))[1])
+    first = decompose(mesh)
+    decompose(mesh)
+    assert len(runs) == 1
+    (kept,) = (cache / "decomposition").iterdir()
+    kept.write_bytes(kept.read_bytes()[:100])
+    assert [h.tobytes() for h in decompose(mesh).hulls] == [h.tobytes() for h in first.hulls]
+    assert len(runs) == 2
+
+
+def test_the_text_is_a_collision_mesh_of_as_many_hulls(mesh: Mesh, tmp_path: Path) -> None:
+    hulls = decompose(mesh).hulls
+    text, library = obj_text(hulls, "ell.mtl")
+    (tmp_path / "ell.obj").write_text(text)
+    (tmp_path / "ell.mtl").write_text(library)
+    again = load_mesh(tmp_path / "ell.obj", Resolver([tmp_path]))
+    assert not again.diagnostics and [part.name for part in again.parts] == ["part_000", "part_001"]
+    for piece, hull in zip(collision_parts(again, "hull"), hulls, strict=True):
+        assert np.array_equal(np.unique(piece.vertices, axis=0), np.unique(hull, axis=0))
+
+
+def test_a_moving_mesh_that_is_convex_stays_one_hull() -> None:
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6],
+                      [0, 2, 6], [0, 6, 4], [1, 7, 3], [1, 5, 7]], dtype=np.int32)  # fmt: skip
+    assert [len(piece) for piece in convex_pieces(CUBE, faces)] == [8]
+
+
+@pytest.mark.parametrize("missing", [0, 1], ids=["closed", "open"])
+def test_a_moving_mesh_that_is_concave_leaves_its_notch_free(missing: int) -> None:
+    vertices, faces = ell()
+    notch = np.array([0.016, 0.016, 0.005])
+    pieces = convex_pieces(vertices, faces[missing:])
+    assert len(pieces) > 1
+    assert not any((notch > piece.min(axis=0)).all() and (notch < piece.max(axis=0)).all() for piece in pieces)
+
+
+def test_a_flat_moving_mesh_is_its_outline() -> None:
+    vertices, faces = ell()
+    assert len(convex_pieces(vertices[:6], faces[:4])[0]) == 5
+
+
+def test_when_coacd_takes_too_long_the_hull_stands_in_and_a_warning_says_so(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(module, "QUICK_LIMIT", 0.001)
+    with caplog.at_level(logging.WARNING):
+        (piece,) = convex_pieces(*ell())
+    assert len(piece) == 10
+    assert "collides as its convex hull: CoACD took longer than 0.001 s; run 'ligature decompose'" in caplog.text
+
+
+@pytest.mark.parametrize(("threshold", "text"), [(0.0, "threshold is 0; it must be from 0.01 to 1"), (2.0, "is 2;")])
+def test_thresholds_that_make_no_sense_are_refused(mesh: Mesh, threshold: float, text: str) -> None:
+    with pytest.raises(DecompositionError, match=text):
+        decompose(mesh, threshold)
+
+
+def test_a_mesh_without_triangles_is_refused() -> None:
+    with pytest.raises(DecompositionError, match="the mesh holds no triangle"):
+        decompose(Mesh(Path("/m.obj"), ()))
