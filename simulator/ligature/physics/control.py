@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
+GIVING_FRICTION = 0.005
+"""Effort (N·m or N) that a motor which gives always has, so that it arrives at its set-point."""
+
 KICK_SECONDS = 0.01
 """Time over which the derivative answers a jump of the target: two updates of a usual AMBF session."""
 
@@ -30,6 +33,11 @@ FREE, FORCE, POSITION, VELOCITY = (
     int(CommandType.POSITION),
     int(CommandType.VELOCITY),
 )
+SERVO = 3
+"""Mode of a joint that an arm of a robot drives: it follows a set-point and its velocity."""
+
+SERVO_GAIN = 200.0
+"""Closing speed over following error in 1/s: the set-point is reached with a time constant of 5 ms."""
 
 MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
@@ -38,7 +46,8 @@ PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 @njit(cache=True)
 def outputs(
     mode: Integers, force_output: Flags, turns: Flags, sprung: Flags, p: Array, i: Array, d: Array,
-    stiffness: Array, damping: Array, rest: Array, target: Array, position: Array, velocity: Array, dt: float,
+    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, fastest: Array,
+    position: Array, velocity: Array, dt: float,
     integral: Array, last_error: Array, kick: Array, kick_ticks: Integers, motor: Array, effort: Array,
 ) -> None:  # fmt: skip
     """Motor velocities and efforts of one tick for n axes, all arrays (n,); the last eight change."""
@@ -59,6 +68,9 @@ def outputs(
                     kick_ticks[k] -= 1
                 motor[k] = (pull + d[k] * jump) / (1.0 + d[k])
             last_error[k] = error
+        elif mode[k] == SERVO:
+            wanted = pace[k] + SERVO_GAIN * (target[k] - position[k])
+            motor[k] = min(max(wanted, -fastest[k]), fastest[k])
         elif mode[k] == VELOCITY:
             motor[k] = target[k]
         elif mode[k] == FORCE:
@@ -90,6 +102,9 @@ class TreeControl:
         self._spring_setup()
         self.mode = np.full(n, FREE)
         self.target = np.zeros(n)
+        self._pace = np.zeros(n)
+        self._fastest = np.full(n, np.inf)
+        self._give = np.zeros(n)
         self._integral = np.zeros(n)
         self._last_error = np.zeros(n)
         self._kick = np.zeros(n)
@@ -142,6 +157,19 @@ class TreeControl:
             self._kick[row] = (left + jump / self._dt) / ticks
             self._kick_ticks[row] = ticks
 
+    def servo(self, joint: int, position: float, velocity: float, fastest: float, give: float) -> None:
+        """Follow a set-point that moves with ``velocity``, at most with the speed ``fastest``.
+
+        ``give`` is the stiffness (N·m/rad, N/m) with which the motor yields to a load; 0 is as strong as the motor.
+        """
+        row = self.row[joint]
+        self._pace[row], self._fastest[row], self._give[row] = velocity, fastest, give
+        self._switch(row, SERVO, position)
+
+    def push(self, joint: int, effort: float) -> None:
+        """Drive one joint with an effort; 0 lets it move freely."""
+        self._switch(self.row[joint], FORCE, effort)
+
     def release(self, joint: int) -> None:
         """Let one joint go limp."""
         self._switch(self.row[joint], FREE, 0.0)
@@ -171,8 +199,8 @@ class TreeControl:
         """Set motors and torques of this tick; positions must have been read."""
         outputs(
             self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
-            self._damping, self._rest, self.target, self.position, self.velocity, self._dt, self._integral,
-            self._last_error, self._kick, self._kick_ticks, self._motor, self._effort,
+            self._damping, self._rest, self.target, self._pace, self._fastest, self.position, self.velocity,
+            self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor, self._effort,
         )  # fmt: skip
         if self._driven:
             pybullet.setJointMotorControlArray(
@@ -180,7 +208,7 @@ class TreeControl:
                 self._driven_links,
                 pybullet.VELOCITY_CONTROL,
                 targetVelocities=self._motor[self._driven].tolist(),
-                forces=self._driven_strength,
+                forces=self._strengths(),
                 physicsClientId=self._client,
             )
         if self._pushed:
@@ -192,9 +220,20 @@ class TreeControl:
                 physicsClientId=self._client,
             )
 
+    def _strengths(self) -> list[float]:
+        """Largest effort of each driven motor; one that gives pulls in proportion to its following error."""
+        if not self._giving:
+            return self._driven_strength
+        rows = self._driven
+        spring = self._give[rows] * np.abs(self.target[rows] - self.position[rows])
+        strength = self._strength[rows]
+        giving = np.minimum(spring + GIVING_FRICTION, strength)
+        limits: list[float] = np.where(self._give[rows] > 0.0, giving, strength).tolist()
+        return limits
+
     def _sort(self) -> None:
         """Sort the axes into those that a motor drives and those that an effort pushes; stop idle motors."""
-        by_motor = (self.mode == VELOCITY) | ((self.mode == POSITION) & ~self._force_output)
+        by_motor = (self.mode == VELOCITY) | (self.mode == SERVO) | ((self.mode == POSITION) & ~self._force_output)
         by_effort = self._sprung | (self.mode == FORCE) | ((self.mode == POSITION) & self._force_output)
         idle = [self.links[row] for row in self._driven if not by_motor[row]]
         if idle:
@@ -205,6 +244,7 @@ class TreeControl:
         self._driven_links = [self.links[row] for row in self._driven]
         self._driven_strength = self._strength[self._driven].tolist()
         self._pushed_links = [self.links[row] for row in self._pushed]
+        self._giving = bool((self._give[self._driven] > 0.0).any())
 
     def memory(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick, for snapshots."""
@@ -212,7 +252,7 @@ class TreeControl:
             name: np.array(getattr(self, name))
             for name in (
                 "mode", "target", "position", "velocity", "motor_effort", "_integral", "_last_error", "_kick",
-                "_kick_ticks",
+                "_kick_ticks", "_pace", "_fastest", "_give",
             )
         }  # fmt: skip
 

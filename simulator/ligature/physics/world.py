@@ -99,6 +99,25 @@ class World(BulletQueries):
                 type_ = types[i] if i < len(types) else CommandType.FORCE
                 tree.command(self.scene.joints[joint], type_, value)
 
+    def servo_joint(self, joint: int, position: float, velocity: float, fastest: float, give: float = 0.0) -> None:
+        """Have a joint follow a set-point; see `TreeControl.servo`."""
+        self._tree_of_joint[joint].servo(joint, position, velocity, fastest, give)
+
+    def push_joint(self, joint: int, effort: float) -> None:
+        """Drive a joint with an effort in N·m or N; 0 lets it move freely."""
+        self._tree_of_joint[joint].push(joint, effort)
+
+    def free_joint(self, joint: int) -> None:
+        """Let a joint go limp."""
+        self._tree_of_joint[joint].release(joint)
+
+    def joint_state(self, joint: int) -> tuple[float, float, float]:
+        """Position, velocity and motor effort of a joint now."""
+        control = self._tree_of_joint[joint]
+        link = control.links[control.row[joint]]
+        position, velocity, _, effort = pybullet.getJointState(control._tree.uid, link, physicsClientId=self.client)
+        return position, velocity, effort
+
     def release(self, body: int) -> None:
         """Clear the command of a body: no force, its joints limp."""
         self._body_controls.pop(body, None)
