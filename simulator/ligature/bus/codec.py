@@ -6,7 +6,9 @@ import struct
 
 from ligature.bus.pacing import Throttle
 from ligature.model.commands import (
+    VERBS,
     ActuatorCommand,
+    ArmCommand,
     BodyCommand,
     Command,
     CommandType,
@@ -18,7 +20,7 @@ from ligature.model.commands import (
 MAX_JOINTS = 64
 MAX_TEXT = 200
 _TYPES = tuple(sorted(CommandType))
-_KINDS = ("body", "camera", "light", "actuator", "sensor", "ghost", "world")
+_KINDS = ("body", "camera", "light", "actuator", "sensor", "ghost", "world", "arm")
 
 Message = Command | Throttle
 
@@ -45,6 +47,8 @@ def encode(message: Message) -> bytes:
     if isinstance(message, PlaceCommand):
         pose = message.pose or ()
         return struct.pack(f"<BBiB{len(pose)}d", 3, _KINDS.index(message.kind), message.index, len(pose), *pose)
+    if isinstance(message, ArmCommand):
+        return _arm(message)
     if isinstance(message, Release):
         return struct.pack("<BBi", 4, _KINDS.index(message.kind), message.index)
     if isinstance(message, Reset):
@@ -68,6 +72,14 @@ def _body(message: BodyCommand) -> bytes:
     return head + struct.pack(
         f"<{n}d{m}d{t}B", *message.target, *message.joint_values, *(int(v) for v in message.joint_types)
     )
+
+
+def _arm(message: ArmCommand) -> bytes:
+    n = len(message.values)
+    if n > MAX_JOINTS:
+        raise CodecError(f"a command has at most {MAX_JOINTS} numbers")
+    head = struct.pack(f"<BiBB{n}d", 7, message.arm, VERBS.index(message.verb), n, *message.values)
+    return head + _texts(message.text)
 
 
 def _texts(*texts: str) -> bytes:
@@ -107,4 +119,8 @@ def _decode(data: bytes) -> Message:
     if kind == 6:
         _, enabled, toggle, skip = struct.unpack_from("<BBBI", data)
         return Throttle(bool(enabled), bool(toggle), skip)
+    if kind == 7:
+        _, arm, verb, n = struct.unpack_from("<BiBB", data)
+        values, at = struct.unpack_from(f"<{n}d", data, 7), 7 + 8 * n
+        return ArmCommand(arm, VERBS[verb], values, data[at + 1 : at + 1 + data[at]].decode("utf-8"))
     raise ValueError(f"unknown kind {kind}")

@@ -34,6 +34,7 @@ class Mailbox:
             "actuator": len(scene.actuators),
             "camera": len(scene.cameras),
             "light": len(scene.lights),
+            "arm": len(scene.arms),
         }
         self._owned: dict[str, set[tuple[str, int]]] = {name: set() for name in rings}
         self.received = self.coalesced = self.rejected = 0

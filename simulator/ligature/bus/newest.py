@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from ligature.bus.codec import Message
-from ligature.model.commands import ActuatorCommand, BodyCommand, PlaceCommand, Release
+from ligature.model.commands import STREAMED, ActuatorCommand, ArmCommand, BodyCommand, PlaceCommand, Release
 
 
 def object_of(message: Message) -> tuple[str, int] | None:
@@ -14,9 +14,25 @@ def object_of(message: Message) -> tuple[str, int] | None:
         return "body", message.body
     if isinstance(message, ActuatorCommand):
         return "actuator", message.actuator
+    if isinstance(message, ArmCommand):
+        return "arm", message.arm
     if isinstance(message, PlaceCommand | Release):
         return message.kind, message.index
     return None
+
+
+def _slot(message: Message) -> Hashable | None:
+    """What a command replaces the last one of; None for what must not be lost.
+
+    Grasping and letting go are different things to do with one actuator: neither replaces the other. Arms are
+    streamed set-points of each kind, and told other things one by one.
+    """
+    item = object_of(message)
+    if isinstance(message, ActuatorCommand):
+        return item, message.actuate
+    if isinstance(message, ArmCommand):
+        return (item, message.verb) if message.verb in STREAMED else None
+    return item
 
 
 class Newest:
@@ -30,16 +46,12 @@ class Newest:
         return len(self._box)
 
     def put(self, message: Message) -> bool:
-        """Add a command; True when it takes the place of an older one.
-
-        Grasping and letting go are different things to do with one actuator: neither replaces the other.
-        """
-        item = object_of(message)
-        if item is None:
+        """Add a command; True when it takes the place of an older one."""
+        slot = _slot(message)
+        if slot is None:
             self.events += 1
             self._box["event", self.events] = message
             return False
-        slot = (*item, message.actuate) if isinstance(message, ActuatorCommand) else item
         replaced = self._box.pop(slot, None) is not None
         self._box[slot] = message
         return replaced

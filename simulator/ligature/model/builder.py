@@ -13,6 +13,7 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
 from ligature.model import attached, trees
+from ligature.model.arms import find_arms
 from ligature.model.frames import pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, shader_files
 from ligature.model.lookup import candidates
@@ -131,11 +132,14 @@ class SceneBuilder:
             message = f"{len(rod.bodies)} bodies from '{rod.name}' on are simulated as one elastic rod"
             mark = self.bodies[rod.bodies[0]].identity.mark
             self.report(Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature rod: false'", "rod"))
+        bodies = self._finished_bodies()
+        arms, findings = find_arms(bodies, self.joints, self.world.extra.get("ligature arms"))
+        self.diagnostics += findings
         return Scene(
             name=self.name,
             world=self.world,
             models=tuple(self.models),
-            bodies=self._finished_bodies(),
+            bodies=bodies,
             joints=tuple(self.joints),
             ghosts=self._attached("ghost", self.ghosts),
             sensors=tuple(self.sensors),
@@ -146,6 +150,7 @@ class SceneBuilder:
             articulations=forest,
             loops=loops,
             rods=rods,
+            arms=arms,
             diagnostics=tuple(self.diagnostics),
         )
 

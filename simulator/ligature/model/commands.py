@@ -57,6 +57,38 @@ class PlaceCommand:
     pose: Vector | None
 
 
+STREAMED = (
+    "servo_jp", "servo_jv", "servo_jf", "servo_cp", "servo_cv", "servo_ci", "servo_cs", "spatial/servo_cf",
+    "body/servo_cf", "jaw/servo_jp", "jaw/servo_jf",
+)  # fmt: skip
+"""Verbs of arms of which only the newest counts."""
+
+ORDERED = (
+    "state_command", "servo_jr", "move_jp", "move_jr", "move_cp", "jaw/move_jp", "hold", "free",
+    "use_gravity_compensation", "body/set_cf_orientation_absolute", "set_base_frame", "trajectory_j/set_ratio",
+    "trajectory_j/set_ratio_v", "trajectory_j/set_ratio_a", "set_tool_type", "tool_type_request",
+    "emulate_adapter_present", "emulate_tool_present", "set_endoscope_type", "lock_orientation",
+    "unlock_orientation", "gripper/servo_jp", "place_jp",
+)  # fmt: skip
+"""Verbs of arms that are carried out one after the other, none left out."""
+
+VERBS = (*STREAMED, *ORDERED)
+
+
+@dataclass(frozen=True)
+class ArmCommand:
+    """One CRTK command to an arm (interface reference §5.4); ``verb`` is the topic's name below the arm's.
+
+    ``values`` are the numbers of the message: joint values, a pose (7,), a twist or wrench (6,), a flag; ``text``
+    its words. How many numbers a verb takes depends on the arm, which refuses a command that does not fit it.
+    """
+
+    arm: int
+    verb: str
+    values: Vector = ()
+    text: str = ""
+
+
 @dataclass(frozen=True)
 class Release:
     """The watchdog of one object expired: its command is cleared (interface reference §2.4)."""
@@ -72,7 +104,7 @@ class Reset:
     bodies_only: bool = False
 
 
-Command = BodyCommand | ActuatorCommand | PlaceCommand | Release | Reset
+Command = BodyCommand | ActuatorCommand | PlaceCommand | ArmCommand | Release | Reset
 
 
 LARGEST = 1e9
@@ -95,6 +127,10 @@ def check(command: Command) -> None:
         _pose("the offset", command.offset)
     elif isinstance(command, PlaceCommand) and command.pose is not None:
         _pose("the pose", command.pose)
+    elif isinstance(command, ArmCommand):
+        if command.verb not in VERBS:
+            raise ValueError(f"arms know no '{command.verb}'; they know {', '.join(VERBS)}")
+        _finite(command.verb, command.values)
 
 
 def _pose(what: str, values: Vector) -> None:

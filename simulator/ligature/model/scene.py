@@ -476,14 +476,41 @@ class WorldSettings:
     extra: dict[str, Any] = field(default_factory=dict)
 
 
+class ArmKind(enum.Enum):
+    """Manipulators of the da Vinci Research Kit; the values are the words of the launch file."""
+
+    PSM = "psm"
+    ECM = "ecm"
+    MTM = "mtm"
+
+
+@dataclass(frozen=True)
+class ArmDescription:
+    """Which bodies are an arm (interface reference §5).
+
+    ``base`` is the body whose frame the arm stands in, ``joints`` the joints of the chain from the base outwards,
+    ``jaw`` the finger joints, ``tip`` the body that the chain ends in, ``tool`` the instrument's model number or
+    type. An ECM without joints moves ``tip``, the body that carries the cameras. An MTM has no bodies. Bodies that
+    do not exist are -1.
+    """
+
+    name: str
+    kind: ArmKind
+    base: int = -1
+    joints: tuple[int, ...] = ()
+    jaw: tuple[int, ...] = ()
+    tip: int = -1
+    tool: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything a launch file describes, ready for physics, sensing, robots and drawing.
 
     ``articulations`` cover every non-rod body once (a lone body is an articulation of one link);
     ``loops`` are the joints that close a kinematic loop or that an articulation cannot express and
-    that constraints must hold; ``rods`` are the recognised sutures. ``diagnostics`` are all the
-    findings of reading and resolving, in order.
+    that constraints must hold; ``rods`` are the recognised sutures, ``arms`` the recognised
+    manipulators. ``diagnostics`` are all the findings of reading and resolving, in order.
     """
 
     name: str
@@ -500,6 +527,7 @@ class Scene:
     articulations: tuple[Articulation, ...] = ()
     loops: tuple[int, ...] = ()
     rods: tuple[RodChain, ...] = ()
+    arms: tuple[ArmDescription, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
 
     @cached_property

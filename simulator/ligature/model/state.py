@@ -15,12 +15,48 @@ from ligature.model.scene import Scene
 MAX_CONTACT_EVENTS = 64
 """Most contact points that contact sensors report in one state; more are counted, not listed."""
 
+ARM_JOINTS = 7
+"""Most joints of an arm."""
+
+ARM_DTYPE = np.dtype(
+    [
+        ("operating", "u1"),
+        ("homed", "?"),
+        ("busy", "?"),
+        ("tool_present", "?"),
+        ("tool", "i4"),
+        ("ratio", "f8", (2,)),
+        ("reference", "S64"),
+        ("measured_js", "f8", (3, ARM_JOINTS)),
+        ("setpoint_js", "f8", (3, ARM_JOINTS)),
+        ("jaw_measured_js", "f8", (3,)),
+        ("jaw_setpoint_js", "f8", (3,)),
+        ("measured_cp", "f8", (7,)),
+        ("setpoint_cp", "f8", (7,)),
+        ("local_measured_cp", "f8", (7,)),
+        ("local_setpoint_cp", "f8", (7,)),
+        ("measured_cv", "f8", (6,)),
+        ("local_measured_cv", "f8", (6,)),
+        ("body_measured_cf", "f8", (6,)),
+        ("spatial_measured_cf", "f8", (6,)),
+        ("body_jacobian", "f8", (6, ARM_JOINTS)),
+        ("spatial_jacobian", "f8", (6, ARM_JOINTS)),
+        ("gravity_jf", "f8", (ARM_JOINTS,)),
+    ]
+)
+"""State of one arm, named as CRTK names it; unused joints are zero.
+
+``operating`` is the number of an `OperatingState`; rows of ``*_js`` are position, velocity, effort; ``ratio`` are
+those of velocity and acceleration; ``reference`` is the frame of a base frame that was set, else empty; ``tool`` is
+the instrument's model number. Local poses are in the arm's base frame. Twists and wrenches are linear then angular.
+"""
+
 StateDtype = np.dtype[np.void]
 StateRecord = NDArray[np.void]
 """One-element record array of `state_dtype`; index fields by name, then ``[0]``."""
 
 
-def state_dtype(scene: Scene, n_arms: int = 0) -> StateDtype:
+def state_dtype(scene: Scene) -> StateDtype:
     """The memory layout of the state of ``scene``.
 
     ``tick`` counts ticks, ``update`` counts updates of 1/p seconds (``WorldState.sim_step``);
@@ -66,6 +102,7 @@ def state_dtype(scene: Scene, n_arms: int = 0) -> StateDtype:
             ("light_pose", "f8", (nl, 7)),
             ("light_world", "f8", (nl, 7)),
             ("rod_tension", "f8", (nb,)),
+            ("arm", ARM_DTYPE, (len(scene.arms),)),
         ]
     )
 
