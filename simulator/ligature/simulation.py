@@ -26,6 +26,7 @@ from ligature.model.commands import (
     CommandType,
     PlaceCommand,
     Release,
+    Reset,
     check,
 )
 from ligature.model.lookup import find_by_text
@@ -239,7 +240,7 @@ class Simulation:
             self._attachments.place(command.kind, command.index, command.pose)
         elif isinstance(command, Release):
             self._release(command)
-        else:
+        elif isinstance(command, Reset):
             self.reset(bodies_only=command.bodies_only)
 
     def _release(self, command: Release) -> None:
