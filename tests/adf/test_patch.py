@@ -5,8 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ligature.adf.nodes import Mapping, parse
-from ligature.adf.patch import PatchError, add_key, remove_key, set_scalar
+from ligature.adf.nodes import Mapping, Sequence, parse, plain
+from ligature.adf.patch import (
+    PatchError,
+    add_item,
+    add_key,
+    aliases_into,
+    apply,
+    remove_item,
+    remove_key,
+    rename_key,
+    set_value,
+)
 
 TEXT = """# a comment
 BODY a: &a
@@ -47,38 +57,96 @@ def changed(before: str, after: str) -> list[tuple[str, str]]:
     ],
 )
 def test_one_scalar_changes_one_line(path: str, value: object, line: str) -> None:
-    after = set_scalar(TEXT, block(TEXT, "BODY a"), path, value)
+    after = apply(TEXT, [set_value(TEXT, block(TEXT, "BODY a"), path, value)])
     assert [b for _, b in changed(TEXT, after)] == [line]
 
 
 def test_a_quoted_scalar_is_replaced_with_its_quotes() -> None:
-    assert "  name: c\n" in set_scalar(TEXT, block(TEXT, "BODY b"), "name", "c")
+    assert "  name: c\n" in apply(TEXT, [set_value(TEXT, block(TEXT, "BODY b"), "name", "c")])
 
 
-def test_a_value_behind_an_alias_is_refused_with_its_place() -> None:
-    with pytest.raises(PatchError, match=r"'inertia' is an alias of the value at m.yaml:6:12"):
-        set_scalar(TEXT, block(TEXT, "BODY b"), "inertia.ix", 3)
+def test_a_value_behind_an_alias_is_changed_for_its_own_user_only() -> None:
+    after = apply(TEXT, [set_value(TEXT, block(TEXT, "BODY b"), "inertia.ix", 3)])
+    assert [b for _, b in changed(TEXT, after)] == ["  inertia: {ix: 3, iy: 2}"]
 
 
 def test_keys_are_added_and_removed_in_place() -> None:
-    added = add_key(TEXT, block(TEXT, "BODY b"), "passive", True)
+    added = apply(TEXT, [add_key(TEXT, block(TEXT, "BODY b"), "passive", True)])
     assert added.replace("  passive: true\n", "") == TEXT
     assert added.index("  passive: true\n") < added.index("# the end")
-    removed = remove_key(added, block(added, "BODY b"), "passive")
-    assert removed == TEXT
-    without = remove_key(TEXT, block(TEXT, "BODY a"), "inertia")
+    assert apply(added, [remove_key(added, block(added, "BODY b"), "passive")]) == TEXT
+    without = apply(TEXT, [remove_key(TEXT, block(TEXT, "BODY a"), "inertia")])
     assert "ix: 1" not in without and "BODY b:" in without
 
 
-def test_a_flow_block_grows_inside_its_braces() -> None:
-    location = block(TEXT, "BODY a").get("location")
+def test_blocks_on_the_way_to_a_new_key_are_added() -> None:
+    after = apply(TEXT, [set_value(TEXT, block(TEXT, "BODY a"), "damping.linear", 0.5)])
+    assert after.replace("  damping:\n    linear: 0.5\n", "") == TEXT
+    rolling = apply(TEXT, [set_value(TEXT, block(TEXT, "BODY b"), "friction.rolling", 0.1)])
+    assert rolling.replace("    rolling: 0.1\n", "") == TEXT
+
+
+def test_a_flow_block_grows_and_shrinks_inside_its_braces() -> None:
+    a = block(TEXT, "BODY a")
+    location = a.get("location")
     assert isinstance(location, Mapping)
-    assert "z: 3}, scale: 2}\n" in add_key(TEXT, location, "scale", 2)
+    grown = apply(TEXT, [add_key(TEXT, location, "scale", 2)])
+    assert "z: 3}, scale: 2}\n" in grown
+    position = location.get("position")
+    assert isinstance(position, Mapping)
+    for name, left in (("x", "{y: 2, z: 3}"), ("y", "{x: 1, z: 3}"), ("z", "{x: 1, y: 2}")):
+        assert f"position: {left}}}" in apply(TEXT, [remove_key(TEXT, position, name)])
 
 
-def test_what_is_not_there_is_told() -> None:
-    with pytest.raises(PatchError, match="there is no 'scale' in the block at m.yaml:2:9"):
-        set_scalar(TEXT, block(TEXT, "BODY a"), "scale", 1)
+def test_an_empty_key_becomes_a_block() -> None:
+    text = "BODY a:\n  name: a\n  friction:\n  mass: 1\n"
+    after = apply(text, [set_value(text, block(text, "BODY a"), "friction.static", 0.5)])
+    assert after == "BODY a:\n  name: a\n  friction:\n    static: 0.5\n  mass: 1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "longer", "shorter"),
+    [
+        ("bodies:\n- BODY a # one\n- BODY b\nmass: 1\n", "bodies:\n- BODY a # one\n- BODY b\n- BODY c\nmass: 1\n",
+         "bodies:\n- BODY b\nmass: 1\n"),
+        ("bodies: [BODY a, BODY b]\n", "bodies: [BODY a, BODY b, BODY c]\n", "bodies: [BODY b]\n"),
+        ("bodies:\r\n  - BODY a\r\n", "bodies:\r\n  - BODY a\r\n  - BODY c\r\n", "bodies:\r\n"),
+        ("bodies: [BODY a,]\n", "bodies: [BODY a, BODY c]\n", "bodies: [,]\n"),
+    ],
+)  # fmt: skip
+def test_lists_grow_and_shrink(text: str, longer: str, shorter: str) -> None:
+    items = parse(text, Path("m.yaml")).get("bodies")
+    assert isinstance(items, Sequence)
+    assert apply(text, [add_item(text, items, "BODY c")]) == longer
+    assert apply(text, [remove_item(text, items, 0)]) in (shorter, "bodies: []\n")
+
+
+def test_an_anchor_may_go_when_its_aliases_are_spelled_out() -> None:
+    root = parse(TEXT, Path("m.yaml"))
+    gone = remove_key(TEXT, root, "BODY a")
+    after = apply(TEXT, [gone, *aliases_into(root, gone.span)])
+    assert plain(parse(after, Path("m.yaml"))) == {
+        "BODY b": {"name": "b", "inertia": {"ix": "1", "iy": "2"}, "friction": {"static": "0.5"}}
+    }
+    assert after.startswith("# a comment\nBODY b:")
+
+
+def test_a_key_is_renamed_in_place() -> None:
+    root = parse(TEXT, Path("m.yaml"))
+    assert apply(TEXT, [rename_key(root, "BODY b", "BODY c")]) == TEXT.replace("BODY b:", "BODY c:")
+    with pytest.raises(PatchError, match="'BODY a' is there already, at m.yaml:2:1"):
+        rename_key(root, "BODY b", "BODY a")
+
+
+def test_changes_that_meet_are_refused() -> None:
+    a = block(TEXT, "BODY a")
+    with pytest.raises(PatchError, match="two changes meet"):
+        apply(TEXT, [set_value(TEXT, a, "mass", 1), set_value(TEXT, a, "mass", 2)])
+
+
+def test_what_cannot_be_is_told() -> None:
+    with pytest.raises(PatchError, match="'mass' at m.yaml:4:9 is no block"):
+        set_value(TEXT, block(TEXT, "BODY a"), "mass.x", 1)
     with pytest.raises(PatchError, match="is there already"):
         add_key(TEXT, block(TEXT, "BODY a"), "mass", 1)
 
@@ -92,10 +160,8 @@ def test_one_mass_of_every_corpus_file_changes_one_line(corpus: Path) -> None:
         root = parse(text, file)
         for _, node in root.entries.values():
             if isinstance(node, Mapping) and "mass" in node.entries:
-                after = set_scalar(text, node, "mass", 12.5)
-                assert [b.strip().partition(" #")[0] for _, b in changed(text, after)] == [
-                    "mass: 12.5"
-                ] or "mass: 12.5" in after
-                assert len(changed(text, after)) == 1
+                after = apply(text, [set_value(text, node, "mass", 12.5)])
+                difference = changed(text, after)
+                assert len(difference) == 1 and "mass: 12.5" in difference[0][1]
                 patched += 1
     assert patched > 300

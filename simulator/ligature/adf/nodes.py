@@ -1,11 +1,13 @@
 """YAML as marked nodes: text and places only, no value is interpreted and no object constructed.
 
 The first of two equal keys wins, only the first document of a stream is read, aliases share nodes.
-Depth, size and alias expansion are limited. Lines and columns count from 1.
+Depth, size and alias expansion are limited. Lines and columns count from 1, offsets from 0; all
+count characters.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,22 +16,32 @@ from typing import Any
 import yaml
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
-from ligature.adf.relax import relax
+from ligature.adf.relax import Relaxed, relax
 
 MAX_DEPTH = 64
-MAX_NODES = 2_000_000
+MAX_NODES = 1_000_000
 """Most nodes of a document after alias expansion; the largest real file has 40 000."""
 
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_PROPERTIES = re.compile(r"([&!]\S*\s*)+")
+"""Anchor and tag before a value."""
+
+Span = tuple[int, int]
+"""First offset and one past the last, in the text of the file."""
 
 
 @dataclass(eq=False)
 class Node:
-    """One YAML node; ``end`` is one past its last character. ``weight`` counts nodes with aliases expanded."""
+    """One YAML node.
+
+    ``span`` is what the value takes in the text, without anchor and tag; ``weight`` counts nodes
+    with aliases expanded; ``anchor`` is the name it can be repeated by, if any.
+    """
 
     mark: Mark
-    end: tuple[int, int]
+    span: Span
     weight: int = 1
+    anchor: str = ""
 
 
 @dataclass(eq=False)
@@ -47,16 +59,23 @@ class Scalar(Node):
 
 @dataclass(eq=False)
 class Sequence(Node):
-    """A list of nodes."""
+    """A list of nodes; ``uses`` are the spans of the items as they stand here, aliases included."""
 
     items: list[Node] = field(default_factory=list)
+    uses: list[Span] = field(default_factory=list)
+    flow: bool = False
 
 
 @dataclass(eq=False)
 class Mapping(Node):
-    """A mapping in file order. ``duplicates`` are the key nodes that came second and have no effect."""
+    """A mapping in file order.
+
+    ``uses`` are the spans of the values as they stand here: of ``*alias`` where the value is one.
+    ``duplicates`` are the key nodes that came second and have no effect.
+    """
 
     entries: dict[str, tuple[Scalar, Node]] = field(default_factory=dict)
+    uses: dict[str, Span] = field(default_factory=dict)
     duplicates: list[Scalar] = field(default_factory=list)
     flow: bool = False
 
@@ -65,43 +84,66 @@ class Mapping(Node):
         entry = self.entries.get(key)
         return None if entry is None else entry[1]
 
+    def aliased(self, key: str) -> bool:
+        """Whether the value of ``key`` is written as an alias of one that stands elsewhere."""
+        return self.uses[key] != self.entries[key][1].span
+
 
 def parse(text: str, file: Path) -> Mapping:
     """Read the first document of ``text``; its root must be a mapping. Raises `AdfError`."""
     try:
-        return _Composer(text, file, None).document()
+        return _Composer(text, Relaxed(text), file).document()
     except yaml.YAMLError as strict_error:
-        relaxed, inserted = relax(text)
-        if not inserted:
-            raise AdfError(_yaml_diagnostic(strict_error, file)) from strict_error
+        relaxed = relax(text)
+        if not relaxed.lines:
+            raise AdfError(_yaml_diagnostic(strict_error, Relaxed(text), file)) from strict_error
         try:
-            return _Composer(relaxed, file, inserted).document()
-        except yaml.YAMLError:
-            raise AdfError(_yaml_diagnostic(strict_error, file)) from strict_error
+            return _Composer(text, relaxed, file).document()
+        except yaml.YAMLError as error:
+            raise AdfError(_yaml_diagnostic(error, relaxed, file)) from error
 
 
-def _yaml_diagnostic(error: yaml.YAMLError, file: Path) -> Diagnostic:
+def _yaml_diagnostic(error: yaml.YAMLError, parsed: Relaxed, file: Path) -> Diagnostic:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
-    place = Mark(file, mark.line + 1, mark.column + 1) if mark else Mark(file, 1, 1)
-    problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-    return Diagnostic(Severity.ERROR, f"this is not YAML: {problem}", place, "", "yaml")
+    if mark is not None:
+        column, _ = parsed.original(mark.line, mark.column, mark.index)
+        place = Mark(file, mark.line + 1, column + 1)
+        message = f"this is not YAML: {getattr(error, 'problem', None) or 'it ends too early'}"
+        return Diagnostic(Severity.ERROR, message, place, str(getattr(error, "context", None) or ""), "yaml")
+    number = getattr(error, "character", None)
+    what = f"character U+{number:04X}" if isinstance(number, int) else "a character"
+    return Diagnostic(
+        Severity.ERROR, f"this is not YAML: {what} is not allowed", _first_control(parsed, file), "remove it", "yaml"
+    )
+
+
+_CONTROL = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def _first_control(parsed: Relaxed, file: Path) -> Mark:
+    """Where the first character stands that YAML forbids."""
+    found = _CONTROL.search(parsed.text)
+    before = parsed.text[: found.start() if found else 0]
+    line, column = before.count("\n"), len(before) - before.rfind("\n") - 1
+    return Mark(file, line + 1, parsed.original(line, column, 0)[0] + 1)
 
 
 class _Composer:
-    """Turns YAML events into nodes."""
+    """Turns YAML events into nodes whose places are those of ``text``."""
 
-    def __init__(self, text: str, file: Path, inserted: dict[int, int] | None) -> None:
-        self._events: Iterator[Any] = yaml.parse(text, Loader=_LOADER)
+    def __init__(self, text: str, parsed: Relaxed, file: Path) -> None:
+        self._events: Iterator[Any] = yaml.parse(parsed.text, Loader=_LOADER)
+        self._text = text
+        self._parsed = parsed
         self._file = file
-        self._inserted = inserted or {}
         self._anchors: dict[str, Node] = {}
-        self._open: list[str | None] = []
+        self._open: list[str] = []
 
     def document(self) -> Mapping:
         root: Node | None = None
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
-                root = self._node(next(self._events), 0)
+                root = self._node(next(self._events), 0)[0]
                 break
         if isinstance(root, Scalar) and root.null:
             root = None
@@ -111,37 +153,62 @@ class _Composer:
             raise self._error(root.mark, "the file does not hold a mapping", "write 'key: value' lines")
         return root
 
-    def _place(self, mark: Any) -> tuple[int, int]:
-        shift = self._inserted.get(mark.line, 0)
-        return mark.line + 1, max(mark.column - shift, 0) + 1
-
     def _error(self, mark: Mark, message: str, hint: str = "") -> AdfError:
         return AdfError(Diagnostic(Severity.ERROR, message, mark, hint, "yaml"))
 
-    def _node(self, event: Any, depth: int) -> Node:
-        line, column = self._place(event.start_mark)
-        mark = Mark(self._file, line, column)
+    def _mark(self, mark: Any) -> Mark:
+        if not self._parsed.lines:
+            return Mark(self._file, mark.line + 1, mark.column + 1)
+        return Mark(self._file, mark.line + 1, self._parsed.original(mark.line, mark.column, mark.index)[0] + 1)
+
+    def _offset(self, mark: Any) -> int:
+        if not self._parsed.lines:
+            return int(mark.index)
+        return self._parsed.original(mark.line, mark.column, mark.index)[1]
+
+    def _node(self, event: Any, depth: int) -> tuple[Node, Span]:
+        """The node that begins with ``event``, and the span it takes here."""
+        mark = self._mark(event.start_mark)
         if depth > MAX_DEPTH:
             raise self._error(mark, f"the file nests deeper than {MAX_DEPTH} levels")
+        span = (self._offset(event.start_mark), self._offset(event.end_mark))
         if isinstance(event, yaml.AliasEvent):
-            return self._alias(event.anchor, mark)
-        end = self._place(event.end_mark)
+            return self._alias(event.anchor, mark), span
         if isinstance(event, yaml.ScalarEvent):
-            node: Node = Scalar(mark, end, 1, event.value, event.style in (None, ""))
-            if event.anchor:
-                self._anchors[event.anchor] = node
-            return node
-        self._open.append(event.anchor)
-        if isinstance(event, yaml.SequenceStartEvent):
-            node = self._sequence(mark, end, depth)
+            node: Node = self._scalar(event, mark, span)
         else:
-            node = self._mapping(mark, end, depth, bool(event.flow_style))
-        self._open.pop()
-        if node.weight > MAX_NODES:
-            raise self._error(mark, f"aliases expand to more than {MAX_NODES} values")
+            self._open.append(event.anchor or "")
+            if isinstance(event, yaml.SequenceStartEvent):
+                node = self._sequence(event, mark, span[0], depth)
+            else:
+                node = self._mapping(event, mark, span[0], depth)
+            self._open.pop()
+            if node.weight > MAX_NODES:
+                raise self._error(mark, f"aliases expand to more than {MAX_NODES} values")
         if event.anchor:
+            node.anchor = event.anchor
             self._anchors[event.anchor] = node
-        return node
+        return node, node.span
+
+    def _scalar(self, event: Any, mark: Mark, span: Span) -> Scalar:
+        start = self._content(event, span[0])
+        if start != span[0]:
+            mark = self._behind(mark, self._text[span[0] : start])
+        return Scalar(mark, (min(start, span[1]), span[1]), 1, "", event.value, event.style in (None, ""))
+
+    def _content(self, event: Any, start: int) -> int:
+        """Where the value itself begins, behind its anchor and tag."""
+        if not event.anchor and not event.tag:
+            return start
+        properties = _PROPERTIES.match(self._text, start)
+        return properties.end() if properties else start
+
+    @staticmethod
+    def _behind(mark: Mark, text: str) -> Mark:
+        """The place behind ``text``, which begins at ``mark``."""
+        lines = text.count("\n")
+        column = len(text) - text.rfind("\n") if lines else mark.column + len(text)
+        return Mark(mark.file, mark.line + lines, column)
 
     def _alias(self, anchor: str, mark: Mark) -> Node:
         if anchor in self._open:
@@ -150,26 +217,27 @@ class _Composer:
             raise self._error(mark, f"alias '*{anchor}' names no anchor", f"define '&{anchor}' before it")
         return self._anchors[anchor]
 
-    def _sequence(self, mark: Mark, end: tuple[int, int], depth: int) -> Sequence:
-        node = Sequence(mark, end)
+    def _sequence(self, start: Any, mark: Mark, at: int, depth: int) -> Sequence:
+        node = Sequence(mark, (at, at), flow=bool(start.flow_style))
         while True:
             event = next(self._events)
             if isinstance(event, yaml.SequenceEndEvent):
-                node.end = self._place(event.end_mark)
+                node.span = (self._content(start, at), self._offset(event.end_mark))
                 return node
-            item = self._node(event, depth + 1)
+            item, span = self._node(event, depth + 1)
             node.items.append(item)
+            node.uses.append(span)
             node.weight += item.weight
 
-    def _mapping(self, mark: Mark, end: tuple[int, int], depth: int, flow: bool) -> Mapping:
-        node = Mapping(mark, end, flow=flow)
+    def _mapping(self, start: Any, mark: Mark, at: int, depth: int) -> Mapping:
+        node = Mapping(mark, (at, at), flow=bool(start.flow_style))
         while True:
             event = next(self._events)
             if isinstance(event, yaml.MappingEndEvent):
-                node.end = self._place(event.end_mark)
+                node.span = (self._content(start, at), self._offset(event.end_mark))
                 return node
-            key = self._node(event, depth + 1)
-            value = self._node(next(self._events), depth + 1)
+            key, _ = self._node(event, depth + 1)
+            value, span = self._node(next(self._events), depth + 1)
             node.weight += key.weight + value.weight
             if not isinstance(key, Scalar):
                 raise self._error(key.mark, "a mapping key must be plain text")
@@ -177,6 +245,7 @@ class _Composer:
                 node.duplicates.append(key)
             else:
                 node.entries[key.text] = (key, value)
+                node.uses[key.text] = span
 
 
 def plain(node: Node) -> Any:

@@ -1,109 +1,245 @@
 """Changes single values of a file's text and leaves every other byte alone, comments and anchors included.
 
-Functions take the text and nodes read from that very text, and return the new text. A value that
-comes through an alias belongs to its anchor: changing it there would change every user of it, so it
-is refused with the place of the anchor.
+Functions take the text and nodes read from that very text, and return edits; `apply` makes the new
+text of them. A value that comes through an alias belongs to its anchor: the alias is replaced by
+the changed value itself, so that other users of the anchor keep theirs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
-from ligature.adf.nodes import Mapping, Node, Scalar, Sequence
-from ligature.adf.writer import scalar_text, text_scalar
+from ligature.adf.nodes import Mapping, Node, Scalar, Sequence, Span
+from ligature.adf.writer import Literal, entry_lines, flow_text, scalar_text, text_scalar
 
 
 class PatchError(ValueError):
     """A change that cannot be made in place; the message says why."""
 
 
-def set_scalar(text: str, owner: Mapping, path: str, value: Any) -> str:
-    """Replace the scalar at the dotted ``path`` below ``owner``; raises `PatchError`."""
-    parent, node = _find(owner, path)
-    if not isinstance(node, Scalar):
-        raise PatchError(f"'{path}' at {node.mark} is a block, not a single value")
-    _own(parent, node, path)
-    start, end = _offset(text, node.mark.line, node.mark.column), _offset(text, *node.end)
-    new = scalar_text(value)
-    if start == end and start > 0 and text[start - 1] == ":":
-        new = " " + new
-    return text[:start] + new + text[end:]
+@dataclass(frozen=True, order=True)
+class Edit:
+    """``text`` in place of what stands at ``span``."""
+
+    span: Span
+    text: str
 
 
-def add_key(text: str, owner: Mapping, name: str, value: Any) -> str:
+def apply(text: str, edits: Iterable[Edit]) -> str:
+    """The text with all edits made; raises `PatchError` when two of them meet.
+
+    Several insertions at one place come in the order given.
+    """
+    pieces: list[str] = []
+    done = 0
+    for edit in sorted(edits, key=lambda e: e.span):
+        start, end = edit.span
+        if start < done:
+            raise PatchError(f"two changes meet at offset {start}")
+        pieces += (text[done:start], edit.text)
+        done = end
+    return "".join((*pieces, text[done:]))
+
+
+def set_value(text: str, owner: Mapping, path: str, value: Any) -> Edit:
+    """Make ``value`` stand at the dotted ``path`` below ``owner``; blocks on the way are added.
+
+    ``value`` is a scalar, or nested mappings and lists of scalars. Raises `PatchError` when a single
+    value stands where a block is needed.
+    """
+    parent = owner
+    *inner, name = path.split(".")
+    for depth, part in enumerate(inner):
+        node = parent.get(part)
+        rest = ".".join((*inner[depth + 1 :], name))
+        if node is None:
+            return add_key(text, parent, part, _nested(rest, value))
+        if parent.aliased(part):
+            return Edit(parent.uses[part], flow_text(_changed(node, rest, value)))
+        if isinstance(node, Scalar) and node.null:
+            return _replaced(text, parent, part, _nested(rest, value))
+        if not isinstance(node, Mapping):
+            raise PatchError(f"'{part}' at {node.mark} is no block, so '{path}' cannot stand in it")
+        parent = node
+    if name not in parent.entries:
+        return add_key(text, parent, name, value)
+    return _replaced(text, parent, name, value)
+
+
+def add_key(text: str, owner: Mapping, name: str, value: Any) -> Edit:
     """Add ``name: value`` at the end of the block ``owner``; raises `PatchError` when it is there already."""
     if name in owner.entries:
         raise PatchError(f"'{name}' is there already, at {owner.entries[name][0].mark}")
-    entry = f"{text_scalar(name)}: {scalar_text(value)}"
     if owner.flow:
-        at = _offset(text, *owner.end) - 1
-        separator = ", " if owner.entries else ""
-        return text[:at].rstrip() + separator + entry + text[at:]
+        at = len(text[: owner.span[1] - 1].rstrip())
+        separator = "" if not owner.entries else " " if text[at - 1] == "," else ", "
+        return Edit((at, at), f"{separator}{text_scalar(name)}: {flow_text(value)}")
     if not owner.entries:
-        raise PatchError(f"the block at {owner.mark} is empty; write it as '{{{entry}}}'")
-    last = max(_last_line(value_) for _, value_ in owner.entries.values() if _inside(owner, value_))
-    column = next(iter(owner.entries.values()))[0].mark.column
-    lines = text.split("\n")
-    lines.insert(last, " " * (column - 1) + entry)
-    return "\n".join(lines)
+        raise PatchError(f"the block at {owner.mark} is empty, so nothing can be added to it")
+    column = next(iter(owner.entries.values()))[0].mark.column - 1
+    at = _line_end(text, content_end(owner))
+    return Edit((at, at), _lines(text, ["", *_indented(entry_lines(name, value), column)]))
 
 
-def remove_key(text: str, owner: Mapping, name: str) -> str:
-    """Remove a key and its value from the block ``owner``; raises `PatchError` for flow blocks with others."""
+def remove_key(text: str, owner: Mapping, name: str) -> Edit:
+    """Remove a key and its value from the block ``owner``, with the lines they take."""
     if name not in owner.entries:
         raise PatchError(f"there is no '{name}' in the block at {owner.mark}")
-    key, value = owner.entries[name]
+    names = list(owner.entries)
+    position = names.index(name)
+    start, end = owner.entries[name][0].span[0], _use_end(owner, name)
+    following = owner.entries[names[position + 1]][0].span[0] if position + 1 < len(names) else None
     if owner.flow:
-        raise PatchError(f"'{name}' at {key.mark} stands in a flow block; rewrite the block")
-    last = _last_line(value) if _inside(owner, value) else key.mark.line
-    lines = text.split("\n")
-    del lines[key.mark.line - 1 : max(last, key.mark.line)]
-    return "\n".join(lines)
+        return Edit(_without_comma(text, (start, end), following, position > 0), "")
+    begin = text.rfind("\n", 0, start) + 1
+    if not text[begin:start].strip():
+        return Edit((begin, _next_line(text, end)), "")
+    if following is None:  # the only key of an item of a list
+        return Edit((start, end), "{}")
+    return Edit((start, following), "")
 
 
-def _find(owner: Mapping, path: str) -> tuple[Mapping, Node]:
-    parent = owner
+def add_item(text: str, items: Sequence, value: Any) -> Edit:
+    """Add ``value`` at the end of a list."""
+    if items.flow:
+        at = len(text[: items.span[1] - 1].rstrip())
+        separator = "" if not items.items else " " if text[at - 1] == "," else ", "
+        return Edit((at, at), separator + flow_text(value))
+    at = _line_end(text, content_end(items))
+    dash = text.rfind("-", 0, items.uses[-1][0])
+    column = dash - (text.rfind("\n", 0, dash) + 1)
+    return Edit((at, at), _lines(text, ["", " " * column + "- " + flow_text(value)]))
+
+
+def remove_item(text: str, items: Sequence, index: int) -> Edit:
+    """Remove one item of a list, with the lines it takes."""
+    start, end = items.uses[index][0], _item_end(items, index)
+    if items.flow:
+        following = items.uses[index + 1][0] if index + 1 < len(items.items) else None
+        return Edit(_without_comma(text, (start, end), following, index > 0), "")
+    begin = text.rfind("\n", 0, start) + 1
+    return Edit((begin, _next_line(text, end)), "")
+
+
+def rename_key(owner: Mapping, name: str, new: str) -> Edit:
+    """Another key for the same value; raises `PatchError` when the new one is taken."""
+    if new in owner.entries:
+        raise PatchError(f"'{new}' is there already, at {owner.entries[new][0].mark}")
+    return Edit(owner.entries[name][0].span, text_scalar(new))
+
+
+def aliases_into(root: Node, span: Span) -> Iterator[Edit]:
+    """Edits that spell out every alias, outside ``span``, of a value that stands inside it."""
+    if isinstance(root, Mapping):
+        uses = [(root.uses[name], value) for name, (_, value) in root.entries.items()]
+    elif isinstance(root, Sequence):
+        uses = list(zip(root.uses, root.items, strict=True))
+    else:
+        return
+    for use, value in uses:
+        if span[0] <= use[0] < span[1]:
+            continue
+        if use == value.span:
+            yield from aliases_into(value, span)
+        elif span[0] <= value.span[0] < span[1]:
+            yield Edit(use, flow_text(_literal(value)))
+
+
+def content_end(node: Node) -> int:
+    """Offset behind the last character of a value, without blank lines and comments that follow it."""
+    if isinstance(node, Mapping) and not node.flow and node.entries:
+        return max(_use_end(node, name) for name in node.entries)
+    if isinstance(node, Sequence) and not node.flow and node.items:
+        return _item_end(node, len(node.items) - 1)
+    return node.span[1]
+
+
+def _use_end(owner: Mapping, name: str) -> int:
+    return owner.uses[name][1] if owner.aliased(name) else content_end(owner.entries[name][1])
+
+
+def _item_end(items: Sequence, index: int) -> int:
+    aliased = items.uses[index] != items.items[index].span
+    return items.uses[index][1] if aliased else content_end(items.items[index])
+
+
+def _replaced(text: str, parent: Mapping, name: str, value: Any) -> Edit:
+    """Another value for a key that is there, in the way the old one was written."""
+    node = parent.entries[name][1]
+    if parent.aliased(name):
+        return Edit(parent.uses[name], flow_text(value))
+    start, end = node.span[0], content_end(node)
+    if not isinstance(value, dict | list | tuple):
+        new = scalar_text(value)
+        return Edit((start, end), " " + new if start == end and text[start - 1] == ":" else new)
+    written_flow = isinstance(node, Mapping | Sequence) and node.flow
+    if parent.flow or written_flow or not value:
+        new = flow_text(value)
+        return Edit((start, end), " " + new if start == end and text[start - 1] == ":" else new)
+    key = parent.entries[name][0]
+    column = key.mark.column - 1
+    first, *rest = _indented(entry_lines(name, value), column)
+    behind = text[key.span[1] : start]
+    anchor = f" {behind[1:].strip()}" if node.anchor else ""
+    return Edit((key.span[0], end), _lines(text, [first[column:] + anchor, *rest]))
+
+
+def _nested(path: str, value: Any) -> Any:
+    for part in reversed(path.split(".")):
+        value = {part: value}
+    return value
+
+
+def _changed(node: Node, path: str, value: Any) -> Any:
+    """The plain value of ``node`` with ``value`` at ``path``."""
+    whole = _literal(node)
+    target = whole = whole if isinstance(whole, dict) else {}
     *inner, name = path.split(".")
     for part in inner:
-        node = parent.get(part)
-        if not isinstance(node, Mapping):
-            raise PatchError(f"there is no block '{part}' on the way to '{path}' at {parent.mark}")
-        _own(parent, node, part)
-        parent = node
-    found = parent.get(name)
-    if found is None:
-        raise PatchError(f"there is no '{path}' in the block at {owner.mark}")
-    return parent, found
+        if not isinstance(target.get(part), dict):
+            target[part] = {}
+        target = target[part]
+    target[name] = value
+    return whole
 
 
-def _own(parent: Mapping, node: Node, path: str) -> None:
-    if not _inside(parent, node):
-        raise PatchError(f"'{path}' is an alias of the value at {node.mark}; change it there or replace the alias")
-
-
-def _inside(parent: Node, node: Node) -> bool:
-    start = (parent.mark.line, parent.mark.column)
-    return start <= (node.mark.line, node.mark.column) <= parent.end
-
-
-def _last_line(node: Node) -> int:
-    """The last line, from 1, that holds something of a node."""
-    inner: list[Node] = []
+def _literal(node: Node) -> Any:
+    """A node as nested dicts, lists and texts whose numbers keep their digits."""
     if isinstance(node, Mapping):
-        inner = [value for _, value in node.entries.values() if _inside(node, value)]
-        inner += [key for key, _ in node.entries.values()]
-    elif isinstance(node, Sequence):
-        inner = [item for item in node.items if _inside(node, item)]
-    if isinstance(node, Mapping) and not node.flow and inner:
-        return max(_last_line(child) for child in inner)
-    if isinstance(node, Sequence) and inner and node.end[1] == 1:
-        return max(_last_line(child) for child in inner)
-    return node.end[0]
+        return {key: _literal(value) for key, (_, value) in node.entries.items()}
+    if isinstance(node, Sequence):
+        return [_literal(item) for item in node.items]
+    assert isinstance(node, Scalar)
+    return Literal(node.text) if node.plain else node.text
 
 
-def _offset(text: str, line: int, column: int) -> int:
-    """Position in ``text`` of a line and column, both from 1."""
-    at = 0
-    for _ in range(line - 1):
-        at = text.index("\n", at) + 1
-    return at + column - 1
+def _without_comma(text: str, span: Span, following: int | None, has_previous: bool) -> Span:
+    """The span of an entry of a flow collection with one of the commas around it."""
+    if following is not None:
+        return span[0], following
+    if has_previous:
+        return text.rindex(",", 0, span[0]), span[1]
+    return span
+
+
+def _line_end(text: str, offset: int) -> int:
+    """The end of the line that holds ``offset``, before its line break."""
+    end = text.find("\n", offset)
+    end = len(text) if end < 0 else end
+    return end - 1 if end > 0 and text[end - 1] == "\r" else end
+
+
+def _next_line(text: str, offset: int) -> int:
+    end = text.find("\n", offset)
+    return len(text) if end < 0 else end + 1
+
+
+def _lines(text: str, lines: list[str]) -> str:
+    """Lines joined by the line break that ``text`` uses."""
+    return ("\r\n" if "\r\n" in text else "\n").join(lines)
+
+
+def _indented(lines: list[str], column: int) -> list[str]:
+    return [" " * column + line for line in lines]

@@ -1,7 +1,8 @@
 """Reads launch, world, model and input-device files into documents.
 
 Nothing is skipped in silence: what is not usable, unknown or without effect is a finding with its
-place. Files are opened through a `Resolver` only.
+place. A bad value costs the object that holds it; in strict mode, the file, as with AMBF. Files are
+opened through a `Resolver` only.
 """
 
 from __future__ import annotations
@@ -9,14 +10,27 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
-from ligature.adf.document import Document, Element, problems
+from ligature.adf.checker import (
+    MAX_FINDINGS,
+    errors,
+    key_problems,
+    missing_keys,
+    problems,
+    repeated_keys,
+    suggestion,
+)
+from ligature.adf.diagnostics import Diagnostic, Mark, Severity
+from ligature.adf.document import Document, Element
 from ligature.adf.nodes import Mapping, Node, Scalar, Sequence, parse
 from ligature.adf.resolver import ResolutionError, Resolver
-from ligature.adf.schema import BY_PATH, LISTS, NOT_SIMULATED
+from ligature.adf.rules import rule_findings
+from ligature.adf.schema import BY_PATH, LISTS, NOT_SIMULATED, SCHEMA, Key, Type
 
 MAX_TEXT = 64 * 1024 * 1024
 """Largest scene file in bytes; the largest real one has 300 kB."""
+
+REFUSING = ("value", "missing", "version")
+"""Codes of the findings for which AMBF refuses a whole file (ADF specification §1.3, §26)."""
 
 _DEFAULTED = ("body", "camera", "light")
 """Kinds of which AMBF makes a default object when one is listed but not defined."""
@@ -44,30 +58,33 @@ class LaunchDocument(Document):
 
 def read_launch(path: Path, resolver: Resolver, strict: bool = False) -> LaunchDocument:
     """Read a launch file; raises `AdfError` when it is not readable at all."""
-    document = _read(path, "launch", resolver, strict)
-    launch = LaunchDocument(**vars(document))
-    launch.world = _reference(document, "world config", resolver)
-    launch.devices = _reference(document, "input devices config", resolver)
-    launch.colours = _reference(document, "color config", resolver)
-    node = document.top.node.get("multibody configs")
-    if isinstance(node, Sequence):
-        launch.models = tuple(_resolved(item, document.path.parent, resolver) for item in node.items)
-    return launch
+    return _launch(_opened(path, resolver), resolver, strict)
 
 
 def read_world(path: Path, resolver: Resolver, strict: bool = False) -> Document:
     """Read a world file; raises `AdfError` when it is not readable at all."""
-    return _read(path, "world", resolver, strict)
+    return _document(_opened(path, resolver), "world", strict)
 
 
 def read_model(path: Path, resolver: Resolver, strict: bool = False) -> Document:
     """Read a model file; raises `AdfError` when it is not readable at all."""
-    return _read(path, "model", resolver, strict)
+    return _document(_opened(path, resolver), "model", strict)
 
 
 def read_devices(path: Path, resolver: Resolver, strict: bool = False) -> Document:
     """Read an input-devices file; raises `AdfError` when it is not readable at all."""
-    return _read(path, "input devices", resolver, strict)
+    return _document(_opened(path, resolver), "input devices", strict)
+
+
+def read_any(path: Path, resolver: Resolver, strict: bool = False) -> Document:
+    """Read a file of any kind, told apart by its keys; raises `AdfError` when it is not readable at all."""
+    source = _opened(path, resolver)
+    kind = kind_of(source.root)
+    if kind == "launch":
+        return _launch(source, resolver, strict)
+    if kind == "colors":
+        return Document(source.path, kind, source.text, source.root, Element("model", source.path.name, source.root))
+    return _document(source, kind, strict)
 
 
 def kind_of(root: Mapping) -> str:
@@ -77,7 +94,7 @@ def kind_of(root: Mapping) -> str:
         return "launch"
     if "input devices" in keys:
         return "input devices"
-    if keys & {"environment", "enclosure size", "max iterations", "skybox"} and "bodies" not in keys:
+    if keys & {"environment", "enclosure", "enclosure size", "max iterations", "skybox"} and "bodies" not in keys:
         return "world"
     values = [value for _, value in root.entries.values()]
     if values and all(isinstance(v, Mapping) and {"r", "g", "b"} <= set(v.entries) for v in values):
@@ -85,55 +102,67 @@ def kind_of(root: Mapping) -> str:
     return "model"
 
 
-def read_any(path: Path, resolver: Resolver, strict: bool = False) -> Document:
-    """Read a file of any of the four kinds, told apart by its keys."""
-    real = resolver.allow(Path(path))
-    text = resolver.read_text(real, MAX_TEXT)
-    kind = kind_of(parse(text, real))
-    if kind == "launch":
-        return read_launch(real, resolver, strict)
-    if kind == "colors":
-        return Document(real, kind, text, Element("model", real.name, parse(text, real)))
-    return _read(real, kind, resolver, strict)
+@dataclass(frozen=True)
+class _Source:
+    """A file that was read and parsed."""
+
+    path: Path
+    text: str
+    root: Mapping
 
 
-def _read(path: Path, kind: str, resolver: Resolver, strict: bool) -> Document:
+def _opened(path: Path, resolver: Resolver) -> _Source:
     real = resolver.allow(Path(path))
     text = resolver.read_text(real, MAX_TEXT)
-    root = parse(text, real)
-    own = _own_keys(root, kind)
-    found = problems(Element(kind, real.name, own))
-    top = Element(kind, real.name, _usable(own, found))
-    document = Document(real, kind, text, top)
-    document.diagnostics += found
-    document.diagnostics += _version(top)
-    for name, object_kind in LISTS.items():
+    return _Source(real, text, parse(text, real))
+
+
+def _launch(source: _Source, resolver: Resolver, strict: bool) -> LaunchDocument:
+    launch = LaunchDocument(**vars(_document(source, "launch", strict)))
+    launch.world = _reference(launch, "world config", resolver)
+    launch.devices = _reference(launch, "input devices config", resolver)
+    launch.colours = _reference(launch, "color config", resolver)
+    node = launch.top.node.get("multibody configs")
+    if isinstance(node, Sequence):
+        launch.models = tuple(_resolved(item, launch.path.parent, resolver) for item in node.items)
+    return launch
+
+
+def _document(source: _Source, kind: str, strict: bool) -> Document:
+    top, found = _top(source, kind)
+    document = Document(source.path, kind, source.text, source.root, top, diagnostics=found)
+    document.diagnostics += _other_keys(source.root, kind)
+    for name in LISTS:
         if name in BY_PATH[kind]:
-            document.lists[name] = _elements(root, name, object_kind, document, strict)
-    document.diagnostics += _unlisted(root, document)
-    if strict and not document.ok:
-        document.lists = {}
+            document.lists[name] = _elements(document, name, strict)
+    if strict:
+        _refuse_as_ambf(document)
     return document
 
 
-def _own_keys(root: Mapping, kind: str) -> Mapping:
-    """The root with the keys of the schema only; all others define objects or hold anchors."""
-    known = BY_PATH[kind]
-    return replace(root, entries={name: entry for name, entry in root.entries.items() if name in known})
+def _top(source: _Source, kind: str) -> tuple[Element, list[Diagnostic]]:
+    """The file's own keys, without those that hold an error, and the findings about them."""
+    own = {name: entry for name, entry in source.root.entries.items() if name in BY_PATH[kind]}
+    element = Element(kind, source.path.name, replace(source.root, entries=own, duplicates=[]))
+    found = [*repeated_keys(source.root), *missing_keys(element)]
+    sound = {}
+    for name, entry in own.items():
+        of_key = key_problems(element, name)
+        found += of_key
+        if not errors(of_key):
+            sound[name] = entry
+    top = Element(kind, source.path.name, replace(source.root, entries=sound, duplicates=[]))
+    return top, [*found, *rule_findings(top), *_version(top)]
 
 
-def _usable(own: Mapping, found: list[Diagnostic]) -> Mapping:
-    """The file's own keys without those that hold an error: their defaults are taken."""
-    errors = [d.mark for d in found if d.severity >= Severity.ERROR and d.mark is not None and d.mark != own.mark]
-
-    def sound(value: Node) -> bool:
-        start = (value.mark.line, value.mark.column)
-        return not any(start <= (mark.line, mark.column) <= value.end for mark in errors)
-
-    return replace(own, entries={name: entry for name, entry in own.entries.items() if sound(entry[1])})
+def _version(top: Element) -> list[Diagnostic]:
+    if not top.has("adf version") or top.text("adf version") == "1.0":
+        return []
+    message = "'adf version' is not 1.0"
+    return [Diagnostic(Severity.ERROR, message, top.mark_of("adf version"), "write 1.0", "version")]
 
 
-def _listed_names(root: Mapping, kind: str) -> set[str]:
+def _listed(root: Mapping, kind: str) -> set[str]:
     names: set[str] = set()
     for list_name in LISTS:
         node = root.get(list_name)
@@ -142,48 +171,80 @@ def _listed_names(root: Mapping, kind: str) -> set[str]:
     return names
 
 
-def _version(top: Element) -> list[Diagnostic]:
-    if not top.has("adf version"):
-        return []
-    node = top.node.get("adf version")
-    if isinstance(node, Scalar) and node.text == "1.0":
-        return []
-    message = "'adf version' is not 1.0"
-    return [Diagnostic(Severity.ERROR, message, top.mark_of("adf version"), "write 1.0", "version")]
+def _other_keys(root: Mapping, kind: str) -> list[Diagnostic]:
+    """Top-level keys that are neither the file's own nor listed objects: slips, spare objects, anchor holders."""
+    listed = _listed(root, kind)
+    found: list[Diagnostic] = []
+    for name, (key, node) in root.entries.items():
+        if name in BY_PATH[kind] or name in listed or len(found) > MAX_FINDINGS:
+            continue
+        found.append(_other_key(name, key, node, kind))
+    return found
 
 
-def _elements(root: Mapping, list_name: str, kind: str, document: Document, strict: bool) -> tuple[Element, ...]:
-    node = root.get(list_name)
-    if not isinstance(node, Sequence):
-        return ()
+def _other_key(name: str, key: Scalar, node: Node, kind: str) -> Diagnostic:
+    meant = suggestion(name, [key.name for key in SCHEMA[kind] if _may_hold(key, node)])
+    if _holds_anchor(node):
+        return Diagnostic(Severity.DEBUG, f"'{name}' only holds values for aliases", key.mark, "", "unlisted")
+    if isinstance(node, Mapping) and not meant:
+        message = f"'{name}' is defined but not listed, so it does not exist"
+        return Diagnostic(Severity.DEBUG, message, key.mark, "", "unlisted")
+    message = f"unknown key '{name}' in {kind} file"
+    return Diagnostic(Severity.WARNING, message, key.mark, meant or "it has no effect", "unknown")
+
+
+def _may_hold(key: Key, node: Node) -> bool:
+    """Whether a key can have been meant by the look of the value: an unlisted object is no slip of a list."""
+    return isinstance(node, Mapping) == (key.type in (Type.MAP, Type.VECTOR, Type.POSE))
+
+
+def _holds_anchor(node: Node) -> bool:
+    if node.anchor:
+        return True
+    inner: list[Node] = []
+    if isinstance(node, Mapping):
+        inner = [value for name, (_, value) in node.entries.items() if not node.aliased(name)]
+    elif isinstance(node, Sequence):
+        inner = [item for item, use in zip(node.items, node.uses, strict=True) if use == item.span]
+    return any(map(_holds_anchor, inner))
+
+
+def _elements(document: Document, list_name: str, strict: bool) -> tuple[Element, ...]:
+    """The usable objects of one list; one that is listed twice is checked once and stands twice."""
+    node = document.top.node.get(list_name)
     checked: dict[str, Element | None] = {}
     elements = []
-    for item in node.items:
+    for item in node.items if isinstance(node, Sequence) else []:
         if not isinstance(item, Scalar):
             continue
-        if item.text not in checked:
-            checked[item.text] = _element(root, item, kind, document, strict)
+        if len(document.diagnostics) > MAX_FINDINGS:
+            message = f"more than {MAX_FINDINGS} findings; the rest of the file is not read"
+            document.diagnostics.append(Diagnostic(Severity.ERROR, message, item.mark, "", "too many"))
+            break
+        if item.text in checked:
+            message = f"'{item.text}' is listed twice in '{list_name}', so it exists twice"
+            document.diagnostics.append(Diagnostic(Severity.INFO, message, item.mark, "", "repeated"))
+        else:
+            checked[item.text] = _element(document, item, LISTS[list_name], strict)
         element = checked[item.text]
         if element is not None:
             elements.append(element)
     return tuple(elements)
 
 
-def _element(root: Mapping, item: Scalar, kind: str, document: Document, strict: bool) -> Element | None:
-    node = root.get(item.text)
+def _element(document: Document, item: Scalar, kind: str, strict: bool) -> Element | None:
+    node = document.root.get(item.text)
     if not isinstance(node, Mapping):
-        severity = Severity.WARNING if kind in _DEFAULTED else Severity.ERROR
-        message = f"{kind} '{item.text}' is listed but not defined"
-        document.diagnostics.append(
-            Diagnostic(severity, message, item.mark, "define it or take it from the list", "undefined")
-        )
+        document.diagnostics.append(_undefined(document, item, node, kind))
         return None
     element = Element(kind, item.text, node)
     found = problems(element)
     if kind == "joint":
-        found = _joint_policy(element, found, strict)
+        found = [*found, *_lone_motor(element)] if strict else _typeless_is_revolute(element, found)
+    if not errors(found):
+        found = [*found, *rule_findings(element)]
     document.diagnostics += found
-    if any(d.severity >= Severity.ERROR for d in found):
+    if errors(found):
         return None
     if kind in NOT_SIMULATED:
         message = f"{kind} '{item.text}' is read and checked, but not simulated"
@@ -191,35 +252,43 @@ def _element(root: Mapping, item: Scalar, kind: str, document: Document, strict:
     return element
 
 
-def _joint_policy(element: Element, found: list[Diagnostic], strict: bool) -> list[Diagnostic]:
-    """AMBF's refusals of old joints become warnings, unless strict (ADF specification §14, §30)."""
-    motor_alone = element.has("enable motor") and not element.has("enable feedback")
-    if strict:
-        if motor_alone:
-            message = f"joint '{element.key}' has 'enable motor' without 'enable feedback'"
-            found = [
-                *found,
-                Diagnostic(Severity.ERROR, message, element.mark_of("enable motor"), "AMBF refuses the file", "motor"),
-            ]
+def _undefined(document: Document, item: Scalar, node: Node | None, kind: str) -> Diagnostic:
+    """AMBF makes a default body, camera or light, and refuses the file for a joint (§4.7)."""
+    severity = Severity.WARNING if kind in _DEFAULTED or (isinstance(node, Scalar) and node.null) else Severity.ERROR
+    if node is not None:
+        message, hint = f"{kind} '{item.text}' is listed, but what defines it is no block of keys", "it is left out"
+        return Diagnostic(severity, message, node.mark, hint, "undefined")
+    others = {name for name in document.root.entries if name not in BY_PATH[document.kind]}
+    hint = suggestion(item.text, others - _listed(document.root, document.kind)) or "define it or take it from the list"
+    message = f"{kind} '{item.text}' is listed but not defined"
+    return Diagnostic(severity, message, item.mark, hint, "missing" if kind == "joint" else "undefined")
+
+
+def _lone_motor(element: Element) -> list[Diagnostic]:
+    """AMBF evaluates 'enable feedback' when 'enable motor' is there, and fails without it (§14)."""
+    if not element.has("enable motor") or element.has("enable feedback"):
+        return []
+    message = f"joint '{element.key}' has 'enable motor' without 'enable feedback'"
+    return [Diagnostic(Severity.ERROR, message, element.mark_of("enable motor"), "remove 'enable motor'", "missing")]
+
+
+def _typeless_is_revolute(element: Element, found: list[Diagnostic]) -> list[Diagnostic]:
+    """A joint without type is an old revolute one (§27, §30)."""
+    if element.has("type"):
         return found
-    softened = []
-    for diagnostic in found:
-        if diagnostic.code == "missing" and diagnostic.message.endswith("lacks the key 'type'"):
-            message = f"joint '{element.key}' has no 'type'; it is taken as revolute"
-            diagnostic = Diagnostic(Severity.WARNING, message, diagnostic.mark, "add type: revolute", "type")
-        softened.append(diagnostic)
-    return softened
+    others = [d for d in found if not (d.code == "missing" and "the key 'type'" in d.message)]
+    message = f"joint '{element.key}' has no 'type'; it is taken as revolute"
+    return [*others, Diagnostic(Severity.WARNING, message, element.mark, "add type: revolute", "type")]
 
 
-def _unlisted(root: Mapping, document: Document) -> list[Diagnostic]:
-    """Objects that are defined but not listed, told by keys that only objects have."""
-    listed = _listed_names(root, document.kind)
-    found = []
-    for name, (key, node) in root.entries.items():
-        if isinstance(node, Mapping) and name not in listed and name not in BY_PATH[document.kind] and node.get("name"):
-            message = f"'{name}' is defined but not listed, so it does not exist"
-            found.append(Diagnostic(Severity.DEBUG, message, key.mark, "", "unlisted"))
-    return found
+def _refuse_as_ambf(document: Document) -> None:
+    """Drop everything when one finding makes AMBF refuse the file, and say which."""
+    causes = [d for d in document.diagnostics if d.severity >= Severity.ERROR and d.code in REFUSING]
+    if causes:
+        message = f"AMBF refuses the whole file for {len(causes)} of these errors"
+        document.diagnostics.append(Diagnostic(Severity.ERROR, message, causes[0].mark, causes[0].message, "refused"))
+        document.refused = True
+        document.lists = {}
 
 
 def _reference(document: Document, name: str, resolver: Resolver) -> Reference | None:
@@ -236,21 +305,7 @@ def _resolved(node: Node, base: Path, resolver: Resolver) -> Reference:
     except ResolutionError as error:
         return Reference(node.text, None, node.mark, error.diagnostic)
     if not path.is_file():
-        diagnostic = Diagnostic(
-            Severity.ERROR, f"'{node.text}' does not exist", node.mark, f"looked for {path}", "path"
-        )
+        message = f"'{node.text}' does not exist"
+        diagnostic = Diagnostic(Severity.ERROR, message, node.mark, f"looked for {path}", "path")
         return Reference(node.text, None, node.mark, diagnostic)
     return Reference(node.text, path, node.mark)
-
-
-__all__ = [
-    "AdfError",
-    "LaunchDocument",
-    "Reference",
-    "kind_of",
-    "read_any",
-    "read_devices",
-    "read_launch",
-    "read_model",
-    "read_world",
-]

@@ -2,35 +2,54 @@
 
 YAML wants the lines of a ``{…}`` or ``[…]`` to be indented deeper than the key they belong to;
 yaml-cpp does not mind, and real files rely on it (ADF specification §1.1). Blanks are inserted at
-line starts only, so that lines stay lines and columns can be counted back.
+line starts only, so that lines stay lines and every place can be counted back. Lines and columns
+count from 0 here, as YAML libraries do.
 """
 
 from __future__ import annotations
+
+import bisect
+import re
+from dataclasses import dataclass, field
 
 INDENT = 32
 """Blanks put before a flow line; deeper than any block mapping of a scene file."""
 
 
-def relax(text: str) -> tuple[str, dict[int, int]]:
-    """``text`` with flow lines indented, and how many blanks each line (from 0) was given."""
+@dataclass(frozen=True)
+class Relaxed:
+    """``text`` with blanks inserted before some ``lines``, and the way back to the places before."""
+
+    text: str
+    lines: list[int] = field(default_factory=list)
+
+    def original(self, line: int, column: int, index: int) -> tuple[int, int]:
+        """Column and index, before the insertion, of a place in ``text``."""
+        at = bisect.bisect_left(self.lines, line)
+        here = min(INDENT, column) if at < len(self.lines) and self.lines[at] == line else 0
+        return column - here, index - at * INDENT - here
+
+
+def relax(text: str) -> Relaxed:
+    """``text`` with the lines inside flow collections indented."""
     lines = text.split("\n")
-    inserted: dict[int, int] = {}
+    inserted: list[int] = []
     depth = 0
     opens_value = False
     for number, line in enumerate(lines):
         stripped = line.lstrip(" \t")
         if depth > 0 or (opens_value and stripped[:1] in ("{", "[")):
-            inserted[number] = INDENT
+            inserted.append(number)
             lines[number] = " " * INDENT + line
         depth = _depth_after(line, depth)
         if stripped and not stripped.startswith("#"):
             opens_value = depth == 0 and _ends_open(stripped)
-    return "\n".join(lines), inserted
+    return Relaxed("\n".join(lines), inserted)
 
 
 def _ends_open(line: str) -> bool:
     """Whether a line ends with ``key:`` or ``key: &anchor`` and its value follows on the next."""
-    words = line.split(" #", 1)[0].rstrip().split()
+    words = re.split(r"\s#", line, maxsplit=1)[0].split()
     if words and words[-1].startswith("&"):
         words.pop()
     return bool(words) and words[-1].endswith(":")

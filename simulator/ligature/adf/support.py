@@ -2,36 +2,54 @@
 
 from __future__ import annotations
 
-from ligature.adf.schema import NOT_SIMULATED, SCHEMA, Key, Status
+from ligature.adf.schema import NOT_SIMULATED, PLURALS, SCHEMA, Fault, Key, Status
 
 _INTRODUCTION = """# ADF support
 
 Every key that the reader knows, by kind of file or object, with its type, default and what becomes of it. Section
 numbers (§) are those of the ADF specification. Keys that are not here are reported as unknown, with a suggestion.
 
-- **used**: has the effect that AMBF gives it.
-- **read and ignored, as in AMBF**: legal, without effect there and here; told at debug level (`ligature check -v`).
-- **Ligature's own**: AMBF ignores it, so files that use it stay valid there.
+- **used**, where nothing else is said: has the effect that AMBF gives it.
+- **{ignored}**: legal, without effect there and here; told at debug level (`ligature check -v`).
+- **{kept}**: handed on as written; no plug-in is run.
+- **{not_simulated_status}**: of kinds that are not simulated.
+- **{ours}**, so files that use it stay valid there.
 
-Bodies, joints, ghost objects, sensors, actuators, cameras, lights and sutures are simulated; {not_simulated} are read,
-checked and reported as not simulated.
+A bad value is an error at its place, and leaves its object out; where the table says "bad: default", it is a warning
+and the default is taken. {simulated} are simulated; {not_simulated} are read, checked and reported as not simulated.
 
 Where AMBF's behaviour is a defect that no file relies on, ours is the sane one: an unknown sensor type leaves that
 sensor out instead of crashing, one bad value leaves its object out instead of refusing the file (`--strict` refuses
 it), a joint without `type` is revolute with a warning, a lone `enable motor` is accepted, duplicates get topics of
 their own, a missing low-resolution mesh falls back to the high-resolution one with a warning.
+
+This page is generated from the schema by `make docs`.
 """
 
 
 def support_table() -> str:
     """The text of ``docs/adf.md``."""
-    parts = [_INTRODUCTION.format(not_simulated=", ".join(f"{kind}s" for kind in sorted(NOT_SIMULATED)))]
-    for kind, keys in SCHEMA.items():
-        parts.append(
-            f"\n## {kind[0].upper()}{kind[1:]}\n\n| key | type | default | unit | meaning |\n|---|---|---|---|---|\n"
+    listed = [kind for kind in SCHEMA if kind in PLURALS and kind != "input device"]
+    parts = [
+        _INTRODUCTION.format(
+            ignored=Status.IGNORED.value,
+            kept=Status.KEPT.value,
+            not_simulated_status=Status.NOT_SIMULATED.value,
+            ours=Status.OURS.value,
+            simulated=_enumerated([k for k in listed if k not in NOT_SIMULATED]).capitalize(),
+            not_simulated=_enumerated([k for k in listed if k in NOT_SIMULATED]),
         )
+    ]
+    for kind, keys in SCHEMA.items():
+        title = "Input devices file" if kind == "input devices" else kind[0].upper() + kind[1:]
+        parts.append(f"\n## {title}\n\n| key | type | default | unit | meaning |\n|---|---|---|---|---|\n")
         parts += [_row(key) for key in keys]
     return "".join(parts)
+
+
+def _enumerated(kinds: list[str]) -> str:
+    *first, last = (PLURALS[kind] for kind in kinds)
+    return f"{', '.join(first)} and {last}"
 
 
 def _row(key: Key) -> str:
@@ -42,6 +60,8 @@ def _row(key: Key) -> str:
     meaning = key.doc
     if key.status is not Status.USED:
         meaning = f"{meaning}; {key.status.value}" if meaning else key.status.value
+    if key.fault is Fault.VALUE:
+        meaning += "; bad: default"
     return f"| `{key.path}` | {type_} | {default} | {key.unit} | {meaning} |\n"
 
 

@@ -17,6 +17,10 @@ _LOOKS_LIKE_VALUE = {"true", "false", "yes", "no", "on", "off", "y", "n", "null"
 _VECTORS = ({"x", "y", "z"}, {"r", "p", "y"}, {"r", "g", "b"}, {"r", "g", "b", "a"}, {"ix", "iy", "iz"})
 
 
+class Literal(str):
+    """A text that is written as it is, such as a number with the digits it had."""
+
+
 def write_document(kind: str, values: Mapping[str, Any]) -> str:
     """The text of a document; ``kind`` is launch, world, model or input devices.
 
@@ -33,12 +37,14 @@ def write_document(kind: str, values: Mapping[str, Any]) -> str:
         value = values[name]
         if name in objects and isinstance(value, Mapping):
             value = _ordered(objects[name], value)
-        lines += _entry(name, value, 0)
+        lines += entry_lines(name, value)
     return "\n".join(lines) + "\n"
 
 
 def scalar_text(value: Any) -> str:
     """One scalar as the format writes it; a float keeps all its digits."""
+    if isinstance(value, Literal):
+        return str(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -91,13 +97,14 @@ def _ordered(kind: str, value: Mapping[str, Any], prefix: str = "") -> dict[str,
     }
 
 
-def _entry(name: str, value: Any, depth: int) -> list[str]:
+def entry_lines(name: str, value: Any, depth: int = 0) -> list[str]:
+    """The lines of ``name: value`` at a depth of indentation; vectors in flow style, all else in blocks."""
     indent = "  " * depth
     key = f"{indent}{text_scalar(str(name))}:"
     if isinstance(value, Mapping):
         if not value or set(value) in _VECTORS:
-            return [f"{key} {_flow(value)}"]
-        return [key, *(line for inner, item in value.items() for line in _entry(inner, item, depth + 1))]
+            return [f"{key} {flow_text(value)}"]
+        return [key, *(line for inner, item in value.items() for line in entry_lines(inner, item, depth + 1))]
     if isinstance(value, Sequence) and not isinstance(value, str):
         if not value:
             return [f"{key} []"]
@@ -108,14 +115,15 @@ def _entry(name: str, value: Any, depth: int) -> list[str]:
 def _item(value: Any, depth: int) -> list[str]:
     indent = "  " * depth
     if isinstance(value, Mapping) and value:
-        inner = [line for name, item in value.items() for line in _entry(name, item, depth + 1)]
+        inner = [line for name, item in value.items() for line in entry_lines(name, item, depth + 1)]
         return [f"{indent}- {inner[0][2 * (depth + 1) :]}", *inner[1:]]
-    return [f"{indent}- {_flow(value)}"]
+    return [f"{indent}- {flow_text(value)}"]
 
 
-def _flow(value: Any) -> str:
+def flow_text(value: Any) -> str:
+    """A value in one line, as ``{a: 1, b: [2, 3]}``."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{text_scalar(str(k))}: {_flow(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{text_scalar(str(k))}: {flow_text(v)}" for k, v in value.items()) + "}"
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return "[" + ", ".join(_flow(item) for item in value) + "]"
+        return "[" + ", ".join(flow_text(item) for item in value) + "]"
     return scalar_text(value) or "''"

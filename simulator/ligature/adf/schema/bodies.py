@@ -1,0 +1,236 @@
+"""Rows of the schema for bodies, joints, ghosts, soft bodies, vehicles and sutures (ADF §12–§16, §20, §21)."""
+
+from __future__ import annotations
+
+from ligature.adf.schema.blocks import (
+    COLLISION,
+    COLOUR,
+    IDENTITY,
+    LOOKS,
+    OUTPUT_TYPE,
+    PARENT,
+    F,
+    N,
+    P,
+    T,
+    U,
+    V,
+    gains,
+    shaders,
+)
+from ligature.adf.schema.keys import POSE_ZERO, ZERO, Fault, Key, Status, Type, each, ignored
+
+C, I, MAP, POSE = Type.CHOICE, Type.INTEGER, Type.MAP, Type.POSE
+
+JOINT_TYPES = {
+    **{s: "revolute" for s in ("revolute", "hinge", "continuous")},
+    **{s: "prismatic" for s in ("prismatic", "slider")},
+    "fixed": "fixed",
+    **{s: "linear spring" for s in ("linear spring", "spring")},
+    **{s: "torsion spring" for s in ("torsion spring", "torsional spring", "angular spring")},
+    "p2p": "p2p",
+    "cone twist": "cone twist",
+    "six dof": "six dof",
+    "six dof spring": "six dof spring",
+}
+ROD = Key("ligature rod", F, True, doc="false: never part of a rod", status=Status.OURS)
+
+BODY = (
+    *IDENTITY,
+    Key("parent", T, "", doc="reference to a parent object, of newer revisions of AMBF", status=Status.IGNORED),
+    *LOOKS,
+    *COLLISION,
+    *shaders("shaders"),
+    Key("mass", N, 1.0, "kg", "0 makes the body static; without it the inertial keys are not read", least=0.0),
+    Key("inertia", MAP, doc="principal moments about the inertial frame; estimated when absent"),
+    *each(("ix", "iy", "iz"), N, "inertia.{}", unit="kg·m²", doc="principal moment", required=True, least=0.0),
+    Key("inertial offset", POSE, None, "m, rad", "inertial frame I in B"),
+    Key("gravity", V, unit="m/s²", doc="gravity of this body, in world axes"),
+    Key("location", POSE, POSE_ZERO, "m, rad", "initial pose of B in the world"),
+    Key("friction", MAP, doc="surface friction"),
+    Key("friction.static", N, 0.5, doc="friction coefficient"),
+    Key("friction.rolling", N, 0.01, doc="rolling friction coefficient"),
+    *ignored(("friction.linear",), "old name of `static`"),
+    Key("damping", MAP, doc="loss of velocity"),
+    Key("damping.linear", N, 0.04, doc="velocity × (1 − d)^dt; taken as 0 to 1"),
+    Key("damping.angular", N, 0.1, doc="velocity × (1 − d)^dt; taken as 0 to 1"),
+    Key("restitution", N, 0.1, doc="coefficient of restitution"),
+    Key("controller", MAP, doc="Cartesian controller, §13"),
+    *gains("controller.linear", "gains of the linear half", required=True),
+    *gains("controller.angular", "gains of the angular half", required=True),
+    OUTPUT_TYPE,
+    Key("publish children names", F, False, doc="list the bodies below this one in its state"),
+    Key("publish joint names", F, True, doc="list the joints below this one in its state"),
+    Key("publish joint positions", F, True, doc="positions, velocities and efforts of these joints"),
+    *ignored(("linear gain", "angular gain"), "old name of the controller's halves"),
+    *ignored(("resistive surface", "resistive surface1"), "of AMBF 1.0; sensors of type Resistance replaced it"),
+    *ignored(("enable feedback",), "belongs to joints"),
+    ROD,
+)
+
+
+def _six(block: str, default: float, unit: str, doc: str) -> tuple[Key, ...]:
+    return (
+        Key(block, Type.NUMBER_OR_MAP, unit=unit, doc=f"{doc}; of a six-DOF joint a block"),
+        *(
+            key
+            for half in ("linear", "angular")
+            for key in (
+                Key(f"{block}.{half}", MAP, doc=f"{half} axes of a six-DOF joint", fault=Fault.VALUE),
+                *each("xyz", N, f"{block}.{half}.{{}}", default, unit, f"{doc}, axis {{}}", fault=Fault.VALUE),
+            )
+        ),
+    )
+
+
+def _limits(half: str, unit: str) -> tuple[Key, ...]:
+    return (
+        Key(f"joint limits.{half}", MAP, doc=f"{half} limits of a six-DOF joint", fault=Fault.VALUE),
+        *(
+            key
+            for end, value in (("low", -1.2), ("high", 1.2))
+            for key in (
+                Key(
+                    f"joint limits.{half}.{end}",
+                    MAP,
+                    doc="low = high locks an axis, low > high frees it",
+                    fault=Fault.VALUE,
+                ),
+                *each(
+                    "xyz",
+                    N,
+                    f"joint limits.{half}.{end}.{{}}",
+                    value,
+                    unit,
+                    f"{end} end of axis {{}}",
+                    fault=Fault.VALUE,
+                ),
+            )
+        ),
+    )
+
+
+JOINT = (
+    *IDENTITY,
+    Key("parent", T, "", doc="parent body, §4.5", required=True, fault=Fault.OBJECT),
+    Key("child", T, "", doc="child body, §4.5", required=True, fault=Fault.OBJECT),
+    Key("type", C, doc="joint type, §14", required=True, choices=JOINT_TYPES),
+    Key("parent pivot", V, unit="m", doc="joint origin in the parent's body frame", required=True),
+    Key("child pivot", V, unit="m", doc="joint origin in the child's body frame", required=True),
+    Key("parent axis", V, doc="joint axis in the parent's body frame", required=True),
+    Key("child axis", V, doc="joint axis in the child's body frame", required=True),
+    Key("offset", N, None, "rad", "rotation of the child about the axis at joint position 0"),
+    Key("child offset", N, 0.0, "rad", "old name of `offset`, which wins"),
+    Key("joint offset", N, 0.0, "rad", "rotation of the constraint frame about the axis"),
+    Key("joint limits", MAP, doc="unlimited unless both ends are given"),
+    Key("joint limits.low", N, unit="rad, m", doc="lower limit"),
+    Key("joint limits.high", N, unit="rad, m", doc="upper limit"),
+    *each("xyz", N, "joint limits.{}", 0.7, "rad", "half angle of a cone twist about frame {}"),
+    *_limits("linear", "m"),
+    *_limits("angular", "rad"),
+    *gains("controller", "joint PID, §15.6", required=False),
+    OUTPUT_TYPE,
+    Key("max motor impulse", N, 0.1, "N·m·s, N·s", "motor strength for each ms"),
+    Key("joint erp", N, 0.1, doc="error reduction of the constraint, §15.4"),
+    Key("joint cfm", N, 0.1, doc="constraint force mixing, §15.4"),
+    *_six("damping", 0.7, "N·s/m, N·m·s/rad", "damper of a spring; revolute and prismatic joints ignore it"),
+    *_six("stiffness", 1.0, "N/m, N·m/rad", "spring"),
+    *_six("equilibrium point", 0.0, "m, rad", "rest position; the middle of the limits when absent"),
+    Key("enable feedback", F, False, doc="compute effort and wrench"),
+    Key("enable motor", Type.ANY, doc="0 or false: no position commands"),
+    Key("ignore inter-collision", F, True, doc="the two bodies do not collide"),
+    *ignored(("detached", "redundant"), "hint for importers"),
+    *ignored(("controller gains",), "not the controller's key, which is `controller`"),
+    *ignored(("origin", "axis"), "of AMBF 1.0; pivots and axes replaced it"),
+    ROD,
+)
+GHOST = (
+    *IDENTITY,
+    *PARENT,
+    *LOOKS,
+    *COLLISION,
+    Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame"),
+    Key("inertial offset", POSE, None, "m, rad", "taken when `collision offset` is absent"),
+    *ignored(("mass", "inertia", "friction", "damping", "restitution"), "a ghost has no mechanics"),
+)
+
+_STATUS = Status.NOT_SIMULATED
+_SOFT_NUMBERS = {
+    "kLST": "linear stiffness", "kAST": "angular stiffness", "kVST": "volume stiffness",
+    "kVCF": "velocity correction", "kDP": "damping", "kDG": "drag", "kLF": "lift", "kPR": "pressure",
+    "kVC": "volume conservation", "kDF": "dynamic friction", "kMT": "pose matching",
+    "kCHR": "rigid contact hardness", "kKHR": "kinetic contact hardness", "kSHR": "soft contact hardness",
+    "kAHR": "anchor hardness", "kSRHR_CL": "hardness of cluster against rigid",
+    "kSKHR_CL": "hardness of cluster against kinetic", "kSSHR_CL": "hardness of cluster against soft",
+    "kSR_SPLT_CL": "impulse split of cluster against rigid", "kSK_SPLT_CL": "impulse split of cluster against kinetic",
+    "kSS_SPLT_CL": "impulse split of cluster against soft", "maxvolume": "largest volume ratio",
+    "timescale": "time scale",
+}  # fmt: skip
+_SOFT_INTEGERS = {
+    "viterations": "velocity iterations", "piterations": "position iterations", "diterations": "drift iterations",
+    "citerations": "cluster iterations", "flags": "collision flags",
+    "bending constraint": "distance of the bending links", "clusters": "number of clusters",
+}  # fmt: skip
+SOFT_BODY = (
+    *IDENTITY,
+    *PARENT,
+    *LOOKS,
+    *COLLISION,
+    Key("location", POSE, POSE_ZERO, "m, rad", "initial pose", status=_STATUS),
+    Key("mass", N, 1.0, "kg", "total mass, spread evenly over the nodes", status=_STATUS, least=0.0),
+    Key("randomize constraints", F, doc="any value randomises", status=_STATUS),
+    Key("config", MAP, doc="Bullet's soft-body parameters, §20", status=_STATUS),
+    *(Key(f"config.{k}", N, doc=doc, status=_STATUS) for k, doc in _SOFT_NUMBERS.items()),
+    *(Key(f"config.{k}", I, doc=doc, status=_STATUS) for k, doc in _SOFT_INTEGERS.items()),
+    Key("config.fixed nodes", Type.INTEGERS, (), doc="nodes of infinite mass", status=_STATUS),
+    *ignored(("config.cutting", "config.margin"), "no effect"),
+    *ignored(
+        (
+            "inertial offset", "inertia", "controller", "controller output type", "gravity", "friction", "damping",
+            "restitution",
+        ),
+        "no effect on a soft body",
+    ),
+)  # fmt: skip
+_POWER = ("engine", "brake")
+_SUSPENSION = {"stiffness": "N/m", "damping": "N·s/m", "compression": "N·s/m", "rest length": "m"}
+VEHICLE = (
+    *IDENTITY,
+    *PARENT,
+    Key("chassis", T, "", doc="chassis body of an earlier file", required=True, fault=Fault.OBJECT, status=_STATUS),
+    Key("wheels", Type.MAPS, doc="wheels", status=_STATUS),
+    Key("wheels[].body", T, "", doc="body that shows the wheel", status=_STATUS),
+    Key("wheels[].mesh", P, "", doc="mesh that shows the wheel", status=_STATUS),
+    Key("wheels[].radius", N, unit="m", doc="radius", status=_STATUS),
+    *ignored(("wheels[].width",), "no effect"),
+    Key("wheels[].friction", N, doc="friction slip of Bullet's vehicle", status=_STATUS),
+    Key("wheels[].roll influence", N, doc="share of the rolling moment", status=_STATUS),
+    Key("wheels[].suspension", MAP, doc="suspension", status=_STATUS),
+    *(
+        Key(f"wheels[].suspension.{k}", N, None, unit, k, required=True, status=_STATUS)
+        for k, unit in _SUSPENSION.items()
+    ),
+    Key("wheels[].down direction", V, ZERO, doc="direction of the wheel's ray, in the chassis frame", status=_STATUS),
+    Key("wheels[].axel direction", V, ZERO, doc="direction of the axle, in the chassis frame", status=_STATUS),
+    Key("wheels[].offset", V, ZERO, "m", "connection point, in the chassis frame", status=_STATUS),
+    Key("wheels[].front", F, False, doc="whether the wheel steers", status=_STATUS),
+    Key("wheels[].steering limits", MAP, doc="limits of steering", status=_STATUS),
+    *each(("low", "high"), N, "wheels[].steering limits.{}", 0.0, "rad", "{} limit", required=True, status=_STATUS),
+    *each(_POWER, N, "wheels[].max {} power", 0.0, "N", "largest force", status=_STATUS),
+    *ignored(("high resolution path",), "no effect"),
+)
+SUTURE = (
+    *IDENTITY,
+    Key("length", N, unit="m", doc="length of the thread", required=True),
+    Key("diameter", N, unit="m", doc="diameter; or give `USP size`"),
+    Key("USP size", T, "", doc="such as 2-0"),
+    Key("density", N, 1200.0, "kg/m³", "density"),
+    Key("youngs modulus", N, 2.0e9, "Pa", "Young's modulus"),
+    Key("poisson ratio", N, 0.4, doc="ratio that gives the shear modulus"),
+    Key("damping time", N, 0.002, "s", "bending damping over bending stiffness"),
+    Key("elements", U, 40, doc="number of elements"),
+    Key("friction", N, 0.3, doc="friction coefficient"),
+    Key("location", POSE, POSE_ZERO, "m, rad", "pose of the start; the thread leaves along +z"),
+    Key("parent", T, "", doc="body that the start is fixed to; `location` is then in its frame"),
+    *(key for key in COLOUR if key.path.startswith("color rgba")),
+)

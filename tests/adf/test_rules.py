@@ -1,0 +1,95 @@
+"""Findings that take more than one key: each rule says what is wrong, where, and what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ligature.adf import Resolver, Severity, read_any
+
+JOINT = (
+    "joints: [J]\nJ:\n  name: j\n  parent: A\n  child: B\n  type: {type}\n"
+    "  parent pivot: {{x: 0, y: 0, z: 0}}\n  child pivot: {{x: 0, y: 0, z: 0}}\n"
+    "  parent axis: {{x: 0, y: 0, z: 1}}\n  child axis: {{x: 0, y: 0, z: 1}}\n{keys}"
+)
+CAMERA = "environment: e.yaml\ncameras: [C]\nC:\n  name: c\n  namespace: /a/\n{keys}"
+OBJECT = "{list}: [X]\nX:\n  name: x\n{keys}"
+
+
+def findings(tmp_path: Path, text: str, least: Severity = Severity.DEBUG) -> str:
+    (tmp_path / "m.yaml").write_text(text, encoding="utf-8")
+    found = read_any(tmp_path / "m.yaml", Resolver([tmp_path])).diagnostics
+    return "\n".join(str(d).split("/m.yaml:", 1)[1] for d in found if d.severity >= least)
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "words"),
+    [
+        ("revolute", "  joint limits: {low: -1}\n", "has only 'low' of its limits, so it is unlimited"),
+        ("torsion spring", "  stiffness: 1\n", "is a torsion spring without limits, which locks it"),
+        (
+            "cone twist",
+            "  joint limits: {x: 1, y: 1}\n",
+            "error: joint 'J' is a cone twist without 'z' in 'joint limits'",
+        ),
+        ("six dof", "  damping: 0.5\n", "is a six dof joint with one number as 'damping'; write damping: {linear:"),
+        (
+            "revolute",
+            "  stiffness: {linear: {x: 1}}\n",
+            "is a revolute joint with a block as 'stiffness'; give one number",
+        ),
+        (
+            "fixed",
+            "  joint limits: {low: -1.2, high: 1.2}\n",
+            "debug: joint 'J' is fixed, so 'joint limits' has no effect",
+        ),
+        ("revolute", "  offset: 1\n  child offset: 2\n", "has 'offset' too, which wins; remove one"),
+    ],
+)
+def test_joint_keys_that_contradict_the_type_are_told(tmp_path: Path, kind: str, keys: str, words: str) -> None:
+    assert words in findings(tmp_path, JOINT.format(type=kind, keys=keys))
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("  look at: {x: 0, y: 0, z: 0}\n", "looks nowhere, so it has no orientation"),
+        ("  look at: {x: 0, y: 0, z: 1}\n", "'look at' is a point, and 'up' is not along the line of sight"),
+        (
+            "  look at: {x: 1, y: 0, z: 0}\n  clipping plane: {near: 2, far: 1}\n",
+            "sees from 2 m to 1 m; 0 < near < far",
+        ),
+        (
+            "  look at: {x: 1, y: 0, z: 0}\n  publish image interval: 0\n",
+            "has 0 as 'publish image interval'; 1 is taken",
+        ),
+    ],
+)
+def test_cameras_that_show_nothing_are_told(tmp_path: Path, keys: str, words: str) -> None:
+    assert words in findings(tmp_path, CAMERA.format(keys=keys))
+
+
+@pytest.mark.parametrize(
+    ("list_", "keys", "words"),
+    [
+        ("bodies", "  collision shape: BOX\n  collision geometry: {x: 1, y: 1}\n", "is a BOX without 'z' in 'collision geometry'"),
+        ("bodies", "  compound collision shape: []\n", "has an empty 'compound collision shape'"),
+        ("bodies", "  namespace: /a\n", "has a namespace without '/' at its end; write '/a/'"),
+        ("bodies", "  publish frequency: {low: 9, high: 3}\n", "publishes at 9 Hz without commands and at 3 Hz with them"),
+        ("bodies", "  plugins: [{name: p}]\n", "a plug-in of body 'X' lacks name or filename; it is left out"),
+        ("sensors", "  type: proximity\n", "has no rays, so it senses nothing; give array, mesh or parametric"),
+        ("sensors", "  type: contact\n  distance threshold: -1\n", "asks for penetration; 0 is contact"),
+        ("bodies", "  mass: -1\n", "'mass' of body 'X' is not usable; expected at least 0, not -1"),
+    ],
+)  # fmt: skip
+def test_objects_that_cannot_work_are_told(tmp_path: Path, list_: str, keys: str, words: str) -> None:
+    assert words in findings(tmp_path, OBJECT.format(list=list_, keys=keys))
+
+
+def test_a_sound_object_draws_no_finding(tmp_path: Path) -> None:
+    keys = "  mass: 1\n  namespace: /a/\n  collision shape: SPHERE\n  collision geometry: {radius: 1}\n"
+    assert findings(tmp_path, OBJECT.format(list="bodies", keys=keys)) == ""
+
+
+def test_a_listed_object_under_a_slightly_different_name_is_suggested(tmp_path: Path) -> None:
+    assert "did you mean 'BODY arm'?" in findings(tmp_path, "bodies: [BODY Arm]\nBODY arm:\n  name: a\n  mass: 1\n")
