@@ -19,6 +19,7 @@ from ligature.mesh import distance
 
 SOURCES = (
     "bonds", "chain", "contacts", "coupling", "layout", "placing", "reactions", "rotations", "step", "substeps",
+    "tables",
 )  # fmt: skip
 """Modules of this room that hold kernels."""
 

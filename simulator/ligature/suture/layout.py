@@ -128,6 +128,34 @@ class Work(NamedTuple):
     group_box: Array  # (elements, 2, 3)
 
 
+def nodes(total: int) -> Nodes:
+    """``total`` nodes of mass 1 at the origin, at rest."""
+    z = np.zeros
+    return Nodes(
+        mass=np.ones(total), inertia=np.ones((total, 3)), fixed=np.zeros(total, np.bool_), gravity=z((total, 3)),
+        keep=np.ones((total, 2)), x=z((total, 3)), q=np.tile([0.0, 0.0, 0.0, 1.0], (total, 1)), v=z((total, 3)),
+        w=z((total, 3)), radius=z(total), friction=np.ones(total), axis=z((total, 2, 3)),
+    )  # fmt: skip
+
+
+def joints(n: int) -> Joints:
+    """Room for ``n`` joints."""
+    z = np.zeros
+    return Joints(
+        pivot=z((n, 2, 3)), frame=z((n, 2, 4)), give=z(n), stiffness=z((n, 3)), damping=z((n, 3)), rest=z((n, 3)),
+        low=z((n, 3)), high=z((n, 3)), stop=z(n), angle=z((n, 3)), load=z((n, 6)),
+    )  # fmt: skip
+
+
+def no_shapes(elements: int) -> Shapes:
+    """The shapes around a rod of ``elements`` elements that touches nothing but itself."""
+    z = np.zeros
+    return Shapes(
+        np.zeros(0, np.int64), np.zeros(0, np.int64), z((0, 3)), z((0, 4)), np.zeros((0, 2), np.int64),
+        z((0, 7)), z((0, 2, 3)), z(0), z(0), np.zeros((0, elements), np.bool_),
+    )  # fmt: skip
+
+
 def work(n: int, total: int, elements: int, contacts: int) -> Work:
     """Scratch for ``n`` chain nodes (``elements`` of the rod), ``total`` nodes and ``contacts`` contact points."""
     z = np.zeros

@@ -20,6 +20,7 @@ from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
 from ligature.suture.placing import bounds
 from ligature.suture.substeps import run_tick
+from ligature.suture.tables import table_of
 
 Array = NDArray[np.float64]
 
@@ -106,10 +107,12 @@ class Rod:
         self._total = self._chain + len(rest)
         self.joints = _joints(description, head, tail)
         self._nodes = self._new_nodes()
-        self._shapes = shapes or _no_shapes(n)
+        self._shapes = shapes or layout.no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
         self._work = layout.work(self._chain, self._total, n, capacity)
         self._touches = tuple(layout.touches(capacity) for _ in range(3))
+        self._tables = [table_of(group) for group in (self._nodes, self.joints, self._shapes, self._work)]
+        self._touch_tables = {id(touches): table_of(touches) for touches in self._touches}
         self._shape_poses = np.zeros_like(self._shapes.pose)
         self._counts = np.zeros(4, np.int64)
         self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
@@ -129,13 +132,8 @@ class Rod:
     # --- building ---------------------------------------------------------------------------
 
     def _new_nodes(self) -> layout.Nodes:
-        total, own, description = self._total, self._own, self.description
-        nodes = layout.Nodes(
-            mass=np.ones(total), inertia=np.ones((total, 3)), fixed=np.zeros(total, np.bool_),
-            gravity=np.zeros((total, 3)), keep=np.ones((total, 2)), x=np.zeros((total, 3)),
-            q=np.tile([0.0, 0.0, 0.0, 1.0], (total, 1)), v=np.zeros((total, 3)), w=np.zeros((total, 3)),
-            radius=np.zeros(total), friction=np.ones(total), axis=np.zeros((total, 2, 3)),
-        )  # fmt: skip
+        own, description = self._own, self.description
+        nodes = layout.nodes(self._total)
         nodes.mass[own], nodes.inertia[own] = description.mass, description.inertia
         nodes.gravity[own], nodes.radius[own] = description.gravity, description.radius
         nodes.friction[own], nodes.axis[own] = description.friction, description.ends
@@ -309,11 +307,12 @@ class Rod:
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds what each partner receives."""
         a, b, c = self._touches
+        last, next_, spare = (self._touch_tables[id(touches)] for touches in self._touches)
+        nodes, joints, shapes, work = self._tables
         grips, points = self._bonds
         run_tick(
-            self._first, self._chain, self._total, self._nodes, self.joints, self._shapes, self._shape_poses,
-            a, b, c, self._work, grips, points, self._counts, self._self_skip, self._stiffness,
-            self.impulse, self.tension, self.dt,
+            self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
+            work, grips, points, self._counts, self._self_skip, self._stiffness, self.impulse, self.tension, self.dt,
         )  # fmt: skip
         self.newton_steps = int(self._counts[2])
         self._touches = (c, a, b) if self._counts[3] else (b, c, a)
@@ -371,12 +370,4 @@ def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> 
         pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), give=np.array(give),
         **arrays, stop=np.maximum(100.0 * bending, 100.0 * weight * span),
         angle=np.zeros((n, 3)), load=np.zeros((n, 6)),
-    )  # fmt: skip
-
-
-def _no_shapes(n: int) -> layout.Shapes:
-    z = np.zeros
-    return layout.Shapes(
-        np.zeros(0, np.int64), np.zeros(0, np.int64), z((0, 3)), z((0, 4)), np.zeros((0, 2), np.int64),
-        z((0, 7)), z((0, 2, 3)), z(0), z(0), np.zeros((0, n), np.bool_),
     )  # fmt: skip

@@ -7,12 +7,20 @@ axes, SI units.
 
 from __future__ import annotations
 
+from ligature.suture import layout
 from ligature.suture.bonds import place_bonds
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.contacts import detect
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
+from ligature.suture.tables import opener
+
+open_nodes = opener(layout.nodes(1))
+open_joints = opener(layout.joints(1))
+open_shapes = opener(layout.no_shapes(1))
+open_touches = opener(layout.touches(1))
+open_work = opener(layout.work(2, 2, 1, 1))
 
 REFINEMENT, MAX_PARTS = 4, 16
 """How many steps take the place of one that did not settle, and the most in a tick."""
@@ -78,14 +86,16 @@ def _one_step(
 
 @kernel
 def run_tick(
-    first, n, total, nodes, joints, shapes, shape_poses, a, b, c, work, grips, points, counts, self_skip,
-    stiffness, impulse, tension, dt,
+    first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, spare, work_table, grips,
+    points, counts, self_skip, stiffness, impulse, tension, dt,
 ):  # fmt: skip
-    """One tick; contacts of the last one are in ``a``, those of this one go to ``b``, or ``c``.
+    """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``spare``.
 
-    ``counts`` returns: contacts found, contacts for which there was no room, Newton steps, and whether
-    the contacts lie in ``c``.
+    Groups of arrays come as the tables of `ligature.suture.tables`. ``counts`` returns: contacts found,
+    contacts for which there was no room, Newton steps, and whether the contacts lie in ``spare``.
     """
+    nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
+    a, b, c, work = open_touches(last), open_touches(next_), open_touches(spare), open_work(work_table)
     _keep(nodes, joints, work)
     _copy2(shapes.pose, shape_poses)
     parts, steps, settled, in_c = 1, 0, False, False
