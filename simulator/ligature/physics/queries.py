@@ -19,6 +19,7 @@ from ligature.model.hits import Contact, RayHits
 from ligature.model.scene import Collider, Scene
 from ligature.physics import shapes
 from ligature.physics.bodies import Placement
+from ligature.physics.wrenches import about, contact_wrench, fixed_wrench
 
 Array = NDArray[np.float64]
 
@@ -43,6 +44,7 @@ class BulletQueries:
 
     scene: Scene
     client: int
+    dt: float
     place_of: dict[int, Placement]
     _cache: CollisionCache
 
@@ -53,6 +55,7 @@ class BulletQueries:
         self._probes: list[int] = []
         self._held: dict[int, _Held] = {}
         self._next_handle = 0
+        self._impulses: dict[int, Array] = {}
         for colliders, margin in probes:
             self.add_probe(colliders, margin)
 
@@ -134,6 +137,34 @@ class BulletQueries:
         """Let go what `add_fixed` holds."""
         held = self._held.pop(handle)
         pybullet.removeConstraint(held.constraint, physicsClientId=self.client)
+
+    def contact_wrench(self, bodies: Sequence[int], point: Array) -> Array:
+        """Force and moment (6,) about ``point`` (3,) that the rest of the world exerted on ``bodies`` in the last tick.
+
+        Counted are contacts, holds of actuators, and all that was given to `apply_impulse`: rods, grasps, tissue.
+        Gravity, inertia and what the bodies do to each other are not.
+        """
+        places = [self.place_of[body] for body in bodies if body in self.place_of]
+        own = {(place.uid, place.link) for place in places}
+        wrench = np.zeros(6)
+        for uid in dict.fromkeys(place.uid for place in places):
+            links = {link for owner, link in own if owner == uid}
+            wrench += contact_wrench(self.client, uid, links, own, point)
+        inside = set(bodies)
+        for held in self._held.values():
+            if (held.parent in inside) != (held.child in inside):
+                sign = 1.0 if held.parent in inside else -1.0
+                wrench += sign * self._hold_wrench(held, point)
+        for body in inside & self._impulses.keys():
+            wrench += about(self._impulses[body] / self.dt, self.place_of[body].centre(), point)
+        return wrench
+
+    def _hold_wrench(self, held: _Held, point: Array) -> Array:
+        """Wrench (6,) of a hold on its parent."""
+        pose, twist = np.empty(7), np.empty(6)
+        self.place_of[held.parent].read_inertial(pose, twist)
+        in_parent = inverse(self.scene.bodies[held.parent].T_body_inertial) @ held.T_parent_frame
+        return fixed_wrench(self.client, held.constraint, pose, in_parent, point)
 
     def held_constraints(self) -> dict[int, _Held]:
         """The grasps that hold, to be made again after a rebuild."""

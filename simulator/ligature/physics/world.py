@@ -129,6 +129,7 @@ class World(BulletQueries):
 
     def pre_step(self) -> None:
         """Controllers, springs and gravity of the coming tick."""
+        self._impulses.clear()
         for control in self._controls:
             if control.active:
                 control.read()
@@ -189,6 +190,7 @@ class World(BulletQueries):
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,)."""
         place = self.place_of[body]
+        self._impulses[body] = self._impulses.get(body, 0.0) + np.concatenate([impulse, moment])
         place.push(impulse / self.dt)
         place.twist(moment / self.dt)
 
