@@ -1,8 +1,8 @@
 """Ligature: an open simulator for robot-assisted suturing."""
 
+from ligature.in_process import Simulation
 from ligature.model.load import SceneError, load
 from ligature.model.scene import Scene
-from ligature.simulation import Simulation
 
 __version__ = "0.1.0"
 

@@ -30,7 +30,7 @@ from ligature.model.commands import (
     check,
 )
 from ligature.model.lookup import find_by_text
-from ligature.model.scene import Body, Joint, Scene
+from ligature.model.scene import Body, Camera, Joint, Scene
 from ligature.model.state import StateRecord, new_state
 from ligature.physics import World
 from ligature.sensing.actuators import Actuators
@@ -55,17 +55,22 @@ class Snapshot:
 
 
 class Handles(Mapping[str, Handle], Generic[Handle]):
-    """Objects of one kind by topic name, identifier, or any part of these that only one of them has."""
+    """Objects of one kind by topic name, identifier, name, or any part of these that only one of them has."""
 
-    def __init__(self, kind: str, items: Sequence[Body] | Sequence[Joint], handles: Sequence[Handle]) -> None:
+    def __init__(
+        self, kind: str, items: Sequence[Body] | Sequence[Joint] | Sequence[Camera], handles: Sequence[Handle]
+    ) -> None:
         self._kind = kind
         self._names = ([i.identity.topic for i in items], [i.identity.identifier for i in items])
+        self._bare_names = [i.identity.name for i in items]
         self._handles = list(handles)
 
     def __getitem__(self, text: str) -> Handle:
         for names in self._names:
             if text in names:
                 return self._handles[names.index(text)]
+        if self._bare_names.count(text) == 1:
+            return self._handles[self._bare_names.index(text)]
         for names in self._names:
             found = find_by_text(names, text)
             if found is not None:

@@ -45,8 +45,8 @@ def test_depth_of_a_sphere_follows_its_equation(drawn) -> None:
     K = view.intrinsics
     rows, columns = np.nonzero(frame.ids == 2)
     depth = frame.depth[rows, columns]
-    x = (columns + 0.5 - K[0, 2]) / K[0, 0] * depth
-    y = (rows + 0.5 - K[1, 2]) / K[1, 1] * depth
+    x = (columns - K[0, 2]) / K[0, 0] * depth
+    y = (rows - K[1, 2]) / K[1, 1] * depth
     radius = np.sqrt(x**2 + y**2 + (depth - 1.0) ** 2)
     # the drawn sphere has 32 facets around: it lies within 0.5 % of the radius inside the true one
     assert radius.max() < 0.3 + 1e-5 and radius.min() > 0.3 * 0.985
@@ -62,8 +62,8 @@ def test_ids_split_the_picture_where_the_silhouette_is(drawn) -> None:
 def test_a_known_point_is_seen_where_the_intrinsics_say(drawn) -> None:
     frame, view = drawn
     rows, columns = np.nonzero(frame.ids == 2)
-    assert columns.mean() + 0.5 == pytest.approx(view.intrinsics[0, 2], abs=0.1)
-    assert rows.mean() + 0.5 == pytest.approx(view.intrinsics[1, 2], abs=0.1)
+    assert columns.mean() == pytest.approx(view.intrinsics[0, 2], abs=0.1)
+    assert rows.mean() == pytest.approx(view.intrinsics[1, 2], abs=0.1)
 
 
 def test_normals_of_the_wall_face_the_camera(drawn) -> None:

@@ -1,8 +1,8 @@
 """Camera mathematics: projection, view and intrinsics of an ADF camera.
 
 Camera frame C (ADF specification §18.1): the camera looks along -X, +Y is image right, +Z image up.
-OpenGL eye frame: x right, y up, -z forward. OpenCV frame: x right, y down, z forward. Pixels have
-their centres at half-integers in OpenGL and at integers in `intrinsics`. Metres and radians.
+OpenGL eye frame: x right, y up, -z forward. Pinhole matrices count pixels as `ligature.model.optics` does.
+Metres and radians.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.frames import pose7_matrix
+from ligature.model.optics import eye_offset, eye_pose, pinhole
 from ligature.model.scene import Camera
 
 Array = NDArray[np.float64]
@@ -37,13 +37,17 @@ class CameraView:
     height: int
 
     @property
+    def orthographic(self) -> bool:
+        """Whether rays are parallel."""
+        return bool(self.projection[3, 3] != 0.0)
+
+    @property
     def intrinsics(self) -> Array:
-        """Pinhole matrix K (3, 3) in pixels, x right, y down, of a perspective projection."""
-        p = self.projection
-        fx, fy = p[0, 0] * self.width / 2, p[1, 1] * self.height / 2
-        cx = (1 - p[0, 2]) * self.width / 2
-        cy = (1 + p[1, 2]) * self.height / 2
-        return np.array([[fx, -p[0, 1] * self.width / 2, cx], [0, fy, cy], [0, 0, 1]])
+        """Pinhole matrix K (3, 3) in pixels; pixel centres are whole numbers.
+
+        Of an orthographic view it takes metres, not directions, to pixels.
+        """
+        return pinhole(self.projection, self.width, self.height)
 
 
 def view_matrix(T_world_camera: Array) -> Array:
@@ -96,8 +100,11 @@ def from_intrinsics(values: dict[str, float], width: int, height: int, near: flo
     )
 
 
-def projection_matrix(camera: Camera, width: int, height: int) -> Array:
-    """OpenGL projection (4, 4) of an ADF camera for a picture of ``width`` x ``height`` pixels."""
+def projection_matrix(camera: Camera, width: int, height: int, eye: str = "") -> Array:
+    """OpenGL projection (4, 4) of an ADF camera, or one of its eyes, for a picture of ``width`` x ``height`` pixels.
+
+    The frustum of an eye leans towards the middle by a quarter of the separation at the focal length (§18.2).
+    """
     near, far = camera.near, camera.far
     if camera.intrinsics is not None:
         return from_intrinsics(camera.intrinsics, width, height, near, far)
@@ -105,17 +112,37 @@ def projection_matrix(camera: Camera, width: int, height: int) -> Array:
         return np.asarray(camera.projection, dtype=float)
     if camera.orthographic_width is not None:
         return orthographic(camera.orthographic_width, width / height, near, far)
-    return perspective(camera.field_of_view, width / height, near, far)
+    projection = perspective(camera.field_of_view, width / height, near, far)
+    if camera.stereo is not None:
+        projection[0, 2] = -0.5 * eye_offset(camera, eye) / camera.stereo[1] * projection[0, 0]
+    return projection
 
 
-def view_of(camera: Camera, pose: Array, resolution: tuple[int, int] | None = None) -> CameraView:
-    """The view of ``camera`` standing at ``pose`` (7,) in world axes."""
+def view_of(camera: Camera, pose: Array, resolution: tuple[int, int] | None = None, eye: str = "") -> CameraView:
+    """The view of ``camera``, or of its eye ``"left"`` or ``"right"``, standing at ``pose`` (7,) in world axes."""
     width, height = resolution or camera.resolution
     return CameraView(
-        view_matrix(pose7_matrix(np.asarray(pose))),
-        projection_matrix(camera, width, height),
+        view_matrix(eye_pose(camera, np.asarray(pose), eye)),
+        projection_matrix(camera, width, height, eye),
         camera.near,
         camera.far,
         width,
         height,
     )
+
+
+def unproject(depth: NDArray[np.float32], view: CameraView) -> NDArray[np.float32]:
+    """Points (h, w, 3) in the optical frame of linear ``depth`` (h, w); NaN where nothing is."""
+    height, width = depth.shape
+    K = view.intrinsics
+    v = (np.arange(height) - K[1, 2]) / K[1, 1]
+    u = (np.arange(width)[None, :] - K[0, 2] - K[0, 1] * v[:, None]) / K[0, 0]
+    z = np.where(np.isfinite(depth), depth, np.float32(np.nan))
+    reach = np.float32(1.0) if view.orthographic else z
+    points = np.empty((height, width, 3), dtype=np.float32)
+    points[..., 0] = u.astype(np.float32) * reach
+    points[..., 1] = v.astype(np.float32)[:, None] * reach
+    points[..., 2] = z
+    if view.orthographic:
+        points[~np.isfinite(depth)] = np.nan
+    return points

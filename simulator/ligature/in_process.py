@@ -1,0 +1,25 @@
+"""The simulation as Python users have it: with cameras, which stand on the simulation and so cannot be a part of it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from ligature import simulation
+
+if TYPE_CHECKING:
+    from ligature.render.cameras import CameraHandle
+
+
+class Simulation(simulation.Simulation):
+    """A running scene (`ligature.simulation.Simulation`) that can be looked at.
+
+    OpenGL is loaded when ``cameras`` is used for the first time, and a context is made at the first picture.
+    """
+
+    @cached_property
+    def cameras(self) -> simulation.Handles[CameraHandle]:
+        """Cameras of the scene by name; raises ImportError where OpenGL's Python package is missing."""
+        from ligature.render.cameras import camera_handles
+
+        return camera_handles(self)

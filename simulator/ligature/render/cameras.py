@@ -1,0 +1,101 @@
+"""The cameras of a running simulation: pictures on demand, of the state as it is.
+
+Poses are x y z qx qy qz qw of the camera frame, world axes; the camera looks along -X. Metres, pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.commands import PlaceCommand
+from ligature.model.optics import Calibration, stereo_partners
+from ligature.model.scene import Camera, Scene
+from ligature.render.calibration import calibrations
+from ligature.render.camera import CameraView, view_of
+from ligature.render.renderer import Frame, Renderer
+from ligature.render.sensor import IDEAL, ImageSensor
+from ligature.simulation import Handles, Simulation
+
+Array = NDArray[np.float64]
+
+
+class Studio:
+    """Draws the cameras of one scene with one renderer, which is made when the first picture is taken."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.partners = stereo_partners(scene)
+        self.handles: list[CameraHandle] = []
+
+    @cached_property
+    def renderer(self) -> Renderer:
+        """The renderer; raises `RenderUnavailable` where no OpenGL can be had."""
+        return Renderer(self.scene)
+
+
+class CameraHandle:
+    """One camera of a running simulation.
+
+    ``camera`` is its description; put another one there (`dataclasses.replace`) to change the lens.
+    """
+
+    def __init__(self, simulation: Simulation, studio: Studio, camera: Camera) -> None:
+        self._simulation, self._studio = simulation, studio
+        self.camera = camera
+
+    @property
+    def pose(self) -> Array:
+        """Pose (7,) in world axes."""
+        return np.array(self._simulation.state["camera_world"][0, self.camera.index])
+
+    def place(self, pose: Sequence[float]) -> None:
+        """Put the camera at ``pose`` (7,) in its parent's frame, from the next tick on."""
+        self._simulation.apply(PlaceCommand("camera", self.camera.index, tuple(map(float, pose))))
+
+    def view(self, resolution: tuple[int, int] | None = None, eye: str = "") -> CameraView:
+        """What is to be drawn now: eye pose, projection and the pinhole matrix ``intrinsics``."""
+        return view_of(self.camera, self.pose, resolution, eye)
+
+    def capture(
+        self, resolution: tuple[int, int] | None = None, *, eye: str = "", sensor: ImageSensor = IDEAL
+    ) -> Frame:
+        """Take a picture of the state as it is: ``rgb``, ``depth``, ``ids`` and ``normals``.
+
+        Parameters
+        ----------
+        resolution
+            Width and height in pixels; the camera's own when not given.
+        eye
+            ``"left"`` or ``"right"`` of a camera with a ``stereo`` block.
+        sensor
+            What the lens and the sensor do to the picture; nothing when not given.
+
+        Raises
+        ------
+        RenderUnavailable
+            When the machine has no OpenGL.
+        """
+        state = self._simulation.state
+        view = self.view(resolution, eye)
+        frame = self._studio.renderer.render(state, sensor.view(view))
+        return sensor.expose(frame, view, (self.camera.index, int(state["tick"][0])))
+
+    def calibration(
+        self, resolution: tuple[int, int] | None = None, *, eye: str = "", sensor: ImageSensor = IDEAL
+    ) -> Calibration:
+        """What a calibration would find; in a stereo pair the right one holds the baseline."""
+        cameras = [handle.camera for handle in self._studio.handles]
+        lenses = {camera.index: sensor.distortion for camera in cameras}
+        poses = self._simulation.state["camera_world"][0]
+        return calibrations(cameras, poses, self._studio.partners, lenses, resolution)[self.camera.index, eye]
+
+
+def camera_handles(simulation: Simulation) -> Handles[CameraHandle]:
+    """All cameras of ``simulation`` by name."""
+    studio = Studio(simulation.scene)
+    studio.handles = [CameraHandle(simulation, studio, camera) for camera in simulation.scene.cameras]
+    return Handles("camera", simulation.scene.cameras, studio.handles)
