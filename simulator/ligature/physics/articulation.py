@@ -1,7 +1,9 @@
-"""Builds one Bullet multibody from one articulation of the scene.
+"""Builds the Bullet multibody of one articulation of the scene.
 
 Link frames sit at the joints' constraint frames; the inertial frame of each link is the ADF
-inertial frame I of its body, so that Bullet's centre-of-mass pose is the pose of I.
+inertial frame I of its body, so that Bullet's centre-of-mass pose is the pose of I. A static root with
+links below it stands as a body of its own beside a base without shape: for what touches the root
+Bullet would otherwise work through all links, in three rows a contact point.
 """
 
 from __future__ import annotations
@@ -25,6 +27,9 @@ LIGHT = 1e-3
 
 LEAST_INERTIA = 1e-12
 """Moments below this (kg·m²) are replaced by those of a 1 cm ball: Bullet cannot invert them."""
+
+LIMIT_SLACK = 1e-9
+"""Travel in metres or radians beyond a limit: a joint at rest exactly on it would cost Bullet a constraint row."""
 
 
 @dataclass
@@ -54,9 +59,13 @@ class _Plan:
 
 @dataclass
 class Tree:
-    """A Bullet multibody: its id, link of each body (-1 is the base), and its single axes by link."""
+    """A Bullet multibody: its id, link of each body (-1 is the base), and its single axes by link.
+
+    ``stand`` is the id under which the root's shapes stand: ``uid``, or a static body of their own.
+    """
 
     uid: int
+    stand: int
     root: int
     link_of: dict[int, int]
     axes: list[tuple[int, int, Axis, float]]
@@ -67,6 +76,16 @@ class Tree:
     def moving_links(self) -> list[int]:
         """Links that carry a body."""
         return [link for link in self.link_of.values() if link >= 0]
+
+    def place(self, body: int) -> tuple[int, int]:
+        """Bullet's id and link of a body."""
+        link = self.link_of[body]
+        return (self.stand, -1) if link < 0 else (self.uid, link)
+
+    @property
+    def bases(self) -> tuple[int, ...]:
+        """The ids that move when the root is put elsewhere."""
+        return (self.uid,) if self.stand == self.uid else (self.stand, self.uid)
 
 
 def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articulation) -> Tree:
@@ -82,12 +101,19 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         inner = articulation.links[link.parent_link].body
         _append(plan, client, cache, bodies[link.body], joints[link.joint], inner, link_of, T_link_inertial, axes)
     T_world_inertial = root.T_world_body @ root.T_body_inertial
+    at = {
+        "basePosition": T_world_inertial[:3, 3].tolist(),
+        "baseOrientation": matrix_quaternion(T_world_inertial[:3, :3]).tolist(),
+        "physicsClientId": client,
+    }
     shape = shapes.create(client, cache, root.colliders, inverse(root.T_body_inertial), not root.static)
+    stand = None
+    if root.static and plan.masses and shape != shapes.NO_SHAPE:
+        stand = pybullet.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape, **at)
+        shape = shapes.NO_SHAPE
     uid = pybullet.createMultiBody(
         baseMass=root.mass,
         baseCollisionShapeIndex=shape,
-        basePosition=T_world_inertial[:3, 3].tolist(),
-        baseOrientation=matrix_quaternion(T_world_inertial[:3, :3]).tolist(),
         linkMasses=plan.masses,
         linkCollisionShapeIndices=plan.shapes,
         linkVisualShapeIndices=[-1] * len(plan.masses),
@@ -99,9 +125,9 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         linkJointTypes=plan.types,
         linkJointAxis=plan.directions,
         flags=pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_MAINTAIN_LINK_ORDER,
-        physicsClientId=client,
+        **at,
     )
-    tree = Tree(uid, root.index, link_of, axes, root.static)
+    tree = Tree(uid, uid if stand is None else stand, root.index, link_of, axes, root.static)
     _set_dynamics(client, tree, plan, bodies)
     return tree
 
@@ -205,10 +231,10 @@ def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: tuple[Body, ...]
             localInertiaDiagonal=inertia_of(root).tolist(),
             physicsClientId=client,
         )
-    for index, link in tree.link_of.items():
+    for index in tree.link_of:
         body = bodies[index]
         pybullet.changeDynamics(
-            tree.uid, link, lateralFriction=body.friction, rollingFriction=body.rolling_friction,
+            *tree.place(index), lateralFriction=body.friction, rollingFriction=body.rolling_friction,
             restitution=body.restitution, collisionMargin=body.collision_margin, physicsClientId=client,
         )  # fmt: skip
     links = [link for link, *_ in tree.axes]
@@ -219,6 +245,7 @@ def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: tuple[Body, ...]
     for link, _, axis, _ in tree.axes:
         if axis.low is not None and axis.high is not None:
             pybullet.changeDynamics(
-                tree.uid, link, jointLowerLimit=axis.low, jointUpperLimit=axis.high, jointLimitForce=1e5,
+                tree.uid, link, jointLowerLimit=axis.low - LIMIT_SLACK,
+                jointUpperLimit=axis.high + LIMIT_SLACK, jointLimitForce=1e5,
                 physicsClientId=client,
             )  # fmt: skip

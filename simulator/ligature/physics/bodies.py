@@ -5,6 +5,8 @@ Poses are of the body frame B in world axes; Bullet speaks of the inertial frame
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
@@ -25,8 +27,10 @@ SMALLEST_MOVE, SMALLEST_TURN = 1e-5, 1e-4
 class Placement:
     """Where a body lives in Bullet: multibody ``uid`` and ``link`` (-1 is the base)."""
 
-    def __init__(self, client: int, tree: Tree, link: int, body: Body) -> None:
-        self.client, self.uid, self.link, self.body = client, tree.uid, link, body
+    def __init__(self, client: int, tree: Tree, body: Body) -> None:
+        self.client, self.body = client, body
+        self.uid, self.link = tree.place(body.index)
+        self._bases = tree.bases
         self.inertial_to_body = matrix_pose7(inverse(body.T_body_inertial))
         self.moved = True
         """Whether a static body was put elsewhere since its pose was last written."""
@@ -48,10 +52,13 @@ class Placement:
     def put(self, pose: Array) -> None:
         """Put the base at ``pose`` (7,) of B, at rest."""
         T = pose7_matrix(pose) @ self.body.T_body_inertial
-        pybullet.resetBasePositionAndOrientation(
-            self.uid, T[:3, 3].tolist(), matrix_quaternion(T[:3, :3]).tolist(), physicsClientId=self.client
-        )
-        pybullet.resetBaseVelocity(self.uid, [0.0] * 3, [0.0] * 3, physicsClientId=self.client)
+        self.put_inertial(T[:3, 3].tolist(), matrix_quaternion(T[:3, :3]).tolist())
+
+    def put_inertial(self, position: Sequence[float], quaternion: Sequence[float]) -> None:
+        """Put the base's inertial frame I at a position (3,) and quaternion (4,), at rest."""
+        for uid in self._bases:
+            pybullet.resetBasePositionAndOrientation(uid, position, quaternion, physicsClientId=self.client)
+            pybullet.resetBaseVelocity(uid, [0.0] * 3, [0.0] * 3, physicsClientId=self.client)
         self.moved = True
 
     def set_twist(self, linear: Array, angular: Array) -> None:

@@ -62,9 +62,7 @@ class World(BulletQueries):
         pybullet.setGravity(*self._world_gravity.tolist(), physicsClientId=self.client)
         self.trees = [build(self.client, self._cache, scene, a) for a in scene.articulations]
         self.place_of = {
-            body: Placement(self.client, tree, link, scene.bodies[body])
-            for tree in self.trees
-            for body, link in tree.link_of.items()
+            body: Placement(self.client, tree, scene.bodies[body]) for tree in self.trees for body in tree.link_of
         }
         self._tree_of_joint: dict[int, TreeControl] = {}
         self._controls = [TreeControl(self.client, tree, scene.joints, self.dt) for tree in self.trees]
@@ -252,7 +250,7 @@ class World(BulletQueries):
         self.close()
         self._create()
         for tree, (pose, velocity, joints) in zip(self.trees, memory["trees"], strict=True):
-            pybullet.resetBasePositionAndOrientation(tree.uid, *pose, physicsClientId=self.client)
+            self.place_of[tree.root].put_inertial(*pose)
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
