@@ -34,7 +34,7 @@ def test_keys_come_in_the_order_of_the_schema() -> None:
     assert text == (
         "bodies:\n- BODY a\nnamespace: /env/\nBODY a:\n  name: needle\n  mass: 1.5\n  location:\n"
         "    orientation: {y: 0, r: 1, p: 2}\n    position: {x: 1, y: 2, z: 3}\n"
-    ).replace("{y: 0, r: 1, p: 2}", "{'y': 0, r: 1, p: 2}").replace("{x: 1, y: 2, z: 3}", "{x: 1, 'y': 2, z: 3}")
+    )
 
 
 def test_every_corpus_file_written_anew_reads_the_same(corpus: Path) -> None:

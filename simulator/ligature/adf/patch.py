@@ -174,10 +174,10 @@ def _replaced(text: str, parent: Mapping, name: str, value: Any) -> Edit:
     if not isinstance(value, dict | list | tuple):
         new = scalar_text(value)
         return Edit((start, end), " " + new if start == end and text[start - 1] == ":" else new)
-    written_flow = isinstance(node, Mapping | Sequence) and node.flow
-    if parent.flow or written_flow or not value:
-        new = flow_text(value)
-        return Edit((start, end), " " + new if start == end and text[start - 1] == ":" else new)
+    if parent.flow or (isinstance(node, Mapping | Sequence) and node.flow):
+        return Edit((start, end), flow_text(value))
+    if not value:
+        return Edit((parent.entries[name][0].span[1], end), ": " + flow_text(value))
     key = parent.entries[name][0]
     column = key.mark.column - 1
     first, *rest = _indented(entry_lines(name, value), column)

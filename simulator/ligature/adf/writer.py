@@ -63,6 +63,11 @@ def text_scalar(text: str) -> str:
     return "'" + text.replace("'", "''") + "'" if text.isprintable() else _escaped(text)
 
 
+def _key_text(name: str) -> str:
+    """A key; those of vectors stay plain, as everybody writes them, also ``y`` and ``n``."""
+    return name if len(name) == 1 and name.isalpha() else text_scalar(name)
+
+
 def _escaped(text: str) -> str:
     body = "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in text)
     return f'"{body}"'
@@ -100,7 +105,7 @@ def _ordered(kind: str, value: Mapping[str, Any], prefix: str = "") -> dict[str,
 def entry_lines(name: str, value: Any, depth: int = 0) -> list[str]:
     """The lines of ``name: value`` at a depth of indentation; vectors in flow style, all else in blocks."""
     indent = "  " * depth
-    key = f"{indent}{text_scalar(str(name))}:"
+    key = f"{indent}{_key_text(str(name))}:"
     if isinstance(value, Mapping):
         if not value or set(value) in _VECTORS:
             return [f"{key} {flow_text(value)}"]
@@ -123,7 +128,7 @@ def _item(value: Any, depth: int) -> list[str]:
 def flow_text(value: Any) -> str:
     """A value in one line, as ``{a: 1, b: [2, 3]}``."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{text_scalar(str(k))}: {flow_text(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_key_text(str(k))}: {flow_text(v)}" for k, v in value.items()) + "}"
     if isinstance(value, Sequence) and not isinstance(value, str):
         return "[" + ", ".join(flow_text(item) for item in value) + "]"
     return scalar_text(value) or "''"

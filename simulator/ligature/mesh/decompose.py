@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from ligature.mesh.cache import cache_folder, write_atomically
 from ligature.mesh.inertia import hull_properties, mass_properties
 from ligature.mesh.mesh import Array, Mesh
-from ligature.mesh.quality import hausdorff_distance, volume_error
 from ligature.mesh.surface import convex_surface, hull_vertices, joined
 
 CONVEX_ENOUGH = 0.02
@@ -75,6 +74,8 @@ def decompose(mesh: Mesh, threshold: float = 0.05, max_hulls: int = -1, seed: in
         raise DecompositionError("the mesh holds no triangle")
     settings = {"threshold": threshold, "max_convex_hull": max(max_hulls, 0) or -1, "seed": seed}
     hulls = _cached_hulls(vertices, faces, settings, AUTHORING_LIMIT)
+    from ligature.mesh.quality import hausdorff_distance, volume_error  # compiled; pieces alone do without
+
     return Decomposition(hulls, volume_error(vertices, faces, hulls), hausdorff_distance(vertices, faces, hulls, seed))
 
 

@@ -1,10 +1,12 @@
-"""Triangle surfaces: welding, closedness, convex hulls. Vertices (n, 3), faces (m, 3); any one length unit."""
+"""Triangle surfaces: welding, closedness, convex hulls. Vertices (n, 3), faces (m, 3); any one length unit.
+
+SciPy is imported by the hulls alone: Blender, which lacks it, can use all the rest.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from ligature.mesh.mesh import Array, MeshPart
 
@@ -56,6 +58,8 @@ def hull_vertices(points: Array) -> Array:
 
     Points in one plane give the corners of their polygon, points in one line its two ends.
     """
+    from scipy.spatial import ConvexHull, QhullError
+
     distinct = np.sort(np.unique(points, axis=0, return_index=True)[1])
     points = points[distinct]
     if len(points) < 3:
@@ -74,6 +78,8 @@ def hull_vertices(points: Array) -> Array:
 
 def convex_surface(points: Array) -> tuple[Array, Faces]:
     """Corners (n, 3) and outward triangles (m, 3) of the hull of ``points``; raises ValueError when it is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
     corners = hull_vertices(points)
     try:
         if len(corners) < 4:

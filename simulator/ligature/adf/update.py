@@ -1,0 +1,382 @@
+"""Makes a file say what is wanted by changing only what differs, and writes new files in canonical order.
+
+An `Item` is one object as it is to stand in the file. Values are typed as the schema types them;
+numbers count as equal when they are equal in single precision, which is what editors store.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ligature.adf import nodes
+from ligature.adf.document import Document, Element
+from ligature.adf.patch import (
+    Edit,
+    PatchError,
+    add_item,
+    add_key,
+    aliases_into,
+    apply,
+    remove_item,
+    remove_key,
+    rename_key,
+    set_value,
+)
+from ligature.adf.schema import BY_PATH, LISTS, PLURALS, SCHEMA, Key, Type
+from ligature.adf.values import BadValue
+from ligature.adf.writer import entry_lines, text_scalar, write_document
+
+MAX_ROUNDS = 200
+"""Most times a file is read again while it is changed; changes behind aliases take one each."""
+
+_POSE = ("position", "orientation")
+_PARTS = {Type.VECTOR: ("x", "y", "z"), Type.RPY: ("r", "p", "y")}
+
+
+@dataclass(frozen=True)
+class Item:
+    """One object of a file.
+
+    Attributes
+    ----------
+    kind, key
+        Kind of the schema, and the key that lists and defines it.
+    values
+        The value of every key that is given, by dotted path; blocks stand in the paths of their keys.
+    was
+        Its key in the file that is changed, when that is another one.
+    extra
+        Keys that the schema does not know, as nested plain values; written for new objects only.
+    """
+
+    kind: str
+    key: str
+    values: Mapping[str, Any]
+    was: str = ""
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+
+def given_values(element: Element) -> dict[str, Any]:
+    """The typed value of every key of the schema that an element gives, but for the lists of a file's objects.
+
+    Bad values are left out.
+    """
+    return _given(element, "")
+
+
+def items_of(document: Document) -> list[Item]:
+    """The usable objects of a document, each once, in the order of its lists."""
+    found = {e.key: e for elements in document.lists.values() for e in elements}
+    return [Item(e.kind, e.key, given_values(e), extra=unknown_values(e)) for e in found.values()]
+
+
+def unknown_values(element: Element) -> dict[str, Any]:
+    """The top-level keys of an element that the schema does not know, as nested plain values."""
+    return {
+        name: nodes.plain(value)
+        for name, (_, value) in element.node.entries.items()
+        if name not in BY_PATH[element.kind]
+    }
+
+
+def new_text(kind: str, top: Mapping[str, Any], items: Sequence[Item]) -> str:
+    """The text of a new file of ``kind``, in canonical order."""
+    values: dict[str, Any] = _nested(kind, top)
+    for item in items:
+        values.setdefault(PLURALS[item.kind], []).append(item.key)
+    for item in items:
+        if item.key in values:
+            raise PatchError(f"'{item.key}' names two things; give one of them another identifier")
+        values[item.key] = {**_nested(item.kind, item.values), **item.extra}
+    return write_document(kind, values)
+
+
+def updated(text: str, kind: str, top: Mapping[str, Any], items: Sequence[Item], removed: Collection[str] = ()) -> str:
+    """``text``, a file of ``kind``, with the changes that make it say ``top`` and hold ``items``.
+
+    Objects whose keys are ``removed`` go; all others stay, also those that cannot be read. Keys that
+    the schema does not know, comments, anchors and order stay. Raises `PatchError`.
+    """
+    text = _renamed(text, kind, items)
+    for _ in range(MAX_ROUNDS):
+        root = nodes.parse(text, Path())
+        edits = _edits(text, root, kind, top, items, removed)
+        if not edits:
+            return text
+        text = apply(text, edits)
+    raise PatchError("the file cannot be changed as wanted; aliases lead in a circle")
+
+
+def _renamed(text: str, kind: str, items: Sequence[Item]) -> str:
+    for item in items:
+        if not item.was or item.was == item.key:
+            continue
+        root = nodes.parse(text, Path())
+        if item.was not in root.entries:
+            continue
+        edits = [rename_key(root, item.was, item.key)]
+        listed = root.get(PLURALS[item.kind])
+        for use, entry in _list_entries(listed):
+            if entry.text == item.was:
+                edits.append(Edit(use, text_scalar(item.key)))
+        text = apply(text, edits)
+    return text
+
+
+def _edits(
+    text: str,
+    root: nodes.Mapping,
+    kind: str,
+    top: Mapping[str, Any],
+    items: Sequence[Item],
+    removed: Collection[str],
+) -> list[Edit]:
+    """Changes of one round: those where the values stand; when there are none, one behind an alias."""
+    behind_alias: list[Edit] = []
+    own = nodes.Mapping(root.mark, root.span, entries={n: e for n, e in root.entries.items() if n in BY_PATH[kind]})
+    own.uses = root.uses
+    edits = list(_changes(text, root, Element(kind, kind, own), top, behind_alias))
+    edits += _object_edits(text, root, kind, items, removed)
+    for item in items:
+        node = root.get(item.key)
+        if isinstance(node, nodes.Mapping):
+            edits += _changes(text, node, Element(item.kind, item.key, node), item.values, behind_alias)
+    return edits or behind_alias[:1]
+
+
+def _object_edits(
+    text: str, root: nodes.Mapping, kind: str, items: Sequence[Item], removed: Collection[str]
+) -> Iterator[Edit]:
+    """Changes of the lists of objects, and of the blocks that define them."""
+    for list_name, object_kind in LISTS.items():
+        if list_name not in BY_PATH[kind]:
+            continue
+        node = root.get(list_name)
+        listed = [entry.text for _, entry in _list_entries(node)]
+        gone = [i for i, name in enumerate(listed) if name in removed]
+        new = [i.key for i in items if i.kind == object_kind and i.key not in listed]
+        if isinstance(node, nodes.Sequence) and node.items and len(gone) < len(listed):
+            yield from (remove_item(text, node, i) for i in (gone[:1] if node.flow else gone))
+            yield from (add_item(text, node, name) for name in new)
+        elif gone or new:
+            yield _list_edit(text, root, list_name, new)
+    removals = [remove_key(text, root, name) for name in dict.fromkeys(removed) if name in root.entries]
+    yield from removals
+    for removal in removals:
+        for alias in aliases_into(root, removal.span):
+            if not any(other.span[0] <= alias.span[0] < other.span[1] for other in removals):
+                yield alias
+    for item in items:
+        if item.key not in root.entries:
+            yield _definition(text, item)
+
+
+def _definition(text: str, item: Item) -> Edit:
+    """The block of a new object, at the end of the file."""
+    at = len(text)
+    lines = entry_lines(item.key, {**_nested(item.kind, item.values), **item.extra})
+    line_break = "\r\n" if "\r\n" in text else "\n"
+    start = "" if text.endswith("\n") or not text else line_break
+    return Edit((at, at), start + line_break.join((*lines, "")))
+
+
+def _list_edit(text: str, root: nodes.Mapping, name: str, keys: list[str]) -> Edit:
+    """A list written whole, where it stands or after the lists that are there."""
+    if name in root.entries:
+        return set_value(text, root, name, keys)
+    before = [other for other in LISTS if other in root.entries]
+    if not before:
+        return add_key(text, root, name, keys)
+    last = nodes.Mapping(root.mark, root.span, entries={before[-1]: root.entries[before[-1]]})
+    last.uses = root.uses
+    return add_key(text, last, name, keys)
+
+
+def _list_entries(node: nodes.Node | None) -> list[tuple[nodes.Span, nodes.Scalar]]:
+    if not isinstance(node, nodes.Sequence):
+        return []
+    return [(u, i) for u, i in zip(node.uses, node.items, strict=True) if isinstance(i, nodes.Scalar)]
+
+
+def _changes(
+    text: str, owner: nodes.Mapping, element: Element, wanted: Mapping[str, Any], behind_alias: list[Edit]
+) -> Iterator[Edit]:
+    """Edits that give ``owner`` the wanted values; those of aliased values go to ``behind_alias``."""
+    old = given_values(element)
+    known = BY_PATH[element.kind]
+    additions: dict[str, dict[str, Any]] = {}
+    for path, value in wanted.items():
+        if path in old and same(old[path], value):
+            continue
+        for inner, part in _pieces(owner, known[path], path, old.get(path), value):
+            if _aliased(owner, inner):
+                behind_alias.append(set_value(text, owner, inner, part))
+                continue
+            block = _missing_block(owner, inner)
+            if block is None:
+                yield set_value(text, owner, inner, part)
+            else:
+                _put(additions.setdefault(block, {}), inner[len(block) + 1 :], part)
+    for block, values in additions.items():
+        yield set_value(text, owner, block, values)
+    yield from _removals(text, owner, element, [path for path in old if path not in wanted])
+
+
+def _pieces(owner: nodes.Mapping, key: Key, path: str, old: Any, new: Any) -> Iterator[tuple[str, Any]]:
+    """The values to write for one key: of a vector or pose that is there, the numbers that differ."""
+    if old is not None and key.type is Type.POSE:
+        for half, type_, before, after in zip(_POSE, (Type.VECTOR, Type.RPY), old, new, strict=True):
+            if same(before, after):
+                continue
+            if _missing_block(owner, f"{path}.{half}.x") is None:
+                yield from _different(f"{path}.{half}", _PARTS[type_], before, after)
+            else:
+                yield f"{path}.{half}", dict(zip(_PARTS[type_], after, strict=True))
+    elif old is not None and key.type in _PARTS:
+        yield from _different(path, _PARTS[key.type], old, new)
+    else:
+        yield path, _plain(key, new)
+
+
+def _different(path: str, names: Sequence[str], before: Sequence[float], after: Sequence[float]) -> Iterator[Any]:
+    for name, old, new in zip(names, before, after, strict=True):
+        if not same(old, new):
+            yield f"{path}.{name}", new
+
+
+def _missing_block(owner: nodes.Mapping, path: str) -> str | None:
+    """The outermost block on the way to ``path`` that is not there, so that its keys are added at once."""
+    node: nodes.Node | None = owner
+    parts = path.split(".")
+    for depth, part in enumerate(parts[:-1]):
+        node = node.get(part) if isinstance(node, nodes.Mapping) else None
+        if node is None or (isinstance(node, nodes.Scalar) and node.null):
+            return ".".join(parts[: depth + 1])
+    return None
+
+
+def _aliased(owner: nodes.Mapping, path: str) -> bool:
+    node: nodes.Node | None = owner
+    for part in path.split("."):
+        if not isinstance(node, nodes.Mapping) or part not in node.entries:
+            return False
+        if node.aliased(part):
+            return True
+        node = node.get(part)
+    return False
+
+
+def _removals(text: str, owner: nodes.Mapping, element: Element, paths: list[str]) -> Iterator[Edit]:
+    """Edits that remove keys, and blocks that would be left empty."""
+    for path in _whole_blocks(owner, paths):
+        *inner, name = path.split(".")
+        parent: nodes.Node | None = owner
+        for part in inner:
+            parent = parent.get(part) if isinstance(parent, nodes.Mapping) else None
+        if not isinstance(parent, nodes.Mapping) or name not in parent.entries:
+            continue
+        if inner and _aliased(owner, ".".join(inner)):
+            raise PatchError(
+                f"'{path}' of {element.kind} '{element.key}' stands behind an alias and cannot be removed alone; "
+                f"remove '{inner[0]}' or give it a value"
+            )
+        yield remove_key(text, parent, name)
+
+
+def _whole_blocks(owner: nodes.Mapping, paths: list[str]) -> list[str]:
+    """``paths`` with every block whose keys all go in place of these keys."""
+    going = set(paths)
+    for path in paths:
+        block = path.rpartition(".")[0]
+        while block:
+            node: nodes.Node | None = owner
+            for part in block.split("."):
+                node = node.get(part) if isinstance(node, nodes.Mapping) else None
+            if not isinstance(node, nodes.Mapping) or not all(f"{block}.{name}" in going for name in node.entries):
+                break
+            going -= {f"{block}.{name}" for name in node.entries}
+            going.add(block)
+            block = block.rpartition(".")[0]
+    return [path for path in going if not any(path.startswith(f"{other}.") for other in going)]
+
+
+def _given(element: Element, prefix: str) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for key in SCHEMA[element.kind]:
+        if not key.path.startswith(prefix) or "[]" in key.path[len(prefix) :] or key.type is Type.MAP:
+            continue
+        path = key.path[len(prefix) :]
+        if not element.has(path) or (key.type is Type.TEXTS and path in LISTS):
+            continue
+        if key.type is Type.MAPS:
+            values[path] = tuple(_given(child, f"{key.path}[].") for child in element.children(path))
+        elif key.type is Type.NUMBER_OR_MAP and isinstance(element.raw_value(path), dict):
+            continue
+        else:
+            try:
+                values[path] = element.value(path)
+            except BadValue:
+                continue
+    return values
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two typed values are equal, numbers in single precision."""
+    if isinstance(a, bool) or isinstance(b, bool):
+        return a is b
+    if isinstance(a, int | float) and isinstance(b, int | float):
+        return a == b or _single(a) == _single(b)
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(same(a[k], b[k]) for k in a)
+    return bool(a == b)
+
+
+def _single(value: float) -> float:
+    return float(struct.unpack("f", struct.pack("f", value))[0])
+
+
+def _nested(kind: str, values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values by dotted path as nested blocks, in the order of the schema."""
+    nested: dict[str, Any] = {}
+    for key in SCHEMA[kind]:
+        path = key.path[len(prefix) :]
+        if key.path.startswith(prefix) and path in values:
+            _put(nested, path, _plain(key, values[path], kind))
+    unknown = [path for path in values if prefix + path not in BY_PATH[kind]]
+    if unknown:
+        raise KeyError(f"the schema knows no '{prefix}{unknown[0]}' of a {kind}")
+    return nested
+
+
+def _put(nested: dict[str, Any], path: str, value: Any) -> None:
+    *inner, name = path.split(".")
+    for part in inner:
+        nested = nested.setdefault(part, {})
+    nested[name] = value
+
+
+def _plain(key: Key, value: Any, kind: str = "") -> Any:
+    """A typed value as the file writes it."""
+    if key.type in _PARTS:
+        return dict(zip(_PARTS[key.type], value, strict=True))
+    if key.type is Type.POSE:
+        kinds = (Type.VECTOR, Type.RPY)
+        return {
+            half: dict(zip(_PARTS[type_], part, strict=True))
+            for half, type_, part in zip(_POSE, kinds, value, strict=True)
+        }
+    if key.type is Type.MAPS:
+        kind = kind or next(k for k, keys in SCHEMA.items() if key in keys)
+        return [_nested(kind, item, f"{key.path}[].") for item in value]
+    if isinstance(value, tuple):
+        return [list(item) if isinstance(item, tuple) else item for item in value]
+    return value
+
+
+__all__ = ["Item", "given_values", "items_of", "new_text", "same", "unknown_values", "updated"]
