@@ -156,20 +156,20 @@ def _inverse_rows(
         joint[k] = -1
         if not is_rigid(T):
             code[k] = Reason.NOT_A_POSE
-        elif not _branch(table, tool_to_rcm, tip, T, 1.0, T3, R4, q[k]):
-            code[k] = Reason.SINGULAR
-        else:
-            residual[k] = _remaining_angle(R4, T3, q[k, ROLL])
-            joint[k] = first_outside(q[k], limits)
-            if joint[k] < 0:
-                code[k] = Reason.REACHED
-            elif _reached_above(table, tool_to_rcm, tip, limits, T, residual[k], T3, R4, other):
-                joint[k], residual[k] = -1, 0.0
-                code[k] = Reason.ABOVE_REMOTE_CENTRE
-            else:
-                code[k] = Reason.OUTSIDE_LIMITS
-        if code[k] != Reason.REACHED and code[k] != Reason.OUTSIDE_LIMITS:
             q[k] = np.nan
+            continue
+        below = _branch(table, tool_to_rcm, tip, T, 1.0, T3, R4, q[k])
+        if below:
+            residual[k] = _remaining_angle(R4, T3)
+            joint[k] = first_outside(q[k], limits)
+        if below and joint[k] < 0:
+            code[k] = Reason.REACHED
+        elif _reached_above(table, tool_to_rcm, tip, limits, T, residual[k] if below else np.pi, T3, R4, other):
+            code[k] = Reason.ABOVE_REMOTE_CENTRE
+        else:
+            code[k] = Reason.OUTSIDE_LIMITS if below else Reason.SINGULAR
+        if code[k] != Reason.REACHED and code[k] != Reason.OUTSIDE_LIMITS:
+            q[k], joint[k], residual[k] = np.nan, -1, 0.0
 
 
 @compiled  # type: ignore[untyped-decorator]
@@ -180,7 +180,7 @@ def _reached_above(
     """Whether a tip above the RCM would do, whatever the insertion, and comes closer to the orientation."""
     if not _branch(table, tool_to_rcm, tip, T, -1.0, T3, R4, q):
         return False
-    if _remaining_angle(R4, T3, q[ROLL]) > below:
+    if _remaining_angle(R4, T3) > below:
         return False
     q[INSERTION] = limits[0, INSERTION]
     return bool(first_outside(q, limits) < 0)
@@ -221,13 +221,9 @@ def _roll(table: Array, tip: Array, T: Array, T3: Array, R4: Array, q: Array) ->
 
 
 @compiled  # type: ignore[untyped-decorator]
-def _remaining_angle(R4: Array, T3: Array, roll: float) -> float:
-    """Angle in radians from the orientation that the roll gives to the one asked for.
-
-    The roll leaves the shortest turn, which is about an axis across the shaft: the angle between the shafts.
-    """
-    across = 0.0
-    along = 0.0
+def _remaining_angle(R4: Array, T3: Array) -> float:
+    """Angle in radians that the closest roll leaves to the orientation asked for: the one between the two shafts."""
+    across, along = 0.0, 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         across += (T3[j, 2] * R4[k, 2] - T3[k, 2] * R4[j, 2]) ** 2

@@ -82,8 +82,8 @@ class Mtm(Chain):
         """Joint values that bring the tip to ``T_base_tip`` (..., 4, 4).
 
         The wrist platform stays as close as the limits of the wrist allow to that of ``seed`` (7,) or (..., 7), or
-        to zero, and the roll takes the turn closest to that of ``seed``. A pose is singular with the wrist on the
-        axis of the outer yaw.
+        to zero, and the roll takes the turn closest to that of ``seed``. The wrist gives every orientation. A pose is
+        singular with the wrist on the axis of the outer yaw.
         """
         poses, shape = pose_rows(T_base_tip)
         out = Answers(len(poses), 7, shape)
@@ -114,8 +114,7 @@ def _inverse_rows(
         for i in range(3):
             for j in range(3):
                 R37[i, j] = T3[0, i] * T[0, j] + T3[1, i] * T[1, j] + T3[2, i] * T[2, j]
-        if not _wrist(R37, limits, seed, choices, q[k]):
-            _turn_wrist(R37, seed[PLATFORM], limits, seed, q[k])
+        _wrist(R37, limits, seed, choices, q[k])
         joint[k] = first_outside(q[k], limits)
         if joint[k] >= 0:
             code[k] = Reason.OUTSIDE_LIMITS
@@ -140,23 +139,19 @@ def _place(T: Array, q: Array) -> int:
 
 
 @compiled  # type: ignore[untyped-decorator]
-def _wrist(R37: Array, limits: Array, seed: Array, choices: Array, q: Array) -> bool:
-    """The wrist within its limits whose platform is closest to the seed's, into ``q[3:]``; False if there is none."""
+def _wrist(R37: Array, limits: Array, seed: Array, choices: Array, q: Array) -> None:
+    """The wrist within its limits whose platform is closest to the seed's, into ``q[3:]``."""
     near = min(max(seed[PLATFORM], limits[0, PLATFORM]), limits[1, PLATFORM])
     _turn_wrist(R37, near, limits, seed, q)
     if first_outside(q[PLATFORM:], limits[:, PLATFORM:]) < 0:
-        return True
-    count = _platforms(R37[:, 2], limits, near, choices)
-    closest = np.inf
-    for platform in choices[:count]:
+        return
+    best, closest = near, np.inf
+    for platform in choices[: _platforms(R37[:, 2], limits, near, choices)]:
         if abs(platform - near) < closest:
             _turn_wrist(R37, platform, limits, seed, q)
             if first_outside(q[PLATFORM:], limits[:, PLATFORM:]) < 0:
-                closest, best = abs(platform - near), platform
-    if closest == np.inf:
-        return False
+                best, closest = platform, abs(platform - near)
     _turn_wrist(R37, best, limits, seed, q)
-    return True
 
 
 @compiled  # type: ignore[untyped-decorator]

@@ -1,0 +1,100 @@
+"""Inverse kinematics of the endoscope manipulator and of the challenge's camera."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ligature.model.frames import axis_rotation, frame
+from ligature.robots.ecm import ENDOSCOPES, LIMITS, Ecm, SrcCamera
+
+from tests.robots.poses import assert_same_pose, distances
+
+Q = np.array([0.3, -0.2, 0.12, 0.4])
+
+
+@pytest.mark.parametrize("endoscope", ENDOSCOPES)
+@pytest.mark.parametrize("model", LIMITS)
+def test_the_inverse_undoes_the_forward_for_100000_poses(endoscope, model):
+    ecm = Ecm(endoscope, model)
+    lower = np.maximum(ecm.lower, [-10, -10, ecm.insertion_at(1e-3), -10])
+    q = np.random.default_rng(3).uniform(lower, ecm.upper, (100_000, 4))
+    result = ecm.inverse(ecm.forward(q))
+    assert result.ok.all()
+    assert result.residual.max() < 1e-9
+    np.testing.assert_allclose(result.q, q, rtol=0, atol=1e-9)
+
+
+def test_an_orientation_that_four_joints_cannot_give_is_met_as_closely_as_they_can():
+    ecm = Ecm()
+    T = ecm.forward(Q) @ frame(axis_rotation((1.0, 0.0, 0.0), 0.25), (0.0, 0.0, 0.0))
+    result = ecm.inverse(T)
+    assert result.ok
+    metres, radians = distances(ecm.forward(result.q), T)
+    assert metres < 1e-12
+    assert radians == pytest.approx(result.residual, abs=1e-9) == pytest.approx(0.25, abs=1e-9)
+    for nudge in (-1e-3, 1e-3):
+        assert distances(ecm.forward(result.q + [0, 0, 0, nudge]), T)[1] > result.residual
+
+
+@pytest.mark.parametrize("joint", range(4))
+@pytest.mark.parametrize("end", ["lower", "upper"])
+def test_a_pose_beyond_one_limit_names_the_joint(joint, end):
+    ecm = Ecm("Custom_STRAIGHT")
+    q = Q.copy()
+    q[joint] = getattr(ecm, end)[joint] + (0.01 if end == "upper" else -0.01)
+    result = ecm.inverse(ecm.forward(q))
+    assert (result.ok, result.reason, result.joint) == (False, "outside limits", joint)
+    np.testing.assert_allclose(result.q, q, atol=1e-12)
+
+
+def test_a_tip_above_the_remote_centre_is_answered_as_such():
+    ecm = Ecm()
+    result = ecm.inverse(ecm.forward([0.3, 0.2, ecm.insertion_at(-0.02), 0.1]))
+    assert result.reason == "above the remote centre"
+    assert np.isnan(result.q).all()
+
+
+def test_singular_poses_have_no_joints():
+    ecm = Ecm()
+    at_the_centre = ecm.forward([0.3, 0.2, ecm.insertion_at(0.0), 0.1])
+    looking_back = ecm.forward(Q) @ frame(axis_rotation((1.0, 0.0, 0.0), np.pi), (0.0, 0.0, 0.0))
+    result = ecm.inverse(np.array([at_the_centre, looking_back]))
+    assert result.reason.tolist() == ["singular", "singular"]
+    assert np.isnan(result.q).all()
+
+
+@pytest.mark.parametrize("arm", [Ecm(), SrcCamera()], ids=["ECM", "challenge camera"])
+def test_what_is_no_pose_has_no_joints(arm):
+    result = arm.inverse(np.full((4, 4), np.nan))
+    assert result.reason == "not a rigid pose"
+    assert np.isnan(result.q).all()
+
+
+def test_at_zero_the_endoscope_looks_down_the_shaft():
+    T = Ecm().forward(np.zeros(4))
+    np.testing.assert_allclose(T[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-15)
+
+
+def test_an_endoscope_or_a_model_that_does_not_exist_is_refused():
+    with pytest.raises(ValueError, match="there is no endoscope 'ERROR'; known are Classic_SD_STRAIGHT, "):
+        Ecm("ERROR")
+    with pytest.raises(ValueError, match="there is no ECM model 'Xi'; known are Classic, Si"):
+        Ecm(model="Xi")
+
+
+def test_the_camera_of_the_challenge_inverts_for_100000_poses():
+    camera = SrcCamera()
+    q = np.random.default_rng(4).uniform(camera.lower, camera.upper, (100_000, 4))
+    result = camera.inverse(camera.forward(q))
+    assert result.ok.all()
+    np.testing.assert_allclose(result.q, q, rtol=0, atol=1e-9)
+
+
+def test_the_camera_of_the_challenge_moves_forward_along_its_line_of_sight_only():
+    camera = SrcCamera()
+    np.testing.assert_allclose(camera.forward([0, 0, 0.05, 0]), frame(np.eye(3), (0, 0, -0.05)), atol=1e-15)
+    T = frame(np.eye(3), (0.01, 0.0, -0.05))
+    assert camera.inverse(T).reason == "unreachable"
+    beyond = camera.inverse(camera.forward([0, 0, 0.11, 0]))
+    assert (beyond.reason, beyond.joint) == ("outside limits", 2)
+    assert_same_pose(camera.forward(beyond.q), camera.forward([0, 0, 0.11, 0]))
