@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic
+from ligature.arms import ArmSet
 from ligature.grasping import Holder
 from ligature.model.commands import (
     ActuatorCommand,
+    ArmCommand,
     BodyCommand,
     Command,
     CommandType,
@@ -189,6 +191,7 @@ class Simulation:
         self._ghosts = Ghosts(scene, self._world)
         self._rays = Rays(scene, self._world)
         self._contacts = Contacts(scene, self._world)
+        self.arms = ArmSet(scene, self._world)
         self._actuators = Actuators(scene, Holder(scene, self._world, self._rods), self._rays)
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
@@ -215,6 +218,7 @@ class Simulation:
     def _advance(self) -> None:
         """One tick."""
         with self._phase("control"):
+            self.arms.tick(self.dt)
             self._world.pre_step()
         with self._phase("suture"):
             self._rods.step(self._world)
@@ -243,6 +247,8 @@ class Simulation:
                 self.problems.append(problem)
         elif isinstance(command, PlaceCommand):
             self._attachments.place(command.kind, command.index, command.pose)
+        elif isinstance(command, ArmCommand):
+            self.arms.apply(command)
         elif isinstance(command, Release):
             self._release(command)
         elif isinstance(command, Reset):
@@ -253,6 +259,8 @@ class Simulation:
             self._world.release(command.index)
         elif command.kind == "actuator":
             self._actuators.release(command.index)
+        elif command.kind == "arm":
+            self.arms.release(command.index)
 
     def set_pose(self, body: int, pose: Array) -> None:
         """Put the root body of a tree at ``pose`` (7,) at rest; raises ValueError for a link of an arm."""
@@ -264,6 +272,7 @@ class Simulation:
         """Put everything back to where the scene starts; time goes on and commands hold."""
         self._world.reset()
         self._rods.reset()
+        self.arms.reset()
         if not bodies_only:
             self._attachments.reset()
         self._resets += 1
@@ -279,6 +288,7 @@ class Simulation:
             "world": self._world.snapshot(),
             "rods": self._rods.memory(),
             "local": self._attachments.local.copy(),
+            "arms": self.arms.memory(),
         }
         self._write_state()
         return Snapshot(copy.deepcopy(parts))
@@ -290,6 +300,7 @@ class Simulation:
         self._world.restore(parts["world"])
         self._rods.recall(parts["rods"])
         self._attachments.local[:] = parts["local"]
+        self.arms.recall(parts["arms"])
         self._write_state()
 
     def state_hash(self) -> str:
@@ -340,6 +351,7 @@ class Simulation:
             hits.normal,
         )
         self._contacts.write(state)
+        self.arms.write(state["arm"][0])
         held = np.array(self._actuators.held, dtype=np.int32)
         state["actuator_body"][0], state["actuator_active"][0] = held, held >= 0
 

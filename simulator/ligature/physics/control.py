@@ -83,7 +83,7 @@ class TreeControl:
     """State of all single axes of one tree, as arrays in the order of ``tree.axes``."""
 
     def __init__(self, client: int, tree: Tree, joints: tuple[Joint, ...], dt: float) -> None:
-        self._client, self._tree, self._dt = client, tree, dt
+        self._client, self.tree, self._dt = client, tree, dt
         owners = [joints[joint] for _, joint, _, _ in tree.axes]
         self.links = [link for link, *_ in tree.axes]
         self.row = {joint: i for i, (_, joint, _, _) in enumerate(tree.axes)}
@@ -118,8 +118,8 @@ class TreeControl:
 
     def _spring_setup(self) -> None:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
-        axes = [axis for _, _, axis, _ in self._tree.axes]
-        moved = np.array([m for *_, m in self._tree.axes])
+        axes = [axis for _, _, axis, _ in self.tree.axes]
+        moved = np.array([m for *_, m in self.tree.axes])
         self._stiffness = np.minimum([a.stiffness for a in axes], moved / (16.0 * self._dt**2))
         self._damping = np.minimum([a.damping for a in axes], 0.8 * moved / self._dt)
         self._rest = np.array([a.rest for a in axes])
@@ -157,18 +157,33 @@ class TreeControl:
             self._kick[row] = (left + jump / self._dt) / ticks
             self._kick_ticks[row] = ticks
 
-    def servo(self, joint: int, position: float, velocity: float, fastest: float, give: float) -> None:
-        """Follow a set-point that moves with ``velocity``, at most with the speed ``fastest``.
+    def servo(self, rows: Integers, position: Array, velocity: Array, fastest: Array, give: Array) -> None:
+        """Have the axes ``rows`` (k,) follow set-points that move with ``velocity``, at most at the speed ``fastest``.
 
-        ``give`` is the stiffness (N·m/rad, N/m) with which the motor yields to a load; 0 is as strong as the motor.
+        ``give`` is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is as strong as the motor.
         """
-        row = self.row[joint]
-        self._pace[row], self._fastest[row], self._give[row] = velocity, fastest, give
-        self._switch(row, SERVO, position)
+        self.target[rows] = position
+        self._pace[rows] = velocity
+        if (self.mode[rows] != SERVO).any():
+            self._fastest[rows], self._give[rows] = fastest, give
+            self._enter(rows, SERVO)
 
-    def push(self, joint: int, effort: float) -> None:
-        """Drive one joint with an effort; 0 lets it move freely."""
-        self._switch(self.row[joint], FORCE, effort)
+    def push(self, rows: Integers, effort: Array) -> None:
+        """Drive the axes ``rows`` (k,) with efforts; 0 lets one move freely."""
+        self.target[rows] = effort
+        if (self.mode[rows] != FORCE).any():
+            self._enter(rows, FORCE)
+
+    def let_go(self, rows: Integers) -> None:
+        """Let the axes ``rows`` (k,) go limp."""
+        self.target[rows] = 0.0
+        self._enter(rows, FREE)
+
+    def _enter(self, rows: Integers, mode: int) -> None:
+        self.mode[rows] = mode
+        self._kick[rows] = 0.0
+        self._kick_ticks[rows] = 0
+        self._sort()
 
     def release(self, joint: int) -> None:
         """Let one joint go limp."""
@@ -190,7 +205,7 @@ class TreeControl:
 
     def read(self) -> None:
         """Read positions, velocities and motor efforts from Bullet."""
-        states = pybullet.getJointStates(self._tree.uid, self.links, physicsClientId=self._client)
+        states = pybullet.getJointStates(self.tree.uid, self.links, physicsClientId=self._client)
         self.position[:] = [state[0] for state in states]
         self.velocity[:] = [state[1] for state in states]
         self.motor_effort[:] = [state[3] for state in states]
@@ -204,7 +219,7 @@ class TreeControl:
         )  # fmt: skip
         if self._driven:
             pybullet.setJointMotorControlArray(
-                self._tree.uid,
+                self.tree.uid,
                 self._driven_links,
                 pybullet.VELOCITY_CONTROL,
                 targetVelocities=self._motor[self._driven].tolist(),
@@ -213,7 +228,7 @@ class TreeControl:
             )
         if self._pushed:
             pybullet.setJointMotorControlArray(
-                self._tree.uid,
+                self.tree.uid,
                 self._pushed_links,
                 pybullet.TORQUE_CONTROL,
                 forces=self._effort[self._pushed].tolist(),
@@ -238,7 +253,7 @@ class TreeControl:
         idle = [self.links[row] for row in self._driven if not by_motor[row]]
         if idle:
             pybullet.setJointMotorControlArray(
-                self._tree.uid, idle, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(idle), physicsClientId=self._client
+                self.tree.uid, idle, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(idle), physicsClientId=self._client
             )
         self._driven, self._pushed = np.flatnonzero(by_motor).tolist(), np.flatnonzero(by_effort).tolist()
         self._driven_links = [self.links[row] for row in self._driven]

@@ -6,6 +6,7 @@ world axes, twists are linear at the centre of mass, then angular, in world axes
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from ligature.physics.articulation import Tree, build, is_alone
 from ligature.physics.bodies import BodyControl, Placement
 from ligature.physics.closures import Closures
 from ligature.physics.control import TreeControl
+from ligature.physics.drive import Drive
 from ligature.physics.gravity import common_gravity, gravity_lifts
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
@@ -97,24 +99,13 @@ class World(BulletQueries):
                 type_ = types[i] if i < len(types) else CommandType.FORCE
                 tree.command(self.scene.joints[joint], type_, value)
 
-    def servo_joint(self, joint: int, position: float, velocity: float, fastest: float, give: float = 0.0) -> None:
-        """Have a joint follow a set-point; see `TreeControl.servo`."""
-        self._tree_of_joint[joint].servo(joint, position, velocity, fastest, give)
+    def drive(self, joints: Sequence[int], fastest: Array, give: float = 0.0) -> Drive:
+        """The drive of ``joints``, all of one tree; see `Drive`."""
+        return Drive(self, joints, fastest, give)
 
-    def push_joint(self, joint: int, effort: float) -> None:
-        """Drive a joint with an effort in N·m or N; 0 lets it move freely."""
-        self._tree_of_joint[joint].push(joint, effort)
-
-    def free_joint(self, joint: int) -> None:
-        """Let a joint go limp."""
-        self._tree_of_joint[joint].release(joint)
-
-    def joint_state(self, joint: int) -> tuple[float, float, float]:
-        """Position, velocity and motor effort of a joint now."""
-        control = self._tree_of_joint[joint]
-        link = control.links[control.row[joint]]
-        position, velocity, _, effort = pybullet.getJointState(control._tree.uid, link, physicsClientId=self.client)
-        return position, velocity, effort
+    def control_of(self, joint: int) -> TreeControl:
+        """The controllers of the tree that a joint belongs to; another one after a snapshot."""
+        return self._tree_of_joint[joint]
 
     def release(self, body: int) -> None:
         """Clear the command of a body: no force, its joints limp."""
@@ -179,7 +170,7 @@ class World(BulletQueries):
         """Set a joint to a position and velocity at once, without dynamics."""
         control = self._tree_of_joint[joint]
         link = control.links[control.row[joint]]
-        pybullet.resetJointState(control._tree.uid, link, position, velocity, physicsClientId=self.client)
+        pybullet.resetJointState(control.tree.uid, link, position, velocity, physicsClientId=self.client)
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""

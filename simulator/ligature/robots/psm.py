@@ -91,6 +91,8 @@ class Psm(Chain):
     model
         "Classic" or "Si" for the manipulators of the research kit; "SRC" for the arm of the surgical robotics
         challenge, which carries instruments 400006 and 420006 with lengths of its own.
+    lengths
+        Lengths of this very arm, where they are other than the model's.
 
     Raises
     ------
@@ -98,10 +100,10 @@ class Psm(Chain):
         For an unknown instrument or model, and for "SRC" with an instrument that the challenge does not have.
     """
 
-    def __init__(self, tool: Instrument | str | int, model: str = "Classic") -> None:
+    def __init__(self, tool: Instrument | str | int, model: str = "Classic", lengths: PsmLengths | None = None) -> None:
         self.instrument = tool if isinstance(tool, Instrument) else instrument(tool)
         self.model = model
-        self.lengths = _lengths(self.instrument, model)
+        self.lengths = lengths or _lengths(self.instrument, model)
         arm = MANIPULATORS.get(model, MANIPULATORS["Classic"])
         limits = [arm.yaw, arm.pitch, arm.insertion, *zip(self.instrument.lower, self.instrument.upper, strict=True)]
         if model == "SRC":

@@ -1,0 +1,369 @@
+"""The arms of a scene, bound to its physics: which joints they drive, and how long their links are.
+
+World axes, metres, radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.adf import Diagnostic, Severity
+from ligature.model.commands import ArmCommand
+from ligature.model.frames import frame, inverse, matrix_pose7, pose7_matrix, rpy_matrix
+from ligature.model.scene import ArmDescription, ArmKind, Body, Joint, Scene
+from ligature.physics import World
+from ligature.robots import ecm_arm, mtm_arm, psm_arm
+from ligature.robots.arm import Arm
+from ligature.robots.axes import Axes
+from ligature.robots.dispatch import carry_out
+from ligature.robots.ecm import Ecm
+from ligature.robots.ecm_arm import EcmArm
+from ligature.robots.instruments import Instrument, instrument
+from ligature.robots.mtm import Mtm
+from ligature.robots.mtm_arm import MtmArm
+from ligature.robots.operating_state import Refused
+from ligature.robots.plant import IdealPlant
+from ligature.robots.psm import MODELS, Psm, PsmLengths
+from ligature.robots.psm_arm import PsmArm
+from ligature.robots.record import write_arm
+
+Array = NDArray[np.float64]
+
+DEFAULT_TOOL = "400006"
+"""The instrument that the suturing challenge assumes where a scene names none."""
+
+ALIKE = 2e-4
+"""Metres by which the links of a scene may differ from a known arm's to count as that arm."""
+
+JAW_STIFFNESS = 0.5
+"""N·m per radian of following error with which each finger presses: 9 N at the tips of a needle driver at −20°."""
+
+PERIOD = 5
+"""Ticks between two looks at following errors and two writings of an arm's state."""
+
+R_FRAME_OPTICAL = np.diag([1.0, -1.0, -1.0])
+"""A body that carries cameras looks along −z with y up, the tip of an ECM along +z with y down."""
+
+
+class ArmSet(Mapping[str, Arm]):
+    """The arms of a running scene by name."""
+
+    def __init__(self, scene: Scene, world: World) -> None:
+        self._world = world
+        self.problems: list[Diagnostic] = []
+        self._arms: list[Arm] = []
+        for description in scene.arms:
+            self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
+        self._by_name = {arm.name: arm for arm in self._arms}
+        self._ticks = 0
+        self._written = -PERIOD
+
+    def __getitem__(self, name: str) -> Arm:
+        if name not in self._by_name:
+            known = ", ".join(self._by_name) or "none"
+            raise KeyError(f"no arm is called '{name}'; there are {known}")
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self._arms)
+
+    def apply(self, command: ArmCommand) -> None:
+        """Carry out a command; what the arm refuses becomes its warning."""
+        arm = self._arms[command.arm]
+        try:
+            carry_out(arm, command)
+        except Refused as error:
+            arm.emit("warning", str(error))
+            if "move_" in command.verb:
+                arm.emit("goal_reached", False)
+
+    def release(self, index: int) -> None:
+        """Whoever commanded an arm is gone: it stays where it is."""
+        arm = self._arms[index]
+        if arm.is_enabled and arm.is_homed:
+            arm.hold()
+
+    def tick(self, dt: float) -> None:
+        """Advance all arms by ``dt`` seconds."""
+        self._ticks += 1
+        for arm in self._arms:
+            arm.tick(dt)
+        if self._ticks % PERIOD == 0:
+            for arm in self._arms:
+                arm.watch(PERIOD * dt)
+
+    def write(self, records: NDArray[np.void]) -> None:
+        """Write the state of all arms, ``records`` (arms,), unless that was done less than `PERIOD` ticks ago."""
+        if 0 <= self._ticks - self._written < PERIOD:
+            return
+        self._written = self._ticks
+        for arm, record in zip(self._arms, records, strict=True):
+            write_arm(arm, record)
+
+    def events(self) -> list[tuple[int, str, Any]]:
+        """What happened since the last call: number of the arm, name and value."""
+        found = []
+        for index, arm in enumerate(self._arms):
+            found += [(index, event.name, event.value) for event in arm.events]
+            arm.events.clear()
+        return found
+
+    def reset(self) -> None:
+        """The scene was put back to its start: moves end, and arms hold where they are now."""
+        for arm in self._arms:
+            arm.settle()
+
+    def memory(self) -> list[dict[str, Any]]:
+        """For snapshots."""
+        return [{"ticks": self._ticks, "written": self._written}, *(arm.memory() for arm in self._arms)]
+
+    def recall(self, memory: Sequence[dict[str, Any]]) -> None:
+        """Continue from `memory`."""
+        self._ticks, self._written = memory[0]["ticks"], memory[0]["written"]
+        for arm, kept in zip(self._arms, memory[1:], strict=True):
+            arm.recall(kept)
+
+
+# --- building -------------------------------------------------------------------------------
+
+
+def _psm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:
+    tool = _instrument(description, scene, problems)
+    lengths = _lengths(scene, description)
+    kinematics = _known(tool, lengths) or Psm(tool, lengths=lengths)
+    joints = Axes(
+        kinematics.joint_names, _travel(scene, description.joints), psm_arm.FASTEST, psm_arm.HARDEST,
+        world.drive(description.joints, psm_arm.SERVO_FASTEST),
+    )  # fmt: skip
+    arm = PsmArm(description.name, kinematics, joints, _jaw(world, description, tool))
+    parts = [scene.joints[joint].child for joint in description.joints[-1:]]
+    parts += [scene.joints[joint].child for joint in description.jaw]
+    arm.set_tip_wrench(_TipWrench(world, description, parts, arm))
+    return arm
+
+
+def _instrument(description: ArmDescription, scene: Scene, problems: list[Diagnostic]) -> Instrument:
+    try:
+        return instrument(description.tool or DEFAULT_TOOL)
+    except ValueError as error:
+        mark = scene.bodies[description.base].identity.mark
+        message = f"{description.name}: {error}; it is taken for {instrument(DEFAULT_TOOL).type}"
+        problems.append(Diagnostic(Severity.WARNING, message, mark, code="arm"))
+        return instrument(DEFAULT_TOOL)
+
+
+def _lengths(scene: Scene, description: ArmDescription) -> PsmLengths:
+    """The lengths of an arm as its joints have them, at joint values zero.
+
+    The palm is where the wrist pitch axis passes the roll axis, the RCM the origin of the base body.
+    """
+    lines = _axis_lines(scene, description)
+    origin = scene.bodies[description.base].T_world_body[:3, 3]
+    inwards = lines[2][1]
+    roll, pitch, yaw = lines[3], lines[4], lines[5]
+    palm = _closest(roll, pitch)
+    wrist = float(abs(np.dot(yaw[0] - pitch[0], _unit(np.cross(pitch[1], yaw[1])))))
+    depth = float(np.dot(palm - origin, inwards))
+    rcc = 0.4318
+    return PsmLengths(rcc, rcc + depth, wrist)
+
+
+def _axis_lines(scene: Scene, description: ArmDescription) -> list[tuple[Array, Array]]:
+    """A point (3,) and the direction (3,) of each joint axis in world axes, all joints at zero."""
+    T = scene.bodies[description.base].T_world_body
+    lines = []
+    for index in description.joints:
+        joint: Joint = scene.joints[index]
+        parent: Body = scene.bodies[joint.parent]
+        T_inertial = T @ parent.T_body_inertial
+        lines.append(((T_inertial @ joint.T_parent_a)[:3, 3], T_inertial[:3, :3] @ joint.axis))
+        T = T @ joint.T_parent_child_zero
+    return lines
+
+
+def _closest(line: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+    """The point (3,) of ``line`` that is closest to the ``other`` line."""
+    normal = np.cross(line[1], other[1])
+    along = float(np.dot(np.cross(other[0] - line[0], other[1]), normal) / np.dot(normal, normal))
+    return np.asarray(line[0] + along * line[1])
+
+
+def _unit(vector: Array) -> Array:
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _known(tool: Instrument, lengths: PsmLengths) -> Psm | None:
+    """The known arm that has these lengths, so that its published values hold to the last digit."""
+    for model in reversed(MODELS):
+        try:
+            known = Psm(tool, model)
+        except ValueError:
+            continue
+        reach = abs(known.lengths.tool_to_rcm - lengths.tool_to_rcm)
+        if reach < ALIKE and abs(known.lengths.wrist - lengths.wrist) < ALIKE:
+            return known
+    return None
+
+
+def _travel(scene: Scene, joints: Sequence[int]) -> Array:
+    """Ends of travel (2, n) of the joints of a scene."""
+    low = [scene.joints[j].low for j in joints]
+    high = [scene.joints[j].high for j in joints]
+    return np.array([[-np.inf if v is None else v for v in low], [np.inf if v is None else v for v in high]])
+
+
+def _jaw(world: World, description: ArmDescription, tool: Instrument) -> Axes | None:
+    if len(description.jaw) != 2:
+        return None
+    plant = JawPlant(world, description.jaw)
+    limits = np.array(tool.jaw, dtype=float).reshape(2, 1)
+    return Axes(("jaw",), limits, [psm_arm.JAW_FASTEST], [psm_arm.JAW_HARDEST], plant)
+
+
+class JawPlant:
+    """Two fingers as one jaw: the opening is shared by both, a jaw's effort acts on each (virtual work)."""
+
+    def __init__(self, world: World, fingers: Sequence[int]) -> None:
+        self._drive = world.drive(fingers, np.full(2, psm_arm.SERVO_FASTEST[-1]), JAW_STIFFNESS)
+
+    def read(self) -> Array:
+        """Opening, its speed, and effort (3, 1)."""
+        position, velocity, effort = self._drive.read()
+        return np.array([[position.sum()], [velocity.sum()], [effort.mean()]])
+
+    def servo(self, position: Array, velocity: Array) -> None:
+        """Open to ``position`` (1,); below zero the fingers press."""
+        self._drive.servo(np.repeat(position / 2.0, 2), np.repeat(velocity / 2.0, 2))
+
+    def push(self, effort: Array) -> None:
+        """Turn each finger with ``effort`` (1,)."""
+        self._drive.push(np.repeat(effort, 2))
+
+    def free(self) -> None:
+        """Let the fingers go limp."""
+        self._drive.free()
+
+    def place(self, position: Array) -> None:
+        """Put the fingers at an opening at once."""
+        self._drive.place(np.repeat(np.maximum(position, 0.0) / 2.0, 2))
+
+    def reset(self) -> None:
+        """Nothing: the fingers belong to the physics."""
+
+    def memory(self) -> None:
+        """Nothing: it is part of the physics."""
+
+    def recall(self, memory: None) -> None:
+        """Nothing."""
+
+
+class _TipWrench:
+    """What the world exerts on the instrument, in base axes about the tip."""
+
+    def __init__(self, world: World, description: ArmDescription, bodies: Sequence[int], arm: Arm) -> None:
+        self._world, self._base, self._bodies, self._arm = world, description.base, tuple(bodies), arm
+
+    def __call__(self) -> Array:
+        T_world_base = pose7_matrix(self._world.pose7(self._base))
+        tip = T_world_base @ self._arm.kinematics.forward(self._arm.joints.measured()[0])
+        wrench = self._world.contact_wrench(self._bodies, tip[:3, 3])
+        R = T_world_base[:3, :3].T
+        return np.concatenate([R @ wrench[:3], R @ wrench[3:]])
+
+
+def _ecm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:
+    kinematics = Ecm()
+    limits = np.array([kinematics.lower, kinematics.upper])
+    if description.joints:
+        travel = _travel(scene, description.joints)
+        limits = np.array([np.maximum(limits[0], travel[0]), np.minimum(limits[1], travel[1])])
+        plant: Any = world.drive(description.joints, ecm_arm.SERVO_FASTEST)
+    else:
+        plant = CameraPlant(scene, world, description.tip, kinematics, ecm_arm.HOME)
+    joints = Axes(kinematics.joint_names, limits, ecm_arm.FASTEST, ecm_arm.HARDEST, plant)
+    return EcmArm(description.name, kinematics, joints)
+
+
+class CameraPlant:
+    """An ECM of which a scene has only the body that carries the cameras: moved as the arm would move it.
+
+    The base stands where the scene's camera pose is that of the home pose.
+    """
+
+    def __init__(self, scene: Scene, world: World, body: int, kinematics: Ecm, start: Array) -> None:
+        self._world, self._body, self._kinematics = world, body, kinematics
+        T_tip_body = frame(R_FRAME_OPTICAL, (0.0, 0.0, 0.0))
+        self.T_world_base = scene.bodies[body].T_world_body @ inverse(T_tip_body) @ inverse(kinematics.forward(start))
+        self._T_tip_body = T_tip_body
+        self._start = start
+        self._state = np.zeros((3, len(start)))
+        self._state[0] = start
+
+    def read(self) -> Array:
+        """Joint values, velocities and zero efforts (3, 4)."""
+        return self._state
+
+    def servo(self, position: Array, velocity: Array) -> None:
+        """Put the camera where the joint values have it."""
+        self._state[1] = velocity
+        if (position != self._state[0]).any():
+            self._state[0] = position
+            pose = self.T_world_base @ self._kinematics.forward(position) @ self._T_tip_body
+            self._world.set_pose(self._body, matrix_pose7(pose))
+
+    def push(self, effort: Array) -> None:
+        """Nothing pushes a camera without an arm: it stays."""
+        self._state[1] = 0.0
+
+    def free(self) -> None:
+        """It stays."""
+        self._state[1] = 0.0
+
+    def place(self, position: Array) -> None:
+        """Put the camera where the joint values have it."""
+        self.servo(position, np.zeros(len(position)))
+
+    def reset(self) -> None:
+        """The scene put the camera back."""
+        self._state[:] = 0.0
+        self._state[0] = self._start
+
+    def memory(self) -> Array:
+        """The joint values that the camera's pose stands for."""
+        return self._state.copy()
+
+    def recall(self, memory: Array) -> None:
+        """Continue from `memory`."""
+        self._state[:] = memory
+
+
+def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:
+    side = "left" if description.name.upper().endswith("L") else "right"
+    kinematics = Mtm(side)
+    limits = np.array([kinematics.lower, kinematics.upper])
+    start = np.clip(mtm_arm.HOME, limits[0], limits[1])
+    plant = IdealPlant(limits[0], limits[1], mtm_arm.INERTIA, mtm_arm.DAMPING, start)
+    joints = Axes(kinematics.joint_names, limits, mtm_arm.FASTEST, mtm_arm.HARDEST, plant)
+    ends = mtm_arm.GRIPPER_LIMITS
+    fingers = IdealPlant(ends[0], ends[1], np.full(1, 1e-3), np.full(1, 1e-2), np.zeros(1))
+    gripper = Axes(("gripper",), ends, np.full(1, 20.0), np.full(1, 200.0), fingers)
+    arm = MtmArm(description.name, kinematics, joints, gripper)
+    arm.set_base_frame(_console_pose(side), "HRSV")
+    arm.set_tip_wrench(lambda: np.zeros(6))
+    return arm
+
+
+def _console_pose(side: str) -> Array:
+    """Where a master stands before the operator's view (interface reference §5.6), (4, 4)."""
+    x = 0.180 if side == "left" else -0.180
+    return frame(rpy_matrix(5.0 * np.pi / 6.0, 0.0, np.pi), (x, 0.400, 0.475))
+
+
+_BUILDERS = {ArmKind.PSM: _psm, ArmKind.ECM: _ecm, ArmKind.MTM: _mtm}

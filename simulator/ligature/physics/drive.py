@@ -1,0 +1,72 @@
+"""The drive of an arm: joints of one tree that follow set-points or efforts. Radians, metres, N·m, N."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ligature.physics.control import TreeControl
+    from ligature.physics.world import World
+
+Array = NDArray[np.float64]
+
+
+class Drive:
+    """Joints of one tree as a plant of `ligature.robots`; arrays are (n,).
+
+    Parameters
+    ----------
+    world, joints
+        Where the joints are, and their indices.
+    fastest
+        Largest speeds (n,) at which set-points are followed.
+    give
+        Stiffness in N·m/rad with which the motors yield to a load; 0 is as strong as they are.
+    """
+
+    def __init__(self, world: World, joints: Sequence[int], fastest: Array, give: float) -> None:
+        self._world, self._joints, self._fastest = world, tuple(joints), fastest
+        self._give = np.full(len(joints), give)
+        control = self._control
+        self._rows = np.array([control.row[joint] for joint in self._joints], dtype=np.int64)
+        self._links = [control.links[row] for row in self._rows]
+
+    @property
+    def _control(self) -> TreeControl:
+        return self._world.control_of(self._joints[0])
+
+    def read(self) -> Array:
+        """Positions, velocities and motor efforts now, (3, n)."""
+        states = pybullet.getJointStates(self._control.tree.uid, self._links, physicsClientId=self._world.client)
+        return np.array([(s[0], s[1], s[3]) for s in states]).T
+
+    def servo(self, position: Array, velocity: Array) -> None:
+        """Follow set-points that move with ``velocity``."""
+        self._control.servo(self._rows, position, velocity, self._fastest, self._give)
+
+    def push(self, effort: Array) -> None:
+        """Drive the joints with efforts."""
+        self._control.push(self._rows, effort)
+
+    def free(self) -> None:
+        """Let the joints go limp."""
+        self._control.let_go(self._rows)
+
+    def place(self, position: Array) -> None:
+        """Put the joints somewhere at once, at rest."""
+        for link, value in zip(self._links, position.tolist(), strict=True):
+            pybullet.resetJointState(self._control.tree.uid, link, value, 0.0, physicsClientId=self._world.client)
+
+    def reset(self) -> None:
+        """Nothing: the joints belong to the physics, which put them back."""
+
+    def memory(self) -> None:
+        """Nothing: it is part of the physics."""
+
+    def recall(self, memory: None) -> None:
+        """Nothing."""

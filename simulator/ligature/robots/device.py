@@ -1,0 +1,287 @@
+"""A CRTK device: operating states, homing, busy flags, events and the groups of joints it drives.
+
+Seconds of simulated time. A command that is not carried out raises `Refused` and changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ligature.robots.axes import Axes, Mode
+from ligature.robots.operating_state import Action, OperatingState, Refused, State, action
+
+Array = NDArray[np.float64]
+
+POWER_UP_SECONDS = 0.2
+SHORTEST_BUSY = 0.05
+"""Seconds that a move is busy at least, so that clients see it begin (interface reference §5.2 rule 3)."""
+
+FOLLOWING_PATIENCE = 1.0
+"""Seconds that a following error beyond its bound is suffered before the arm stops with a fault."""
+
+
+MOST_EVENTS = 500
+"""Most events that are kept for a front end to fetch; the oldest go first."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a device; ``name`` is the topic that tells it, ``value`` what it says."""
+
+    device: str
+    name: str
+    value: Any
+
+
+class Device:
+    """The operating state of an arm and what switches its joints on and off.
+
+    Parameters
+    ----------
+    name
+        ``PSM1`` and the like.
+    axes
+        Its joints.
+    home
+        Joint values (n,) of the home pose.
+    following_bound
+        Following errors (n,) beyond which the arm stops with a fault, when they last.
+    """
+
+    def __init__(self, name: str, axes: Axes, home: Array, following_bound: ArrayLike) -> None:
+        self.name = name
+        self.joints = axes
+        self.time = 0.0
+        self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self._home = home
+        self._following_bound = np.asarray(following_bound, dtype=float)
+        self._state, self._homed, self._busy = State.DISABLED, False, False
+        self._told: OperatingState | None = None
+        self._pending: Action | None = None
+        self._due = 0.0
+        self._busy_until = 0.0
+        self._homing = False
+        self._astray = 0.0
+        self._tell_state()
+
+    # --- operating state --------------------------------------------------------------------
+
+    @property
+    def operating_state(self) -> OperatingState:
+        """State, whether homed, whether busy."""
+        return OperatingState(self._state, self._homed, self._busy)
+
+    @property
+    def is_enabled(self) -> bool:
+        """Whether the drives are on."""
+        return self._state is State.ENABLED
+
+    @property
+    def is_homed(self) -> bool:
+        """Whether joint values are known."""
+        return self._homed
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a move, homing or powering up is under way."""
+        return self._busy
+
+    def enable(self) -> None:
+        """Switch the drives on; takes `POWER_UP_SECONDS`."""
+        self.state_command("enable")
+
+    def disable(self) -> None:
+        """Switch the drives off; the arm goes limp."""
+        self.state_command("disable")
+
+    def pause(self) -> None:
+        """Hold still and take no motion until `resume`."""
+        self.state_command("pause")
+
+    def resume(self) -> None:
+        """Take motion again."""
+        self.state_command("resume")
+
+    def home(self) -> None:
+        """Go to the home pose, switching the drives on first where necessary; nothing when homed already."""
+        self.state_command("home")
+
+    def unhome(self) -> None:
+        """Forget that the arm is homed."""
+        self.state_command("unhome")
+
+    def state_command(self, command: str) -> None:
+        """Carry out one of the commands of CRTK's state machine."""
+        step = action(command, self._state)
+        if step is Action.POWER_UP:
+            self._power_up(step)
+        elif step is Action.DISABLE:
+            self._switch_off(State.DISABLED)
+        elif step is Action.PAUSE:
+            self._stop_moves()
+            self._state = State.PAUSED
+        elif step is Action.RESUME:
+            self._state = State.ENABLED
+            self._hold_all()
+        elif step is Action.HOME:
+            self._begin_home()
+        elif step is Action.UNHOME:
+            self._homed = False
+        self._tell_state(again=step in (Action.NOTHING, Action.HOME))
+
+    def adopt(self) -> None:
+        """Be enabled and homed at once, where the arm stands: for clients that know no states."""
+        if self._state is State.FAULT:
+            raise Refused(f"{self.name} is in FAULT; send 'disable', then 'enable'")
+        self._state, self._homed, self._pending = State.ENABLED, True, None
+        self._busy = self._homing = False
+        self._hold_all()
+        self._tell_state()
+
+    def _power_up(self, then: Action) -> None:
+        self._pending, self._due, self._busy = then, self.time + POWER_UP_SECONDS, True
+        self.emit("desired_state", "ENABLED" if then is Action.POWER_UP else "HOMED")
+
+    def _begin_home(self) -> None:
+        if self._state is State.ENABLED and self._homed:
+            return
+        if self._state is State.DISABLED:
+            self._power_up(Action.HOME)
+        elif not self._homing:
+            self._move_home()
+
+    def _move_home(self) -> None:
+        self.emit("desired_state", "HOMED")
+        self._homing = True
+        self.joints.move(self._home)
+        self._begin_busy()
+
+    def _powered(self) -> None:
+        """The drives are on: stay where the joints are, and go on with what was asked for."""
+        then, self._pending = self._pending, None
+        self._state, self._busy = State.ENABLED, False
+        self._hold_all()
+        self.emit("status", f"{self.name} is powered")
+        if then is Action.HOME:
+            self._move_home()
+
+    def _switch_off(self, state: State) -> None:
+        self._stop_moves()
+        self._state, self._pending = state, None
+        self._off_all()
+
+    def fault(self, why: str) -> None:
+        """Stop with a fault; ``disable`` ends it."""
+        self.emit("error", f"{self.name}: {why}")
+        self._switch_off(State.FAULT)
+        self._tell_state()
+
+    def _tell_state(self, again: bool = False) -> None:
+        state = self.operating_state
+        if again or state != self._told:
+            self._told = state
+            self.emit("operating_state", [int(state.state), state.is_homed, state.is_busy])
+
+    def emit(self, name: str, value: Any) -> None:
+        """Note an event for whoever serves this arm."""
+        self.events.append(Event(self.name, name, value))
+
+    # --- groups of joints -------------------------------------------------------------------
+
+    def _groups(self) -> tuple[Axes, ...]:
+        return (self.joints,)
+
+    def _hold_all(self) -> None:
+        for axes in self._groups():
+            axes.hold()
+
+    def _off_all(self) -> None:
+        for axes in self._groups():
+            axes.off()
+
+    def _stop_moves(self) -> None:
+        """End moves where they are; the goal is not reached."""
+        moving = [axes for axes in self._groups() if axes.moving]
+        for axes in moving:
+            axes.hold()
+        if moving:
+            self.emit("goal_reached", False)
+        self._busy = self._homing = False
+
+    def settle(self) -> None:
+        """The joints were put elsewhere: moves end and the arm stays where it is now."""
+        self._stop_moves()
+        for axes in self._groups():
+            axes.settle()
+        self._tell_state()
+
+    def _begin_busy(self) -> None:
+        self._busy_until = self.time + SHORTEST_BUSY
+        self._busy = True
+        self._tell_state(again=True)
+
+    # --- time -------------------------------------------------------------------------------
+
+    def tick(self, dt: float) -> None:
+        """Advance by ``dt`` seconds: moves, streams, powering up."""
+        self.time += dt
+        if self._pending is not None and self.time >= self._due:
+            self._powered()
+            self._tell_state()
+        if self._state is State.ENABLED:
+            self._advance(dt)
+
+    def _advance(self, dt: float) -> None:
+        for axes in self._groups():
+            axes.tick(dt)
+        if self._busy and self.time >= self._busy_until and not any(axes.moving for axes in self._groups()):
+            self._arrive()
+
+    def _arrive(self) -> None:
+        self._busy = False
+        if self._homing:
+            self._homing = False
+            self._finish_home()
+        self.emit("goal_reached", True)
+        self._tell_state()
+
+    def _finish_home(self) -> None:
+        self._homed = True
+
+    def watch(self, seconds: float) -> None:
+        """Look after following errors; called every ``seconds``, seldom."""
+        if self._state is not State.ENABLED or self.joints.mode in (Mode.OFF, Mode.EFFORT):
+            self._astray = 0.0
+            return
+        q = self.joints.measured()[0]
+        if not np.isfinite(q).all():
+            self.fault("a joint value is not finite")
+            return
+        error = np.abs(q - self.joints.setpoint[0])
+        worst = int(np.argmax(error / self._following_bound))
+        self._astray = self._astray + seconds if error[worst] > self._following_bound[worst] else 0.0
+        if self._astray > FOLLOWING_PATIENCE:
+            self.fault(f"joint {self.joints.names[worst]} is {error[worst]:.3g} away from its set-point")
+
+    # --- snapshots --------------------------------------------------------------------------
+
+    _KEPT: tuple[str, ...] = (
+        "time", "_state", "_homed", "_busy", "_told", "_pending", "_due", "_busy_until", "_homing", "_astray",
+    )  # fmt: skip
+
+    def memory(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick, for snapshots."""
+        kept = {name: getattr(self, name) for name in self._KEPT}
+        return {**kept, "groups": [axes.memory() for axes in self._groups()]}
+
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Continue from `memory`."""
+        for name in self._KEPT:
+            setattr(self, name, memory[name])
+        for axes, kept in zip(self._groups(), memory["groups"], strict=True):
+            axes.recall(kept)

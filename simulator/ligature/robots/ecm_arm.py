@@ -1,0 +1,49 @@
+"""An endoscope camera manipulator as a CRTK arm. Metres, radians."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ligature.robots.arm import Arm
+from ligature.robots.axes import Axes
+from ligature.robots.ecm import ENDOSCOPES, INSERTION, Ecm
+from ligature.robots.operating_state import Refused
+
+Array = NDArray[np.float64]
+
+HOME = np.array([0.0, 0.0, 0.12, 0.0])
+FASTEST = np.array([np.pi / 6, np.pi / 6, 0.06, np.pi / 6])
+HARDEST = np.array([np.pi / 2, np.pi / 2, 0.06, np.pi / 2])
+"""Limits of moves (interface reference §5.5)."""
+
+SERVO_FASTEST = np.array([4.0, 4.0, 0.6, 4.0])
+FOLLOWING_BOUND = np.array([0.6, 0.6, 0.06, 1.5])
+
+LEAST_INSERTION = 0.04
+"""Insertion in metres that inverse kinematics keeps (§6.5)."""
+
+
+class EcmArm(Arm):
+    """An ECM with its endoscope."""
+
+    kind = "ECM"
+    kinematics: Ecm
+
+    def __init__(self, name: str, kinematics: Ecm, joints: Axes) -> None:
+        super().__init__(name, kinematics, joints, HOME, FOLLOWING_BOUND)
+        self.emit("endoscope_type", kinematics.endoscope)
+
+    _KEPT = (*Arm._KEPT, "kinematics")
+
+    def set_endoscope_type(self, endoscope: str) -> None:
+        """Change the endoscope, which turns the picture of UP and DOWN scopes; NONE keeps the straight one."""
+        if endoscope not in ENDOSCOPES:
+            raise Refused(f"there is no endoscope '{endoscope}'; known are {', '.join(ENDOSCOPES)}")
+        self.kinematics = Ecm(endoscope, self.kinematics.model)
+        self.emit("endoscope_type", endoscope)
+
+    def _solve(self, pose: ArrayLike, what: str) -> Array:
+        q = super()._solve(pose, what)
+        q[INSERTION] = max(q[INSERTION], LEAST_INSERTION)
+        return q

@@ -1,0 +1,66 @@
+"""The operating state of a CRTK device: which command is allowed in which state (interface reference §5.2).
+
+The table is that of the real dVRK 2.x, which differs from CRTK's text in ``pause`` and ``home`` of a disabled arm.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+
+class State(enum.IntEnum):
+    """States of CRTK; the numbers are those of the state record."""
+
+    DISABLED = 0
+    ENABLED = 1
+    PAUSED = 2
+    FAULT = 3
+
+
+@dataclass(frozen=True)
+class OperatingState:
+    """What ``crtk_msgs/OperatingState`` says: ``is_busy`` during moves and homing, never because of ``servo_``."""
+
+    state: State = State.DISABLED
+    is_homed: bool = False
+    is_busy: bool = False
+
+
+class Action(enum.Enum):
+    """What an allowed command leads to."""
+
+    NOTHING = enum.auto()
+    POWER_UP = enum.auto()
+    DISABLE = enum.auto()
+    PAUSE = enum.auto()
+    RESUME = enum.auto()
+    HOME = enum.auto()
+    UNHOME = enum.auto()
+
+
+class Refused(ValueError):
+    """A command that the arm does not carry out; the text says why and what would be right."""
+
+
+_D, _E, _P, _F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
+TRANSITIONS: dict[str, dict[State, Action]] = {
+    "enable": {_D: Action.POWER_UP, _E: Action.NOTHING},
+    "disable": dict.fromkeys(State, Action.DISABLE),
+    "pause": {_D: Action.PAUSE, _E: Action.PAUSE, _P: Action.NOTHING},
+    "resume": {_P: Action.RESUME},
+    "home": {_D: Action.HOME, _E: Action.HOME},
+    "unhome": dict.fromkeys(State, Action.UNHOME),
+}
+"""Action of each command in each state; what is missing is refused."""
+
+
+def action(command: str, state: State) -> Action:
+    """What ``command`` leads to in ``state``; raises `Refused` for an unknown command or one that is not allowed."""
+    if command not in TRANSITIONS:
+        raise Refused(f"'{command}' is no state command; there are {', '.join(TRANSITIONS)}")
+    found = TRANSITIONS[command].get(state)
+    if found is None:
+        allowed = ", ".join(s.name for s in TRANSITIONS[command])
+        raise Refused(f"'{command}' is not allowed in state {state.name}, only in {allowed}")
+    return found

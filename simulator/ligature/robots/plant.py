@@ -1,0 +1,102 @@
+"""What an arm moves: axes that follow set-points or efforts, real ones in the physics or ideal ones here.
+
+Radians and metres, newton metres and newtons.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Plant(Protocol):
+    """Axes that an arm drives; arrays are (n,)."""
+
+    def read(self) -> Array:
+        """Positions, velocities and efforts now, (3, n)."""
+
+    def servo(self, position: Array, velocity: Array) -> None:
+        """Follow set-points that move with ``velocity``."""
+
+    def push(self, effort: Array) -> None:
+        """Drive the axes with efforts; zeros let them move freely."""
+
+    def free(self) -> None:
+        """Switch the drives off."""
+
+    def place(self, position: Array) -> None:
+        """Put the axes somewhere at once, at rest."""
+
+    def reset(self) -> None:
+        """The scene was put back to its start."""
+
+    def memory(self) -> Any:
+        """What lasts from tick to tick and is not part of the physics, for snapshots."""
+
+    def recall(self, memory: Any) -> None:
+        """Continue from `memory`."""
+
+
+class IdealPlant:
+    """Axes without bodies: they are where they should be, and yield to efforts as damped inertias.
+
+    A master arm is simulated so: nothing touches it but the commands of its clients.
+
+    Parameters
+    ----------
+    lower, upper
+        Ends of travel (n,).
+    inertia, damping
+        Of each axis (n,): kg·m² and N·m·s, or kg and N·s/m.
+    """
+
+    def __init__(self, lower: Array, upper: Array, inertia: Array, damping: Array, start: Array) -> None:
+        self._lower, self._upper = lower, upper
+        self._inertia, self._damping = inertia, damping
+        self._state = np.zeros((3, len(start)))
+        self._state[0] = start
+        self._pushed = False
+
+    def read(self) -> Array:
+        return self._state
+
+    def servo(self, position: Array, velocity: Array) -> None:
+        self._pushed = False
+        self._state[0], self._state[1], self._state[2] = position, velocity, 0.0
+
+    def push(self, effort: Array) -> None:
+        self._pushed = True
+        self._state[2] = effort
+
+    def free(self) -> None:
+        self._pushed = False
+        self._state[1:] = 0.0
+
+    def place(self, position: Array) -> None:
+        self.free()
+        self._state[0] = position
+
+    def reset(self) -> None:
+        self.free()
+
+    def memory(self) -> Any:
+        return self._pushed, self._state.copy()
+
+    def recall(self, memory: Any) -> None:
+        self._pushed = memory[0]
+        self._state[:] = memory[1]
+
+    def step(self, dt: float) -> None:
+        """Advance by ``dt`` seconds: implicit in the damping, stopped at the ends of travel."""
+        if not self._pushed:
+            return
+        q, qd, effort = self._state
+        qd[:] = (qd + dt * effort / self._inertia) / (1.0 + dt * self._damping / self._inertia)
+        q += dt * qd
+        ended = (q < self._lower) | (q > self._upper)
+        qd[ended] = 0.0
+        np.clip(q, self._lower, self._upper, out=q)

@@ -1,0 +1,42 @@
+"""Writes the state of an arm into its part of the state record. Radians, metres, N·m, N."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ligature.model.frames import matrix_pose7
+from ligature.robots.arm import Arm
+from ligature.robots.mtm_arm import MtmArm
+from ligature.robots.poses import turned
+from ligature.robots.psm_arm import PsmArm
+
+
+def write_arm(arm: Arm, record: Any) -> None:
+    """Fill ``record``, of `ligature.model.state.ARM_DTYPE`, with the state of ``arm`` now."""
+    n, axes = arm.joints.n, arm.joints
+    measured, setpoint = axes.measured(), axes.setpoint
+    state = arm.operating_state
+    record["operating"], record["homed"], record["busy"] = state.state, state.is_homed, state.is_busy
+    record["ratio"] = axes.ratio_v, axes.ratio_a
+    record["reference"] = arm.reference.encode("utf-8")[:64]
+    record["measured_js"][:, :n] = measured
+    record["setpoint_js"][:, :n] = setpoint
+    T, wanted = arm.kinematics.forward(np.array([measured[0], setpoint[0]]))
+    base, body, spatial = arm.base_frame, arm.kinematics.jacobian_body(measured[0]), arm.spatial_jacobian()
+    record["local_measured_cp"], record["local_setpoint_cp"] = matrix_pose7(T), matrix_pose7(wanted)
+    record["measured_cp"], record["setpoint_cp"] = matrix_pose7(base @ T), matrix_pose7(base @ wanted)
+    record["body_jacobian"][:, :n], record["spatial_jacobian"][:, :n] = body, spatial
+    twist = turned(T[:3, :3], body @ measured[1])
+    record["local_measured_cv"], record["measured_cv"] = twist, turned(base[:3, :3], twist)
+    wrench = arm.spatial_measured_cf()
+    record["spatial_measured_cf"] = turned(base[:3, :3], wrench)
+    record["body_measured_cf"] = wrench if arm.cf_orientation_absolute else turned(T[:3, :3].T, wrench)
+    if isinstance(arm, PsmArm):
+        record["tool"], record["tool_present"] = arm.kinematics.instrument.id, arm.tool_present
+        if arm.jaw is not None:
+            record["jaw_measured_js"] = arm.jaw.axes.measured()[:, 0]
+            record["jaw_setpoint_js"] = arm.jaw.axes.setpoint[:, 0]
+    elif isinstance(arm, MtmArm):
+        record["jaw_measured_js"] = arm.gripper.measured()[:, 0]
