@@ -32,7 +32,10 @@ class MeshError(AdfError):
 
 @dataclass(frozen=True)
 class Material:
-    """A material of a mesh file; colours 0..1, ``alpha`` 1 is opaque; texture paths may not exist."""
+    """A material of a mesh file; colours 0..1, ``alpha`` 1 is opaque; texture paths may not exist.
+
+    ``roughness``, ``metallic`` and ``coat`` (a clear film, of ``coat_roughness``) are None unless the file gives them.
+    """
 
     name: str
     ambient: Triple = (0.3, 0.3, 0.3)
@@ -42,6 +45,13 @@ class Material:
     alpha: float = 1.0
     texture: Path | None = None
     normal_map: Path | None = None
+    emission: Triple = (0.0, 0.0, 0.0)
+    roughness: float | None = None
+    metallic: float | None = None
+    coat: float | None = None
+    coat_roughness: float = 0.1
+    roughness_map: Path | None = None
+    metallic_map: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)

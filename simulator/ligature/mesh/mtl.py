@@ -11,9 +11,12 @@ from ligature.adf.resolver import Resolver
 from ligature.mesh.mesh import MAX_PARTS, Findings, Material, Triple, failure
 from ligature.mesh.texture import texture_file
 
-_COLOURS = ("Ka", "Kd", "Ks")
-_SCALARS = ("Ns", "d", "Tr")
-_TEXTURES = ("map_Kd", "map_Bump")
+_COLOURS = ("Ka", "Kd", "Ks", "Ke")
+_SCALARS = ("Ns", "d", "Tr", "Pr", "Pm", "Pc", "Pcr")
+"""The reference honours the first three; the rest are roughness, metallic, clear coat and its roughness, as Blender
+and others write them for physically based rendering."""
+
+_TEXTURES = ("map_Kd", "map_Bump", "map_Pr", "map_Pm")
 
 _OPTIONS = {
     "-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
@@ -45,6 +48,13 @@ class _Draft:
             alpha=min(self.scalars.get("alpha", plain.alpha), 1.0),
             texture=self.textures.get("map_Kd"),
             normal_map=self.textures.get("map_Bump"),
+            emission=self.colours.get("Ke", plain.emission),
+            roughness=self.scalars.get("Pr"),
+            metallic=self.scalars.get("Pm"),
+            coat=self.scalars.get("Pc"),
+            coat_roughness=self.scalars.get("Pcr", plain.coat_roughness),
+            roughness_map=self.textures.get("map_Pr"),
+            metallic_map=self.textures.get("map_Pm"),
         )
 
 
@@ -99,7 +109,7 @@ def _value(draft: _Draft, word: str, rest: str, path: Path, number: int, finding
     elif count == 3:
         draft.colours[word] = (_unit(values[0]), _unit(values[1]), _unit(values[2]))
     else:
-        draft.scalars["Ns" if word == "Ns" else "alpha"] = max(values[0], 0.0)
+        draft.scalars["alpha" if word in ("d", "Tr") else word] = max(values[0], 0.0)
 
 
 def _unit(value: float) -> float:

@@ -34,3 +34,18 @@ def compose_rows(parents: Array, locals_: Array, rows: NDArray[np.int64], out: A
     """Compose row i of ``parents`` and ``locals_`` (n, 7) into row ``rows[i]`` of ``out``."""
     for i in range(rows.shape[0]):
         compose(parents[i], locals_[i], out[rows[i]])
+
+
+def pose7_matrices(poses: Array) -> Array:
+    """Homogeneous matrices (n, 4, 4) of ``poses`` (n, 7); quaternions are normalised."""
+    q = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    v, w = q[:, :3], q[:, 3]
+    T = np.zeros((len(poses), 4, 4))
+    T[:, :3, :3] = 2.0 * v[:, :, None] * v[:, None, :]
+    T[:, [0, 1, 2], [0, 1, 2]] += (w * w - np.einsum("ni,ni->n", v, v))[:, None]
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        T[:, i, j] -= 2.0 * w * v[:, k]
+        T[:, j, i] += 2.0 * w * v[:, k]
+    T[:, :3, 3] = poses[:, :3]
+    T[:, 3, 3] = 1.0
+    return T

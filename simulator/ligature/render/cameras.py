@@ -16,8 +16,9 @@ from ligature.model.optics import Calibration, stereo_partners
 from ligature.model.scene import Camera, Scene
 from ligature.render.calibration import calibrations
 from ligature.render.camera import CameraView, view_of
-from ligature.render.renderer import Frame, Renderer
+from ligature.render.renderer import Renderer
 from ligature.render.sensor import IDEAL, ImageSensor
+from ligature.render.target import Frame
 from ligature.simulation import Handles, Simulation
 
 Array = NDArray[np.float64]

@@ -30,9 +30,33 @@ class Triangles:
     uvs: Array
     faces: NDArray[np.int32]
 
-    def interleaved(self) -> NDArray[np.float32]:
-        """Vertices as the shaders want them: position, normal, uv; (n, 8) float32."""
-        return np.hstack([self.positions, self.normals, self.uvs]).astype("f4")
+    def interleaved(self, tangents: bool = False) -> NDArray[np.float32]:
+        """Vertices as the shaders want them: position, normal, uv, tangent if wanted; (n, 8 or 12) float32."""
+        columns = [self.positions, self.normals, self.uvs]
+        return np.hstack([*columns, self.tangents()] if tangents else columns).astype("f4")
+
+    def tangents(self) -> Array:
+        """Direction of growing u at each vertex, and the handedness that makes v grow along w·(n x t); (n, 4).
+
+        Lengyel, Foundations of Game Engine Development 2 (2019), §7.5: summed over the faces of a vertex.
+        """
+        corners, uvs = self.positions[self.faces], self.uvs[self.faces]
+        (e1, e2), (d1, d2) = ((a[:, 1] - a[:, 0], a[:, 2] - a[:, 0]) for a in (corners, uvs))
+        area = d1[:, 0] * d2[:, 1] - d2[:, 0] * d1[:, 1]
+        inverse = np.divide(1.0, area, out=np.zeros_like(area), where=np.abs(area) > 1e-20)[:, None]
+        along_u = (e1 * d2[:, 1:] - e2 * d1[:, 1:]) * inverse
+        along_v = (e2 * d1[:, :1] - e1 * d2[:, :1]) * inverse
+        u, v = np.zeros_like(self.positions), np.zeros_like(self.positions)
+        for corner in range(3):
+            np.add.at(u, self.faces[:, corner], along_u)
+            np.add.at(v, self.faces[:, corner], along_v)
+        n = self.normals
+        u -= n * np.einsum("ij,ij->i", n, u)[:, None]
+        length = np.linalg.norm(u, axis=1, keepdims=True)
+        across = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
+        u = np.where(length > 1e-12, np.divide(u, length, out=np.zeros_like(u), where=length > 1e-12), across)
+        handed = np.where(np.einsum("ij,ij->i", np.cross(n, u), v) < 0.0, -1.0, 1.0)
+        return np.hstack([u, handed[:, None]])
 
 
 def of_shape(shape: Shape) -> Triangles:
@@ -127,26 +151,6 @@ def flat_shaded(vertices: Array, faces: NDArray[np.int32]) -> Triangles:
         np.zeros((n, 2)),
         np.arange(n, dtype=np.int32).reshape(-1, 3),
     )
-
-
-def tube(points: Array, radius: float, sides: int = 10) -> Triangles:
-    """A smooth tube of ``radius`` through ``points`` (n, 3), with parallel-transported cross-sections."""
-    tangents = np.gradient(points, axis=0)
-    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True) + 1e-30
-    frames = np.empty((len(points), 2, 3))
-    side = np.cross(tangents[0], np.eye(3)[int(np.argmin(np.abs(tangents[0])))])
-    for i, t in enumerate(tangents):
-        side = side - (side @ t) * t
-        side /= np.linalg.norm(side) + 1e-30
-        frames[i] = side, np.cross(t, side)
-    angles = np.linspace(0, 2 * np.pi, sides + 1)
-    normals = np.cos(angles)[None, :, None] * frames[:, None, 0] + np.sin(angles)[None, :, None] * frames[:, None, 1]
-    positions = points[:, None] + radius * normals
-    index = np.arange(len(points) * (sides + 1)).reshape(len(points), sides + 1)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    uvs = np.stack(np.meshgrid(angles / (2 * np.pi), np.linspace(0, 1, len(points))), -1).reshape(-1, 2)
-    return Triangles(positions.reshape(-1, 3), normals.reshape(-1, 3), uvs, faces.astype(np.int32))
 
 
 def _arc(

@@ -1,278 +1,251 @@
-"""Draws one camera's view of a scene from a state record: colour, linear depth, ids and normals in one pass.
+"""Draws one camera's view of a scene from a state record: colour, linear depth, ids, normals, motion.
 
 Inputs in world axes and metres. Ids are 1 + body index; ghosts follow the bodies; 0 is background.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from importlib import resources
-from pathlib import Path
-from typing import Any
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
-from ligature.adf import Resolver
-from ligature.mesh import Material, MeshError, load_mesh
-from ligature.model.frames import pose7_matrix
-from ligature.model.scene import Colour, RodChain, Scene, Visual
+from ligature.adf import AdfError
+from ligature.model.poses import pose7_matrices
+from ligature.model.scene import Scene
+from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
 from ligature.render.context import create_context
-from ligature.render.geometry import Triangles, flat_shaded, of_shape, tube
+from ligature.render.lights import Lights
+from ligature.render.programs import Program, Programs
+from ligature.render.surface import Physical, Surface, surface_of
+from ligature.render.target import PASSES, Frame, Target
+from ligature.render.textures import Textures
+from ligature.render.thread import Tube
+from ligature.render.visuals import Piece, VisualLoader
 
 Array = NDArray[np.float64]
 
-MAX_LIGHTS = 8
 BACKGROUND = (0.02, 0.02, 0.03, 1.0)
-SPLINE_POINTS = 4
-"""Points of the drawn tube per rod element."""
+SAMPLES = 4
+"""Samples a pixel of the colour picture: what Mesa's software rasteriser offers."""
 
+COARSE_BELOW = 24.0
+"""Radius in pixels below which the low-resolution mesh of an object is drawn."""
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One picture, row 0 at the top.
+THREAD = Physical(roughness=0.45)
+"""Reflectance of a thread whose material does not ask for another: the sheen of silk or a coated filament."""
 
-    ``rgb`` (h, w, 3) uint8; ``depth`` (h, w) float32 metres along the optical axis, inf where
-    nothing is; ``ids`` (h, w) int32; ``normals`` (h, w, 3) float32 in the OpenGL eye frame.
-    """
-
-    rgb: NDArray[np.uint8]
-    depth: NDArray[np.float32]
-    ids: NDArray[np.int32]
-    normals: NDArray[np.float32]
-
-
-@dataclass(frozen=True, eq=False)
-class _Item:
-    """One draw call: a vertex array, its material, whose it is and where on it (``T_owner_item``)."""
-
-    vertices: moderngl.VertexArray
-    colour: Colour
-    texture: moderngl.Texture | None
-    owner: int
-    T_owner_item: Array
+LARGE = 2.0
+"""Radius in metres above which a piece is ground or wall and does not set the extent of shadow maps."""
 
 
 class Renderer:
-    """Everything that is drawn of one scene; `render` takes pictures of it."""
+    """Everything that is drawn of one scene; `render` takes pictures of it.
 
-    def __init__(self, scene: Scene) -> None:
+    Parameters
+    ----------
+    scene
+        What to draw.
+    samples
+        Samples a pixel of the colour picture; 0 draws colour without anti-aliasing, in one pass with the rest.
+    """
+
+    def __init__(self, scene: Scene, samples: int = SAMPLES) -> None:
         self._scene = scene
         self._context = create_context()
-        self._program = self._context.program(_glsl("surface.vert"), _glsl("surface.frag"))
-        self._textures: dict[Path, moderngl.Texture | None] = {}
-        self._targets: dict[tuple[int, int], _Target] = {}
-        self.problems: list[MeshError] = []
-        rod_bodies = scene.rod_bodies
-        owners = [(b.index, b.visual) for b in scene.bodies if b.index not in rod_bodies]
-        owners += [(len(scene.bodies) + g.index, g.visual) for g in scene.ghosts]
-        items = [item for owner, visual in owners if visual.visible for item in self._items(owner, visual)]
-        self._opaque = [item for item in items if item.colour.alpha >= 1.0]
-        self._transparent = [item for item in items if item.colour.alpha < 1.0]
+        self._samples = min(samples, self._context.max_samples)
+        self._programs = Programs(self._context)
+        self._textures = Textures(self._context)
+        self._targets: dict[tuple[int, int, tuple[str, ...]], Target] = {}
+        self._lights = Lights(self._context, scene)
+        loader = VisualLoader()
+        pieces = loader.of_scene(scene)
+        self._tubes = [Tube(scene, rod) for rod in scene.rods]
+        rods = self._rod_pieces(loader)
+        self._batches, ordered = self._batched(pieces, rods)
+        self._instances = Instances(ordered)
+        self._before: dict[Hashable, Array] = {}
+        self.problems: list[AdfError] = loader.problems
 
-    def render(self, state: NDArray[np.void], view: CameraView) -> Frame:
-        """Draw ``state`` (one-element record) as seen by ``view``."""
-        poses = np.concatenate([state["body_pose"][0], state["ghost_world"][0]])
-        target = self._target(view.width, view.height)
-        target.clear()
-        context = self._context
-        context.enable(moderngl.DEPTH_TEST)
-        context.disable(moderngl.BLEND)
-        self._uniform("uProjection").write(view.projection.T.astype("f4").tobytes())
-        self._set_lights(state, view)
-        for item in self._opaque:
-            self._draw(item, poses[item.owner], view)
-        for rod in self._scene.rods:
-            self._draw_rod(rod, poses, view)
-        for item in sorted(self._transparent, key=lambda i: -_distance(poses[i.owner], view)):
-            self._draw(item, poses[item.owner], view)
+    @property
+    def lights(self) -> Lights:
+        """The lights, whose settings may be changed between pictures."""
+        return self._lights
+
+    @property
+    def triangles(self) -> int:
+        """Triangles of the whole scene, none of them culled."""
+        return sum(len(batch.triangles.faces) * len(batch.pieces) for batch in self._batches)
+
+    def render(
+        self, state: NDArray[np.void], view: CameraView, passes: Sequence[str] = ("rgb", "depth", "ids", "normals")
+    ) -> Frame:
+        """Draw ``state`` (one-element record) as seen by ``view``; only the ``passes`` that are named.
+
+        ``flow`` counts from the picture before of equal size and passes.
+        """
+        self._place(state, view.view)
+        target = self._target(view, passes)
+        seen = self._instances.seen(view.view, view.projection, view.height, COARSE_BELOW)
+        if "rgb" in target.passes:
+            self._cast_shadows(seen, view)
+        target.clear(BACKGROUND)
+        self._context.enable(moderngl.DEPTH_TEST)
+        if self._samples or not all(batch.surface.opaque for batch in self._batches):
+            if target.colour is not None:
+                self._draw(target.colour, ["rgb"], seen, view)
+            if target.geometry is not None:
+                self._draw(target.geometry, [name for name in target.passes if name != "rgb"], seen, view)
+        else:
+            self._draw(target.whole, target.passes, seen, view)
         return target.read()
 
     def release(self) -> None:
         """Give the OpenGL objects back."""
         self._context.release()
 
-    def _items(self, owner: int, visual: Visual) -> list[_Item]:
-        if visual.mesh is None:
-            colour = visual.colour or Colour()
-            return [_Item(self._upload(of_shape(c.shape)), colour, None, owner, c.T_body_shape) for c in visual.shapes]
-        try:
-            mesh = load_mesh(visual.mesh, Resolver([visual.mesh.parent]))
-        except MeshError as error:
-            self.problems.append(error)
-            return []
-        scale = np.diag([visual.scale] * 3 + [1.0])
-        items = []
-        for part in mesh.parts:
-            if not len(part.faces):
-                continue
-            if part.normals is None:
-                triangles = flat_shaded(part.vertices, part.faces)
-            else:
-                uvs = part.uvs if part.uvs is not None else np.zeros((len(part.vertices), 2))
-                triangles = Triangles(part.vertices, part.normals, uvs, part.faces)
-            colour = visual.colour or _colour(part.material)
-            texture = self._texture(part.material)
-            items.append(_Item(self._upload(triangles), colour, texture, owner, scale))
-        return items
+    def _rod_pieces(self, loader: VisualLoader) -> list[Piece]:
+        """The rods as pieces in world axes, looking like their first element's material or ADF colours."""
+        T_world_body = np.array([body.T_world_body for body in self._scene.bodies])
+        pieces = []
+        for rod, tube in zip(self._scene.rods, self._tubes, strict=True):
+            visual = self._scene.bodies[rod.bodies[0]].visual
+            surface = surface_of(visual.colour, loader.material(visual))
+            surface = Surface(surface.colour, physical=surface.physical or THREAD)
+            triangles = tube.triangles(T_world_body)
+            pieces.append(Piece(id(rod), triangles, surface, rod.bodies[0], np.eye(4), True, None, visual.shaders))
+        return pieces
 
-    def _upload(self, triangles: Triangles) -> moderngl.VertexArray:
+    def _batched(self, pieces: list[Piece], rods: list[Piece]) -> tuple[list[Batch], list[Piece]]:
+        """Pieces grouped into batches, and in the order of the groups; rods come last."""
+        groups: dict[Hashable, list[Piece]] = {}
+        for piece in [*pieces, *rods]:
+            key = (piece.geometry, piece.surface, piece.closed, piece.coarse, piece.shaders)
+            groups.setdefault(key, []).append(piece)
+        batches: list[Batch] = []
+        ordered: list[Piece] = []
+        for group in groups.values():
+            batches.append(Batch(self._context, group, self._loadable(group[0].surface), len(ordered)))
+            ordered += group
+        return batches, ordered
+
+    def _loadable(self, surface: Surface) -> Surface:
+        """``surface`` without the pictures that cannot be loaded."""
+        get = self._textures.get
+        surface = replace(
+            surface,
+            texture=surface.texture if get(surface.texture) else None,
+            normal_map=surface.normal_map if get(surface.normal_map) else None,
+        )
+        look = surface.physical
+        if look is not None:
+            metallic = look.metallic_map if get(look.metallic_map) else None
+            roughness = look.roughness_map if get(look.roughness_map) else None
+            look = replace(look, metallic_map=metallic, roughness_map=roughness)
+        return replace(surface, physical=look)
+
+    def _place(self, state: NDArray[np.void], view: Array) -> None:
+        """Move everything to where ``state`` has it."""
+        T = pose7_matrices(np.concatenate([state["body_pose"][0], state["ghost_world"][0]]))
+        tubes = [tube.triangles(T) for tube in self._tubes]
+        for rod in self._scene.rods:
+            T[rod.bodies[0]] = np.eye(4)  # tubes stand in world axes
+        self._instances.place(T)
+        for batch, tube in zip(self._batches[len(self._batches) - len(tubes) :], tubes, strict=True):
+            batch.load(tube)
+            self._instances.reach(batch.rows.start, batch.triangles)
+        self._lights.place(pose7_matrices(state["light_world"][0]), view)
+
+    def _cast_shadows(self, seen: Seen, view: CameraView) -> None:
+        """Draw the shadow maps of what may throw shadows into the picture."""
+        if "SHADOWS" not in self._lights.defines:
+            return
+        small = seen.mask & (self._instances.radii < LARGE)
+        if not small.any():
+            small = seen.mask
+        if not small.any():
+            return
+        centre, radius = self._instances.around(small)
         context = self._context
-        vertices = context.buffer(triangles.interleaved().tobytes())
-        indices = context.buffer(np.ascontiguousarray(triangles.faces, dtype="i4").tobytes())
-        content = [(vertices, "3f 3f 2f", "aPosition", "aNormal", "aTexCoord")]
-        return context.vertex_array(self._program, content, index_buffer=indices)
+        context.enable_only(moderngl.DEPTH_TEST)
+        context.polygon_offset = (1.5, 2.0)
+        self._lights.cast(self._draw_shadow, centre, radius, view.view)
+        context.polygon_offset = (0.0, 0.0)
 
-    def _texture(self, material: Material | None) -> moderngl.Texture | None:
-        path = None if material is None else material.texture
-        if path is None:
-            return None
-        if path not in self._textures:
-            self._textures[path] = self._load_texture(path)
-        return self._textures[path]
+    def _draw_shadow(self, view: Array, projection: Array, size: int) -> None:
+        program = self._programs.get("shadow", {})
+        program.write("uProjection", projection)
+        seen = self._instances.seen(view, projection, size, COARSE_BELOW)
+        for batch in self._batches:
+            rows = seen.rows(batch)
+            if len(rows) and batch.surface.opaque:
+                batch.draw(program, seen.instances[rows])
 
-    def _load_texture(self, path: Path) -> moderngl.Texture | None:
-        if not path.is_file():
-            return None
-        with Image.open(path) as picture:
-            image = picture.convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
-        texture = self._context.texture(image.size, 4, image.tobytes())
-        texture.build_mipmaps()
-        texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        return texture
+    def _draw(self, buffer: moderngl.Framebuffer, passes: Sequence[str], seen: Seen, view: CameraView) -> None:
+        """Draw everything that is seen: the opaque from near to far, then the transparent from far to near."""
+        buffer.use()
+        calls = [(batch, rows) for batch in self._batches if len(rows := seen.rows(batch))]
+        opaque = [(batch, rows) for batch, rows in calls if batch.surface.opaque]
+        for batch, rows in sorted(opaque, key=lambda call: seen.nearest[call[1]].min()):
+            self._draw_batch(batch, passes, rows, seen, view)
+        clear = [(batch, row) for batch, rows in calls if not batch.surface.opaque for row in rows]
+        if clear and "rgb" in passes:
+            self._context.enable(moderngl.BLEND)
+            buffer.depth_mask = False
+        for batch, row in sorted(clear, key=lambda call: -seen.depth[call[1]]):
+            self._draw_batch(batch, passes, np.array([row]), seen, view)
+        self._context.disable(moderngl.BLEND)
+        buffer.depth_mask = True
 
-    def _target(self, width: int, height: int) -> _Target:
-        if (width, height) not in self._targets:
-            self._targets[width, height] = _Target(self._context, width, height)
-        return self._targets[width, height]
+    def _draw_batch(
+        self, batch: Batch, passes: Sequence[str], rows: NDArray[np.int64], seen: Seen, view: CameraView
+    ) -> None:
+        (self._context.enable if batch.closed else self._context.disable)(moderngl.CULL_FACE)
+        program = self._program(batch, passes)
+        program.write("uProjection", view.projection)
+        program.set("uHalfSize", (view.width / 2, view.height / 2))
+        if "rgb" in passes:
+            self._lights.bind(program)
+            program.write("uWorldFromEye", view.view[:3, :3].T)
+            self._bind_surface(program, batch.surface)
+        batch.draw(program, seen.instances[rows])
 
-    def _set_lights(self, state: NDArray[np.void], view: CameraView) -> None:
-        lights = self._scene.lights[:MAX_LIGHTS]
-        self._set("uLightCount", len(lights))
-        for light in lights:
-            T_eye_light = view.view @ pose7_matrix(state["light_world"][0][light.index])
-            name = f"uLights[{light.index}]"
-            self._set(f"{name}.position", tuple(T_eye_light[:3, 3]))
-            self._set(f"{name}.direction", tuple(T_eye_light[:3, 0]))
-            self._set(f"{name}.attenuation", light.attenuation)
-            self._set(f"{name}.cosCutoff", float(np.cos(min(light.cutoff, np.pi / 2))))
-            self._set(f"{name}.exponent", light.spot_exponent)
+    def _program(self, batch: Batch, passes: Sequence[str]) -> Program:
+        defines = {f"PASS_{name.upper()}": place for place, name in enumerate(passes)} | {"LIGHTS": 1}
+        if "rgb" in passes:
+            defines |= self._lights.defines | dict.fromkeys(batch.surface.defines, 1)
+        return self._programs.get("surface", defines)
 
-    def _draw(self, item: _Item, pose: Array, view: CameraView) -> None:
-        model_view = view.view @ pose7_matrix(pose) @ item.T_owner_item
-        self._uniform("uModelView").write(model_view.T.astype("f4").tobytes())
-        self._set_material(item.colour, item.texture, item.owner)
-        item.vertices.render()
+    def _bind_surface(self, program: Program, surface: Surface) -> None:
+        """Fill the material's uniforms of a built-in program."""
+        colour, look = surface.colour, surface.physical
+        program.set("uAmbient", colour.ambient)
+        program.set("uDiffuse", colour.diffuse)
+        program.set("uSpecular", colour.specular)
+        program.set("uEmission", colour.emission)
+        program.set("uShininess", float(max(colour.shininess, 1)))
+        program.set("uAlpha", colour.alpha)
+        maps = {"uTexture": surface.texture, "uNormalMap": surface.normal_map}
+        if look is not None:
+            program.set("uMetallic", look.metallic)
+            program.set("uRoughness", look.roughness)
+            program.set("uCoat", look.coat)
+            program.set("uCoatRoughness", look.coat_roughness)
+            maps |= {"uMetallicMap": look.metallic_map, "uRoughnessMap": look.roughness_map}
+        for unit, (name, path) in enumerate(maps.items()):
+            texture = self._textures.get(path)
+            if texture is not None:
+                texture.use(unit)
+                program.set(name, unit)
 
-    def _draw_rod(self, rod: RodChain, poses: Array, view: CameraView) -> None:
-        """Draw a rod as one smooth tube through the middles and ends of its elements."""
-        points = _spline(rod, poses)
-        vertices = self._upload(tube(points, rod.radius))
-        self._uniform("uModelView").write(view.view.T.astype("f4").tobytes())
-        visual = self._scene.bodies[rod.bodies[0]].visual
-        self._set_material(visual.colour or Colour(diffuse=(0.1, 0.1, 0.35)), None, rod.bodies[0])
-        vertices.render()
-        vertices.release()
-
-    def _set_material(self, colour: Colour, texture: moderngl.Texture | None, owner: int) -> None:
-        self._set("uAmbient", colour.ambient)
-        self._set("uDiffuse", colour.diffuse)
-        self._set("uSpecular", colour.specular)
-        self._set("uEmission", colour.emission)
-        self._set("uShininess", float(max(colour.shininess, 1)))
-        self._set("uAlpha", colour.alpha)
-        self._set("uTextured", texture is not None)
-        self._set("uId", owner + 1)
-        if texture is not None:
-            texture.use(0)
-
-    def _set(self, name: str, value: Any) -> None:
-        """Set a uniform unless the compiler dropped it."""
-        if name in self._program:
-            self._uniform(name).value = value
-
-    def _uniform(self, name: str) -> moderngl.Uniform:
-        member = self._program[name]
-        assert isinstance(member, moderngl.Uniform)
-        return member
-
-
-class _Target:
-    """Frame buffer with one attachment per output of the geometry pass."""
-
-    def __init__(self, context: moderngl.Context, width: int, height: int) -> None:
-        size = (width, height)
-        self._size = size
-        self._colour = context.texture(size, 4)
-        self._depth = context.texture(size, 1, dtype="f4")
-        self._ids = context.texture(size, 1, dtype="i4")
-        self._normals = context.texture(size, 4, dtype="f4")
-        self._buffer = context.framebuffer(
-            [self._colour, self._depth, self._ids, self._normals], context.depth_renderbuffer(size)
-        )
-
-    def clear(self) -> None:
-        """Make the target current and empty."""
-        self._buffer.use()
-        self._buffer.clear(*BACKGROUND)
-        self._depth.write(np.full(self._size, np.inf, dtype="f4").tobytes())
-        self._ids.write(np.zeros(self._size, dtype="i4").tobytes())
-        self._normals.write(np.zeros((*self._size, 4), dtype="f4").tobytes())
-
-    def read(self) -> Frame:
-        """Copy the picture out, top row first."""
-        width, height = self._size
-
-        def array(texture: moderngl.Texture, dtype: str, channels: int) -> NDArray[Any]:
-            data = np.frombuffer(texture.read(), dtype=dtype)
-            return data.reshape(height, width, channels)[::-1]
-
-        return Frame(
-            np.ascontiguousarray(array(self._colour, "u1", 4)[..., :3]),
-            np.ascontiguousarray(array(self._depth, "f4", 1)[..., 0]),
-            np.ascontiguousarray(array(self._ids, "i4", 1)[..., 0]),
-            np.ascontiguousarray(array(self._normals, "f4", 4)[..., :3]),
-        )
-
-
-def _glsl(name: str) -> str:
-    return resources.files("ligature.render").joinpath("glsl", name).read_text(encoding="utf-8")
-
-
-def _colour(material: Material | None) -> Colour:
-    """The colours of a mesh file's material."""
-    if material is None:
-        return Colour()
-    return Colour(
-        diffuse=material.diffuse,
-        ambient=material.ambient,
-        specular=material.specular,
-        shininess=int(material.shininess),
-        alpha=material.alpha,
-    )
-
-
-def _distance(pose: Array, view: CameraView) -> float:
-    """Depth of a pose's origin in front of the eye."""
-    return -float(view.view[2, :3] @ pose[:3] + view.view[2, 3])
-
-
-def _spline(rod: RodChain, poses: Array) -> Array:
-    """Points (n, 3) of a C1 spline through the element centres and the two free ends."""
-    from scipy.interpolate import CubicSpline
-
-    elements = poses[list(rod.bodies)]
-    centres = elements[:, :3]
-    axes = np.array([pose7_matrix(p)[:3, 2] for p in elements[[0, -1]]])
-    if len(centres) > 1:
-        axes[0] *= np.sign(axes[0] @ (centres[0] - centres[1])) or 1.0
-        axes[1] *= np.sign(axes[1] @ (centres[-1] - centres[-2])) or 1.0
-    ends = centres[[0, -1]] + 0.5 * np.asarray(rod.lengths)[[0, -1], None] * axes
-    knots = np.vstack([ends[:1], centres, ends[1:]])
-    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1) + 1e-12)])
-    fine = np.linspace(0.0, chord[-1], SPLINE_POINTS * len(knots))
-    points: Array = CubicSpline(chord, knots)(fine)
-    return points
+    def _target(self, view: CameraView, passes: Sequence[str]) -> Target:
+        unknown = set(passes) - set(PASSES)
+        if unknown or not passes:
+            raise ValueError(f"{sorted(unknown) or 'no pass'} cannot be drawn; there are {', '.join(PASSES)}")
+        key = (view.width, view.height, tuple(passes))
+        if key not in self._targets:
+            self._targets[key] = Target(self._context, key[:2], passes, self._samples)
+        return self._targets[key]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ligature.model.optics import NO_DISTORTION
 from ligature.render.camera import CameraView
-from ligature.render.renderer import Frame
+from ligature.render.target import Frame
 
 Array = NDArray[np.float64]
 

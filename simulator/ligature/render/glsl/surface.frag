@@ -1,18 +1,4 @@
-#version 330 core
-// One pass writes colour, linear depth, object id and eye-space normal together.
-
-const int MAX_LIGHTS = 8;
-
-struct Light {
-    vec3 position;     // eye space, metres
-    vec3 direction;    // eye space, unit
-    vec3 attenuation;  // constant, linear, quadratic
-    float cosCutoff;
-    float exponent;
-};
-
-uniform Light uLights[MAX_LIGHTS];
-uniform int uLightCount;
+// Writes what the passes of a picture ask for: colour, linear depth, ids, eye-space normal, motion.
 
 uniform vec3 uAmbient;
 uniform vec3 uDiffuse;
@@ -20,42 +6,103 @@ uniform vec3 uSpecular;
 uniform vec3 uEmission;
 uniform float uShininess;
 uniform float uAlpha;
-uniform bool uTextured;
+uniform vec2 uHalfSize;  // of the picture in pixels
+#ifdef TEXTURED
 uniform sampler2D uTexture;
-uniform int uId;
+#endif
+#ifdef NORMAL_MAP
+uniform sampler2D uNormalMap;
+in vec4 vTangent;
+#endif
 
 in vec3 vEye;
 in vec3 vNormal;
 in vec2 vTexCoord;
+flat in ivec2 vIds;
 
-layout(location = 0) out vec4 fColour;
-layout(location = 1) out float fDepth;
-layout(location = 2) out int fId;
-layout(location = 3) out vec4 fNormal;
+#include "lights.glsl"
+#ifdef PHYSICAL
+#include "physical.glsl"
+#endif
+
+#ifdef PASS_FLOW
+in vec4 vNow;
+in vec4 vBefore;
+#endif
+
+#ifdef PASS_RGB
+layout(location = PASS_RGB) out vec4 fColour;
+#endif
+#ifdef PASS_DEPTH
+layout(location = PASS_DEPTH) out float fDepth;
+#endif
+#ifdef PASS_IDS
+layout(location = PASS_IDS) out int fId;
+#endif
+#ifdef PASS_PARTS
+layout(location = PASS_PARTS) out int fPart;
+#endif
+#ifdef PASS_NORMALS
+layout(location = PASS_NORMALS) out vec4 fNormal;
+#endif
+#ifdef PASS_FLOW
+layout(location = PASS_FLOW) out vec2 fFlow;
+#endif
+
+#ifdef PASS_RGB
+vec3 shadedNormal(vec3 n) {
+#ifdef NORMAL_MAP
+    vec3 t = normalize(vTangent.xyz - n * dot(n, vTangent.xyz));
+    vec3 m = texture(uNormalMap, vTexCoord).xyz * 2.0 - 1.0;
+    return normalize(m.x * t + m.y * vTangent.w * cross(n, t) + m.z * n);
+#else
+    return n;
+#endif
+}
+
+vec3 phong(vec3 texel, vec3 n, vec3 toEye) {
+    vec3 base = uDiffuse * texel;
+    vec3 colour = (uEmission + AMBIENT_LIGHT * uAmbient) * texel;
+    for (int i = 0; i < LIGHTS; ++i) {
+        vec3 toLight;
+        float strength = lightAt(i, vEye, n, toLight);
+        float facing = max(dot(n, toLight), 0.0);
+        float shine = facing > 0.0 ? pow(max(dot(n, normalize(toLight + toEye)), 0.0), uShininess) : 0.0;
+        colour += strength * (facing * base + shine * uSpecular);
+    }
+    return colour;
+}
+#endif
 
 void main() {
-    vec3 toEye = normalize(-vEye);
+    vec3 toEye = isPerspective() ? normalize(-vEye) : vec3(0.0, 0.0, 1.0);
     vec3 normal = normalize(vNormal);
     if (dot(normal, toEye) < 0.0) normal = -normal;  // meshes of others are not always closed
-
-    vec4 base = vec4(uDiffuse, uAlpha);
-    if (uTextured) base *= texture(uTexture, vTexCoord);
-
-    vec3 colour = uEmission + 0.35 * uAmbient * (uTextured ? base.rgb : vec3(1.0));
-    for (int i = 0; i < uLightCount; ++i) {
-        vec3 toLight = uLights[i].position - vEye;
-        float range = length(toLight);
-        toLight /= range;
-        float cone = dot(-toLight, uLights[i].direction);
-        if (cone < uLights[i].cosCutoff) continue;
-        vec3 a = uLights[i].attenuation;
-        float strength = pow(max(cone, 0.0), uLights[i].exponent) / max(a.x + a.y * range + a.z * range * range, 1e-3);
-        float facing = max(dot(normal, toLight), 0.0);
-        float shine = facing > 0.0 ? pow(max(dot(normal, normalize(toLight + toEye)), 0.0), uShininess) : 0.0;
-        colour += strength * (facing * base.rgb + shine * uSpecular);
-    }
-    fColour = vec4(colour, base.a);
+#ifdef PASS_RGB
+#ifdef TEXTURED
+    vec4 texel = texture(uTexture, vTexCoord);
+#else
+    vec4 texel = vec4(1.0);
+#endif
+#ifdef PHYSICAL
+    fColour = vec4(physical(uDiffuse * texel.rgb, shadedNormal(normal), toEye), uAlpha * texel.a);
+#else
+    fColour = vec4(phong(texel.rgb, shadedNormal(normal), toEye), uAlpha * texel.a);
+#endif
+#endif
+#ifdef PASS_DEPTH
     fDepth = -vEye.z;
-    fId = uId;
+#endif
+#ifdef PASS_IDS
+    fId = vIds.x;
+#endif
+#ifdef PASS_PARTS
+    fPart = vIds.y;
+#endif
+#ifdef PASS_NORMALS
     fNormal = vec4(normal, 1.0);
+#endif
+#ifdef PASS_FLOW
+    fFlow = (vNow.xy / vNow.w - vBefore.xy / vBefore.w) * vec2(uHalfSize.x, -uHalfSize.y);
+#endif
 }

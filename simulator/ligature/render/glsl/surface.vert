@@ -1,21 +1,45 @@
-#version 330 core
-// Geometry pass: positions in eye space, so that depth and light need no further matrices.
+// Positions in eye space, so that depth and light need no further matrices. One instance is one body.
 
-uniform mat4 uModelView;
 uniform mat4 uProjection;
 
-layout(location = 0) in vec3 aPosition;
-layout(location = 1) in vec3 aNormal;
-layout(location = 2) in vec2 aTexCoord;
+in vec3 aPosition;
+in vec3 aNormal;
+in vec2 aTexCoord;
+#ifdef NORMAL_MAP
+in vec4 aTangent;
+#endif
+
+in mat4 iModelView;
+in ivec2 iIds;  // of the object, of the piece
+#ifdef PASS_FLOW
+in mat4 iBefore;  // model-view-projection of the frame before
+#endif
 
 out vec3 vEye;
 out vec3 vNormal;
 out vec2 vTexCoord;
+flat out ivec2 vIds;
+#ifdef NORMAL_MAP
+out vec4 vTangent;
+#endif
+#ifdef PASS_FLOW
+out vec4 vNow;
+out vec4 vBefore;
+#endif
 
 void main() {
-    vec4 eye = uModelView * vec4(aPosition, 1.0);
+    vec4 eye = iModelView * vec4(aPosition, 1.0);
+    mat3 turn = mat3(iModelView);
     vEye = eye.xyz;
-    vNormal = mat3(uModelView) * aNormal;
+    vNormal = turn * aNormal;
     vTexCoord = aTexCoord;
+    vIds = iIds;
+#ifdef NORMAL_MAP
+    vTangent = vec4(turn * aTangent.xyz, aTangent.w);
+#endif
     gl_Position = uProjection * eye;
+#ifdef PASS_FLOW
+    vNow = gl_Position;
+    vBefore = iBefore * vec4(aPosition, 1.0);
+#endif
 }

@@ -1,0 +1,187 @@
+"""Lights of a scene as the shaders want them, in eye space, and the shadows they cast.
+
+A light shines along +X of its frame (ADF specification §19). Metres and radians.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.scene import Light, Scene
+from ligature.render.camera import perspective
+from ligature.render.programs import Program
+
+Array = NDArray[np.float64]
+
+MAX_LIGHTS, MAX_SHADOWS = 8, 2
+SHADOW_SIZES = (0, 256, 512, 1024, 2048, 4096)
+"""Edge of a shadow map in texels by the ADF's ``shadow quality``; other values mean the middle one."""
+
+SHADOW_UNIT = 8
+"""First texture unit of the shadow maps; surfaces use those below."""
+
+WIDEST_SHADOW = np.radians(150.0)
+"""Opening of the shadow map of a light that shines wider, 180 degrees having no projection."""
+
+
+class LightKind(enum.Enum):
+    """Kinds that the run-time parameter ``type`` of a light may name; files know spot lights only."""
+
+    SPOT = "SPOT"
+    POINT = "POINT"
+    DIRECTIONAL = "DIRECTIONAL"
+
+
+@dataclass(frozen=True)
+class LightSettings:
+    """What of a light may change at run time: cutoff half angle in radians, the rest as in the ADF."""
+
+    kind: LightKind = LightKind.SPOT
+    cutoff: float = np.pi / 4
+    exponent: float = 0.7
+    attenuation: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    shadow_quality: int = 0
+
+    @classmethod
+    def of(cls, light: Light) -> LightSettings:
+        """The settings that the scene gives a light."""
+        cutoff = min(light.cutoff, np.pi / 2)
+        return cls(LightKind.SPOT, cutoff, light.spot_exponent, light.attenuation, light.shadow_quality)
+
+    @property
+    def shadow_size(self) -> int:
+        """Edge of its shadow map in texels, 0 for none; a point light, which shines all around, has none."""
+        if self.kind is LightKind.POINT:
+            return 0
+        return SHADOW_SIZES[self.shadow_quality] if 0 <= self.shadow_quality < len(SHADOW_SIZES) else 1024
+
+
+HEADLIGHT = LightSettings(cutoff=np.pi / 2)
+"""Shines from the eye when a scene has no light, so that something is seen."""
+
+
+class Lights:
+    """The lights of a scene: settings, and for each picture their places and shadow maps."""
+
+    def __init__(self, context: moderngl.Context, scene: Scene) -> None:
+        self._context = context
+        self.settings = [LightSettings.of(light) for light in scene.lights[:MAX_LIGHTS]]
+        self._headlight = not self.settings
+        self._maps: dict[tuple[int, int], _ShadowMap] = {}
+        self._shadows: list[tuple[int, _ShadowMap, Array]] = []
+
+    @property
+    def defines(self) -> dict[str, int]:
+        """Shader features: how many lights, how many shadows."""
+        shadows = sum(1 for s in self.settings if s.shadow_size)
+        count = {"LIGHTS": max(len(self.settings), 1)}
+        return {**count, "SHADOWS": min(shadows, MAX_SHADOWS)} if shadows else count
+
+    def place(self, poses: Array, view: Array) -> None:
+        """Put the lights at ``poses`` (n, 4, 4) in the world, seen through ``view`` (4, 4)."""
+        self._T_world_light = poses[: len(self.settings)]
+        self._used = self.settings
+        if self._headlight:
+            T_eye_light = np.eye(4)
+            T_eye_light[:3, 0] = 0, 0, -1
+            self._T_world_light, self._used = (np.linalg.inv(view) @ T_eye_light)[None], [HEADLIGHT]
+        self._T_eye_light = view @ self._T_world_light
+
+    def cast(self, draw: Callable[[Array, Array, int], None], centre: Array, radius: float, view: Array) -> None:
+        """Draw the shadow maps: ``draw(view, projection, size)`` draws every caster.
+
+        Casters and what is seen of their shadows lie within ``radius`` of ``centre`` (3,), in world axes.
+        """
+        self._shadows = []
+        for index, settings in enumerate(self._used):
+            size = settings.shadow_size
+            if not size or len(self._shadows) == MAX_SHADOWS:
+                continue
+            shadow = self._maps.setdefault((index, size), _ShadowMap(self._context, size))
+            light, projection = light_camera(settings, self._T_world_light[index], centre, radius)
+            shadow.use()
+            draw(light, projection, size)
+            self._shadows.append((index, shadow, TO_TEXTURE @ projection @ light @ np.linalg.inv(view)))
+            shadow.spread = 2.0 / (abs(projection[0, 0]) * size)
+
+    def bind(self, program: Program) -> None:
+        """Fill the lights' uniforms of a built-in program."""
+        for i, (settings, T) in enumerate(zip(self._used, self._T_eye_light, strict=True)):
+            name = f"uLights[{i}]"
+            program.set(f"{name}.position", tuple(T[:3, 3]))
+            program.set(f"{name}.direction", tuple(T[:3, 0]))
+            program.set(f"{name}.attenuation", settings.attenuation)
+            program.set(
+                f"{name}.cosCutoff", float(np.cos(settings.cutoff)) if settings.kind is LightKind.SPOT else -1.0
+            )
+            program.set(f"{name}.exponent", settings.exponent)
+            program.set(f"{name}.directional", int(settings.kind is LightKind.DIRECTIONAL))
+        if not self._shadows:
+            return
+        for unit, (_, shadow, _) in enumerate(self._shadows, SHADOW_UNIT):
+            shadow.texture.use(unit)
+            program.set(f"uShadowMap{unit - SHADOW_UNIT}", unit)
+        program.set("uShadowOf", _one_or_list([index for index, _, _ in self._shadows]))
+        program.write("uShadowFromEye", np.array([matrix for _, _, matrix in self._shadows]))
+        texels = [(1.0 / shadow.size, shadow.spread) for _, shadow, _ in self._shadows]
+        program.set("uShadowTexel", _one_or_list(texels))
+
+    def eye_space(self) -> list[tuple[LightSettings, Array]]:
+        """Settings and eye-space frame (4, 4) of every light."""
+        return list(zip(self._used, self._T_eye_light, strict=True))
+
+    def shadow(self) -> tuple[moderngl.Texture, Array] | None:
+        """Map and matrix from eye space to its coordinates of the first light with a shadow."""
+        return (self._shadows[0][1].texture, self._shadows[0][2]) if self._shadows else None
+
+
+TO_TEXTURE = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]])
+"""From clip coordinates -1..1 to texture coordinates and depth 0..1."""
+
+
+def light_camera(settings: LightSettings, T_world_light: Array, centre: Array, radius: float) -> tuple[Array, Array]:
+    """View and projection (4, 4) of a light that sees the sphere of ``radius`` about ``centre``."""
+    x, y, z = T_world_light[:3, :3].T
+    R = np.array([y, z, -x])  # eye axes: the light looks along its +X
+    view = np.eye(4)
+    view[:3, :3], origin = R, T_world_light[:3, 3]
+    if settings.kind is LightKind.DIRECTIONAL:
+        origin = centre - 2.0 * radius * x
+        view[:3, 3] = -R @ origin
+        projection = np.diag([1.0 / radius, 1.0 / radius, -1.0 / radius, 1.0])
+        projection[2, 3] = -2.0
+        return view, projection
+    view[:3, 3] = -R @ origin
+    depth = float((centre - origin) @ x)
+    far = max(depth + radius, 1e-3)
+    near = max(depth - radius, far / 1000.0)
+    return view, perspective(min(2.0 * settings.cutoff, WIDEST_SHADOW), 1.0, near, far)
+
+
+class _ShadowMap:
+    """Depth texture that is compared with while it is sampled."""
+
+    def __init__(self, context: moderngl.Context, size: int) -> None:
+        self.size = size
+        self.spread = 0.0
+        self.texture = context.depth_texture((size, size))
+        self.texture.compare_func = "<="
+        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self._buffer = context.framebuffer(depth_attachment=self.texture)
+
+    def use(self) -> None:
+        """Make it current and empty."""
+        self._buffer.use()
+        self._buffer.clear()
+
+
+def _one_or_list(values: Sequence[object]) -> object:
+    """What moderngl wants for an array uniform, which for one element is the element itself."""
+    return values[0] if len(values) == 1 else list(values)

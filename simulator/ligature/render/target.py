@@ -1,0 +1,92 @@
+"""Frame buffers of one picture size, and the picture read from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+PASSES = {
+    "rgb": (4, "f1"),
+    "depth": (1, "f4"),
+    "ids": (1, "i4"),
+    "parts": (1, "i4"),
+    "normals": (4, "f4"),
+    "flow": (2, "f4"),
+}
+"""What a picture can hold: channels and type of the texture of each."""
+
+
+def _nothing(dtype: str, *channels: int) -> Any:
+    return field(default_factory=lambda: np.zeros((0, 0, *channels), dtype=dtype))
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One picture, row 0 at the top; what was not asked for is empty.
+
+    ``rgb`` (h, w, 3) uint8; ``depth`` (h, w) float32 metres along the optical axis, inf where
+    nothing is; ``ids`` (h, w) int32, 1 + index of the body or ghost; ``normals`` (h, w, 3) float32 in
+    the OpenGL eye frame; ``parts`` (h, w) int32, 1 + index of the piece of one material; ``flow``
+    (h, w, 2) float32, by how many pixels right and down what is seen has moved since the frame before.
+    """
+
+    rgb: NDArray[np.uint8] = _nothing("u1", 3)
+    depth: NDArray[np.float32] = _nothing("f4")
+    ids: NDArray[np.int32] = _nothing("i4")
+    normals: NDArray[np.float32] = _nothing("f4", 3)
+    parts: NDArray[np.int32] = _nothing("i4")
+    flow: NDArray[np.float32] = _nothing("f4", 2)
+
+
+class Target:
+    """One texture for each pass; colour with ``samples`` a pixel when above 0, resolved before it is read.
+
+    ``colour`` and ``geometry`` are drawn one after the other, or ``whole`` at once.
+    """
+
+    def __init__(self, context: moderngl.Context, size: tuple[int, int], passes: Sequence[str], samples: int) -> None:
+        self._context = context
+        self.size = size
+        self.passes = [name for name in PASSES if name in passes]
+        self._textures = {name: context.texture(size, n, dtype=t) for name in self.passes for n, t in [PASSES[name]]}
+        depth = context.depth_renderbuffer(size)
+        rest = [self._textures[name] for name in self.passes if name != "rgb"]
+        self.geometry = context.framebuffer(rest, depth) if rest else None
+        self.whole = context.framebuffer(list(self._textures.values()), depth)
+        self._resolved: moderngl.Framebuffer | None = None
+        self.colour: moderngl.Framebuffer | None = None
+        if "rgb" in self.passes:
+            self.colour = context.framebuffer([self._textures["rgb"]], depth)
+            if samples:
+                self._resolved = self.colour
+                many = context.renderbuffer(size, 4, samples=samples)
+                self.colour = context.framebuffer([many], context.depth_renderbuffer(size, samples=samples))
+        empty = {"ids": np.int32(0), "parts": np.int32(0), "depth": np.float32(np.inf)}
+        self._empty = {name: np.full(size, empty[name]).tobytes() for name in self.passes if name in empty}
+
+    def clear(self, background: tuple[float, float, float, float]) -> None:
+        """Empty what will be drawn into."""
+        if self.geometry is not None:
+            self.geometry.clear()
+        if self.colour is not None:
+            self.colour.clear(*background)
+        for name, data in self._empty.items():  # what OpenGL's clear colour cannot express
+            self._textures[name].write(data)
+
+    def read(self) -> Frame:
+        """Copy the picture out, top row first."""
+        if self._resolved is not None and self.colour is not None:
+            self._context.copy_framebuffer(self._resolved, self.colour)
+        return Frame(**{name: self._array(name) for name in self.passes})
+
+    def _array(self, name: str) -> NDArray[Any]:
+        width, height = self.size
+        channels, dtype = PASSES[name]
+        data = np.frombuffer(self._textures[name].read(), dtype="u1" if dtype == "f1" else dtype)
+        rows = data.reshape(height, width, channels)[::-1]
+        return np.ascontiguousarray(rows[..., 0] if channels == 1 else rows[..., :3])

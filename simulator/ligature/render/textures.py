@@ -1,0 +1,42 @@
+"""Picture files as OpenGL textures with mipmaps, each loaded once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import moderngl
+from PIL import Image
+
+ANISOTROPY = 4.0
+"""Samples along the steeper direction: floors and drapes are seen at grazing angles."""
+
+
+class Textures:
+    """The textures of one context by path."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._loaded: dict[Path, moderngl.Texture | None] = {}
+        self.white = context.texture((1, 1), 4, b"\xff" * 4)
+        """Stands in where a shader wants a texture that a surface lacks."""
+
+    def get(self, path: Path | None) -> moderngl.Texture | None:
+        """The texture of ``path``; None when it is not a picture, as the mesh reader has reported."""
+        if path is None:
+            return None
+        if path not in self._loaded:
+            self._loaded[path] = self._load(path)
+        return self._loaded[path]
+
+    def _load(self, path: Path) -> moderngl.Texture | None:
+        try:
+            with Image.open(path) as picture:
+                image = picture.convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
+        except (OSError, Image.DecompressionBombError):
+            return None
+        if max(image.size) > self._context.info["GL_MAX_TEXTURE_SIZE"]:
+            image.thumbnail((self._context.info["GL_MAX_TEXTURE_SIZE"],) * 2)
+        texture = self._context.texture(image.size, 4, image.tobytes())
+        texture.build_mipmaps()
+        texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        return texture
