@@ -10,7 +10,7 @@ setup(
     python_requires=">=3.10",
     package_dir={"": "simulator"},
     packages=find_packages("simulator"),
-    package_data={"ligature": ["py.typed", "**/*.glsl", "**/*.vert", "**/*.frag"]},
+    package_data={"ligature": ["py.typed", "**/*.glsl", "**/*.vert", "**/*.frag", "client/names/*/*.py"]},
     entry_points={
         "console_scripts": [
             "ligature = ligature.cli.main:main",

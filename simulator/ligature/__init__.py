@@ -1,9 +1,29 @@
 """Ligature: an open simulator for robot-assisted suturing."""
 
-from ligature.in_process import Simulation
-from ligature.model.load import SceneError, load
-from ligature.model.scene import Scene
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ligature.in_process import Simulation
+    from ligature.model.load import SceneError, load
+    from ligature.model.scene import Scene
 
 __version__ = "0.1.0"
 
 __all__ = ["Scene", "SceneError", "Simulation", "load"]
+
+_HOMES = {
+    "Scene": "ligature.model.scene",
+    "SceneError": "ligature.model.load",
+    "Simulation": "ligature.in_process",
+    "load": "ligature.model.load",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import the simulator at its first use: `ligature.client` runs where none of its engines is installed."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)

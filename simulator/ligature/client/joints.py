@@ -1,0 +1,110 @@
+"""Reading of joint lists by name or index, shared by rigid bodies and the legacy objects; radians or metres."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+
+from ligature.client.base_object import BaseObject
+
+
+class JointedObject(BaseObject):
+    """A handle whose messages list children and joints, once a command has asked for them."""
+
+    def get_children_names(self) -> list[str]:
+        """Names of all bodies below this one."""
+        return list(self._state.children_names)
+
+    def get_num_of_children(self) -> int:
+        """How many bodies are below this one."""
+        return len(self._state.children_names)
+
+    def get_joint_names(self) -> list[str]:
+        """Names of the joints below this body."""
+        return list(self._state.joint_names)
+
+    def get_num_joints(self) -> int:
+        """How many joints there are below this body."""
+        return len(self._state.joint_positions)
+
+    def is_joint_idx_valid(self, joint_idx: int) -> bool:
+        """Whether there is a joint of that index; tells which there are when not."""
+        if 0 <= joint_idx < self.get_num_joints():
+            return True
+        rospy.logwarn(f"{self._name}: no joint {joint_idx}; {self._extent()}")
+        return False
+
+    def get_joint_idx_from_name(self, joint_name: str) -> int | None:
+        """Index of a joint; None, with a message, when there is none of that name."""
+        if joint_name in self._state.joint_names:
+            return int(self._state.joint_names.index(joint_name))
+        rospy.logwarn(f"{self._name}: no joint {joint_name!r}; {self._extent()}")
+        return None
+
+    def get_joint_name_from_idx(self, joint_idx: int) -> str | None:
+        """Name of a joint; None, with a message, when there is none of that index."""
+        return self._state.joint_names[joint_idx] if self.is_joint_idx_valid(joint_idx) else None
+
+    def get_joint_pos(self, joint_name_or_idx: str | int) -> float | None:
+        """Position of a joint; None, with a message, when there is none of that name or index."""
+        return self._value(self._state.joint_positions, joint_name_or_idx)
+
+    def get_all_joint_pos(self) -> list[float]:
+        """Positions of all joints."""
+        return list(self._state.joint_positions)
+
+    def get_publish_children_names_flag(self) -> bool:
+        """Whether the command asks for the names of children."""
+        return self._cmd.publish_children_names
+
+    def get_publish_joint_names_flag(self) -> bool:
+        """Whether the command asks for the names of joints."""
+        return self._cmd.publish_joint_names
+
+    def get_publish_joint_positions_flag(self) -> bool:
+        """Whether the command asks for positions, velocities and efforts of joints."""
+        return self._cmd.publish_joint_positions
+
+    def set_publish_children_names_flag(self, state: bool) -> None:
+        """Ask for the names of children."""
+        self._cmd.publish_children_names = bool(state)
+
+    def set_publish_joint_names_flag(self, state: bool) -> None:
+        """Ask for the names of joints."""
+        self._cmd.publish_joint_names = bool(state)
+
+    def set_publish_joint_positions_flag(self, state: bool) -> None:
+        """Ask for positions, velocities and efforts of joints."""
+        self._cmd.publish_joint_positions = bool(state)
+
+    def set_active(self) -> None:
+        """Have the command published, and ask for all lists."""
+        with self._lock:
+            self.set_publish_children_names_flag(True)
+            self.set_publish_joint_names_flag(True)
+            self.set_publish_joint_positions_flag(True)
+        super().set_active()
+
+    def _index(self, joint: str | int) -> int | None:
+        if isinstance(joint, str):
+            return self.get_joint_idx_from_name(joint)
+        index = operator.index(joint)
+        return index if self.is_joint_idx_valid(index) else None
+
+    def _value(self, values: Sequence[float], joint: str | int) -> float | None:
+        index = self._index(joint)
+        return None if index is None or index >= len(values) else values[index]
+
+    def _extent(self) -> str:
+        names = self._state.joint_names
+        if not names:
+            return "its state lists no joints yet, or it has none"
+        return "it has " + ", ".join(f"{index} {name}" for index, name in enumerate(names))
+
+
+def grown(values: Sequence[Any], length: int, fill: Any) -> list[Any]:
+    """``values`` with at least ``length`` entries; never shorter than it was."""
+    return [*values, *[fill] * (length - len(values))]

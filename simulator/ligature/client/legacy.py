@@ -1,0 +1,72 @@
+"""Handles of the legacy ``Object`` messages, which other simulators of the AMBF family still publish."""
+
+from __future__ import annotations
+
+import copy
+
+from ambf_msgs.msg import ObjectCmd, ObjectState
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
+
+from ligature.client.euler import quaternion_from_euler
+from ligature.client.joints import JointedObject, grown
+
+
+class Object(JointedObject):
+    """A body with one mask that says which joints are driven to positions, the others by efforts."""
+
+    State = ObjectState
+    Command = ObjectCmd
+
+    def get_inertia(self) -> Point:
+        """Principal moments of inertia, kg·m²."""
+        return self._state.pInertia
+
+    def set_force(self, fx: float, fy: float, fz: float) -> None:
+        """Command a force, world axes; the torque stays."""
+        self.set_wrench(Wrench(Vector3(float(fx), float(fy), float(fz)), self._cmd.wrench.torque))
+
+    def set_torque(self, nx: float, ny: float, nz: float) -> None:
+        """Command a torque, world axes; the force stays."""
+        self.set_wrench(Wrench(self._cmd.wrench.force, Vector3(float(nx), float(ny), float(nz))))
+
+    def set_wrench(self, wrench: Wrench) -> None:
+        """Command force and torque, world axes."""
+        with self._lock:
+            self._cmd.wrench = copy.deepcopy(wrench)
+            self._cmd.enable_position_controller = False
+
+    def wrench_command(self, fx: float, fy: float, fz: float, nx: float, ny: float, nz: float) -> None:
+        """Command force and torque by their components."""
+        self.set_force(fx, fy, fz)
+        self.set_torque(nx, ny, nz)
+
+    def pose_command(
+        self, px: float, py: float, pz: float, roll: float, pitch: float, yaw: float, *joints: float
+    ) -> None:
+        """Command a pose, turned as in `RigidBody.pose_command`, and the positions of the first joints."""
+        rotation = Quaternion(*quaternion_from_euler(roll, pitch, yaw, "szyx"))
+        self.set_pose(Pose(Point(float(px), float(py), float(pz)), rotation))
+        with self._lock:
+            self._cmd.joint_cmds = [float(value) for value in joints]
+            self._cmd.position_controller_mask = [True] * len(joints)
+
+    def set_joint_pos(self, joint_name_or_idx: str | int, pos: float) -> None:
+        """Command the position of a joint."""
+        self._command_joint(joint_name_or_idx, pos, True)
+
+    def set_joint_effort(self, joint_name_or_idx: str | int, effort: float) -> None:
+        """Command the torque or force of a joint."""
+        self._command_joint(joint_name_or_idx, effort, False)
+
+    def _pose_commanded(self) -> None:
+        self._cmd.enable_position_controller = True
+
+    def _command_joint(self, joint: str | int, value: float, position: bool) -> None:
+        value, index = float(value), self._index(joint)
+        if index is None:
+            return
+        with self._lock:
+            cmd = self._cmd
+            cmd.joint_cmds = grown(cmd.joint_cmds, index + 1, 0.0)
+            cmd.position_controller_mask = grown(cmd.position_controller_mask, index + 1, False)
+            cmd.joint_cmds[index], cmd.position_controller_mask[index] = value, position

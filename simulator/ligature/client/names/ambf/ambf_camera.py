@@ -1,0 +1,5 @@
+"""The name under which scripts import the handle `Camera`."""
+
+from ligature.client.placed import Camera
+
+__all__ = ["Camera"]

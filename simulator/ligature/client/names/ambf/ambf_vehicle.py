@@ -1,0 +1,5 @@
+"""The name under which scripts import the handle `Vehicle`."""
+
+from ligature.client.vehicle import Vehicle
+
+__all__ = ["Vehicle"]

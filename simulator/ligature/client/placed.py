@@ -1,0 +1,28 @@
+"""Handles of cameras and lights, whose poses are in their parent's frame."""
+
+from __future__ import annotations
+
+from ambf_msgs.msg import CameraCmd, CameraState, LightCmd, LightState
+
+from ligature.client.base_object import BaseObject
+
+
+class _Placed(BaseObject):
+    """Something that goes where it is put; a pose set once holds."""
+
+    def _pose_commanded(self) -> None:
+        self._cmd.enable_position_controller = True
+
+
+class Camera(_Placed):
+    """A camera."""
+
+    State = CameraState
+    Command = CameraCmd
+
+
+class Light(_Placed):
+    """A light."""
+
+    State = LightState
+    Command = LightCmd
