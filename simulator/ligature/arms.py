@@ -140,7 +140,7 @@ def _psm(scene: Scene, world: World, description: ArmDescription, problems: list
     kinematics = _known(tool, lengths) or Psm(tool, lengths=lengths)
     joints = Axes(
         kinematics.joint_names, _travel(scene, description.joints), psm_arm.FASTEST, psm_arm.HARDEST,
-        world.drive(description.joints, psm_arm.SERVO_FASTEST),
+        world.drive(description.joints, psm_arm.SERVO_FASTEST, psm_arm.SERVO_HARDEST),
     )  # fmt: skip
     arm = PsmArm(description.name, kinematics, joints, _jaw(world, description, tool))
     parts = [scene.joints[joint].child for joint in description.joints[-1:]]
@@ -231,7 +231,9 @@ class JawPlant:
     """Two fingers as one jaw: the opening is shared by both, a jaw's effort acts on each (virtual work)."""
 
     def __init__(self, world: World, fingers: Sequence[int]) -> None:
-        self._drive = world.drive(fingers, np.full(2, psm_arm.SERVO_FASTEST[-1]), JAW_STIFFNESS)
+        self._drive = world.drive(
+            fingers, np.full(2, psm_arm.SERVO_FASTEST[-1]), np.full(2, psm_arm.SERVO_HARDEST[-1]), JAW_STIFFNESS
+        )
 
     def read(self) -> Array:
         """Opening, its speed, and effort (3, 1)."""
@@ -284,7 +286,7 @@ def _ecm(scene: Scene, world: World, description: ArmDescription, problems: list
     if description.joints:
         travel = _travel(scene, description.joints)
         limits = np.array([np.maximum(limits[0], travel[0]), np.minimum(limits[1], travel[1])])
-        plant: Any = world.drive(description.joints, ecm_arm.SERVO_FASTEST)
+        plant: Any = world.drive(description.joints, ecm_arm.SERVO_FASTEST, ecm_arm.SERVO_HARDEST)
     else:
         plant = CameraPlant(scene, world, description.tip, kinematics, ecm_arm.HOME)
     joints = Axes(kinematics.joint_names, limits, ecm_arm.FASTEST, ecm_arm.HARDEST, plant)

@@ -1,4 +1,4 @@
-"""The shared memory block: newest state under a sequence lock, figures, and command rings.
+"""The shared memory block: newest state under a sequence lock, figures, command rings, events.
 
 The writer never waits. A reader copies the state and tries again when the writer was at it
 meanwhile. That rests on stores and loads being seen in program order, as on x86-64. Files live in
@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.bus.events import LOG_BYTES, EventLog
 from ligature.bus.ring import RING_BYTES, Ring
 from ligature.model.state import StateDtype, StateRecord
 
@@ -70,7 +71,8 @@ class Block:
         self._owner = owner
         self._dtype = dtype
         ring_at = _STATE_AT + -(-dtype.itemsize // 64) * 64
-        size = ring_at + RING_BYTES * len(PRODUCERS)
+        log_at = ring_at + RING_BYTES * len(PRODUCERS)
+        size = log_at + LOG_BYTES
         descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if owner else 0), 0o600)
         try:
             if owner:
@@ -90,6 +92,7 @@ class Block:
             name: Ring(memoryview(self._map)[ring_at + i * RING_BYTES : ring_at + (i + 1) * RING_BYTES])
             for i, name in enumerate(PRODUCERS)
         }
+        self.events = EventLog(memoryview(self._map)[log_at:])
         if owner:
             self.figures["magic"], self.figures["state_bytes"] = MAGIC, dtype.itemsize
 
@@ -153,6 +156,7 @@ class Block:
         """Unmap; the owner also removes the file."""
         for ring in self.rings.values():
             ring.release()
+        self.events.release()
         del self.figures, self._state
         self._map.close()
         if self._owner:

@@ -108,6 +108,8 @@ class Loop:
         state["wall_time"] = time.monotonic() - self._start
         state["stamp"] = time.time()
         self._block.write(state)
+        for event in self._simulation.arms.events():
+            self._block.events.write(*event)
 
     def _obey(self, messages: Iterable[Message]) -> None:
         for message in messages:

@@ -46,7 +46,7 @@ PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 @njit(cache=True)
 def outputs(
     mode: Integers, force_output: Flags, turns: Flags, sprung: Flags, p: Array, i: Array, d: Array,
-    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, fastest: Array,
+    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, fastest: Array, hardest: Array,
     position: Array, velocity: Array, dt: float,
     integral: Array, last_error: Array, kick: Array, kick_ticks: Integers, motor: Array, effort: Array,
 ) -> None:  # fmt: skip
@@ -69,8 +69,9 @@ def outputs(
                 motor[k] = (pull + d[k] * jump) / (1.0 + d[k])
             last_error[k] = error
         elif mode[k] == SERVO:
-            wanted = pace[k] + SERVO_GAIN * (target[k] - position[k])
-            motor[k] = min(max(wanted, -fastest[k]), fastest[k])
+            error = target[k] - position[k]
+            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * hardest[k] * abs(error)))
+            motor[k] = min(max(pace[k] + np.copysign(closing, error), -fastest[k]), fastest[k])
         elif mode[k] == VELOCITY:
             motor[k] = target[k]
         elif mode[k] == FORCE:
@@ -104,6 +105,7 @@ class TreeControl:
         self.target = np.zeros(n)
         self._pace = np.zeros(n)
         self._fastest = np.full(n, np.inf)
+        self._hardest = np.full(n, np.inf)
         self._give = np.zeros(n)
         self._integral = np.zeros(n)
         self._last_error = np.zeros(n)
@@ -157,15 +159,18 @@ class TreeControl:
             self._kick[row] = (left + jump / self._dt) / ticks
             self._kick_ticks[row] = ticks
 
-    def servo(self, rows: Integers, position: Array, velocity: Array, fastest: Array, give: Array) -> None:
-        """Have the axes ``rows`` (k,) follow set-points that move with ``velocity``, at most at the speed ``fastest``.
+    def servo(
+        self, rows: Integers, position: Array, velocity: Array, fastest: Array, hardest: Array, give: Array
+    ) -> None:
+        """Have the axes ``rows`` (k,) follow set-points that move with ``velocity``.
 
-        ``give`` is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is as strong as the motor.
+        They do so at most at the speed ``fastest``, and brake with ``hardest``, so that a step does not overshoot.
+        ``give`` (k,) is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is as strong as the motor.
         """
         self.target[rows] = position
         self._pace[rows] = velocity
         if (self.mode[rows] != SERVO).any():
-            self._fastest[rows], self._give[rows] = fastest, give
+            self._fastest[rows], self._hardest[rows], self._give[rows] = fastest, hardest, give
             self._enter(rows, SERVO)
 
     def push(self, rows: Integers, effort: Array) -> None:
@@ -214,8 +219,8 @@ class TreeControl:
         """Set motors and torques of this tick; positions must have been read."""
         outputs(
             self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
-            self._damping, self._rest, self.target, self._pace, self._fastest, self.position, self.velocity,
-            self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor, self._effort,
+            self._damping, self._rest, self.target, self._pace, self._fastest, self._hardest, self.position,
+            self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor, self._effort,
         )  # fmt: skip
         if self._driven:
             pybullet.setJointMotorControlArray(
@@ -267,7 +272,7 @@ class TreeControl:
             name: np.array(getattr(self, name))
             for name in (
                 "mode", "target", "position", "velocity", "motor_effort", "_integral", "_last_error", "_kick",
-                "_kick_ticks", "_pace", "_fastest", "_give",
+                "_kick_ticks", "_pace", "_fastest", "_hardest", "_give",
             )
         }  # fmt: skip
 

@@ -25,12 +25,14 @@ class Drive:
         Where the joints are, and their indices.
     fastest
         Largest speeds (n,) at which set-points are followed.
+    hardest
+        Decelerations (n,) with which the joints brake before a set-point.
     give
         Stiffness in N·m/rad with which the motors yield to a load; 0 is as strong as they are.
     """
 
-    def __init__(self, world: World, joints: Sequence[int], fastest: Array, give: float) -> None:
-        self._world, self._joints, self._fastest = world, tuple(joints), fastest
+    def __init__(self, world: World, joints: Sequence[int], fastest: Array, hardest: Array, give: float) -> None:
+        self._world, self._joints, self._fastest, self._hardest = world, tuple(joints), fastest, hardest
         self._give = np.full(len(joints), give)
         control = self._control
         self._rows = np.array([control.row[joint] for joint in self._joints], dtype=np.int64)
@@ -47,7 +49,7 @@ class Drive:
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Follow set-points that move with ``velocity``."""
-        self._control.servo(self._rows, position, velocity, self._fastest, self._give)
+        self._control.servo(self._rows, position, velocity, self._fastest, self._hardest, self._give)
 
     def push(self, effort: Array) -> None:
         """Drive the joints with efforts."""

@@ -99,9 +99,9 @@ class World(BulletQueries):
                 type_ = types[i] if i < len(types) else CommandType.FORCE
                 tree.command(self.scene.joints[joint], type_, value)
 
-    def drive(self, joints: Sequence[int], fastest: Array, give: float = 0.0) -> Drive:
+    def drive(self, joints: Sequence[int], fastest: Array, hardest: Array, give: float = 0.0) -> Drive:
         """The drive of ``joints``, all of one tree; see `Drive`."""
-        return Drive(self, joints, fastest, give)
+        return Drive(self, joints, fastest, hardest, give)
 
     def control_of(self, joint: int) -> TreeControl:
         """The controllers of the tree that a joint belongs to; another one after a snapshot."""

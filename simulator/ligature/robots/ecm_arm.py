@@ -18,6 +18,9 @@ HARDEST = np.array([np.pi / 2, np.pi / 2, 0.06, np.pi / 2])
 """Limits of moves (interface reference §5.5)."""
 
 SERVO_FASTEST = np.array([4.0, 4.0, 0.6, 4.0])
+SERVO_HARDEST = np.array([50.0, 50.0, 20.0, 100.0])
+"""Speeds and decelerations with which the drives catch up with a set-point at most."""
+
 FOLLOWING_BOUND = np.array([0.6, 0.6, 0.06, 1.5])
 
 LEAST_INSERTION = 0.04

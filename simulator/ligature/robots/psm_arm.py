@@ -25,6 +25,9 @@ JAW_FASTEST, JAW_HARDEST = 6 * np.pi, 4 * np.pi
 SERVO_FASTEST = np.array([10.0, 10.0, 1.5, 40.0, 40.0, 40.0])
 """Speeds at which the drives catch up with a set-point at most: beyond those of moves, below those of accidents."""
 
+SERVO_HARDEST = np.array([100.0, 100.0, 50.0, 4000.0, 4000.0, 4000.0])
+"""Decelerations with which they do: what the drives can give such masses, so that a step does not overshoot."""
+
 FOLLOWING_BOUND = np.array([0.6, 0.6, 0.06, 1.5, 1.5, 1.5])
 
 LEAST_DEPTH, ENTRY_DEPTH = 0.045, 0.043
