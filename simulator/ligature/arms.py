@@ -6,6 +6,7 @@ World axes, metres, radians.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
 from ligature.model.commands import ArmCommand
-from ligature.model.frames import frame, inverse, matrix_pose7, pose7_matrix, rpy_matrix
-from ligature.model.scene import ArmDescription, ArmKind, Body, Joint, Scene
+from ligature.model.frames import matrix_pose7, pose7_matrix
+from ligature.model.scene import ArmDescription, ArmKind, Scene
 from ligature.physics import World
 from ligature.robots import ecm_arm, mtm_arm, psm_arm
 from ligature.robots.arm import Arm
@@ -22,31 +23,29 @@ from ligature.robots.axes import Axes
 from ligature.robots.dispatch import carry_out
 from ligature.robots.ecm import Ecm
 from ligature.robots.ecm_arm import EcmArm
-from ligature.robots.instruments import Instrument, instrument
+from ligature.robots.fitting import (
+    DEFAULT_TOOL,
+    T_TIP_CAMERA,
+    camera_arm_base,
+    console_pose,
+    master_side,
+    psm_kinematics,
+)
+from ligature.robots.instruments import Instrument
 from ligature.robots.mtm import Mtm
 from ligature.robots.mtm_arm import MtmArm
 from ligature.robots.operating_state import Refused
 from ligature.robots.plant import IdealPlant
-from ligature.robots.psm import MODELS, Psm, PsmLengths
 from ligature.robots.psm_arm import PsmArm
 from ligature.robots.record import write_arm
 
 Array = NDArray[np.float64]
-
-DEFAULT_TOOL = "400006"
-"""The instrument that the suturing challenge assumes where a scene names none."""
-
-ALIKE = 2e-4
-"""Metres by which the links of a scene may differ from a known arm's to count as that arm."""
 
 JAW_STIFFNESS = 0.5
 """N·m per radian of following error with which each finger presses: 9 N at the tips of a needle driver at −20°."""
 
 PERIOD = 5
 """Ticks between two looks at following errors and two writings of an arm's state."""
-
-R_FRAME_OPTICAL = np.diag([1.0, -1.0, -1.0])
-"""A body that carries cameras looks along −z with y up, the tip of an ECM along +z with y down."""
 
 
 class ArmSet(Mapping[str, Arm]):
@@ -135,81 +134,22 @@ class ArmSet(Mapping[str, Arm]):
 
 
 def _psm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:
-    tool = _instrument(description, scene, problems)
-    lengths = _lengths(scene, description)
-    kinematics = _known(tool, lengths) or Psm(tool, lengths=lengths)
+    try:
+        kinematics = psm_kinematics(scene, description)
+    except ValueError as error:
+        mark = scene.bodies[description.base].identity.mark
+        message = f"{description.name}: {error}; it is taken for a {DEFAULT_TOOL}"
+        problems.append(Diagnostic(Severity.WARNING, message, mark, code="arm"))
+        kinematics = psm_kinematics(scene, replace(description, tool=DEFAULT_TOOL))
     joints = Axes(
         kinematics.joint_names, _travel(scene, description.joints), psm_arm.FASTEST, psm_arm.HARDEST,
         world.drive(description.joints, psm_arm.SERVO_FASTEST, psm_arm.SERVO_HARDEST),
     )  # fmt: skip
-    arm = PsmArm(description.name, kinematics, joints, _jaw(world, description, tool))
+    arm = PsmArm(description.name, kinematics, joints, _jaw(world, description, kinematics.instrument))
     parts = [scene.joints[joint].child for joint in description.joints[-1:]]
     parts += [scene.joints[joint].child for joint in description.jaw]
     arm.set_tip_wrench(_TipWrench(world, description, parts, arm))
     return arm
-
-
-def _instrument(description: ArmDescription, scene: Scene, problems: list[Diagnostic]) -> Instrument:
-    try:
-        return instrument(description.tool or DEFAULT_TOOL)
-    except ValueError as error:
-        mark = scene.bodies[description.base].identity.mark
-        message = f"{description.name}: {error}; it is taken for {instrument(DEFAULT_TOOL).type}"
-        problems.append(Diagnostic(Severity.WARNING, message, mark, code="arm"))
-        return instrument(DEFAULT_TOOL)
-
-
-def _lengths(scene: Scene, description: ArmDescription) -> PsmLengths:
-    """The lengths of an arm as its joints have them, at joint values zero.
-
-    The palm is where the wrist pitch axis passes the roll axis, the RCM the origin of the base body.
-    """
-    lines = _axis_lines(scene, description)
-    origin = scene.bodies[description.base].T_world_body[:3, 3]
-    inwards = lines[2][1]
-    roll, pitch, yaw = lines[3], lines[4], lines[5]
-    palm = _closest(roll, pitch)
-    wrist = float(abs(np.dot(yaw[0] - pitch[0], _unit(np.cross(pitch[1], yaw[1])))))
-    depth = float(np.dot(palm - origin, inwards))
-    rcc = 0.4318
-    return PsmLengths(rcc, rcc + depth, wrist)
-
-
-def _axis_lines(scene: Scene, description: ArmDescription) -> list[tuple[Array, Array]]:
-    """A point (3,) and the direction (3,) of each joint axis in world axes, all joints at zero."""
-    T = scene.bodies[description.base].T_world_body
-    lines = []
-    for index in description.joints:
-        joint: Joint = scene.joints[index]
-        parent: Body = scene.bodies[joint.parent]
-        T_inertial = T @ parent.T_body_inertial
-        lines.append(((T_inertial @ joint.T_parent_a)[:3, 3], T_inertial[:3, :3] @ joint.axis))
-        T = T @ joint.T_parent_child_zero
-    return lines
-
-
-def _closest(line: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
-    """The point (3,) of ``line`` that is closest to the ``other`` line."""
-    normal = np.cross(line[1], other[1])
-    along = float(np.dot(np.cross(other[0] - line[0], other[1]), normal) / np.dot(normal, normal))
-    return np.asarray(line[0] + along * line[1])
-
-
-def _unit(vector: Array) -> Array:
-    return np.asarray(vector / np.linalg.norm(vector))
-
-
-def _known(tool: Instrument, lengths: PsmLengths) -> Psm | None:
-    """The known arm that has these lengths, so that its published values hold to the last digit."""
-    for model in reversed(MODELS):
-        try:
-            known = Psm(tool, model)
-        except ValueError:
-            continue
-        reach = abs(known.lengths.tool_to_rcm - lengths.tool_to_rcm)
-        if reach < ALIKE and abs(known.lengths.wrist - lengths.wrist) < ALIKE:
-            return known
-    return None
 
 
 def _travel(scene: Scene, joints: Sequence[int]) -> Array:
@@ -301,9 +241,7 @@ class CameraPlant:
 
     def __init__(self, scene: Scene, world: World, body: int, kinematics: Ecm, start: Array) -> None:
         self._world, self._body, self._kinematics = world, body, kinematics
-        T_tip_body = frame(R_FRAME_OPTICAL, (0.0, 0.0, 0.0))
-        self.T_world_base = scene.bodies[body].T_world_body @ inverse(T_tip_body) @ inverse(kinematics.forward(start))
-        self._T_tip_body = T_tip_body
+        self._T_world_base = camera_arm_base(scene, body, kinematics, start)
         self._start = start
         self._state = np.zeros((3, len(start)))
         self._state[0] = start
@@ -317,7 +255,7 @@ class CameraPlant:
         self._state[1] = velocity
         if (position != self._state[0]).any():
             self._state[0] = position
-            pose = self.T_world_base @ self._kinematics.forward(position) @ self._T_tip_body
+            pose = self._T_world_base @ self._kinematics.forward(position) @ T_TIP_CAMERA
             self._world.set_pose(self._body, matrix_pose7(pose))
 
     def push(self, effort: Array) -> None:
@@ -347,7 +285,7 @@ class CameraPlant:
 
 
 def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:
-    side = "left" if description.name.upper().endswith("L") else "right"
+    side = master_side(description.name)
     kinematics = Mtm(side)
     limits = np.array([kinematics.lower, kinematics.upper])
     start = np.clip(mtm_arm.HOME, limits[0], limits[1])
@@ -357,15 +295,9 @@ def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list
     fingers = IdealPlant(ends[0], ends[1], np.full(1, 1e-3), np.full(1, 1e-2), np.zeros(1))
     gripper = Axes(("gripper",), ends, np.full(1, 20.0), np.full(1, 200.0), fingers)
     arm = MtmArm(description.name, kinematics, joints, gripper)
-    arm.set_base_frame(_console_pose(side), "HRSV")
+    arm.set_base_frame(console_pose(side), "HRSV")
     arm.set_tip_wrench(lambda: np.zeros(6))
     return arm
-
-
-def _console_pose(side: str) -> Array:
-    """Where a master stands before the operator's view (interface reference §5.6), (4, 4)."""
-    x = 0.180 if side == "left" else -0.180
-    return frame(rpy_matrix(5.0 * np.pi / 6.0, 0.0, np.pi), (x, 0.400, 0.475))
 
 
 _BUILDERS = {ArmKind.PSM: _psm, ArmKind.ECM: _ecm, ArmKind.MTM: _mtm}

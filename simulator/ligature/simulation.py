@@ -192,6 +192,7 @@ class Simulation:
         self._rays = Rays(scene, self._world)
         self._contacts = Contacts(scene, self._world)
         self.arms = ArmSet(scene, self._world)
+        self.problems += self.arms.problems
         self._actuators = Actuators(scene, Holder(scene, self._world, self._rods), self._rays)
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])

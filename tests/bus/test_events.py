@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-
 from ligature.bus.events import LOG_BYTES, SLOTS, BusEvent, EventLog
 
 

@@ -220,7 +220,8 @@ class TreeControl:
         outputs(
             self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
             self._damping, self._rest, self.target, self._pace, self._fastest, self._hardest, self.position,
-            self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor, self._effort,
+            self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor,
+            self._effort,
         )  # fmt: skip
         if self._driven:
             pybullet.setJointMotorControlArray(
