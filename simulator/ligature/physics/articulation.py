@@ -56,6 +56,31 @@ class _Plan:
         self.inertial_positions.append(T_link_inertial[:3, 3].tolist())
         self.inertial_orientations.append(matrix_quaternion(T_link_inertial[:3, :3]).tolist())
 
+    def frames(self) -> list[LinkFrame]:
+        """Where the links sit."""
+        return [
+            LinkFrame(parent, type_, np.array(axis), np.array(at + around), np.array(offset + turn))
+            for parent, type_, axis, at, around, offset, turn in zip(
+                self.parents, self.types, self.directions, self.positions, self.orientations,
+                self.inertial_positions, self.inertial_orientations, strict=True,
+            )
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class LinkFrame:
+    """Where a link sits: ``parent`` counts links from 1, 0 is the base; ``type`` is Bullet's joint type.
+
+    ``axis`` (3,) is in the link frame; ``parent_link`` (7,) is the link frame in its parent's with the joint at
+    zero, that of the base being its inertial frame; ``link_inertial`` (7,) the inertial frame in the link frame.
+    """
+
+    parent: int
+    type: int
+    axis: Array
+    parent_link: Array
+    link_inertial: Array
+
 
 @dataclass
 class Tree:
@@ -71,6 +96,7 @@ class Tree:
     axes: list[tuple[int, int, Axis, float]]
     """Link, ADF joint, axis and effective mass or inertia of every degree of freedom."""
     static: bool
+    frames: list[LinkFrame]
 
     @property
     def moving_links(self) -> list[int]:
@@ -127,7 +153,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         flags=pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_MAINTAIN_LINK_ORDER,
         **at,
     )
-    tree = Tree(uid, uid if stand is None else stand, root.index, link_of, axes, root.static)
+    tree = Tree(uid, uid if stand is None else stand, root.index, link_of, axes, root.static, plan.frames())
     _set_dynamics(client, tree, plan, bodies)
     return tree
 

@@ -17,23 +17,26 @@ from ligature.model.poses import compose
 from ligature.model.scene import Body, OutputType
 from ligature.physics.articulation import Tree
 from ligature.physics.control import KICK_SECONDS
+from ligature.physics.motions import Motions
 
 Array = NDArray[np.float64]
 
 SMALLEST_MOVE, SMALLEST_TURN = 1e-5, 1e-4
 """A static body is not moved by less than both of these (metres, radians), as in the reference."""
 
+REST = [0.0] * 6
+
 
 class Placement:
     """Where a body lives in Bullet: multibody ``uid`` and ``link`` (-1 is the base)."""
 
-    def __init__(self, client: int, tree: Tree, body: Body) -> None:
+    def __init__(self, client: int, tree: Tree, body: Body, motions: Motions, index: int) -> None:
         self.client, self.body = client, body
+        self.motions, self.tree = motions, index
+        self.row = motions.row(index, tree.link_of[body.index])
         self.uid, self.link = tree.place(body.index)
         self._bases = tree.bases
         self.inertial_to_body = matrix_pose7(inverse(body.T_body_inertial))
-        self.moved = True
-        """Whether a static body was put elsewhere since its pose was last written."""
 
     def read(self, pose: Array, twist: Array) -> None:
         """Fill ``pose`` (7,) of the body frame B and ``twist`` (6,)."""
@@ -42,12 +45,15 @@ class Placement:
 
     def read_inertial(self, pose: Array, twist: Array) -> None:
         """Fill ``pose`` (7,) of the inertial frame I and ``twist`` (6,)."""
+        self._refresh()
+        pose[:], twist[:] = self.motions.pose[self.row], self.motions.twist[self.row]
+
+    def _refresh(self) -> None:
         if self.link < 0:
-            pose[:3], pose[3:] = pybullet.getBasePositionAndOrientation(self.uid, physicsClientId=self.client)
-            twist[:3], twist[3:] = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
+            self.motions.base(self.tree)
+            self.motions.pace(self.tree)
         else:
-            found = pybullet.getLinkState(self.uid, self.link, 1, 1, physicsClientId=self.client)
-            pose[:3], pose[3:], twist[:3], twist[3:] = found[0], found[1], found[6], found[7]
+            self.motions.links(self.tree)
 
     def put(self, pose: Array) -> None:
         """Put the base at ``pose`` (7,) of B, at rest."""
@@ -59,24 +65,29 @@ class Placement:
         for uid in self._bases:
             pybullet.resetBasePositionAndOrientation(uid, position, quaternion, physicsClientId=self.client)
             pybullet.resetBaseVelocity(uid, [0.0] * 3, [0.0] * 3, physicsClientId=self.client)
-        self.moved = True
+        self.motions.forget(self.tree)
 
     def set_twist(self, linear: Array, angular: Array) -> None:
         """Set the velocity of the base."""
         pybullet.resetBaseVelocity(self.uid, linear.tolist(), angular.tolist(), physicsClientId=self.client)
+        self.motions.forget(self.tree)
 
     def slow_down(self, linear: float, angular: float) -> None:
-        """Multiply the velocity of the base by two factors."""
-        v, w = pybullet.getBaseVelocity(self.uid, physicsClientId=self.client)
-        pybullet.resetBaseVelocity(
-            self.uid, [linear * c for c in v], [angular * c for c in w], physicsClientId=self.client
-        )
+        """Multiply the velocity of a base without links by two factors."""
+        self.motions.pace(self.tree)
+        twist = self.motions.twist[self.row]
+        before = twist.tolist()
+        if before != REST:
+            x, y, z, a, b, c = before
+            slow = (linear * x, linear * y, linear * z, angular * a, angular * b, angular * c)
+            twist[:] = slow
+            pybullet.resetBaseVelocity(self.uid, slow[:3], slow[3:], physicsClientId=self.client)
 
     def centre(self) -> Array:
         """Centre of mass (3,)."""
-        if self.link < 0:
-            return np.array(pybullet.getBasePositionAndOrientation(self.uid, physicsClientId=self.client)[0])
-        return np.array(pybullet.getLinkState(self.uid, self.link, physicsClientId=self.client)[0])
+        self._refresh()
+        centre: Array = self.motions.pose[self.row, :3]
+        return centre
 
     def push(self, force: Array, point: Array | None = None) -> None:
         """Apply ``force`` (3,) at ``point`` (3,), default the centre of mass, for one tick."""

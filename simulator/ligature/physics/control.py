@@ -8,6 +8,8 @@ does, a D near 1 chatters at the rate of the loop; the implicit form is the same
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import pybullet
 from numba import njit
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 from ligature.model.commands import CommandType
 from ligature.model.scene import Joint, JointType, OutputType
 from ligature.physics.articulation import Tree
+from ligature.physics.motions import Motions
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -83,8 +86,11 @@ def outputs(
 class TreeControl:
     """State of all single axes of one tree, as arrays in the order of ``tree.axes``."""
 
-    def __init__(self, client: int, tree: Tree, joints: tuple[Joint, ...], dt: float) -> None:
+    def __init__(
+        self, client: int, tree: Tree, joints: tuple[Joint, ...], dt: float, motions: Motions, index: int
+    ) -> None:
         self._client, self.tree, self._dt = client, tree, dt
+        self._motions, self._index = motions, index
         owners = [joints[joint] for _, joint, _, _ in tree.axes]
         self.links = [link for link, *_ in tree.axes]
         self.row = {joint: i for i, (_, joint, _, _) in enumerate(tree.axes)}
@@ -113,9 +119,8 @@ class TreeControl:
         self._kick_ticks = np.zeros(n, dtype=np.int64)
         self._motor, self._effort = np.zeros(n), np.zeros(n)
         self._driven: list[int] = []
-        self.position = np.zeros(n)
-        self.velocity = np.zeros(n)
-        self.motor_effort = np.zeros(n)
+        rows = motions.slices[index]
+        self.position, self.velocity = motions.position[rows], motions.velocity[rows]
         self._sort()
 
     def _spring_setup(self) -> None:
@@ -146,6 +151,7 @@ class TreeControl:
             return
         value = min(max(value, self._low[row]), self._high[row])
         if self.mode[row] != POSITION:
+            self._motions.joints(self._index)
             self._integral[row] = 0.0
             self._last_error[row] = value - self.position[row]
             previous = self.position[row]
@@ -208,15 +214,19 @@ class TreeControl:
         """``error``, the shorter way round for a joint that turns without limits."""
         return float((error + np.pi) % (2 * np.pi) - np.pi) if self._turns[row] else float(error)
 
-    def read(self) -> None:
-        """Read positions, velocities and motor efforts from Bullet."""
-        states = pybullet.getJointStates(self.tree.uid, self.links, physicsClientId=self._client)
-        self.position[:] = [state[0] for state in states]
-        self.velocity[:] = [state[1] for state in states]
-        self.motor_effort[:] = [state[3] for state in states]
+    def read(self, rows: Integers) -> Array:
+        """Positions, velocities and motor efforts (3, k) of the axes ``rows`` (k,) now."""
+        return self._motions.joints(self._index)[:, rows]
+
+    def put(self, rows: Iterable[int], positions: Iterable[float], velocity: float = 0.0) -> None:
+        """Set axes to positions and a velocity at once, without dynamics."""
+        for row, position in zip(rows, positions, strict=True):
+            pybullet.resetJointState(self.tree.uid, self.links[row], position, velocity, physicsClientId=self._client)
+        self._motions.forget(self._index)
 
     def apply(self) -> None:
-        """Set motors and torques of this tick; positions must have been read."""
+        """Set motors and torques of this tick."""
+        self._motions.joints(self._index)
         outputs(
             self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
             self._damping, self._rest, self.target, self._pace, self._fastest, self._hardest, self.position,
@@ -272,8 +282,8 @@ class TreeControl:
         return {
             name: np.array(getattr(self, name))
             for name in (
-                "mode", "target", "position", "velocity", "motor_effort", "_integral", "_last_error", "_kick",
-                "_kick_ticks", "_pace", "_fastest", "_hardest", "_give",
+                "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_fastest",
+                "_hardest", "_give",
             )
         }  # fmt: skip
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ class Drive:
         self._give = np.full(len(joints), give)
         control = self._control
         self._rows = np.array([control.row[joint] for joint in self._joints], dtype=np.int64)
-        self._links = [control.links[row] for row in self._rows]
 
     @property
     def _control(self) -> TreeControl:
@@ -44,8 +42,7 @@ class Drive:
 
     def read(self) -> Array:
         """Positions, velocities and motor efforts now, (3, n)."""
-        states = pybullet.getJointStates(self._control.tree.uid, self._links, physicsClientId=self._world.client)
-        return np.array([(s[0], s[1], s[3]) for s in states]).T
+        return self._control.read(self._rows)
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Follow set-points that move with ``velocity``."""
@@ -61,8 +58,7 @@ class Drive:
 
     def place(self, position: Array) -> None:
         """Put the joints somewhere at once, at rest."""
-        for link, value in zip(self._links, position.tolist(), strict=True):
-            pybullet.resetJointState(self._control.tree.uid, link, value, 0.0, physicsClientId=self._world.client)
+        self._control.put(self._rows.tolist(), position.tolist())
 
     def reset(self) -> None:
         """Nothing: the joints belong to the physics, which put them back."""

@@ -31,36 +31,30 @@ def common_gravity(scene: Scene) -> Array:
 class Lift:
     """Forces on the bodies of one tree whose gravity is not the common one, at their centres of mass."""
 
-    def __init__(self, client: int, tree: Tree, forces: Mapping[int, Array]) -> None:
-        self._client, self._uid = client, tree.uid
-        self._base = next((f.tolist() for link, f in forces.items() if link < 0), None)
-        self._links = [link for link in forces if link >= 0]
-        self._forces = [forces[link].tolist() for link in self._links]
+    def __init__(self, client: int, places: Sequence[Placement], forces: Sequence[Array]) -> None:
+        self._client, self._uid = client, places[0].uid
+        self._rows = [place.row for place in places]
+        self._pushes = [(place.link, force.tolist()) for place, force in zip(places, forces, strict=True)]
+        self._motions, self._tree = places[0].motions, places[0].tree
+        self._read = self._motions.base if all(place.link < 0 for place in places) else self._motions.links
 
     def push(self) -> None:
         """Apply the forces for one tick."""
-        if self._base is not None:
-            at = pybullet.getBasePositionAndOrientation(self._uid, physicsClientId=self._client)[0]
-            self._apply(-1, self._base, at)
-        if self._links:
-            states = pybullet.getLinkStates(self._uid, self._links, physicsClientId=self._client)
-            for link, force, state in zip(self._links, self._forces, states, strict=True):
-                self._apply(link, force, state[0])
-
-    def _apply(self, link: int, force: list[float], at: Sequence[float]) -> None:
-        pybullet.applyExternalForce(self._uid, link, force, at, pybullet.WORLD_FRAME, physicsClientId=self._client)
+        self._read(self._tree)
+        centres = self._motions.pose[self._rows].tolist()
+        for (link, force), at in zip(self._pushes, centres, strict=True):
+            pybullet.applyExternalForce(
+                self._uid, link, force, at[:3], pybullet.WORLD_FRAME, physicsClientId=self._client
+            )
 
 
 def gravity_lifts(client: int, trees: Sequence[Tree], place_of: Mapping[int, Placement], common: Array) -> list[Lift]:
     """What has to be pushed every tick so that every body feels its own gravity."""
     lifts = []
     for tree in trees:
-        forces = {}
-        for body, link in tree.link_of.items():
-            wanted = place_of[body].body
-            force = wanted.mass * (wanted.gravity - common)
-            if np.any(force):
-                forces[link] = force
-        if forces:
-            lifts.append(Lift(client, tree, forces))
+        places = [place_of[body] for body in tree.link_of]
+        forces = [place.body.mass * (place.body.gravity - common) for place in places]
+        pushed = [i for i, force in enumerate(forces) if np.any(force)]
+        if pushed:
+            lifts.append(Lift(client, [places[i] for i in pushed], [forces[i] for i in pushed]))
     return lifts

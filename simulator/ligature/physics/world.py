@@ -25,6 +25,7 @@ from ligature.physics.closures import Closures
 from ligature.physics.control import TreeControl
 from ligature.physics.drive import Drive
 from ligature.physics.gravity import common_gravity, gravity_lifts
+from ligature.physics.motions import Motions
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
 
@@ -63,11 +64,16 @@ class World(BulletQueries):
         )  # fmt: skip
         pybullet.setGravity(*self._world_gravity.tolist(), physicsClientId=self.client)
         self.trees = [build(self.client, self._cache, scene, a) for a in scene.articulations]
+        self._motions = Motions(self.client, self.trees)
         self.place_of = {
-            body: Placement(self.client, tree, scene.bodies[body]) for tree in self.trees for body in tree.link_of
+            body: Placement(self.client, tree, scene.bodies[body], self._motions, k)
+            for k, tree in enumerate(self.trees)
+            for body in tree.link_of
         }
         self._tree_of_joint: dict[int, TreeControl] = {}
-        self._controls = [TreeControl(self.client, tree, scene.joints, self.dt) for tree in self.trees]
+        self._controls = [
+            TreeControl(self.client, tree, scene.joints, self.dt, self._motions, k) for k, tree in enumerate(self.trees)
+        ]
         for control in self._controls:
             self._tree_of_joint.update(dict.fromkeys(control.row, control))
         self._body_controls: dict[int, BodyControl] = {}
@@ -75,7 +81,7 @@ class World(BulletQueries):
         self._damped = self._damping_factors()
         self._silence_pairs()
         self._closures = Closures(self.client, scene, self.place_of, self.report)
-        self._readout = Readout(self.client, scene, self.trees, self._controls, self.place_of)
+        self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
         self._setup_queries()
 
     def report(self, diagnostic: Diagnostic) -> None:
@@ -121,7 +127,6 @@ class World(BulletQueries):
         self._impulses.clear()
         for control in self._controls:
             if control.active:
-                control.read()
                 control.apply()
         for place, linear, angular in self._damped:
             place.slow_down(linear, angular)
@@ -133,6 +138,7 @@ class World(BulletQueries):
     def step(self) -> None:
         """Advance Bullet by one tick."""
         pybullet.stepSimulation(physicsClientId=self.client)
+        self._motions.expire()
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists, joints and wrenches into a state record."""
@@ -169,8 +175,7 @@ class World(BulletQueries):
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
         """Set a joint to a position and velocity at once, without dynamics."""
         control = self._tree_of_joint[joint]
-        link = control.links[control.row[joint]]
-        pybullet.resetJointState(control.tree.uid, link, position, velocity, physicsClientId=self.client)
+        control.put([control.row[joint]], [position], velocity)
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
@@ -187,36 +192,29 @@ class World(BulletQueries):
 
     def heal(self) -> list[Diagnostic]:
         """Put trees that diverged back to where the scene starts, and say so."""
-        found = []
-        for tree in self.trees:
-            if not self._sane(tree):
-                self._restart(tree)
+        found: list[Diagnostic] = []
+        self._motions.everything()
+        if self._motions.slower_than(MAX_SPEED):
+            return found
+        for k, tree in enumerate(self.trees):
+            if not all(abs(speed) < MAX_SPEED for speed in self._motions.speeds(k)):
+                self._restart(k, tree)
                 name = self.scene.bodies[tree.root].identity.identifier
                 message = f"'{name}' diverged and was put back to its initial pose"
                 found.append(Diagnostic(Severity.ERROR, message, code="diverged"))
         return found
 
-    def _sane(self, tree: Tree) -> bool:
-        """Whether a tree's state is finite and slow enough to be real."""
-        if tree.static and not tree.axes:
-            return True
-        linear, angular = pybullet.getBaseVelocity(tree.uid, physicsClientId=self.client)
-        speeds = [*linear, *angular]
-        if tree.axes:
-            states = pybullet.getJointStates(tree.uid, [a[0] for a in tree.axes], physicsClientId=self.client)
-            speeds += [state[1] for state in states]
-        return all(abs(speed) < MAX_SPEED for speed in speeds)
-
     def reset(self) -> None:
         """Put every body back to its initial pose, at rest; commands hold on."""
-        for tree in self.trees:
-            self._restart(tree)
+        for k, tree in enumerate(self.trees):
+            self._restart(k, tree)
 
-    def _restart(self, tree: Tree) -> None:
+    def _restart(self, index: int, tree: Tree) -> None:
         body = self.scene.bodies[tree.root]
         self.place_of[tree.root].put(matrix_pose7(body.T_world_body))
         for link, *_ in tree.axes:
             pybullet.resetJointState(tree.uid, link, 0.0, 0.0, physicsClientId=self.client)
+        self._motions.forget(index)
 
     def snapshot(self) -> dict[str, Any]:
         """All dynamic state; the world is rebuilt from it, so that it and a restored one continue alike."""
@@ -251,6 +249,7 @@ class World(BulletQueries):
             control_ = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
             control_.recall(kept)
         self.hold_again(held)
+        self._motions.forget_all()
 
     def close(self) -> None:
         """Give the Bullet client back."""
