@@ -45,7 +45,7 @@ def test_bench_prints_its_figures_as_json() -> None:
 
 def test_bench_of_a_bad_file_ends_with_two(tmp_path: Path) -> None:
     done = ligature("bench", tmp_path / "none.yaml")
-    assert done.returncode == 2 and "does not exist" in done.stdout
+    assert done.returncode == 2 and "does not exist" in " ".join(done.stdout.split())  # rich wraps long paths
 
 
 def test_a_list_of_indices_that_is_none_is_told() -> None:
