@@ -140,6 +140,7 @@ def test_a_body_is_moved_driven_and_pushed(client: Any) -> None:
     wait_for(lambda: abs(needle.get_pos().z - above[2]) < 2e-3)
     needle.velocity_command(0.0, 0.0, 0.02, 0.0, 0.0, 0.0)
     wait_for(lambda: needle.get_pos().z > above[2] + 0.01)
+    assert needle.get_linear_vel().z == pytest.approx(0.02, abs=1e-3)
     needle.set_force(0.0, 0.0, 0.0)
     needle.set_torque(0.0, 0.0, 0.0)
     wait_for(lambda: needle.get_pos().z < above[2])  # free: it falls

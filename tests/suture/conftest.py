@@ -43,6 +43,9 @@ class Bench:
     def motion(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         return self.pose[body].copy(), self.twist[body].copy()
 
+    def driven(self, body: int) -> bool:
+        return False
+
     def apply_impulse(self, body: int, impulse: np.ndarray, moment: np.ndarray) -> None:
         b = self.scene.bodies[body]
         R = pose7_matrix(self.pose[body])[:3, :3]

@@ -137,9 +137,18 @@ class BodyControl:
         elif self._place.body.static:
             self._move_static()
         elif self.type is CommandType.VELOCITY:
-            self._drive(self.target[:3], self.target[3:], np.zeros(3))
+            self._drive(self.target[:3], self.target[3:])
         else:
             self._follow()
+
+    @property
+    def sets_velocity(self) -> bool:
+        """Whether the command sets the velocity of the body, rather than forces on it or nothing."""
+        body = self._place.body
+        if body.static or self._place.link >= 0:
+            return False
+        by_pose = self.type is CommandType.POSITION and body.controller.linear_output is not OutputType.FORCE
+        return self.type is CommandType.VELOCITY or by_pose
 
     def memory(self) -> tuple[int, Array, Array, int, Array | None]:
         """Everything that lasts from tick to tick."""
@@ -186,12 +195,12 @@ class BodyControl:
             self._place.push(halves[0])
             self._place.twist(halves[1])
         else:
-            self._drive(halves[0], halves[1], self._place.body.gravity * self._dt)
+            self._drive(halves[0], halves[1])
 
-    def _drive(self, linear: Array, angular: Array, fall: Array) -> None:
-        """Make the body move with a twist; ``fall`` (3,) is what gravity adds within the tick."""
+    def _drive(self, linear: Array, angular: Array) -> None:
+        """Make the body move with a twist, less what gravity adds within the tick."""
         if self._place.link < 0:
-            self._place.set_twist(linear - fall, angular)
+            self._place.set_twist(linear - self._place.body.gravity * self._dt, angular)
             return
         pose, twist = np.empty(7), np.empty(6)
         self._place.read(pose, twist)

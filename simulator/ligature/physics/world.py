@@ -181,12 +181,21 @@ class World(BulletQueries):
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
         self.place_of[body].push(force, point)
 
+    def driven(self, body: int) -> bool:
+        """Whether a command sets the velocity of a body, so that a thread, however light the body, does not."""
+        control = self._body_controls.get(body)
+        return control is not None and control.sets_velocity
+
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
-        """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,)."""
+        """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,).
+
+        A driven body feels it and moves as commanded.
+        """
         place = self.place_of[body]
         self._impulses[body] = self._impulses.get(body, 0.0) + np.concatenate([impulse, moment])
-        place.push(impulse / self.dt)
-        place.twist(moment / self.dt)
+        if not self.driven(body):
+            place.push(impulse / self.dt)
+            place.twist(moment / self.dt)
 
     # --- health, reset, snapshots -----------------------------------------------------------
 

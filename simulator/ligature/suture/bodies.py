@@ -19,5 +19,8 @@ class Bodies(Protocol):
     def motion(self, body: int) -> tuple[Array, Array]:
         """Pose (7,) of a body's inertial frame and its twist (6,), linear part at the centre of mass."""
 
+    def driven(self, body: int) -> bool:
+        """Whether a body moves as a command says, whatever pushes it."""
+
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,)."""

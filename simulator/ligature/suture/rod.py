@@ -120,6 +120,7 @@ class Rod:
         self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._permanent = [self._grip_of(tie) for tie in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
+        self._fixed = {p.body: p.fixed for p in partners}
         self._near: list[int] = []
         self._tied = [tie.body for tie in description.ties]
         self._corners = np.zeros((2, 3))
@@ -269,6 +270,8 @@ class Rod:
         for body in self._holding:
             if body not in near:
                 self.place(body, *bodies.motion(body))
+        for body in {*near, *self._holding}:
+            self._nodes.fixed[self.node_of[body]] = self._fixed[body] or bodies.driven(body)
 
     def grip(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
         """Hold frame a of an element and frame b of a partner, (4, 4) in their frames B, together."""

@@ -21,6 +21,9 @@ class _Still:
     def motion(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
 
+    def driven(self, body: int) -> bool:
+        return False
+
     def apply_impulse(self, body: int, impulse: np.ndarray, moment: np.ndarray) -> None:
         raise AssertionError("a static body receives no impulses")
 

@@ -1,0 +1,52 @@
+"""A light body that a client drives, with a thread on it, on our small scene."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ligature import Simulation, load
+
+SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
+
+
+@pytest.fixture
+def sim() -> Simulation:
+    return Simulation(load(SMALL))
+
+
+def first_gap(sim: Simulation) -> float:
+    """Distance from the needle to the first element of its thread, metres."""
+    chain = sim.scene.rods[0]
+    return float(np.linalg.norm(sim.state["body_pose"][0, chain.bodies[0], :3] - sim.bodies["Needle"].pose[:3]))
+
+
+def test_a_driven_needle_takes_the_commanded_pose_whatever_its_thread_pulls(sim: Simulation) -> None:
+    sim.step(100)
+    gap = first_gap(sim)
+    target = [0.005, 0.2, 0.765, 0.0, 0.0, math.sin(0.5), math.cos(0.5)]
+    sim.bodies["Needle"].command_pose(target)
+    sim.step(2500)
+    assert sim.bodies["Needle"].pose == pytest.approx(target, abs=1e-4)
+    assert first_gap(sim) == pytest.approx(gap, abs=2e-4)  # the thread came along
+
+
+def test_a_driven_needle_keeps_the_commanded_velocity(sim: Simulation) -> None:
+    sim.step(100)
+    sim.bodies["Needle"].command_twist([0.0, 0.0, 0.02, 0.0, 0.0, 0.3])
+    before = sim.bodies["Needle"].pose
+    sim.step(1000)
+    after = sim.bodies["Needle"].pose
+    assert after[2] - before[2] == pytest.approx(0.02, abs=2e-4)
+    assert 2 * math.atan2(after[5], after[6]) == pytest.approx(0.3, abs=5e-3)
+
+
+def test_a_needle_that_is_let_go_hangs_on_its_thread_again(sim: Simulation) -> None:
+    needle = sim.bodies["Needle"]
+    needle.command_pose([0.005, 0.2, 0.765, 0.0, 0.0, 0.0, 1.0])
+    sim.step(1000)
+    needle.command_wrench([0.0] * 6)
+    sim.step(300)
+    assert needle.pose[2] < 0.75
