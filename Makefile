@@ -5,7 +5,7 @@ STAMPS := build/stamps
 SCENE  ?= scenes/suturing_small/launch.yaml
 MUTANTS ?= 100000
 
-.PHONY: run test setup lint types check-imports unit fuzz bench docs clean
+.PHONY: run test setup lint types check-imports unit fuzz bench soak docs clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -55,6 +55,10 @@ fuzz: setup
 
 bench: setup
 	$(PYTHON) -m tests.bench.run
+
+# two simulated hours of servo on both arms, as fast as the machine allows
+soak: setup
+	$(PYTHON) -m tests.bench.soak
 
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md

@@ -1,0 +1,442 @@
+"""Arms on ROS: topics, frames and rates; and what becomes of commands that no arm can carry out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.ros.conftest import BIN, SMALL
+
+pytestmark = pytest.mark.ros
+
+ARMS = ("PSM1", "PSM2", "ECM", "MTML", "MTMR")
+JOINTS = {
+    "PSM": ["yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw"],
+    "ECM": ["yaw", "pitch", "insertion", "roll"],
+    "MTM": ["outer_yaw", "shoulder_pitch", "elbow_pitch", "wrist_platform", "wrist_pitch", "wrist_yaw", "wrist_roll"],
+}
+
+
+@pytest.fixture(scope="module")
+def simulator(start: Callable[..., Any]) -> Any:
+    program = start(BIN / "ligature", "run", SMALL, "-p", "500")
+    program.wait_for("ligature is running")
+    return program
+
+
+@pytest.fixture(scope="module")
+def arms(simulator: Any, node: Any) -> Iterator[dict[str, Any]]:
+    from tests.ros import crtk
+
+    kinds = {"PSM": crtk.Psm, "ECM": crtk.Arm, "MTM": crtk.Mtm}
+    clients = {name: kinds[name[:3]](node, name) for name in ARMS}
+    for client in clients.values():
+        client.check_connections(10.0)
+    yield clients
+    for client in clients.values():
+        client.close()
+
+
+@pytest.fixture(params=ARMS)
+def arm(arms: dict[str, Any], request: pytest.FixtureRequest) -> Any:
+    """A client of each arm in turn, enabled and homed."""
+    client = arms[request.param]
+    assert client.enable(1.0)
+    assert client.home(5.0)
+    return client
+
+
+def table(node: Any) -> tuple[dict[str, str], dict[str, set[str]], dict[str, set[str]]]:
+    """Types of topics, and who publishes and subscribes them, without this process."""
+    import rosgraph
+
+    master = rosgraph.Master(node.get_name())
+    publishers, subscribers, _ = master.getSystemState()
+    others = [{topic: set(names) - {node.get_name()} for topic, names in side} for side in (publishers, subscribers)]
+    return dict(master.getTopicTypes()), others[0], others[1]
+
+
+# --- topics ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_topic_of_an_arm_is_there_with_its_type_and_direction(arms, node, name):
+    from crtk_msgs.msg import OperatingState, StringStamped
+    from sensor_msgs.msg import JointState
+
+    from tests.ros import crtk
+
+    types, published, subscribed = table(node)
+    out = {"operating_state": OperatingState, **crtk.HEARD, **crtk.EVENTS, **crtk.READS}
+    out |= dict.fromkeys(crtk.BUTTONS[name[:3]], crtk.BUTTON)
+    into = {"state_command": StringStamped, **crtk.SAID}
+    if name.startswith("PSM"):
+        out |= {"jaw/measured_js": JointState, "jaw/setpoint_js": JointState}
+        into |= {"jaw/servo_jp": JointState, "jaw/move_jp": JointState, "jaw/servo_jf": JointState}
+    if name.startswith("MTM"):
+        out |= {"gripper/measured_js": JointState}
+    wrong = []
+    for side, wanted in ((published, out), (subscribed, into)):
+        for topic, type_ in wanted.items():
+            full = f"/{name}/{topic}"
+            if not side.get(full):
+                wrong.append(f"{full}: nobody {'publishes' if side is published else 'subscribes'} it")
+            elif types[full] != type_._type:
+                wrong.append(f"{full}: {types[full]}, not {type_._type}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_console_system_and_pedals_have_both_ends(simulator, node):
+    from tests.ros.crtk import Console, System
+
+    for link in (Console(node), System(node)):
+        link.check_connections(5.0)
+        link.close()
+    _, published, _ = table(node)
+    wanted = [f"/footpedals/{pedal}" for pedal in ("clutch", "camera", "coag")]
+    wanted += [f"/console/{name}" for name in ("operator_present", "clutch", "camera", "teleop/enabled")]
+    assert [topic for topic in wanted if not published.get(topic)] == []
+
+
+def test_feedback_comes_at_a_hundred_hertz_with_rising_stamps(arm, listen):
+    from sensor_msgs.msg import JointState
+
+    listener = listen(arm.topic("measured_js"), JointState)
+    listener.wait()
+    assert listener.rate(1.0) == pytest.approx(100.0, rel=0.15)
+    stamps = [message.header.stamp.to_sec() for message in listener.messages]
+    assert min(np.diff(stamps)) >= 0.0
+    assert abs(stamps[-1] - time.time()) < 0.1
+
+
+def test_joint_states_carry_names_and_arrays_of_one_length(arm):
+    message = arm.hear("measured_js")
+    assert list(message.name) == JOINTS[arm.name[:3]]
+    assert len(message.position) == len(message.velocity) == len(message.effort) == len(message.name)
+    assert message.header.frame_id == ""
+
+
+def test_poses_are_told_in_the_frame_of_the_base(arm):
+    reference = "HRSV" if arm.name.startswith("MTM") else f"{arm.name}_base"
+    assert arm.hear("measured_cp").header.frame_id == arm.hear("setpoint_cp").header.frame_id == reference
+    for topic in ("local/measured_cp", "local/setpoint_cp"):
+        assert arm.hear(topic).header.frame_id == f"{arm.name}_base"
+
+
+def test_measured_poses_are_the_forward_kinematics_of_measured_joints(arm):
+    from tests.ros.crtk import pose7, pose_distance
+
+    answer = arm.forward_kinematics(arm.measured_jp(), local=True)
+    assert answer.result
+    metres, radians = pose_distance(pose7(answer.cp), pose7(arm.hear("local/measured_cp").pose))
+    assert (metres, radians) < (1e-5, 1e-4)
+    metres, radians = pose_distance(pose7(arm.forward_kinematics(arm.measured_jp()).cp), arm.measured_cp())
+    assert (metres, radians) < (1e-5, 1e-4)
+
+
+def test_inverse_kinematics_undoes_the_local_forward(arm):
+    from tests.ros.crtk import pose7
+
+    q = arm.measured_jp()
+    answer = arm.inverse_kinematics(q, pose7(arm.forward_kinematics(q, local=True).cp))
+    assert answer.result
+    np.testing.assert_allclose(answer.jp, q, atol=1e-6)
+
+
+def test_queries_that_cannot_be_answered_say_why(arm):
+    q = arm.measured_jp()
+    answer = arm.forward_kinematics([*q, 0.0])
+    assert (answer.result, "too many joints" in answer.message) == (False, True)
+    answer = arm.inverse_kinematics(q[:-1], arm.measured_cp())
+    assert (answer.result, "incorrect number of joints" in answer.message) == (False, True)
+    answer = arm.inverse_kinematics(q, [0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0])
+    assert (answer.result, "inverse kinematics failed" in answer.message) == (False, True)
+
+
+def test_jacobians_have_six_rows_and_a_column_a_joint(arm):
+    for frame in ("body", "spatial"):
+        assert arm.jacobian(frame).shape == (6, len(JOINTS[arm.name[:3]]))
+
+
+def test_tf_has_a_frame_for_every_arm(arms, listen):
+    from tf2_msgs.msg import TFMessage
+
+    listener = listen("/tf", TFMessage)
+    time.sleep(1.0)
+    pairs = {(t.header.frame_id, t.child_frame_id) for message in listener.messages for t in message.transforms}
+    wanted = {("HRSV" if name.startswith("MTM") else f"{name}_base", name) for name in ARMS}
+    assert wanted <= pairs
+
+
+def test_the_operating_state_is_latched_for_whoever_comes_late(arm, node):
+    from crtk_msgs.msg import OperatingState
+
+    begin = time.monotonic()
+    message = node.wait_for_message(arm.topic("operating_state"), OperatingState, timeout=2.0)
+    assert (message.state, message.is_homed) == ("ENABLED", True)
+    assert time.monotonic() - begin < 1.0
+
+
+def test_services_tell_state_and_version(arm, node):
+    from crtk_msgs.srv import TriggerOperatingState
+    from std_srvs.srv import Trigger
+
+    state = node.ServiceProxy(arm.topic("operating_state"), TriggerOperatingState)().operating_state
+    assert (state.state, state.is_homed) == ("ENABLED", True)
+    assert node.ServiceProxy(arm.topic("crtk_version"), Trigger)().message == "1.1.0"
+
+
+# --- states ---------------------------------------------------------------------------------
+
+
+def test_an_arm_is_enabled_within_a_second_and_homed_within_five(arms):
+    for client in arms.values():
+        assert client.disable(2.0)
+        client.state.command("unhome")
+    for client in arms.values():
+        begin = time.monotonic()
+        assert client.enable(1.0)
+        assert time.monotonic() - begin < 1.0
+        begin = time.monotonic()
+        assert client.home(5.0)
+        assert time.monotonic() - begin < 5.0
+
+
+def test_enable_and_home_of_a_homed_arm_change_nothing(arm):
+    from tests.ros.crtk import shifted
+
+    assert arm.move_cp(shifted(arm.setpoint_cp(), [0.005, 0.0, 0.0])).wait()
+    before = arm.measured_jp()
+    assert arm.enable(0.0)
+    assert arm.home(0.0)
+    time.sleep(0.3)
+    np.testing.assert_allclose(arm.measured_jp(), before, atol=1e-4)
+    assert arm.state.now.state == "ENABLED"
+
+
+def test_states_follow_the_reference_sequence(arm):
+    assert arm.disable(2.0)
+    arm.state.command("unhome")
+    time.sleep(0.2)
+    before = len(arm.state.events)
+    assert arm.enable(1.0)
+    assert arm.home(5.0)
+    told = [(e.state, e.is_homed, e.is_busy) for e in arm.state.events[before:]]
+    short = [told[0], *(state for last, state in zip(told, told[1:], strict=False) if state != last)]
+    assert short == [
+        ("DISABLED", False, True), ("ENABLED", False, False), ("ENABLED", False, True), ("ENABLED", True, False),
+    ]  # fmt: skip
+    stamps = [event.header.stamp.to_sec() for event in arm.state.events]
+    assert min(np.diff(stamps)) > 0.0
+
+
+def test_pause_stops_motion_and_resume_allows_it(arm):
+    start = arm.setpoint_jp()
+    step = np.zeros(len(start))
+    step[0] = 0.1
+    arm.state.command("pause")
+    assert arm.state.wait_for(lambda s: s.state == "PAUSED", 1.0)
+    assert not arm.move_jp(start + step).wait(timeout=0.5)
+    arm.servo_jp(start + step)
+    time.sleep(0.2)
+    np.testing.assert_allclose(arm.measured_jp(), start, atol=1e-3)
+    assert arm.hear("measured_js"), "feedback stays fresh while paused"
+    arm.state.command("resume")
+    assert arm.state.wait_for(lambda s: s.state == "ENABLED", 1.0)
+    assert arm.move_jp(start + step).wait()
+    assert arm.move_jp(start).wait()
+
+
+def test_an_unknown_state_command_is_a_warning_without_effect(arm, listen):
+    from std_msgs.msg import String
+
+    warnings = listen(arm.topic("warning"), String)
+    time.sleep(0.3)
+    arm.state.command("dance")
+    assert "dance" in warnings.wait().data
+    assert arm.state.now.state == "ENABLED"
+
+
+# --- motion ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rate", [100.0, 500.0])
+def test_a_servo_stream_is_followed(arm, rate):
+    from tests.ros.test_client_scripts import stream
+
+    start = arm.setpoint_jp()
+    swing = np.zeros(len(start))
+    swing[:2] = 0.05
+    errors = []
+
+    def send(t: float) -> None:
+        arm.servo_jp(start + swing * np.sin(2.0 * np.pi * t) ** 2)
+        errors.append(np.abs(arm.measured_jp() - arm.setpoint_jp()).max())
+
+    stream(send, 1.0, rate)
+    time.sleep(0.3)
+    np.testing.assert_allclose(arm.measured_jp(), start, atol=2e-3)
+    # 0.31 rad/s: what a measured and a set value of two messages 10 ms apart differ by
+    assert np.percentile(errors, 95) < 0.01
+
+
+def test_a_move_of_no_length_ends(arm):
+    begin = time.monotonic()
+    assert arm.move_jp(arm.setpoint_jp()).wait(timeout=5.0)
+    assert arm.move_cp(arm.setpoint_cp()).wait(timeout=5.0)
+    assert time.monotonic() - begin < 2.0
+
+
+def test_a_newer_move_takes_over_and_only_its_goal_is_reached(arm, listen):
+    from std_msgs.msg import Bool
+
+    goals = listen(arm.topic("goal_reached"), Bool)
+    start = arm.setpoint_jp()
+    step = np.zeros(len(start))
+    step[0] = 0.3
+    first = arm.move_jp(start + step)
+    assert first.wait(is_busy=True, timeout=2.0)
+    time.sleep(0.1)
+    assert arm.move_jp(start).wait()
+    np.testing.assert_allclose(arm.setpoint_jp(), start, atol=1e-6)
+    time.sleep(0.1)
+    assert [message.data for message in goals.messages][-2:] == [False, True]
+
+
+def test_a_servo_command_ends_a_move(arm):
+    start = arm.setpoint_jp()
+    step = np.zeros(len(start))
+    step[0] = 0.3
+    motion = arm.move_jp(start + step)
+    assert motion.wait(is_busy=True, timeout=2.0)
+    time.sleep(0.1)
+    here = arm.setpoint_jp()
+    arm.servo_jp(here)
+    assert motion.wait(timeout=1.0), "busy did not end"
+    time.sleep(0.2)
+    np.testing.assert_allclose(arm.setpoint_jp(), here, atol=1e-6)
+    assert arm.move_jp(start).wait()
+
+
+def test_goals_beyond_the_limits_are_clipped_not_refused(arm):
+    start = arm.setpoint_jp()
+    goal = start.copy()
+    goal[0] = 9.0
+    assert arm.move_jp(goal).wait()
+    assert 0.5 < arm.setpoint_jp()[0] < 3.0
+    assert arm.move_jp(start).wait()
+
+
+@pytest.mark.parametrize("bad", ["short", "long", "empty", "nan", "infinite"])
+def test_joint_commands_that_make_no_sense_change_nothing(arm, bad):
+    start = arm.setpoint_jp()
+    values = {
+        "short": start[:-1] + 0.1, "long": [*start, 0.1], "empty": [], "nan": start * np.nan,
+        "infinite": np.where(np.arange(len(start)) == 0, np.inf, start),
+    }[bad]  # fmt: skip
+    arm.servo_jp(values)
+    assert not arm.move_jp(values).wait(timeout=0.4)
+    np.testing.assert_allclose(arm.setpoint_jp(), start, atol=1e-9)
+    assert arm.state.now.state == "ENABLED"
+    assert not arm.state.now.is_busy
+    assert arm.move_jp(start).wait(timeout=5.0), "a good command works after a bad one"
+
+
+@pytest.mark.parametrize("pose", [[np.nan] * 7, [0.0] * 7, [0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0]], ids=str)
+def test_poses_that_cannot_be_reached_change_nothing(arm, pose, listen):
+    from std_msgs.msg import Bool
+
+    goals = listen(arm.topic("goal_reached"), Bool)
+    start = arm.setpoint_jp()
+    arm.servo_cp(pose)
+    assert not arm.move_cp(pose).wait(timeout=0.4)
+    np.testing.assert_allclose(arm.setpoint_jp(), start, atol=1e-9)
+    assert not arm.state.now.is_busy
+    assert goals.wait().data is False
+
+
+def test_commands_to_an_arm_that_is_not_ready_are_ignored_with_a_warning(arm, listen):
+    from std_msgs.msg import String
+
+    warnings = listen(arm.topic("warning"), String)
+    start = arm.measured_jp()
+    assert arm.disable(2.0)
+    arm.servo_jp(start + 0.05)
+    assert not arm.move_jp(start + 0.05).wait(timeout=0.5)
+    assert "not ready" in warnings.wait().data
+    assert arm.state.now.state == "DISABLED"
+
+
+def test_ratios_are_echoed_and_slow_moves_down(arm, listen):
+    from std_msgs.msg import Float64
+
+    ratios = listen(arm.topic("trajectory_j/ratio"), Float64)
+    start = arm.setpoint_jp()
+    step = np.zeros(len(start))
+    step[0] = 0.2
+    times = {}
+    for ratio in (0.5, 1.0):
+        arm.say("trajectory_j/set_ratio", Float64(ratio))
+        ratios.wait(lambda message, ratio=ratio: message.data == ratio)
+        begin = time.monotonic()
+        assert arm.move_jp(start + step).wait()
+        times[ratio] = time.monotonic() - begin
+        assert arm.move_jp(start).wait()
+    assert times[0.5] > 1.3 * times[1.0]
+    arm.say("trajectory_j/set_ratio", Float64(1.5))
+    time.sleep(0.2)
+    assert ratios.messages[-1].data == 1.0
+
+
+def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
+    from geometry_msgs.msg import PoseStamped
+
+    from tests.ros.crtk import pose7, pose_message, shifted
+
+    base = PoseStamped(pose=pose_message([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0]))
+    base.header.frame_id = "table"
+    local, reference = arm.hear("local/measured_cp"), arm.hear("measured_cp").header.frame_id
+    before = arm.hear("measured_cp").pose
+    arm._said["set_base_frame"].publish(base)
+    deadline = time.monotonic() + 2.0
+    while arm.hear("measured_cp").header.frame_id != "table":
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    there = arm.setpoint_cp()
+    np.testing.assert_allclose(there[:3], pose7(arm.hear("local/setpoint_cp").pose)[:3] + [0.1, 0.2, 0.3], atol=1e-6)
+    assert arm.hear("local/measured_cp").header.frame_id == local.header.frame_id
+    assert arm.move_cp(shifted(there, [0.01, 0.0, 0.0])).wait()
+    np.testing.assert_allclose(arm.setpoint_cp()[:3], there[:3] + [0.01, 0.0, 0.0], atol=1e-5)
+    assert arm.move_cp(there).wait()
+    if reference.endswith("_base"):
+        back = PoseStamped(pose=pose_message([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    else:
+        T = pose7(before), pose7(local.pose)
+        back = PoseStamped(pose=pose_message(_between(*T)))
+    back.header.frame_id = reference
+    arm._said["set_base_frame"].publish(back)
+    time.sleep(0.3)
+
+
+def _between(pose: np.ndarray, local: np.ndarray) -> np.ndarray:
+    from ligature.model.frames import inverse, pose7_matrix
+
+    return pose7_matrix(pose) @ inverse(pose7_matrix(local))
+
+
+@pytest.mark.parametrize("name", ["PSM1", "PSM2"])
+def test_a_jaw_opens_and_closes(arms, name):
+    psm = arms[name]
+    assert psm.enable(1.0)
+    assert psm.home(5.0)
+    assert psm.jaw.open_jaw().wait(timeout=5.0)
+    assert psm.jaw.measured_jp() == pytest.approx(np.deg2rad(60.0), abs=0.02)
+    assert psm.jaw.close_jaw().wait(timeout=5.0)
+    assert psm.jaw.setpoint_jp() == pytest.approx(np.deg2rad(-20.0), abs=1e-6)
+    psm.jaw.servo_jp(0.3)
+    time.sleep(0.5)
+    assert psm.jaw.measured_jp() == pytest.approx(0.3, abs=0.02)
