@@ -138,6 +138,19 @@ class BulletQueries:
         held = self._held.pop(handle)
         pybullet.removeConstraint(held.constraint, physicsClientId=self.client)
 
+    def touched(self, bodies: Sequence[int]) -> bool:
+        """Whether `contact_wrench` may find anything: a quick look."""
+        if any(body in self._impulses for body in bodies):
+            return True
+        if any(held.parent in bodies or held.child in bodies for held in self._held.values()):
+            return True
+        own = {(place.uid, place.link) for place in map(self.place_of.get, bodies) if place is not None}
+        return any(
+            (found[1], found[3]) in own and (found[2], found[4]) not in own
+            for uid in {uid for uid, _ in own}
+            for found in pybullet.getContactPoints(bodyA=uid, physicsClientId=self.client)
+        )
+
     def contact_wrench(self, bodies: Sequence[int], point: Array) -> Array:
         """Force and moment (6,) about ``point`` (3,) that the rest of the world exerted on ``bodies`` in the last tick.
 

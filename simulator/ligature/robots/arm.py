@@ -234,6 +234,8 @@ class Arm(Device):
         if self._tip_wrench is not None:
             return self._tip_wrench()
         q, _, effort = self.joints.measured()
+        if not effort.any():
+            return np.zeros(6)
         jacobian = self.kinematics.jacobian_body(q)
         pushed: Array = np.linalg.lstsq(jacobian.T, -effort, rcond=1e-6)[0]
         return turned(self.kinematics.forward(q)[:3, :3], pushed)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ligature.model.frames import pose7_matrix
 from ligature.robots.operating_state import Refused
 
 Array = NDArray[np.float64]
+compiled: Any = njit(cache=True)
 
 
 def pose_matrix_of(pose: ArrayLike, what: str) -> Array:
@@ -42,3 +46,61 @@ def rotation_vector(R: Array) -> Array:
         return axis
     values, vectors = np.linalg.eigh((R + R.T) / 2.0)
     return np.asarray(np.pi * vectors[:, int(np.argmax(values))])
+
+
+@compiled  # type: ignore[untyped-decorator]
+def describe_tip(tips: Array, base: Array, twist: Array, wrench: Array, poses: Array, vectors: Array) -> None:
+    """What an arm reports of its tip, in the axes in which it reports it.
+
+    ``tips`` (2, 4, 4) are T_base_tip as measured and as asked for, ``base`` (4, 4) the base in the reference
+    frame, ``twist`` (6,) the tip's in axes of the tip, ``wrench`` (6,) that on the tip in base axes. ``poses``
+    (4, 7) receives both tips in the base, then in the reference frame; ``vectors`` (4, 6) the twist in base and
+    reference axes, the wrench in axes of the reference frame and of the tip.
+    """
+    T = np.empty((4, 4))
+    for k in range(2):
+        _write_pose(tips[k], poses[k])
+        for i in range(3):
+            for j in range(4):
+                T[i, j] = base[i, 0] * tips[k, 0, j] + base[i, 1] * tips[k, 1, j] + base[i, 2] * tips[k, 2, j]
+            T[i, 3] += base[i, 3]
+        _write_pose(T, poses[2 + k])
+    R = tips[0]
+    for half in range(0, 6, 3):
+        for i in range(3):
+            turn = R[i, 0] * twist[half] + R[i, 1] * twist[half + 1] + R[i, 2] * twist[half + 2]
+            vectors[0, half + i] = turn
+            vectors[2, half + i] = (
+                base[i, 0] * wrench[half] + base[i, 1] * wrench[half + 1] + base[i, 2] * wrench[half + 2]
+            )
+            vectors[3, half + i] = R[0, i] * wrench[half] + R[1, i] * wrench[half + 1] + R[2, i] * wrench[half + 2]
+        for i in range(3):
+            local = vectors[0]
+            vectors[1, half + i] = (
+                base[i, 0] * local[half] + base[i, 1] * local[half + 1] + base[i, 2] * local[half + 2]
+            )
+
+
+@compiled  # type: ignore[untyped-decorator]
+def _write_pose(T: Array, pose: Array) -> None:
+    """Pose (7,) of ``T`` (4, 4), as `ligature.model.frames.matrix_pose7` has it."""
+    squares = (T[0, 0] - T[1, 1] - T[2, 2], T[1, 1] - T[0, 0] - T[2, 2],
+               T[2, 2] - T[0, 0] - T[1, 1], T[0, 0] + T[1, 1] + T[2, 2])  # fmt: skip
+    i = 0
+    for k in range(1, 4):
+        if squares[k] > squares[i]:
+            i = k
+    q = pose[3:7]
+    if i == 3:
+        q[0], q[1], q[2] = T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]
+        q[3] = 1.0 + squares[3]
+    else:
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[i] = 1.0 + squares[i]
+        q[j], q[k], q[3] = T[j, i] + T[i, j], T[k, i] + T[i, k], T[k, j] - T[j, k]
+    length = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    if q[3] < 0.0:
+        length = -length
+    for k in range(4):
+        q[k] /= length
+    pose[0], pose[1], pose[2] = T[0, 3], T[1, 3], T[2, 3]

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ligature.model.frames import matrix_pose7
 from ligature.robots.arm import Arm
 from ligature.robots.mtm_arm import MtmArm
-from ligature.robots.poses import turned
+from ligature.robots.poses import describe_tip
 from ligature.robots.psm_arm import PsmArm
 
 
@@ -23,16 +22,15 @@ def write_arm(arm: Arm, record: Any) -> None:
     record["reference"] = arm.reference.encode("utf-8")[:64]
     record["measured_js"][:, :n] = measured
     record["setpoint_js"][:, :n] = setpoint
-    T, wanted = arm.kinematics.forward(np.array([measured[0], setpoint[0]]))
-    base, body, spatial = arm.base_frame, arm.kinematics.jacobian_body(measured[0]), arm.spatial_jacobian()
-    record["local_measured_cp"], record["local_setpoint_cp"] = matrix_pose7(T), matrix_pose7(wanted)
-    record["measured_cp"], record["setpoint_cp"] = matrix_pose7(base @ T), matrix_pose7(base @ wanted)
-    record["body_jacobian"][:, :n], record["spatial_jacobian"][:, :n] = body, spatial
-    twist = turned(T[:3, :3], body @ measured[1])
-    record["local_measured_cv"], record["measured_cv"] = twist, turned(base[:3, :3], twist)
+    tips = arm.kinematics.forward(np.array([measured[0], setpoint[0]]))
+    body = arm.kinematics.jacobian_body(measured[0])
+    record["body_jacobian"][:, :n], record["spatial_jacobian"][:, :n] = body, arm.spatial_jacobian()
+    poses, vectors = np.empty((4, 7)), np.empty((4, 6))
     wrench = arm.spatial_measured_cf()
-    record["spatial_measured_cf"] = turned(base[:3, :3], wrench)
-    record["body_measured_cf"] = wrench if arm.cf_orientation_absolute else turned(T[:3, :3].T, wrench)
+    describe_tip(tips, arm.base_frame, body @ measured[1], wrench, poses, vectors)
+    record["local_measured_cp"], record["local_setpoint_cp"], record["measured_cp"], record["setpoint_cp"] = poses
+    record["local_measured_cv"], record["measured_cv"], record["spatial_measured_cf"], turned_back = vectors
+    record["body_measured_cf"] = wrench if arm.cf_orientation_absolute else turned_back
     if isinstance(arm, PsmArm):
         record["tool"], record["tool_present"] = arm.kinematics.instrument.id, arm.tool_present
         if arm.jaw is not None:
