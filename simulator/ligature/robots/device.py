@@ -74,7 +74,7 @@ class Device:
     @property
     def operating_state(self) -> OperatingState:
         """State, whether homed, whether busy."""
-        return OperatingState(self._state, self._homed, self._busy)
+        return OperatingState(self._state, self.is_homed, self._busy)
 
     @property
     def is_enabled(self) -> bool:
@@ -83,8 +83,8 @@ class Device:
 
     @property
     def is_homed(self) -> bool:
-        """Whether joint values are known."""
-        return self._homed
+        """Whether joint values are known; an arm without power does not count as homed (interface reference §5.2)."""
+        return self._homed and self._state in (State.ENABLED, State.PAUSED)
 
     @property
     def is_busy(self) -> bool:
@@ -132,7 +132,7 @@ class Device:
             self._begin_home()
         elif step is Action.UNHOME:
             self._homed = False
-        self._tell_state(again=step in (Action.NOTHING, Action.HOME))
+        self._tell_state(again=True)
 
     def adopt(self) -> None:
         """Be enabled and homed at once, where the arm stands: for clients that know no states."""
