@@ -6,7 +6,6 @@ World axes, metres, radians.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ from ligature.robots.dispatch import carry_out
 from ligature.robots.ecm import Ecm
 from ligature.robots.ecm_arm import EcmArm
 from ligature.robots.fitting import (
-    DEFAULT_TOOL,
     T_TIP_CAMERA,
     camera_arm_base,
     console_pose,
@@ -134,13 +132,10 @@ class ArmSet(Mapping[str, Arm]):
 
 
 def _psm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:
-    try:
-        kinematics = psm_kinematics(scene, description)
-    except ValueError as error:
+    kinematics, problem = psm_kinematics(scene, description)
+    if problem:
         mark = scene.bodies[description.base].identity.mark
-        message = f"{description.name}: {error}; it is taken for a {DEFAULT_TOOL}"
-        problems.append(Diagnostic(Severity.WARNING, message, mark, code="arm"))
-        kinematics = psm_kinematics(scene, replace(description, tool=DEFAULT_TOOL))
+        problems.append(Diagnostic(Severity.WARNING, f"{description.name}: {problem}", mark, code="arm"))
     joints = Axes(
         kinematics.joint_names, _travel(scene, description.joints), psm_arm.FASTEST, psm_arm.HARDEST,
         world.drive(description.joints, psm_arm.SERVO_FASTEST, psm_arm.SERVO_HARDEST),

@@ -37,7 +37,7 @@ def main() -> None:
         tell("fatal", str(error))
         stop.wait(SCENE_PATIENCE)
         sys.exit(2)
-    tell("ready", f"{node.topics} topics")
+    tell("ready", node.told)
     node.run(stop, lambda: tell("first-state"))
 
 

@@ -113,6 +113,7 @@ class TreeControl:
         self._fastest = np.full(n, np.inf)
         self._hardest = np.full(n, np.inf)
         self._give = np.zeros(n)
+        self.owned = np.zeros(n, dtype=bool)
         self._integral = np.zeros(n)
         self._last_error = np.zeros(n)
         self._kick = np.zeros(n)
@@ -138,8 +139,13 @@ class TreeControl:
         return bool(self._driven or self._pushed)
 
     def command(self, joint: Joint, type_: CommandType, value: float) -> None:
-        """Take a command for one joint; a position command of a sprung or disabled joint has no effect."""
+        """Take a command for one joint; a position command of a sprung or disabled joint has no effect.
+
+        Nor has one for a joint that an enabled arm owns.
+        """
         row = self.row[joint.index]
+        if self.owned[row]:
+            return
         if type_ is CommandType.FORCE:
             if joint.type in PUSHED:
                 self._switch(row, FORCE, value)
@@ -173,6 +179,7 @@ class TreeControl:
         They do so at most at the speed ``fastest``, and brake with ``hardest``, so that a step does not overshoot.
         ``give`` (k,) is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is as strong as the motor.
         """
+        self.owned[rows] = True
         self.target[rows] = position
         self._pace[rows] = velocity
         if (self.mode[rows] != SERVO).any():
@@ -181,12 +188,14 @@ class TreeControl:
 
     def push(self, rows: Integers, effort: Array) -> None:
         """Drive the axes ``rows`` (k,) with efforts; 0 lets one move freely."""
+        self.owned[rows] = True
         self.target[rows] = effort
         if (self.mode[rows] != FORCE).any():
             self._enter(rows, FORCE)
 
     def let_go(self, rows: Integers) -> None:
         """Let the axes ``rows`` (k,) go limp."""
+        self.owned[rows] = False
         self.target[rows] = 0.0
         self._enter(rows, FREE)
 
@@ -197,8 +206,9 @@ class TreeControl:
         self._sort()
 
     def release(self, joint: int) -> None:
-        """Let one joint go limp."""
-        self._switch(self.row[joint], FREE, 0.0)
+        """Let one joint go limp, unless an arm owns it."""
+        if not self.owned[self.row[joint]]:
+            self._switch(self.row[joint], FREE, 0.0)
 
     def _switch(self, row: int, mode: int, target: float) -> None:
         before = self.mode[row]
@@ -283,7 +293,7 @@ class TreeControl:
             name: np.array(getattr(self, name))
             for name in (
                 "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_fastest",
-                "_hardest", "_give",
+                "_hardest", "_give", "owned",
             )
         }  # fmt: skip
 

@@ -17,7 +17,7 @@ from ligature.adf import Diagnostic, Severity
 from ligature.mesh import CollisionCache
 from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_pose7
-from ligature.model.scene import Scene
+from ligature.model.scene import Body, Scene
 from ligature.model.state import StateRecord
 from ligature.physics.articulation import Tree, build, is_alone
 from ligature.physics.bodies import BodyControl, Placement
@@ -52,6 +52,7 @@ class World(BulletQueries):
         self.dt = dt
         self._cache = CollisionCache()
         self.problems: list[Diagnostic] = []
+        self._told_owned: set[int] = set()
         self._create()
 
     def _create(self) -> None:
@@ -103,7 +104,16 @@ class World(BulletQueries):
             tree = self._tree_of_joint.get(joint)
             if tree is not None:
                 type_ = types[i] if i < len(types) else CommandType.FORCE
+                if tree.owned[tree.row[joint]] and type_ is not CommandType.FORCE:
+                    self._tell_owned(body)
                 tree.command(self.scene.joints[joint], type_, value)
+
+    def _tell_owned(self, body: Body) -> None:
+        """Say once for each body that an arm owns its joints."""
+        if body.index not in self._told_owned:
+            self._told_owned.add(body.index)
+            message = f"joint commands to '{body.identity.identifier}' have no effect: its arm is enabled"
+            self.report(Diagnostic(Severity.WARNING, message, hint="disable the arm", code="owned"))
 
     def drive(self, joints: Sequence[int], fastest: Array, hardest: Array, give: float = 0.0) -> Drive:
         """The drive of ``joints``, all of one tree; see `Drive`."""

@@ -30,9 +30,9 @@ T_TIP_CAMERA = frame(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 0.0))
 
 
 def kinematics_of(scene: Scene, description: ArmDescription) -> Kinematics:
-    """The kinematics of an arm; raises ValueError for an instrument that is not known."""
+    """The kinematics of an arm."""
     if description.kind is ArmKind.PSM:
-        return psm_kinematics(scene, description)
+        return psm_kinematics(scene, description)[0]
     return Ecm() if description.kind is ArmKind.ECM else Mtm(master_side(description.name))
 
 
@@ -61,11 +61,15 @@ def camera_arm_base(scene: Scene, body: int, kinematics: Ecm, start: Array) -> A
     return scene.bodies[body].T_world_body @ inverse(kinematics.forward(start) @ T_TIP_CAMERA)
 
 
-def psm_kinematics(scene: Scene, description: ArmDescription) -> Psm:
-    """The PSM with its instrument; raises ValueError for an instrument that is not known."""
-    tool = instrument(description.tool or DEFAULT_TOOL)
-    lengths = _lengths(scene, description)
-    return _known(tool, lengths) or Psm(tool, lengths=lengths)
+def psm_kinematics(scene: Scene, description: ArmDescription) -> tuple[Psm, str]:
+    """The PSM with its instrument, and what was wrong with the name of the instrument, if anything."""
+    lengths, problem = _lengths(scene, description), ""
+    try:
+        tool = instrument(description.tool or DEFAULT_TOOL)
+    except ValueError as error:
+        tool = instrument(DEFAULT_TOOL)
+        problem = f"{error}; it is taken for {tool.type}"
+    return _known(tool, lengths) or Psm(tool, lengths=lengths), problem
 
 
 def _lengths(scene: Scene, description: ArmDescription) -> PsmLengths:

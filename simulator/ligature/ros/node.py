@@ -20,6 +20,7 @@ from ligature.bus import Block, Outbox
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from ligature.ros import conversion, names
+from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
 from ligature.ros.master import MasterWatch, require_free
 from ligature.ros.parameters import Parameters
@@ -53,7 +54,8 @@ class Node:
         name = node_name(scene.world.topic)
         require_free(f"/{name}")
         rospy.init_node(name, disable_signals=True)
-        self._reception = Reception(scene, Outbox(self._ring), self._wake)
+        prefix, outbox = scene.world.topic.rpartition("/ambf/")[0] + "/", Outbox(self._ring)
+        self._reception = Reception(scene, outbox, self._wake)
         self._world = conversion.WorldTemplate()
         self._publishers: list[Publisher] = []
         outlets = self._advertise(min_hz, max_hz, policy)
@@ -61,7 +63,9 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
-        self.topics = 2 * len(outlets)
+        self._arms = ArmsNode(scene, self._block, outbox, prefix)
+        arms = ", ".join(arm.name for arm in scene.arms) or "none"
+        self.told = f"{2 * len(outlets)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block)
         self._master = MasterWatch(Parameters(scene).poll)
 
@@ -69,6 +73,8 @@ class Node:
         """Publish until ``stop`` is set or the physics process is gone."""
         self._master.start()
         told, housekeeping = False, 0.0
+        if self._block.read(self._state):
+            self._arms.start(self._state[0])
         while not stop.is_set() and not rospy.is_shutdown():
             now = time.monotonic()
             if now >= housekeeping:
@@ -76,7 +82,7 @@ class Node:
                 if not self._keep_house(now):
                     return
             self._woken.clear()
-            nap = min(self._schedule.next_due(now), housekeeping) - now
+            nap = min(self._schedule.next_due(now), self._arms.next_due(), housekeeping) - now
             if nap > 0.0:
                 self._woken.wait(nap)
             elif self._block.read(self._state):
@@ -117,6 +123,8 @@ class Node:
     def _publish(self, now: float) -> None:
         state = self._state[0]
         sent, missed = self._schedule.publish(now, state, rospy.Time.from_sec(float(state["stamp"])))
+        if self._arms.next_due() <= now:
+            sent += self._arms.publish(now, state)
         figures = self._block.figures
         figures["published"] += np.uint64(sent)
         figures["publish_late"] += np.uint64(missed)
@@ -126,8 +134,8 @@ class Node:
         self._ring.beat()
         self._reception.watch(now)
         figures = self._block.figures
-        figures["malformed"] = self._reception.refused
-        self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers)
+        figures["malformed"] = self._reception.refused + self._arms.refused
+        self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
         self._world.loop_hz = float(figures["loop_hz"][0])
         self._diagnostics.publish(now)
         return self._block.age < PHYSICS_SILENCE

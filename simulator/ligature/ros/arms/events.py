@@ -1,0 +1,102 @@
+"""What an arm tells when it happens: latched topics, each with its newest message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from crtk_msgs.msg import OperatingState
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Bool, Empty, Float64, String
+
+from ligature.model.scene import ArmKind
+
+QUEUE = 100
+STATES = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
+
+_LATCHED: dict[str, type] = {
+    "goal_reached": Bool,
+    "desired_state": String,
+    "error": String,
+    "warning": String,
+    "status": String,
+    "trajectory_j/ratio": Float64,
+    "trajectory_j/ratio_v": Float64,
+    "trajectory_j/ratio_a": Float64,
+}
+_OF_KIND: dict[ArmKind, dict[str, type]] = {
+    ArmKind.PSM: {"tool_type": String, "tool_type_request": Empty, "arm_clutch": Joy, "manip_clutch": Joy},
+    ArmKind.ECM: {"endoscope_type": String, "arm_clutch": Joy, "manip_clutch": Joy},
+    ArmKind.MTM: {"orientation_locked": Bool, "gripper/closed": Bool, "gripper/pinch": Empty},
+}
+_LOGS: dict[str, Callable[[str], None]] = {
+    "error": rospy.logerr,
+    "warning": rospy.logwarn,
+    "status": rospy.logdebug,
+}
+WARNING_PAUSE = 2.0
+
+
+def operating_state(values: list[Any], stamp: Any) -> OperatingState:
+    """The message of an ``operating_state`` event, or of a state record's three fields."""
+    message = OperatingState(state=STATES[int(values[0])], is_homed=bool(values[1]), is_busy=bool(values[2]))
+    message.header.stamp = stamp
+    return message
+
+
+class Clock:
+    """Stamps that never repeat: a client takes no state that is not newer than its last (§5.2 rule 1)."""
+
+    def __init__(self) -> None:
+        self._last = rospy.Time()
+
+    def now(self) -> Any:
+        """The time now, or a nanosecond after the last answer."""
+        self._last = max(rospy.Time.now(), self._last + rospy.Duration(0, 1))
+        return self._last
+
+
+class EventTopics:
+    """The event topics of one arm, whose topics are below ``root``."""
+
+    def __init__(self, root: str, kind: ArmKind) -> None:
+        self._root = root
+        self._clock = Clock()
+        self._state = [0, False, False]
+        self._operating = rospy.Publisher(f"{root}/operating_state", OperatingState, latch=True, queue_size=QUEUE)
+        topics = {**_LATCHED, **_OF_KIND[kind]}
+        self._publishers = {
+            name: rospy.Publisher(f"{root}/{name}", type_, latch=True, queue_size=QUEUE)
+            for name, type_ in topics.items()
+        }
+        self._types = topics
+        self._logged: dict[str, float] = {}
+
+    def tell(self, name: str, value: Any) -> None:
+        """Publish an event."""
+        if name == "operating_state":
+            self._state = value
+            self.beat()
+        elif name in self._publishers:
+            type_ = self._types[name]
+            self._publishers[name].publish(type_() if type_ is Empty else type_(data=value))
+            self._log(name, value)
+
+    def beat(self) -> None:
+        """Publish the operating state again, with a fresh stamp."""
+        self._operating.publish(self.state())
+
+    def state(self) -> OperatingState:
+        """The newest operating state."""
+        return operating_state(self._state, self._clock.now())
+
+    def _log(self, name: str, value: Any) -> None:
+        """Errors go to the log as well, the same one at most every two seconds."""
+        if name not in _LOGS:
+            return
+        now = rospy.get_time()
+        if now - self._logged.get(value, 0.0) > WARNING_PAUSE:
+            self._logged = {text: at for text, at in self._logged.items() if now - at < WARNING_PAUSE}
+            self._logged[value] = now
+            _LOGS[name](f"{self._root}: {value}")

@@ -1,0 +1,66 @@
+"""One arm on ROS: its readings, events and services. Radians, metres."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ligature.model.frames import inverse, pose7_matrix
+from ligature.model.scene import ArmDescription, Scene
+from ligature.robots.fitting import base_pose, kinematics_of
+from ligature.robots.instruments import INSTRUMENTS
+from ligature.robots.psm import Psm
+from ligature.ros.arms.events import EventTopics
+from ligature.ros.arms.readings import Reading, readings
+from ligature.ros.arms.services import Services
+from ligature.ros.publisher import Publisher
+
+SELDOM = 4
+"""Jacobians and the like are published every so many periods."""
+
+_SELDOM_TOPICS = ("body/jacobian", "spatial/jacobian", "gravity_compensation/setpoint_js")
+
+
+class ArmOutlet:
+    """One arm: its topics and services."""
+
+    def __init__(self, index: int, description: ArmDescription, root: str, scene: Scene) -> None:
+        self.index, self.description, self.root = index, description, root
+        self.base_frame = f"{description.name}_base"
+        self.T_base = base_pose(scene, description)
+        self._kinematics = kinematics = kinematics_of(scene, description)
+        self._T_reference_base = np.eye(4)
+        self.events = EventTopics(root, description.kind)
+        self._readings = readings(description.kind, kinematics.joint_names, self.base_frame)
+        self._outlets: list[tuple[Reading, Publisher, int]] = [
+            (reading, Publisher(f"{root}/{reading.topic}", type(reading.message)), _periods(reading))
+            for reading in self._readings
+        ]
+        Services(root, self.events, lambda: self._kinematics, lambda: self._T_reference_base)
+
+    def follow(self, record: Any) -> None:
+        """Keep up with the instrument and the base frame of the state record."""
+        kinematics = self._kinematics
+        if isinstance(kinematics, Psm) and int(record["tool"]) not in (0, kinematics.instrument.id):
+            self._kinematics = Psm(INSTRUMENTS[int(record["tool"])], kinematics.model, kinematics.lengths)
+        local, referred = pose7_matrix(record["local_measured_cp"]), pose7_matrix(record["measured_cp"])
+        self._T_reference_base = referred @ inverse(local)
+
+    def publish(self, record: Any, stamp: Any, count: int) -> int:
+        """Publish the readings that are due in period number ``count`` and that somebody hears."""
+        sent = 0
+        for reading, publisher, every in self._outlets:
+            if publisher.heard and count % every == 0:
+                publisher.publish(reading.filled(record, stamp))
+                sent += 1
+        return sent
+
+    @property
+    def dropped(self) -> int:
+        """Messages that slow clients missed."""
+        return sum(publisher.dropped for _, publisher, _ in self._outlets)
+
+
+def _periods(reading: Reading) -> int:
+    return SELDOM if reading.topic in _SELDOM_TOPICS else 1

@@ -1,0 +1,80 @@
+"""Services of an arm: its state on demand, forward and inverse kinematics (interface reference §5.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import rospy
+from cisst_msgs.srv import ConvertFloat64Array, ConvertFloat64ArrayResponse
+from crtk_msgs.srv import (
+    QueryForwardKinematics,
+    QueryForwardKinematicsResponse,
+    QueryInverseKinematics,
+    QueryInverseKinematicsResponse,
+    TriggerOperatingState,
+    TriggerOperatingStateResponse,
+)
+from geometry_msgs.msg import Pose
+from numpy.typing import NDArray
+from std_srvs.srv import Trigger, TriggerResponse
+
+from ligature.model.frames import matrix_pose7, pose7_matrix
+from ligature.robots.arm import Kinematics
+from ligature.ros.arms.events import EventTopics
+from ligature.ros.arms.readings import set_pose
+
+Array = NDArray[np.float64]
+CRTK_VERSION = "1.1.0"
+
+
+class Services:
+    """The services of one arm.
+
+    ``kinematics`` answers with those of the instrument that is on now, ``base`` with the pose (4, 4) of the base in
+    the reference frame.
+    """
+
+    def __init__(
+        self, root: str, events: EventTopics, kinematics: Callable[[], Kinematics], base: Callable[[], Array]
+    ) -> None:
+        self._kinematics, self._base = kinematics, base
+        rospy.Service(
+            f"{root}/operating_state", TriggerOperatingState, lambda _: TriggerOperatingStateResponse(events.state())
+        )
+        rospy.Service(f"{root}/crtk_version", Trigger, lambda _: TriggerResponse(True, CRTK_VERSION))
+        rospy.Service(f"{root}/forward_kinematics", QueryForwardKinematics, lambda r: self._forward(r, self._base()))
+        rospy.Service(f"{root}/local/forward_kinematics", QueryForwardKinematics, lambda r: self._forward(r, np.eye(4)))
+        rospy.Service(f"{root}/inverse_kinematics", QueryInverseKinematics, self._inverse)
+        rospy.Service(f"{root}/actuator_to_joint_position", ConvertFloat64Array, self._convert)
+
+    def _forward(self, request: Any, base: Array) -> QueryForwardKinematicsResponse:
+        kinematics, cp = self._kinematics(), Pose()
+        cp.orientation.w = 1.0
+        n = len(kinematics.joint_names)
+        jp = np.array(request.jp, dtype=float)
+        if len(jp) > n:
+            return QueryForwardKinematicsResponse(cp, False, "too many joints")
+        if not np.isfinite(jp).all():
+            return QueryForwardKinematicsResponse(cp, False, "joint values must be finite")
+        set_pose(cp, matrix_pose7(base @ kinematics.forward(np.concatenate([jp, np.zeros(n - len(jp))]))))
+        return QueryForwardKinematicsResponse(cp, True, "")
+
+    def _inverse(self, request: Any) -> QueryInverseKinematicsResponse:
+        kinematics = self._kinematics()
+        p, q = request.cp.position, request.cp.orientation
+        pose = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
+        if len(request.jp) != len(kinematics.joint_names):
+            return QueryInverseKinematicsResponse([], False, "incorrect number of joints")
+        if not np.isfinite(pose).all() or not 0.9 < np.linalg.norm(pose[3:]) < 1.1:
+            return QueryInverseKinematicsResponse([], False, "inverse kinematics failed: not a pose")
+        pose[3:] /= np.linalg.norm(pose[3:])
+        result = kinematics.inverse(pose7_matrix(pose), np.array(request.jp, dtype=float))
+        if not result.ok:
+            return QueryInverseKinematicsResponse([], False, f"inverse kinematics failed: {result.reason}")
+        return QueryInverseKinematicsResponse(result.q.tolist(), True, "")
+
+    def _convert(self, request: Any) -> ConvertFloat64ArrayResponse:
+        """Actuators of the simulated arm are its joints."""
+        return ConvertFloat64ArrayResponse(request.input)
