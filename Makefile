@@ -5,7 +5,7 @@ STAMPS := build/stamps
 SCENE  ?= scenes/suturing_small/launch.yaml
 MUTANTS ?= 100000
 
-.PHONY: run test setup lint types check-imports unit fuzz bench soak docs clean
+.PHONY: run test setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -42,8 +42,8 @@ $(STAMPS)/compiled: $(STAMPS)/package
 	@touch $@
 
 lint: setup
-	.venv/bin/ruff format --check simulator tests scenes
-	.venv/bin/ruff check simulator tests scenes
+	.venv/bin/ruff format --check simulator tests scenes blender_addon
+	.venv/bin/ruff check simulator tests scenes blender_addon
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
@@ -63,6 +63,19 @@ soak: setup
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md
 	$(PYTHON) -m docs.pictures
+
+addon: setup
+	$(PYTHON) blender_addon/pack.py dist
+
+# all tests of the extension in the Blender binary, and in the Blender module from the package index
+test-blender: setup $(STAMPS)/bpy
+	$(PYTHON) -m pytest tests/blender
+	BLENDER_MODULE=build/bpy/bin/python $(PYTHON) -m pytest tests/blender/test_in_module.py
+
+$(STAMPS)/bpy: requirements-bpy.txt
+	/usr/bin/python3 -m venv build/bpy
+	build/bpy/bin/pip install --quiet --disable-pip-version-check -r requirements-bpy.txt
+	@touch $@
 
 clean:
 	rm -rf build devel dist out .venv .mypy_cache .ruff_cache

@@ -1,19 +1,5 @@
-"""Finding objects by text: exact, else the only one that contains the text (ADF specification §4.4)."""
+"""The format's look-up by text, by the name that the rooms above know it."""
 
-from __future__ import annotations
+from ligature.adf.references import candidates, find_by_text
 
-from collections.abc import Sequence
-
-
-def candidates(identifiers: Sequence[str], text: str) -> list[int]:
-    """Indices that ``text`` may mean: the exact match alone, else all that contain it."""
-    for index, identifier in enumerate(identifiers):
-        if identifier == text:
-            return [index]
-    return [index for index, identifier in enumerate(identifiers) if text in identifier]
-
-
-def find_by_text(identifiers: Sequence[str], text: str) -> int | None:
-    """Index of the one identifier that ``text`` means; None for no match or several."""
-    found = candidates(identifiers, text)
-    return found[0] if len(found) == 1 else None
+__all__ = ["candidates", "find_by_text"]

@@ -5,16 +5,11 @@ from __future__ import annotations
 import re
 
 from ligature.adf import Element
+from ligature.adf.references import merged
 from ligature.model.scene import Identity
 
 _SLASHES = re.compile(r"/+")
 MAX_REMAP = 100
-
-
-def merged(outer: str, inner: str) -> str:
-    """Namespace of an object: ``inner`` alone when it is absolute, else plain concatenation."""
-    outer, inner = _SLASHES.sub("/", outer), _SLASHES.sub("/", inner)
-    return inner if inner.startswith("/") else outer + inner
 
 
 def topic_name(namespace: str, name: str) -> str:
@@ -50,3 +45,6 @@ class Names:
             parent_text=parent,
             mark=element.mark,
         )
+
+
+__all__ = ["Names", "merged", "topic_name"]

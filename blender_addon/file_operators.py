@@ -1,0 +1,130 @@
+"""Import and export of model, world and launch files, with entries in the File menu."""
+
+from pathlib import Path
+
+import bpy
+
+from .ligature.adf import AdfError
+from .read_file import import_file
+from .write_file import ExportError, after_export, export_file
+
+
+class ADF_OT_import(bpy.types.Operator):
+    """Open model, world or input-devices files; each becomes a collection"""
+
+    bl_idname = "adf.import_file"
+    bl_label = "Import ADF"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default="*.yaml;*.yml;*.ambf", options={"HIDDEN"})
+    root: bpy.props.StringProperty(
+        name="Further Folder",
+        description="Folder outside the scene's own from which meshes may be read",
+        subtype="DIR_PATH",
+    )
+
+    def invoke(self, context, event):
+        if self.filepath or self.files:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        paths = [Path(self.directory, item.name) for item in self.files if item.name] or [Path(self.filepath)]
+        opened = 0
+        for path in paths:
+            try:
+                done = import_file(
+                    Path(bpy.path.abspath(str(path))), context.scene, (Path(self.root),) if self.root else ()
+                )
+            except (AdfError, OSError) as error:
+                self.report({"ERROR"}, str(error))
+                continue
+            opened += 1
+            for problem in done.problems[:20]:
+                self.report({"WARNING"}, problem)
+            self.report({"INFO"}, f"{path.name}: {len(done.collection.all_objects)} objects")
+        return {"FINISHED"} if opened else {"CANCELLED"}
+
+
+class ADF_OT_export(bpy.types.Operator):
+    """Write the collection to its file: only what changed changes in the text"""
+
+    bl_idname = "adf.export_file"
+    bl_label = "Export ADF"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.yaml", options={"HIDDEN"})
+    collection: bpy.props.StringProperty(
+        name="Collection", description="Collection to write; the active one when empty"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if any(c.adf.kind != "NONE" for c in bpy.data.collections):
+            return True
+        cls.poll_message_set("No collection is an ADF file; import one or make one in the sidebar")
+        return False
+
+    def invoke(self, context, event):
+        collection = chosen_collection(context, self.collection)
+        if collection is not None:
+            self.filepath = collection.adf.filepath or f"{collection.name}.yaml"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        collection = chosen_collection(context, self.collection)
+        if collection is None:
+            self.report({"ERROR"}, "No collection is an ADF file; make the one to be written active")
+            return {"CANCELLED"}
+        path = Path(bpy.path.abspath(self.filepath or collection.adf.filepath))
+        try:
+            done = export_file(collection, path)
+        except ExportError as error:
+            self.report({"ERROR"}, f"{collection.name}: {error}")
+            return {"CANCELLED"}
+        after_export(collection, path, done.text)
+        for problem in done.problems:
+            self.report({"WARNING"}, problem)
+        self.report({"INFO"}, f"{path.name}: {len(done.written)} files written")
+        return {"FINISHED"}
+
+
+def chosen_collection(context, name=""):
+    """The collection of that name, else the active one or the one around the active object that is a file."""
+    if name:
+        found = bpy.data.collections.get(name)
+        return found if found is not None and found.adf.kind != "NONE" else None
+    files = [c for c in bpy.data.collections if c.adf.kind != "NONE"]
+    active = context.view_layer.active_layer_collection.collection if context.view_layer else None
+    if active in files:
+        return active
+    obj = context.object
+    holding = [c for c in files if obj is not None and obj.name in c.all_objects]
+    return holding[0] if holding else files[0] if len(files) == 1 else None
+
+
+def _import_entry(self, context):
+    self.layout.operator(ADF_OT_import.bl_idname, text="AMBF Description Format (.yaml)")
+
+
+def _export_entry(self, context):
+    self.layout.operator(ADF_OT_export.bl_idname, text="AMBF Description Format (.yaml)")
+
+
+CLASSES = (ADF_OT_import, ADF_OT_export)
+
+
+def attach() -> None:
+    bpy.types.TOPBAR_MT_file_import.append(_import_entry)
+    bpy.types.TOPBAR_MT_file_export.append(_export_entry)
+
+
+def detach() -> None:
+    bpy.types.TOPBAR_MT_file_import.remove(_import_entry)
+    bpy.types.TOPBAR_MT_file_export.remove(_export_entry)

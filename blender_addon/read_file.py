@@ -1,0 +1,292 @@
+"""Brings a scene file into Blender: a collection for the file, an object for each object of the file.
+
+Nothing is rejected silently: what could not be brought in is in `Import.problems`, with its place.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any
+from .ligature.adf.references import find_by_text, merged
+from .ligature.adf.update import given_values
+from .ligature.authoring.placement import matrix_of
+from .ligature.authoring.shapes import Shape, shape_mesh
+from .ligature.mesh import Mesh, MeshError, load_mesh
+from .mesh_data import MeshMaker, mesh_print, shape_data
+from .placing import SHAPED, attach, place, place_joint, place_light, place_view, state_of
+from .properties import ROLE_OF_KIND
+from .schema_properties import identifier, state_text, store
+
+EMPTY_LOOK = {"joint": "SINGLE_ARROW", "sensor": "CONE", "actuator": "SPHERE", "suture": "SINGLE_ARROW"}
+SHAPE_COLOUR = {"COLLISION": (0.95, 0.75, 0.1, 0.35), "VISUAL": (0.7, 0.7, 0.7, 1.0)}
+
+
+@dataclass
+class Import:
+    """What came of a file: its collection, and what could not be brought in."""
+
+    collection: bpy.types.Collection
+    document: Document | None = None
+    problems: list[str] = field(default_factory=list)
+
+
+def import_file(path: Path, scene: bpy.types.Scene, roots: tuple[Path, ...] = ()) -> Import:
+    """Bring one world, model, input-devices or colours file in; raises `AdfError` when it cannot be read at all."""
+    resolver = Resolver.for_file(path, roots)
+    document = read_any(path, resolver)
+    collection = bpy.data.collections.new(path.stem)
+    scene.collection.children.link(collection)
+    stored = collection.adf
+    stored.filepath = str(path)
+    stored.source = document.text
+    stored.byte_order_mark = path.read_bytes().startswith(b"\xef\xbb\xbf")
+    stored.kind = {"model": "MODEL", "world": "WORLD", "input devices": "INPUT_DEVICES"}.get(document.kind, "OTHER")
+    done = Import(collection, document, [str(d) for d in document.diagnostics if d.severity >= Severity.ERROR])
+    if stored.kind == "OTHER":
+        return done
+    store(getattr(stored, identifier(document.kind)), document.kind, given_values(document.top))
+    _Importer(document, resolver, done).run()
+    return done
+
+
+class _Importer:
+    """Makes the objects of one document."""
+
+    def __init__(self, document: Document, resolver: Resolver, done: Import) -> None:
+        self.document, self.resolver, self.done = document, resolver, done
+        self.collection = done.collection
+        self.folder = document.path.parent
+        self.values: dict[str, dict] = {}
+        self.objects: dict[str, bpy.types.Object] = {}
+        self.maker = MeshMaker()
+        self.files: dict[Path, Mesh | None] = {}
+        self.shapes: dict[tuple, bpy.types.Mesh] = {}
+        self.shape_collection: bpy.types.Collection | None = None
+
+    def run(self) -> None:
+        elements = {e.key: e for listed in self.document.lists.values() for e in listed}
+        bodies_first = sorted(elements.values(), key=lambda e: (e.kind != "body", e.kind == "joint"))
+        for element in bodies_first:
+            self.values[element.key] = given_values(element)
+            if element.kind != "joint":
+                self._make(element)
+        for element in bodies_first:
+            if element.kind == "joint":
+                self._make_joint(element)
+            elif element.kind != "body":
+                self._hang(element)
+        for key in elements:
+            obj = self.objects[key]
+            obj.adf.imported = state_text(state_of(obj))
+            if obj.adf.role in SHAPED:
+                obj.adf.mesh_print = mesh_print(obj)
+        self.collection.adf.imported_keys = json.dumps(list(elements))
+
+    def _new(self, name: str, data: bpy.types.ID | None, role: str, shapes: bool = False) -> bpy.types.Object:
+        obj = bpy.data.objects.new(name, data)
+        (self._shape_collection() if shapes else self.collection).objects.link(obj)
+        obj.adf.role = role
+        return obj
+
+    def _shape_collection(self) -> bpy.types.Collection:
+        """Where primitives, hulls and frames lie, so that one click hides them all."""
+        if self.shape_collection is None:
+            self.shape_collection = bpy.data.collections.new(f"{self.collection.name} Shapes")
+            self.collection.children.link(self.shape_collection)
+        return self.shape_collection
+
+    def _make(self, element: Element) -> None:
+        values = self.values[element.key]
+        obj = self._new(values.get("name") or element.key, self._data(element, values), ROLE_OF_KIND[element.kind])
+        obj.adf.key = obj.adf.was = element.key
+        obj.adf.parent_text = values.get("parent", "")
+        store(getattr(obj.adf, identifier(element.kind)), element.kind, values)
+        self.objects[element.key] = obj
+        place(obj, self._placed(element.kind, values))
+        if obj.type == "EMPTY":
+            obj.empty_display_type = EMPTY_LOOK.get(element.kind, "PLAIN_AXES")
+            obj.empty_display_size = 0.02
+        if obj.adf.role in SHAPED:
+            self._colour(obj, values)
+            self._add_inertial(obj, values)
+            self._add_shapes(obj, values)
+            self._add_collision_mesh(element, obj, values)
+
+    def _placed(self, kind: str, values: dict) -> np.ndarray:
+        if kind == "camera":
+            return place_view(values)
+        if kind == "light":
+            return place_light(values)
+        return matrix_of(values.get("location")) if kind != "input device" else np.eye(4)
+
+    def _data(self, element: Element, values: dict) -> bpy.types.ID | None:
+        name = values.get("name") or element.key
+        if element.kind == "camera":
+            camera = bpy.data.cameras.new(name)
+            camera.sensor_fit = "VERTICAL"
+            camera.angle_y = min(max(element.number("field view angle"), 0.01), 3.0)
+            camera.clip_start = max(element.number("clipping plane.near"), 1e-6)
+            camera.clip_end = element.number("clipping plane.far")
+            camera.display_size = 0.05
+            return camera
+        if element.kind == "light":
+            light = bpy.data.lights.new(name, "SPOT")
+            light.spot_size = min(2.0 * element.number("cutoff angle"), 3.14159)
+            return light
+        if "mesh" in values and element.kind in ("body", "ghost object", "soft body") and "shape" not in values:
+            mesh = self._mesh_file(element, values["mesh"], "high resolution path")
+            return None if mesh is None else self.maker.whole(mesh, name, values.get("scale", 1.0))
+        return None
+
+    def _mesh_file(self, element: Element, name: str, path_key: str) -> Mesh | None:
+        """A mesh file of the element, from the folder that its own or the file's path names."""
+        if not name:
+            return None
+        folder = f"{self.document.top.text(path_key)}/{element.text(path_key)}"
+        try:
+            path = self.resolver.resolve(
+                f"{folder}/{name}".lstrip("/") if not folder.startswith("/") else f"{folder}/{name}", self.folder
+            )
+            if path not in self.files:
+                self.files[path] = load_mesh(path, self.resolver)
+        except (MeshError, AdfError) as error:
+            self.done.problems.append(f"{element.kind} '{element.key}': {error}")
+            return None
+        return self.files[path]
+
+    def _colour(self, obj: bpy.types.Object, values: dict) -> None:
+        rgb = [values.get(f"color components.diffuse.{c}") for c in "rgb"]
+        alpha = values.get("color components.transparency", 1.0)
+        if "color rgba.r" in values:
+            rgb, alpha = [values[f"color rgba.{c}"] for c in "rgb"], values["color rgba.a"]
+        if None not in rgb:
+            obj.color = (*rgb, alpha)
+
+    def _add_inertial(self, obj: bpy.types.Object, values: dict) -> None:
+        T = matrix_of(values.get("inertial offset")) if obj.adf.role != "SOFT_BODY" else np.eye(4)
+        if np.array_equal(T, np.eye(4)):
+            return
+        frame = self._new(f"{obj.name} inertial", None, "INERTIAL", shapes=True)
+        frame.empty_display_type = "ARROWS"
+        frame.empty_display_size = 0.01
+        attach(frame, obj, T)
+
+    def _add_shapes(self, obj: bpy.types.Object, values: dict) -> None:
+        inertial = matrix_of(values.get("inertial offset")) if obj.adf.role != "SOFT_BODY" else np.eye(4)
+        for use, prefix in (("COLLISION", "collision "), ("VISUAL", "")):
+            compound = "compound collision shape" if use == "COLLISION" else "compound shape"
+            if f"{prefix}shape" in values:
+                kind = values[f"{prefix}shape"]
+                T = matrix_of(values["collision offset"]) if "collision offset" in values else inertial
+                self._add_shape(
+                    obj, use, kind, _below(values, f"{prefix}geometry."), T if use == "COLLISION" else np.eye(4), 0
+                )
+            else:
+                for order, item in enumerate(values.get(compound, ())):
+                    T = matrix_of(item.get("offset"))
+                    self._add_shape(obj, use, item["shape"], _below(item, "geometry."), T, order)
+
+    def _add_shape(self, obj: bpy.types.Object, use: str, kind: str, geometry: dict, T: np.ndarray, order: int) -> None:
+        shape = Shape.of(kind, geometry)
+        if shape not in self.shapes:
+            self.shapes[shape] = shape_data(*shape_mesh(shape), kind.title())
+        child = self._new(f"{obj.name} {use.lower()}", self.shapes[shape], "SHAPE", shapes=True)
+        set_shape(child, shape, use, order)
+        attach(child, obj, T)
+
+    def _add_collision_mesh(self, element: Element, obj: bpy.types.Object, values: dict) -> None:
+        if "collision shape" in values or "compound collision shape" in values or not values.get("collision mesh"):
+            return
+        mesh = self._mesh_file(element, values["collision mesh"], "low resolution path")
+        if mesh is None:
+            return
+        for index in range(len(mesh.parts)):
+            data = self.maker.part(mesh, index, f"{obj.name} hull", values.get("scale", 1.0))
+            hull = self._new(f"{obj.name} hull", data, "HULL", shapes=True)
+            hull.adf.shape.order = index
+            hull.display_type = "WIRE"
+            hull.hide_render = True
+            hull.color = SHAPE_COLOUR["COLLISION"]
+            attach(hull, obj, np.eye(4))
+
+    def _find(self, text: str, kinds: tuple[str, ...] = ("body",)) -> bpy.types.Object | None:
+        """The object that a reference means: of this file first, then of any other that is open."""
+        if not text:
+            return None
+        own = [o for o in self.objects.values() if KINDS.get(o.adf.role) in kinds]
+        found = find_by_text([self._qualified(o) for o in own], text)
+        found = found if found is not None else find_by_text([o.adf.key for o in own], text)
+        return own[found] if found is not None else find_open(text, kinds)
+
+    def _qualified(self, obj: bpy.types.Object) -> str:
+        return qualified(self.collection, obj)
+
+    def _make_joint(self, element: Element) -> None:
+        values = self.values[element.key]
+        obj = self._new(values.get("name") or element.key, None, "JOINT")
+        obj.empty_display_type, obj.empty_display_size = EMPTY_LOOK["joint"], 0.02
+        obj.adf.key = obj.adf.was = element.key
+        obj.adf.parent_text, obj.adf.child_text = values.get("parent", ""), values.get("child", "")
+        store(obj.adf.joint, "joint", values)
+        parent, child = self._find(values.get("parent", "")), self._find(values.get("child", ""))
+        obj.adf.parent_object, obj.adf.child_object = parent, child
+        self.objects[element.key] = obj
+        T = place_joint(values, parent, child)
+        if parent is not None:
+            attach(obj, parent, T)
+        else:
+            place(obj, T)
+
+    def _hang(self, element: Element) -> None:
+        """Parent ghosts, sensors, cameras and lights to the object that they name."""
+        obj = self.objects[element.key]
+        parent = self._find(obj.adf.parent_text, tuple(ROLE_OF_KIND))
+        if parent is not None and parent is not obj:
+            obj.parent = parent
+            obj.matrix_parent_inverse = Matrix.Identity(4)
+
+
+def find_open(text: str, kinds: tuple[str, ...]) -> bpy.types.Object | None:
+    """The object of any open file that a reference means."""
+    candidates = [
+        (qualified(collection, obj), obj)
+        for collection in bpy.data.collections
+        if collection.adf.kind != "NONE"
+        for obj in collection.objects
+        if KINDS.get(obj.adf.role) in kinds
+    ]
+    found = find_by_text([name for name, _ in candidates], text)
+    return None if found is None else candidates[found][1]
+
+
+KINDS = {role: kind for kind, role in ROLE_OF_KIND.items()}
+
+
+def qualified(collection: bpy.types.Collection, obj: bpy.types.Object) -> str:
+    """The object's identifier with its namespace (ADF §4.1)."""
+    group = getattr(collection.adf, collection.adf.kind.lower(), None)
+    own = getattr(obj.adf, identifier(KINDS[obj.adf.role]))
+    return merged(getattr(group, "namespace", ""), getattr(own, "namespace", "")) + obj.adf.key
+
+
+def set_shape(obj: bpy.types.Object, shape: Shape, use: str, order: int) -> None:
+    """Make an object stand for a primitive."""
+    data = obj.adf.shape
+    data.kind, data.use, data.order = shape.kind, use, order
+    data.size, data.radius, data.height, data.axis = shape.size, shape.radius, shape.height, shape.axis
+    data.normal, data.offset = shape.normal, shape.offset
+    obj.color = SHAPE_COLOUR[use]
+    if use == "COLLISION":
+        obj.display_type = "WIRE"
+        obj.hide_render = True
+
+
+def _below(values: dict, prefix: str) -> dict:
+    return {path[len(prefix) :]: value for path, value in values.items() if path.startswith(prefix)}

@@ -1,0 +1,109 @@
+"""Writes OBJ and MTL files in the dialect that AMBF reads (ADF §12.4): the same mesh gives the same bytes.
+
+One ``usemtl`` block per part; every material has ``Kd``; texture names are relative and stand alone
+on their lines, since the reference takes the rest of the line for the name. Metres, no axis change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.adf.frames import Array
+
+DIGITS = 7
+"""Significant digits of coordinates: what single precision holds."""
+
+FULL_SHININESS = 128.0
+
+
+class MeshWriteError(ValueError):
+    """A mesh that cannot be written; the message says why."""
+
+
+@dataclass(frozen=True)
+class Paint:
+    """A material: colours 0..1, ``alpha`` 1 is opaque, names of texture files next to the OBJ or empty."""
+
+    name: str
+    diffuse: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    specular: tuple[float, float, float] = (0.2, 0.2, 0.2)
+    shininess: float = 32.0
+    alpha: float = 1.0
+    texture: str = ""
+    normal_map: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles (m, 3) of one material; ``normals`` (m, 3, 3) and ``uvs`` (m, 3, 2) are of their corners."""
+
+    paint: Paint
+    vertices: Array
+    triangles: NDArray[np.int32]
+    normals: Array | None = None
+    uvs: Array | None = None
+
+
+def obj_texts(surfaces: Sequence[Surface], library: str, name: str) -> tuple[str, str]:
+    """OBJ and MTL text; ``library`` is the MTL file's name. Raises `MeshWriteError`."""
+    if not any(len(s.triangles) for s in surfaces):
+        raise MeshWriteError(f"'{name}' has no face; an empty mesh file is of no use")
+    lines = [f"mtllib {library}", f"o {_word(name)}"]
+    counts = [1, 1, 1]
+    for surface in surfaces:
+        if len(surface.triangles):
+            lines += _surface_lines(surface, counts, name)
+    return "\n".join(lines) + "\n", "\n".join(_paint_lines(s.paint) for s in surfaces if len(s.triangles))
+
+
+def _surface_lines(surface: Surface, counts: list[int], name: str) -> list[str]:
+    vertices = np.asarray(surface.vertices, dtype=float)
+    if not np.isfinite(vertices).all():
+        raise MeshWriteError(f"'{name}' has a vertex that is not finite; check its modifiers and its transform")
+    distinct, index = _distinct(vertices[surface.triangles].reshape(-1, 3))
+    lines = [f"v {row}" for row in distinct]
+    corners = [index + counts[0]]
+    counts[0] += len(distinct)
+    for values, letter, place in ((surface.uvs, "vt", 1), (surface.normals, "vn", 2)):
+        if values is None:
+            continue
+        distinct, index = _distinct(np.asarray(values, dtype=float).reshape(len(surface.triangles) * 3, -1))
+        lines += [f"{letter} {row}" for row in distinct]
+        corners.append(index + counts[place])
+        counts[place] += len(distinct)
+    lines.append(f"usemtl {_word(surface.paint.name)}")
+    separator = "//" if surface.uvs is None and surface.normals is not None else "/"
+    words = [separator.join(map(str, corner)) for corner in zip(*(c.tolist() for c in corners), strict=True)]
+    return lines + [f"f {words[i]} {words[i + 1]} {words[i + 2]}" for i in range(0, len(words), 3)]
+
+
+def _distinct(rows: Array) -> tuple[list[str], NDArray[np.int64]]:
+    """Texts of the different rows in order of first use, and the row of each."""
+    with np.errstate(under="ignore"):
+        single = np.ascontiguousarray(rows.astype(np.float32)) + np.float32(0.0)
+    _, first, inverse = np.unique(single, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    texts = [" ".join(f"{v:.{DIGITS}g}" for v in row) for row in single[first[order]].tolist()]
+    return texts, rank[inverse.reshape(-1)]
+
+
+def _paint_lines(paint: Paint) -> str:
+    lines = [f"newmtl {_word(paint.name)}", "Ka 1 1 1"]
+    lines += [
+        f"{key} {' '.join(f'{v:.6g}' for v in values)}"
+        for key, values in (("Kd", paint.diffuse), ("Ks", paint.specular))
+    ]
+    lines += [f"Ns {paint.shininess:.6g}", f"d {paint.alpha:.6g}"]
+    lines += [f"{key} {file}" for key, file in (("map_Kd", paint.texture), ("map_Bump", paint.normal_map)) if file]
+    return "\n".join(lines) + "\n"
+
+
+def _word(name: str) -> str:
+    """A name of one word, since readers split lines at blanks."""
+    return "_".join(name.split()) or "unnamed"

@@ -1,0 +1,69 @@
+"""Saves scene files so that a failure leaves what was there: checked first, written beside, then put in place."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from ligature.adf.diagnostics import AdfError
+from ligature.adf.nodes import parse
+
+
+class SaveError(OSError):
+    """Files that could not be saved; nothing was changed. The message says which and why."""
+
+
+def save_all(files: Mapping[Path, bytes]) -> list[Path]:
+    """Write ``files``; those that hold their content already are left alone.
+
+    All are on the disk before the first takes its place, so that a full disk or a folder that cannot
+    be written leaves everything as it was. Returns the paths that were written. Raises `SaveError`.
+    """
+    changed = {path: data for path, data in files.items() if _content(path) != data}
+    staged: list[tuple[str, Path]] = []
+    try:
+        for path, data in changed.items():
+            staged.append((_staged(path, data), path))
+        for name, path in staged:
+            os.replace(name, path)
+    except OSError as error:
+        for name, _ in staged:
+            if os.path.exists(name):
+                os.unlink(name)
+        path = Path(error.filename or next(iter(changed)))
+        raise SaveError(f"'{path}' cannot be written: {error.strerror or error}") from error
+    return list(changed)
+
+
+def checked_text(text: str, path: Path) -> bytes:
+    """The bytes of a scene file that can be read back; raises `SaveError`."""
+    try:
+        parse(text, path)
+    except AdfError as error:
+        raise SaveError(f"'{path.name}' would not be readable: {error}") from error
+    return text.encode("utf-8")
+
+
+def _content(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None
+
+
+def _staged(path: Path, data: bytes) -> str:
+    """A temporary file beside ``path`` with its content on the disk."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(name, 0o644)
+    except OSError:
+        os.unlink(name)
+        raise
+    return name

@@ -1,0 +1,16 @@
+"""The tests of `inside`, each file in a Blender of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+INSIDE = Path(__file__).resolve().parent / "inside"
+
+
+@pytest.mark.parametrize("file", sorted(p.name for p in INSIDE.glob("test_*.py")))
+def test_the_add_on_holds_in_blender(blender: Callable[..., str], file: str) -> None:
+    output = blender(file)
+    assert " passed" in output and " failed" not in output
