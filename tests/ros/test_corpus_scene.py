@@ -27,7 +27,19 @@ EXTRA = {
 }
 """What is advertised beyond the reference's list, with the reason in docs/ros_interface.md."""
 
-OURS = ("/rosout", "/tf", "/PSM1/", "/PSM2/", "/ECM/", "/MTML/", "/MTMR/", "/SUJ/", "/console/", "/system/", "/footpedals/")
+OURS = (
+    "/rosout",
+    "/tf",
+    "/PSM1/",
+    "/PSM2/",
+    "/ECM/",
+    "/MTML/",
+    "/MTMR/",
+    "/SUJ/",
+    "/console/",
+    "/system/",
+    "/footpedals/",
+)
 """Names of ROS itself and of the dVRK, which the reference has not; `tests/ros/test_arms.py` looks at them."""
 
 
