@@ -152,6 +152,7 @@ class SceneBuilder:
             rods=rods,
             arms=arms,
             diagnostics=tuple(self.diagnostics),
+            roots=self.resolver.roots,
         )
 
     def _list(self, kind: str) -> list[Any]:

@@ -134,7 +134,8 @@ def shader_files(element: Element, block: str, folder: Path) -> ShaderFiles | No
     if f"{block}.path" not in _known(element) or not element.has(block):
         return None
     base = folder / element.text(f"{block}.path")
-    return ShaderFiles(base / element.text(f"{block}.vertex"), base / element.text(f"{block}.fragment"))
+    vertex, fragment = (base / element.text(f"{block}.{stage}") for stage in ("vertex", "fragment"))
+    return ShaderFiles(vertex, fragment, element.mark_of(block))
 
 
 def primitive(element: Element, shape_key: str, geometry: str, T: Array) -> Collider:

@@ -115,10 +115,11 @@ class Colour:
 
 @dataclass(frozen=True)
 class ShaderFiles:
-    """A shader program named by a scene file; paths are resolved but may not exist."""
+    """A shader program named by a scene file at ``mark``; paths are resolved but may not exist."""
 
     vertex: Path
     fragment: Path
+    mark: Mark | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -510,7 +511,8 @@ class Scene:
     ``articulations`` cover every non-rod body once (a lone body is an articulation of one link);
     ``loops`` are the joints that close a kinematic loop or that an articulation cannot express and
     that constraints must hold; ``rods`` are the recognised sutures, ``arms`` the recognised
-    manipulators. ``diagnostics`` are all the findings of reading and resolving, in order.
+    manipulators. ``diagnostics`` are all the findings of reading and resolving, in order. ``roots`` are the
+    folders below which a scene file may have other files opened.
     """
 
     name: str
@@ -529,6 +531,7 @@ class Scene:
     rods: tuple[RodChain, ...] = ()
     arms: tuple[ArmDescription, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
+    roots: tuple[Path, ...] = ()
 
     @cached_property
     def body_index(self) -> dict[str, int]:

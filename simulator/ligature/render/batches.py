@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.render.geometry import Triangles
+from ligature.render.legacy import LegacyBuffers
 from ligature.render.programs import Program
 from ligature.render.surface import Surface
 from ligature.render.visuals import Piece
@@ -39,6 +40,7 @@ class Batch:
         self._before = context.buffer(reserve=len(pieces) * 64, dynamic=True)
         self._arrays: dict[Program, moderngl.VertexArray] = {}
         self._indices: moderngl.Buffer | None = None
+        self._legacy: LegacyBuffers | None = None
         self.load(pieces[0].triangles)
 
     def load(self, triangles: Triangles) -> None:
@@ -50,6 +52,8 @@ class Batch:
             self._indices = self._context.buffer(np.ascontiguousarray(triangles.faces, dtype="i4").tobytes())
         else:
             self._vertices.write(data)
+            if self._legacy is not None:
+                self._legacy.load(triangles)
 
     def draw(self, program: Program, instances: NDArray[np.void], before: NDArray[np.float32] | None = None) -> None:
         """Draw ``instances`` (n,) of `INSTANCE`; ``before`` (n, 4, 4) are their matrices one frame ago."""
@@ -57,6 +61,12 @@ class Batch:
         if before is not None:
             self._before.write(before.tobytes())
         self.array(program).render(instances=len(instances))
+
+    def legacy(self, program: Program) -> moderngl.VertexArray:
+        """The buffers bound to the attributes of a scene file's ``program``, which draws one piece at a time."""
+        if self._legacy is None:
+            self._legacy = LegacyBuffers(self._context, self.triangles)
+        return self._legacy.array(program)
 
     def array(self, program: Program) -> moderngl.VertexArray:
         """The buffers bound to the attributes that ``program`` reads."""

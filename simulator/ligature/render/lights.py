@@ -6,7 +6,7 @@ A light shines along +X of its frame (ADF specification §19). Metres and radian
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import moderngl
@@ -127,10 +127,9 @@ class Lights:
         for unit, (_, shadow, _) in enumerate(self._shadows, SHADOW_UNIT):
             shadow.texture.use(unit)
             program.set(f"uShadowMap{unit - SHADOW_UNIT}", unit)
-        program.set("uShadowOf", _one_or_list([index for index, _, _ in self._shadows]))
+        program.set("uShadowOf", [index for index, _, _ in self._shadows])
         program.write("uShadowFromEye", np.array([matrix for _, _, matrix in self._shadows]))
-        texels = [(1.0 / shadow.size, shadow.spread) for _, shadow, _ in self._shadows]
-        program.set("uShadowTexel", _one_or_list(texels))
+        program.set("uShadowTexel", [(1.0 / shadow.size, shadow.spread) for _, shadow, _ in self._shadows])
 
     def eye_space(self) -> list[tuple[LightSettings, Array]]:
         """Settings and eye-space frame (4, 4) of every light."""
@@ -180,8 +179,3 @@ class _ShadowMap:
         """Make it current and empty."""
         self._buffer.use()
         self._buffer.clear()
-
-
-def _one_or_list(values: Sequence[object]) -> object:
-    """What moderngl wants for an array uniform, which for one element is the element itself."""
-    return values[0] if len(values) == 1 else list(values)

@@ -12,6 +12,9 @@ import moderngl
 
 _INCLUDE = re.compile(r'^#include "(\w+\.glsl)"$', re.MULTILINE)
 
+_SAMPLERS = range(0x8B5D, 0x8B63)
+"""OpenGL's numbers of the types sampler1D to sampler2DShadow."""
+
 Defines = frozenset[tuple[str, int]]
 
 
@@ -29,10 +32,13 @@ class Program:
         self.linked = linked
         self._uniforms: dict[str, moderngl.Uniform] = {}
         self.attributes: list[str] = []
+        self.samplers: list[str] = []
         for name in linked:
             member = linked[name]
             if isinstance(member, moderngl.Uniform):
-                self._uniforms[name] = member
+                self._uniforms[name.removesuffix("[0]")] = member  # an array of one keeps its index
+                if member.gl_type in _SAMPLERS:  # type: ignore[attr-defined]
+                    self.samplers.append(name)
             elif isinstance(member, moderngl.Attribute):
                 self.attributes.append(name)
 
@@ -40,16 +46,20 @@ class Program:
         return name in self._uniforms
 
     def set(self, name: str, value: Any) -> None:
-        """Set a uniform to a number, tuple or list of tuples."""
+        """Set a uniform to a number or tuple, or an array to a list of them, as far as the compiler kept it."""
         uniform = self._uniforms.get(name)
-        if uniform is not None:
-            uniform.value = value
+        if uniform is None:
+            return
+        if isinstance(value, list):
+            value = value[: uniform.array_length] if uniform.array_length > 1 else value[0]
+        uniform.value = value
 
     def write(self, name: str, matrix: Any) -> None:
-        """Set a uniform to the matrix or matrices ``matrix`` (..., n, n)."""
+        """Set a uniform to ``matrix`` (n, n), or an array to matrices (m, n, n), as far as the compiler kept it."""
         uniform = self._uniforms.get(name)
         if uniform is not None:
-            uniform.write(matrix.swapaxes(-1, -2).astype("f4").tobytes())
+            kept = matrix if matrix.ndim == 2 else matrix[: uniform.array_length]
+            uniform.write(kept.swapaxes(-1, -2).astype("f4").tobytes())
 
 
 class Programs:

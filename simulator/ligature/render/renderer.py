@@ -12,14 +12,15 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.adf import AdfError
+from ligature.adf import AdfError, Resolver
 from ligature.model.poses import pose7_matrices
-from ligature.model.scene import Scene
+from ligature.model.scene import Scene, ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
 from ligature.render.context import create_context
 from ligature.render.lights import Lights
-from ligature.render.programs import Program, Programs
+from ligature.render.painter import Brushes, Painter
+from ligature.render.programs import Programs
 from ligature.render.surface import Physical, Surface, surface_of
 from ligature.render.target import PASSES, Frame, Target
 from ligature.render.textures import Textures
@@ -59,7 +60,7 @@ class Renderer:
         self._samples = min(samples, self._context.max_samples)
         self._programs = Programs(self._context)
         self._textures = Textures(self._context)
-        self._targets: dict[tuple[int, int, tuple[str, ...]], Target] = {}
+        self._targets: dict[tuple[int, int, tuple[str, ...], int], Target] = {}
         self._lights = Lights(self._context, scene)
         loader = VisualLoader()
         pieces = loader.of_scene(scene)
@@ -69,6 +70,9 @@ class Renderer:
         self._instances = Instances(ordered)
         self._before: dict[Hashable, Array] = {}
         self.problems: list[AdfError] = loader.problems
+        resolver = Resolver(scene.roots) if scene.roots else None
+        self._brushes = Brushes(self._context, self._programs, self._textures, self._lights, resolver, self.problems)
+        self._brushes.prepare(batch.shaders for batch in self._batches)
 
     @property
     def lights(self) -> Lights:
@@ -81,31 +85,43 @@ class Renderer:
         return sum(len(batch.triangles.faces) * len(batch.pieces) for batch in self._batches)
 
     def render(
-        self, state: NDArray[np.void], view: CameraView, passes: Sequence[str] = ("rgb", "depth", "ids", "normals")
+        self,
+        state: NDArray[np.void],
+        view: CameraView,
+        passes: Sequence[str] = ("rgb", "depth", "ids", "normals"),
+        shaders: ShaderFiles | None = None,
     ) -> Frame:
         """Draw ``state`` (one-element record) as seen by ``view``; only the ``passes`` that are named.
 
-        ``flow`` counts from the picture before of equal size and passes.
+        ``shaders`` draw the colour of every object in place of its own, a camera's ``preprocessing shaders``;
+        such a picture is not smoothed, since its colours may be labels.
         """
+        with self._context:  # several renderers may live in one process
+            return self._drawn(state, view, passes, shaders)
+
+    def _drawn(
+        self, state: NDArray[np.void], view: CameraView, passes: Sequence[str], shaders: ShaderFiles | None
+    ) -> Frame:
         self._place(state, view.view)
-        target = self._target(view, passes)
+        target = self._target(view, passes, 0 if shaders else self._samples)
         seen = self._instances.seen(view.view, view.projection, view.height, COARSE_BELOW)
         if "rgb" in target.passes:
             self._cast_shadows(seen, view)
         target.clear(BACKGROUND)
-        self._context.enable(moderngl.DEPTH_TEST)
-        if self._samples or not all(batch.surface.opaque for batch in self._batches):
+        painter = Painter(self._context, self._brushes, self._batches, seen, view)
+        if self._samples or painter.needs_colour_apart(shaders):
             if target.colour is not None:
-                self._draw(target.colour, ["rgb"], seen, view)
+                painter.paint(target.colour, ["rgb"], shaders)
             if target.geometry is not None:
-                self._draw(target.geometry, [name for name in target.passes if name != "rgb"], seen, view)
+                painter.paint(target.geometry, [name for name in target.passes if name != "rgb"])
         else:
-            self._draw(target.whole, target.passes, seen, view)
+            painter.paint(target.whole, target.passes)
         return target.read()
 
     def release(self) -> None:
         """Give the OpenGL objects back."""
-        self._context.release()
+        with self._context:
+            self._context.release()
 
     def _rod_pieces(self, loader: VisualLoader) -> list[Piece]:
         """The rods as pieces in world axes, looking like their first element's material or ADF colours."""
@@ -184,68 +200,11 @@ class Renderer:
             if len(rows) and batch.surface.opaque:
                 batch.draw(program, seen.instances[rows])
 
-    def _draw(self, buffer: moderngl.Framebuffer, passes: Sequence[str], seen: Seen, view: CameraView) -> None:
-        """Draw everything that is seen: the opaque from near to far, then the transparent from far to near."""
-        buffer.use()
-        calls = [(batch, rows) for batch in self._batches if len(rows := seen.rows(batch))]
-        opaque = [(batch, rows) for batch, rows in calls if batch.surface.opaque]
-        for batch, rows in sorted(opaque, key=lambda call: seen.nearest[call[1]].min()):
-            self._draw_batch(batch, passes, rows, seen, view)
-        clear = [(batch, row) for batch, rows in calls if not batch.surface.opaque for row in rows]
-        if clear and "rgb" in passes:
-            self._context.enable(moderngl.BLEND)
-            buffer.depth_mask = False
-        for batch, row in sorted(clear, key=lambda call: -seen.depth[call[1]]):
-            self._draw_batch(batch, passes, np.array([row]), seen, view)
-        self._context.disable(moderngl.BLEND)
-        buffer.depth_mask = True
-
-    def _draw_batch(
-        self, batch: Batch, passes: Sequence[str], rows: NDArray[np.int64], seen: Seen, view: CameraView
-    ) -> None:
-        (self._context.enable if batch.closed else self._context.disable)(moderngl.CULL_FACE)
-        program = self._program(batch, passes)
-        program.write("uProjection", view.projection)
-        program.set("uHalfSize", (view.width / 2, view.height / 2))
-        if "rgb" in passes:
-            self._lights.bind(program)
-            program.write("uWorldFromEye", view.view[:3, :3].T)
-            self._bind_surface(program, batch.surface)
-        batch.draw(program, seen.instances[rows])
-
-    def _program(self, batch: Batch, passes: Sequence[str]) -> Program:
-        defines = {f"PASS_{name.upper()}": place for place, name in enumerate(passes)} | {"LIGHTS": 1}
-        if "rgb" in passes:
-            defines |= self._lights.defines | dict.fromkeys(batch.surface.defines, 1)
-        return self._programs.get("surface", defines)
-
-    def _bind_surface(self, program: Program, surface: Surface) -> None:
-        """Fill the material's uniforms of a built-in program."""
-        colour, look = surface.colour, surface.physical
-        program.set("uAmbient", colour.ambient)
-        program.set("uDiffuse", colour.diffuse)
-        program.set("uSpecular", colour.specular)
-        program.set("uEmission", colour.emission)
-        program.set("uShininess", float(max(colour.shininess, 1)))
-        program.set("uAlpha", colour.alpha)
-        maps = {"uTexture": surface.texture, "uNormalMap": surface.normal_map}
-        if look is not None:
-            program.set("uMetallic", look.metallic)
-            program.set("uRoughness", look.roughness)
-            program.set("uCoat", look.coat)
-            program.set("uCoatRoughness", look.coat_roughness)
-            maps |= {"uMetallicMap": look.metallic_map, "uRoughnessMap": look.roughness_map}
-        for unit, (name, path) in enumerate(maps.items()):
-            texture = self._textures.get(path)
-            if texture is not None:
-                texture.use(unit)
-                program.set(name, unit)
-
-    def _target(self, view: CameraView, passes: Sequence[str]) -> Target:
+    def _target(self, view: CameraView, passes: Sequence[str], samples: int) -> Target:
         unknown = set(passes) - set(PASSES)
         if unknown or not passes:
             raise ValueError(f"{sorted(unknown) or 'no pass'} cannot be drawn; there are {', '.join(PASSES)}")
-        key = (view.width, view.height, tuple(passes))
+        key = (view.width, view.height, tuple(passes), samples)
         if key not in self._targets:
-            self._targets[key] = Target(self._context, key[:2], passes, self._samples)
+            self._targets[key] = Target(self._context, key[:2], passes, samples)
         return self._targets[key]

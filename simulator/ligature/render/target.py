@@ -61,7 +61,7 @@ class Target:
         self._resolved: moderngl.Framebuffer | None = None
         self.colour: moderngl.Framebuffer | None = None
         if "rgb" in self.passes:
-            self.colour = context.framebuffer([self._textures["rgb"]], depth)
+            self.colour = context.framebuffer([self._textures["rgb"]], context.depth_renderbuffer(size))
             if samples:
                 self._resolved = self.colour
                 many = context.renderbuffer(size, 4, samples=samples)
@@ -71,6 +71,7 @@ class Target:
 
     def clear(self, background: tuple[float, float, float, float]) -> None:
         """Empty what will be drawn into."""
+        self.whole.clear(*background)
         if self.geometry is not None:
             self.geometry.clear()
         if self.colour is not None:

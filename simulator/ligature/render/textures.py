@@ -20,6 +20,10 @@ class Textures:
         self.white = context.texture((1, 1), 4, b"\xff" * 4)
         """Stands in where a shader wants a texture that a surface lacks."""
 
+        self.lit = context.depth_texture((1, 1), b"\xff" * 4)
+        """Stands in for a shadow map where there is no shadow."""
+        self.lit.compare_func = "<="
+
     def get(self, path: Path | None) -> moderngl.Texture | None:
         """The texture of ``path``; None when it is not a picture, as the mesh reader has reported."""
         if path is None:

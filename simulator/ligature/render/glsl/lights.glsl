@@ -28,15 +28,14 @@ bool isPerspective() { return uProjection[3][3] == 0.0; }
 
 #ifdef SHADOWS
 float litThrough(sampler2DShadow map, mat4 fromEye, vec2 texel, vec3 eye, vec3 n) {
-    vec4 place = fromEye * vec4(eye, 1.0);
-    place = fromEye * vec4(eye + n * (1.5 * texel.y * abs(place.w)), 1.0);  // off the surface by a texel and a half
-    if (place.w <= 0.0) return 1.0;
+    float away = abs(dot(vec4(fromEye[0].w, fromEye[1].w, fromEye[2].w, fromEye[3].w), vec4(eye, 1.0)));
+    vec4 place = fromEye * vec4(eye + n * (1.5 * texel.y * away), 1.0);  // off the surface by a texel and a half
     vec3 p = place.xyz / place.w;
-    if (any(lessThan(p.xy, vec2(0.0))) || any(greaterThan(p, vec3(1.0)))) return 1.0;
     float lit = 0.0;
     for (int x = 0; x < 2; ++x)
         for (int y = 0; y < 2; ++y) lit += texture(map, p + vec3((vec2(x, y) - 0.5) * 1.5 * texel.x, 0.0));
-    return 0.25 * lit;
+    bool outside = place.w <= 0.0 || any(lessThan(p.xy, vec2(0.0))) || any(greaterThan(p.xy, vec2(1.0)));
+    return outside ? 1.0 : 0.25 * lit;
 }
 #endif
 

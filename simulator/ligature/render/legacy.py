@@ -1,0 +1,246 @@
+"""Shader programs of scene files: compiled after translation, fed with the state that OpenGL 2 kept for them.
+
+Lights, planes and matrices are in eye space, metres, as the fixed-function state was.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.adf import AdfError, Diagnostic, Mark, Resolver, Severity
+from ligature.model.scene import Colour, ShaderFiles
+from ligature.render.geometry import Triangles
+from ligature.render.lights import LightKind, Lights
+from ligature.render.programs import Program
+from ligature.render.surface import Surface
+from ligature.render.textures import Textures
+from ligature.render.translate import PREFIX, translate
+
+Array = NDArray[np.float64]
+
+AMBIENT_LIGHT = 0.35
+"""Share of a material's ambient colour that each light gives, as in the built-in shader."""
+
+MAX_SHADER_BYTES = 1 << 20
+
+_MESA = re.compile(r"^\d+:(\d+)\((\d+)\): error: (.*)$", re.MULTILINE)
+_NVIDIA = re.compile(r"^\d+\((\d+)\) : (error .*)$", re.MULTILINE)
+_OTHERS = re.compile(r"^ERROR: \d+:(\d+): (.*)$", re.MULTILINE)
+
+_ATTRIBUTES = {
+    "aPosition": "positions", f"{PREFIX}Vertex": "positions",
+    "aNormal": "normals", f"{PREFIX}Normal": "normals",
+    "aTexCoord": "uvs", **{f"{PREFIX}MultiTexCoord{i}": "uvs" for i in range(8)},
+    "aColor": "colours", f"{PREFIX}Color": "colours", f"{PREFIX}SecondaryColor": "colours",
+    "aTangent": "tangents", "aBitangent": "bitangents",
+}  # fmt: skip
+"""What feeds each attribute that authors use."""
+
+_UNITS = {"diffuseMap": 0, "albedoMap": 0, "normalMap": 1, "metallicMap": 2, "roughnessMap": 3, "aoMap": 4,
+          "uMatcapMap": 5, "shadowMap": 8, "skybox": 9, "uVolume": 10}  # fmt: skip
+"""Texture unit of each sampler that authors use."""
+
+_FIRST_FREE_UNIT = 11
+
+
+class ShaderError(AdfError):
+    """Shaders of a scene file that cannot be used; ``diagnostics`` say where and why."""
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """What the shaders know of a picture: view and projection (4, 4), the lights, the shadow map."""
+
+    view: Array
+    projection: Array
+    lights: Lights
+
+
+def compiled(context: moderngl.Context, files: ShaderFiles, resolver: Resolver) -> Program:
+    """The program of ``files``, translated; raises `ShaderError` naming file and line."""
+    texts = [_text(path, resolver, files.mark) for path in (files.vertex, files.fragment)]
+    stages = translate(*texts)
+    try:
+        program = Program(context.program(stages.vertex, stages.fragment))
+    except moderngl.Error as error:
+        raise ShaderError(*findings(str(error), files)) from None
+    unknown = sorted(set(program.attributes) - set(_ATTRIBUTES))
+    if unknown:
+        message = f"wants the vertex attribute '{unknown[0]}', which no object has"
+        hint = f"there are {', '.join(name for name in _ATTRIBUTES if not name.startswith(PREFIX))}"
+        raise ShaderError(Diagnostic(Severity.ERROR, message, Mark(files.vertex, 1, 1), hint, "render"))
+    for unit, name in enumerate((n for n in program.samplers if n not in _UNITS), _FIRST_FREE_UNIT):
+        program.set(name, unit)  # samplers of different kinds may not share a unit
+    for name in program.samplers:
+        if name in _UNITS:
+            program.set(name, _UNITS[name])
+    return program
+
+
+def findings(log: str, files: ShaderFiles) -> list[Diagnostic]:
+    """What the driver's ``log`` says, by file and line; a program that does not link is blamed on both files."""
+    path = files.fragment if "fragment_shader\n" in log else files.vertex
+    found = [(int(m[1]), int(m[2]), m[3]) for m in _MESA.finditer(log)]
+    found += [(int(m[1]), 1, m[2]) for pattern in (_NVIDIA, _OTHERS) for m in pattern.finditer(log)]
+    hint = "the built-in shader is used instead; GLSL 1.10, 1.20 and 3.30 core are understood"
+    if not found:
+        reason = " ".join(line for line in log.split("\n")[1:] if line.strip(" =") and not line.endswith("_shader"))
+        message = f"does not link with {files.fragment.name}: {reason.strip()[:300]}"
+        return [Diagnostic(Severity.ERROR, message, Mark(files.vertex, 1, 1), hint, "render")]
+    return [
+        Diagnostic(
+            Severity.ERROR, f"does not compile: {text.replace(PREFIX, 'gl_')}", Mark(path, line, column), hint, "render"
+        )
+        for line, column, text in found
+    ]
+
+
+def _text(path: Path, resolver: Resolver, mark: Mark | None) -> str:
+    try:
+        return resolver.read_text(path, MAX_SHADER_BYTES, mark or Mark(path, 1, 1))
+    except AdfError as error:
+        first = error.diagnostics[0]
+        message = f"shader: {first.message}"
+        hint = first.hint or "the built-in shader is used instead"
+        raise ShaderError(Diagnostic(Severity.ERROR, message, first.mark, hint, "render")) from None
+
+
+class LegacyBuffers:
+    """The vertices of one batch, one buffer for each quantity that some program reads."""
+
+    def __init__(self, context: moderngl.Context, triangles: Triangles) -> None:
+        self._context = context
+        self._triangles = triangles
+        self._buffers: dict[str, moderngl.Buffer] = {}
+        self._indices = context.buffer(np.ascontiguousarray(triangles.faces, dtype="i4").tobytes())
+        self._arrays: dict[Program, moderngl.VertexArray] = {}
+
+    def load(self, triangles: Triangles) -> None:
+        """Take the same number of new vertices."""
+        self._triangles = triangles
+        for name, buffer in self._buffers.items():
+            buffer.write(self._values(name))
+
+    def array(self, program: Program) -> moderngl.VertexArray:
+        """The buffers bound to the attributes that ``program`` reads."""
+        if program not in self._arrays:
+            content = [(self._buffer(_ATTRIBUTES[name]), _format(name), name) for name in program.attributes]
+            self._arrays[program] = self._context.vertex_array(program.linked, content, index_buffer=self._indices)
+        return self._arrays[program]
+
+    def _buffer(self, name: str) -> moderngl.Buffer:
+        if name not in self._buffers:
+            self._buffers[name] = self._context.buffer(self._values(name))
+        return self._buffers[name]
+
+    def _values(self, name: str) -> bytes:
+        t = self._triangles
+        n = len(t.positions)
+        if name == "colours":
+            values = np.ones((n, 4))
+        elif name == "uvs":
+            values = np.hstack([t.uvs, np.zeros((n, 1))])
+        elif name in ("tangents", "bitangents"):
+            tangents = t.tangents()
+            values = tangents[:, :3]
+            if name == "bitangents":
+                values = np.cross(t.normals, values) * tangents[:, 3:]
+        else:
+            values = getattr(t, name)
+        return np.ascontiguousarray(values, dtype="f4").tobytes()
+
+
+def _format(name: str) -> str:
+    return "4f" if _ATTRIBUTES[name] == "colours" else "3f"
+
+
+def bind_picture(program: Program, picture: Fixed) -> None:
+    """Fill what does not depend on the object: lights, planes of the shadow map, the camera's matrices."""
+    program.write("viewMat", picture.view)
+    program.write("projectionMat", picture.projection)
+    program.write("invProjection", np.linalg.inv(picture.projection))
+    program.write(f"{PREFIX}ProjectionMatrix", picture.projection)
+    program.set(f"{PREFIX}LightModel.ambient", (0.0, 0.0, 0.0, 1.0))
+    for i, (settings, T) in enumerate(picture.lights.eye_space()):
+        directional = settings.kind is LightKind.DIRECTIONAL
+        spot = settings.kind is LightKind.SPOT
+        light = f"{PREFIX}LightSource[{i}]."
+        position = (*-T[:3, 0], 0.0) if directional else (*T[:3, 3], 1.0)
+        program.set(light + "position", position)
+        program.set(light + "ambient", (AMBIENT_LIGHT,) * 3 + (1.0,))
+        program.set(light + "diffuse", (1.0,) * 4)
+        program.set(light + "specular", (1.0,) * 4)
+        program.set(light + "halfVector", (*_unit(_unit(np.array(position[:3])) + [0, 0, 1]), 0.0))
+        program.set(light + "spotDirection", tuple(T[:3, 0]))
+        program.set(light + "spotExponent", settings.exponent)
+        program.set(light + "spotCutoff", float(np.degrees(settings.cutoff)) if spot else 180.0)
+        program.set(light + "spotCosCutoff", float(np.cos(settings.cutoff)) if spot else -1.0)
+        for name, value in zip(("constant", "linear", "quadratic"), settings.attenuation, strict=True):
+            program.set(f"{light}{name}Attenuation", value)
+    shadow = picture.lights.shadow()
+    program.set("uEnableShadow", shadow is not None)
+    if shadow is not None:
+        for row, plane in zip(shadow[1], "STRQ", strict=True):
+            program.set(f"{PREFIX}EyePlane{plane}", _second(tuple(row)))
+
+
+def _second(row: tuple[float, ...]) -> list[tuple[float, ...]]:
+    """Eight planes of which the shadow map's, number 1, is ``row``."""
+    return [(0.0,) * 4, row, *[(0.0,) * 4] * 6]
+
+
+def bind_object(program: Program, model_view: Array, projection: Array) -> None:
+    """Fill the matrices of one object that stands at ``model_view`` (4, 4)."""
+    product = projection @ model_view
+    matrices = {"ModelViewMatrix": model_view, "ProjectionMatrix": projection, "ModelViewProjectionMatrix": product}
+    for name, matrix in matrices.items():
+        for form, value in (("", matrix), ("Inverse", np.linalg.inv(matrix))):
+            program.write(f"{PREFIX}{name}{form}", value)
+            program.write(f"{PREFIX}{name}{form}Transpose", value.T)
+    program.write(f"{PREFIX}NormalMatrix", np.linalg.inv(model_view[:3, :3]).T)
+    program.write(f"{PREFIX}TextureMatrix", np.tile(np.eye(4), (8, 1, 1)))
+
+
+def bind_surface(program: Program, surface: Surface, textures: Textures, lights: Lights) -> None:
+    """Fill the material, its products with the lights, and its textures; white where it has none."""
+    _bind_material(program, surface.colour)
+    look = surface.physical
+    maps: dict[str, Path | None] = {
+        "diffuseMap": surface.texture, "albedoMap": surface.texture, "normalMap": surface.normal_map,
+        "metallicMap": look.metallic_map if look else None, "roughnessMap": look.roughness_map if look else None,
+        "aoMap": None, "uMatcapMap": None,
+    }  # fmt: skip
+    for name, path in maps.items():
+        if name in program:
+            (textures.get(path) or textures.white).use(_UNITS[name])
+    program.set("uTextureEnabled", surface.texture is not None)
+    program.set("vEnableNormalMapping", surface.normal_map is not None)
+    if "shadowMap" in program:
+        shadow = lights.shadow()
+        (shadow[0] if shadow else textures.lit).use(_UNITS["shadowMap"])
+
+
+def _bind_material(program: Program, colour: Colour) -> None:
+    ambient, diffuse, specular = ((*rgb, colour.alpha) for rgb in (colour.ambient, colour.diffuse, colour.specular))
+    emission = (*colour.emission, colour.alpha)
+    for side in ("Front", "Back"):
+        for name, value in (("ambient", ambient), ("diffuse", diffuse), ("specular", specular), ("emission", emission)):
+            program.set(f"{PREFIX}{side}Material.{name}", value)
+        program.set(f"{PREFIX}{side}Material.shininess", float(max(colour.shininess, 1)))
+        program.set(f"{PREFIX}{side}LightModelProduct.sceneColor", emission)
+        for i in range(8):
+            product = f"{PREFIX}{side}LightProduct[{i}]."
+            program.set(product + "ambient", (*(AMBIENT_LIGHT * c for c in colour.ambient), colour.alpha))
+            program.set(product + "diffuse", diffuse)
+            program.set(product + "specular", specular)
+
+
+def _unit(vector: Array) -> Array:
+    unit: Array = vector / (np.linalg.norm(vector) + 1e-30)
+    return unit

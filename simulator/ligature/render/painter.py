@@ -1,0 +1,138 @@
+"""Paints what a frustum holds into a frame buffer, with built-in programs or those of scene files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.adf import AdfError, Resolver
+from ligature.model.scene import ShaderFiles
+from ligature.render import legacy
+from ligature.render.batches import Batch, Seen
+from ligature.render.camera import CameraView
+from ligature.render.lights import Lights
+from ligature.render.programs import Program, Programs
+from ligature.render.surface import Surface
+from ligature.render.textures import Textures
+
+
+class Brushes:
+    """Programs, textures and lights that pictures are painted with; ``problems`` takes shaders that cannot be used."""
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        programs: Programs,
+        textures: Textures,
+        lights: Lights,
+        resolver: Resolver | None,
+        problems: list[AdfError],
+    ) -> None:
+        self._context, self._programs, self.textures, self.lights = context, programs, textures, lights
+        self._resolver, self._problems = resolver, problems
+        self._own: dict[ShaderFiles, Program | None] = {}
+
+    def prepare(self, shaders: Iterable[ShaderFiles | None]) -> None:
+        """Compile programs of scene files, so that what is wrong with them is known before the first picture."""
+        for files in shaders:
+            self.own(files)
+
+    def own(self, files: ShaderFiles | None) -> Program | None:
+        """The program of a scene file; None when there is none or it cannot be used."""
+        if files is not None and files not in self._own:
+            resolver = self._resolver or Resolver([files.vertex.parent, files.fragment.parent])
+            try:
+                self._own[files] = legacy.compiled(self._context, files, resolver)
+            except AdfError as error:
+                self._problems.append(error)
+                self._own[files] = None
+        return None if files is None else self._own[files]
+
+    def built_in(self, surface: Surface, passes: Sequence[str]) -> Program:
+        """The program that writes ``passes`` of ``surface``."""
+        defines = {f"PASS_{name.upper()}": place for place, name in enumerate(passes)} | {"LIGHTS": 1}
+        if "rgb" in passes:
+            defines |= self.lights.defines | dict.fromkeys(surface.defines, 1)
+        return self._programs.get("surface", defines)
+
+
+class Painter:
+    """One picture while it is painted."""
+
+    def __init__(
+        self, context: moderngl.Context, brushes: Brushes, batches: Sequence[Batch], seen: Seen, view: CameraView
+    ) -> None:
+        self._context, self._brushes, self._seen, self._view = context, brushes, seen, view
+        self._calls = [(batch, rows) for batch in batches if len(rows := seen.rows(batch))]
+
+    def needs_colour_apart(self, shaders: ShaderFiles | None) -> bool:
+        """Whether colour cannot be written together with the rest: by blending, or by scene files' programs."""
+        own = self._brushes.own
+        return any(not b.surface.opaque or own(shaders) or own(b.shaders) for b, _ in self._calls)
+
+    def paint(self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None) -> None:
+        """Draw ``passes``: the opaque from near to far, then the transparent from far to near."""
+        context, seen = self._context, self._seen
+        context.enable_only(moderngl.DEPTH_TEST)
+        buffer.use()
+        opaque = [(batch, rows) for batch, rows in self._calls if batch.surface.opaque]
+        for batch, rows in sorted(opaque, key=lambda call: float(seen.nearest[call[1]].min())):
+            self._draw(batch, passes, rows, shaders)
+        clear = [(batch, row) for batch, rows in self._calls if not batch.surface.opaque for row in rows]
+        if clear and "rgb" in passes:
+            context.enable(moderngl.BLEND)
+            buffer.depth_mask = False
+        for batch, row in sorted(clear, key=lambda call: -float(seen.depth[call[1]])):
+            self._draw(batch, passes, np.array([row]), shaders)
+        buffer.depth_mask = True
+
+    def _draw(self, batch: Batch, passes: Sequence[str], rows: NDArray[np.int64], shaders: ShaderFiles | None) -> None:
+        (self._context.enable if batch.closed else self._context.disable)(moderngl.CULL_FACE)
+        if "rgb" in passes:
+            own = self._brushes.own(shaders) or self._brushes.own(batch.shaders)
+            if own is not None:
+                self._draw_own(own, batch, rows)
+                return
+        view, program = self._view, self._brushes.built_in(batch.surface, passes)
+        program.write("uProjection", view.projection)
+        if "rgb" in passes:
+            self._brushes.lights.bind(program)
+            program.write("uWorldFromEye", view.view[:3, :3].T)
+            bind_surface(program, batch.surface, self._brushes.textures)
+        batch.draw(program, self._seen.instances[rows])
+
+    def _draw_own(self, program: Program, batch: Batch, rows: NDArray[np.int64]) -> None:
+        """Draw with a scene file's program, which knows no instances."""
+        view, brushes = self._view, self._brushes
+        legacy.bind_picture(program, legacy.Fixed(view.view, view.projection, brushes.lights))
+        legacy.bind_surface(program, batch.surface, brushes.textures, brushes.lights)
+        for row in rows:
+            model_view = self._seen.instances["model_view"][row].T.astype(float)
+            legacy.bind_object(program, model_view, view.projection)
+            batch.legacy(program).render()
+
+
+def bind_surface(program: Program, surface: Surface, textures: Textures) -> None:
+    """Fill the material's uniforms of a built-in program."""
+    colour, look = surface.colour, surface.physical
+    program.set("uAmbient", colour.ambient)
+    program.set("uDiffuse", colour.diffuse)
+    program.set("uSpecular", colour.specular)
+    program.set("uEmission", colour.emission)
+    program.set("uShininess", float(max(colour.shininess, 1)))
+    program.set("uAlpha", colour.alpha)
+    maps = {"uTexture": surface.texture, "uNormalMap": surface.normal_map}
+    if look is not None:
+        program.set("uMetallic", look.metallic)
+        program.set("uRoughness", look.roughness)
+        program.set("uCoat", look.coat)
+        program.set("uCoatRoughness", look.coat_roughness)
+        maps |= {"uMetallicMap": look.metallic_map, "uRoughnessMap": look.roughness_map}
+    for unit, (name, path) in enumerate(maps.items()):
+        texture = textures.get(path)
+        if texture is not None:
+            texture.use(unit)
+            program.set(name, unit)
