@@ -120,8 +120,7 @@ class Renderer:
 
     def release(self) -> None:
         """Give the OpenGL objects back."""
-        with self._context:
-            self._context.release()
+        self._context.release()
 
     def _rod_pieces(self, loader: VisualLoader) -> list[Piece]:
         """The rods as pieces in world axes, looking like their first element's material or ADF colours."""
