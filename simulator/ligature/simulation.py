@@ -10,7 +10,6 @@ import copy
 import hashlib
 import time as clock
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -47,6 +46,20 @@ Handle = TypeVar("Handle")
 
 PHASES = ("control", "suture", "bodies", "sensing", "state")
 """What the time of a tick is spent on, in order."""
+
+
+class Stopwatch:
+    """Adds up the time of what is done within it; time never flows into the simulation."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self._start = 0.0
+
+    def __enter__(self) -> None:
+        self._start = clock.perf_counter()
+
+    def __exit__(self, *exception: object) -> None:
+        self.seconds += clock.perf_counter() - self._start
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +194,7 @@ class Simulation:
         self.dt = dt
         self.ticks_per_update = max(1, round((update or dt) / dt))
         self.state: StateRecord = new_state(scene)
-        self.phase_seconds = dict.fromkeys(PHASES, 0.0)
+        self.phases = {name: Stopwatch() for name in PHASES}
         self.problems: list[Diagnostic] = []
         self._tick = 0
         self._resets = 0
@@ -209,21 +222,21 @@ class Simulation:
         """Advance by ``ticks`` ticks and write the state."""
         for _ in range(ticks):
             self._advance()
-        with self._phase("state"):
+        with self.phases["state"]:
             self._write_bodies()
-        with self._phase("sensing"):
+        with self.phases["sensing"]:
             self._sense()
-        with self._phase("state"):
+        with self.phases["state"]:
             self._write_rest()
 
     def _advance(self) -> None:
         """One tick."""
-        with self._phase("control"):
+        with self.phases["control"]:
             self.arms.tick(self.dt)
             self._world.pre_step()
-        with self._phase("suture"):
+        with self.phases["suture"]:
             self._rods.step(self._world)
-        with self._phase("bodies"):
+        with self.phases["bodies"]:
             self._world.step()
         self._tick += 1
 
@@ -355,10 +368,3 @@ class Simulation:
         self.arms.write(state["arm"][0])
         held = np.array(self._actuators.held, dtype=np.int32)
         state["actuator_body"][0], state["actuator_active"][0] = held, held >= 0
-
-    @contextmanager
-    def _phase(self, name: str) -> Iterator[None]:
-        """Add the time of a block to ``phase_seconds``; time never flows into the simulation."""
-        start = clock.perf_counter()
-        yield
-        self.phase_seconds[name] += clock.perf_counter() - start

@@ -72,7 +72,8 @@ def measure(scene: Scene, seconds: float, rate: float, loading: float = 0.0) -> 
     start = loading + time.perf_counter() - begin
     for _ in range(max(1, WARM_UP // batch)):
         simulation.step(batch)
-    simulation.phase_seconds = dict.fromkeys(simulation.phase_seconds, 0.0)
+    for phase in simulation.phases.values():
+        phase.seconds = 0.0
     times: list[float] = []
     end = time.perf_counter() + seconds
     while time.perf_counter() < end:
@@ -92,5 +93,5 @@ def measure(scene: Scene, seconds: float, rate: float, loading: float = 0.0) -> 
         "tick_max_us": max(times) * 1e6,
         "start_s": start,
         "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-        "phases_us": {name: value / ticks * 1e6 for name, value in simulation.phase_seconds.items()},
+        "phases_us": {name: phase.seconds / ticks * 1e6 for name, phase in simulation.phases.items()},
     }

@@ -21,49 +21,98 @@ Array = NDArray[np.float64]
 SAMPLES = 5
 """Points along a rod element that are tested; neighbours are closer than the element's diameter."""
 
+CONVEX = (Box, Sphere, Cylinder, Capsule, Cone, Hull)
+"""Shapes that rod elements are tested against."""
+
 STILL = 1e-6
 """Change of a pose (metres, quaternion) below which a pair is not asked about again."""
 
 
 @njit(cache=True)
 def _elements_inside(
-    kind: int,
-    size: Array,
+    kinds: NDArray[np.int64],
+    sizes: Array,
     planes: Array,
-    shape_pose: Array,
-    bound: float,
-    elements: Array,
+    plane_range: NDArray[np.int64],
+    local: Array,
+    bounds: Array,
+    owner: NDArray[np.int64],
+    ghost_world: Array,
+    body_pose: Array,
+    elements: NDArray[np.int64],
     half_lengths: Array,
     radii: Array,
-    hit: NDArray[np.bool_],
+    sensed: NDArray[np.bool_],
 ) -> None:
-    """Set ``hit[i]`` for every element (pose row of ``elements``, axis local Z) that touches the shape."""
-    inverse, normal = np.empty(7), np.empty(3)
-    conjugate = np.array([0.0, 0.0, 0.0, -shape_pose[3], -shape_pose[4], -shape_pose[5], shape_pose[6]])
-    origin = np.zeros(7)
-    origin[0:3] = -shape_pose[0:3]
-    origin[6] = 1.0
-    compose(conjugate, origin, inverse)
-    point, local = np.zeros(7), np.empty(7)
+    """Set ``sensed[g, b]`` for every element b (axis local Z) that touches a piece of ghost g, clear it for others."""
+    for g in range(sensed.shape[0]):
+        for b in elements:
+            sensed[g, b] = False
+    shape, back, normal = np.empty(7), np.empty(7), np.empty(3)
+    point, there = np.zeros(7), np.empty(7)
     point[6] = 1.0
-    for i in range(elements.shape[0]):
-        dx = elements[i, 0] - shape_pose[0]
-        dy = elements[i, 1] - shape_pose[1]
-        dz = elements[i, 2] - shape_pose[2]
-        reach = bound + half_lengths[i] + radii[i]
-        if hit[i] or dx * dx + dy * dy + dz * dz > reach * reach:
-            continue
-        x, y, z, w = elements[i, 3], elements[i, 4], elements[i, 5], elements[i, 6]
-        ax, ay, az = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
-        for k in range(SAMPLES):
-            s = half_lengths[i] * (2.0 * k / (SAMPLES - 1) - 1.0)
-            point[0] = elements[i, 0] + s * ax
-            point[1] = elements[i, 1] + s * ay
-            point[2] = elements[i, 2] + s * az
-            compose(inverse, point, local)
-            if signed_distance(kind, size, planes, local, normal) <= radii[i]:
-                hit[i] = True
-                break
+    for v in range(kinds.shape[0]):
+        hit = sensed[owner[v]]
+        compose(ghost_world[owner[v]], local[v], shape)
+        _invert(shape, back)
+        own = planes[plane_range[v, 0] : plane_range[v, 1]]
+        for i in range(elements.shape[0]):
+            pose = body_pose[elements[i]]
+            dx, dy, dz = pose[0] - shape[0], pose[1] - shape[1], pose[2] - shape[2]
+            reach = bounds[v] + half_lengths[i] + radii[i]
+            if hit[elements[i]] or dx * dx + dy * dy + dz * dz > reach * reach:
+                continue
+            x, y, z, w = pose[3], pose[4], pose[5], pose[6]
+            ax, ay, az = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+            for k in range(SAMPLES):
+                s = half_lengths[i] * (2.0 * k / (SAMPLES - 1) - 1.0)
+                point[0], point[1], point[2] = pose[0] + s * ax, pose[1] + s * ay, pose[2] + s * az
+                compose(back, point, there)
+                if signed_distance(kinds[v], sizes[v], own, there, normal) <= radii[i]:
+                    hit[elements[i]] = True
+                    break
+
+
+@njit(cache=True)
+def _invert(pose: Array, out: Array) -> None:
+    """The inverse of a pose (7,)."""
+    turn_back, origin = np.zeros(7), np.zeros(7)
+    turn_back[3], turn_back[4], turn_back[5], turn_back[6] = -pose[3], -pose[4], -pose[5], pose[6]
+    origin[0], origin[1], origin[2], origin[6] = -pose[0], -pose[1], -pose[2], 1.0
+    compose(turn_back, origin, out)
+
+
+@njit(cache=True)
+def _pairs_to_ask(
+    ghost_world: Array,
+    body_pose: Array,
+    solid: NDArray[np.int64],
+    ghost_reach: Array,
+    reach: Array,
+    seen_ghost: Array,
+    seen_body: Array,
+    known: NDArray[np.bool_],
+    ask: NDArray[np.bool_],
+) -> bool:
+    """Flag in ``ask`` the pairs that are near each other and moved since they were asked about; clear far ones."""
+    found = False
+    for g in range(ask.shape[0]):
+        for i in range(ask.shape[1]):
+            square, still = 0.0, True
+            pose = body_pose[solid[i]]
+            for a in range(7):
+                if a < 3:
+                    square += (ghost_world[g, a] - pose[a]) ** 2
+                still = (
+                    still
+                    and abs(seen_ghost[g, i, a] - ghost_world[g, a]) <= STILL
+                    and abs(seen_body[g, i, a] - pose[a]) <= STILL
+                )
+            near = square <= (ghost_reach[g] + reach[i]) ** 2
+            known[g, i] = known[g, i] and near
+            ask[g, i] = near and not still
+            found = found or ask[g, i]
+    return found
 
 
 def _shape_arrays(shape: Shape) -> tuple[int, Array, Array, float]:
@@ -86,25 +135,13 @@ def _shape_arrays(shape: Shape) -> tuple[int, Array, Array, float]:
     )
 
 
-class _Volume:
-    """One convex piece of a ghost, ready for the test against rod elements."""
-
-    def __init__(self, collider: Collider) -> None:
-        self.kind, self.size, self.planes, self.bound = _shape_arrays(collider.shape)
-        self.local = matrix_pose7(collider.T_body_shape)
-        self.world = np.empty(7)
-
-
 class Ghosts:
     """All ghosts of a scene; `update` fills ``sensed`` (ghosts, bodies)."""
 
     def __init__(self, scene: Scene, queries: Queries) -> None:
         self._queries = queries
         self._probes = [queries.add_probe(g.colliders, g.collision_margin) for g in scene.ghosts]
-        self._volumes = [
-            [_Volume(c) for c in g.colliders if isinstance(c.shape, Box | Sphere | Cylinder | Capsule | Cone | Hull)]
-            for g in scene.ghosts
-        ]
+        self._lay_out_volumes(scene)
         self._elements = np.array(sorted(scene.rod_bodies), dtype=np.int64)
         lengths = {b: length for rod in scene.rods for b, length in zip(rod.bodies, rod.lengths, strict=True)}
         radii = {b: rod.radius for rod in scene.rods for b in rod.bodies}
@@ -118,52 +155,58 @@ class Ghosts:
         self.sensed = np.zeros((len(scene.ghosts), len(scene.bodies)), dtype=bool)
         self.forget()
 
+    def _lay_out_volumes(self, scene: Scene) -> None:
+        """The convex pieces of all ghosts, as arrays for the test against rod elements."""
+        pieces = [
+            (g, c) for g, ghost in enumerate(scene.ghosts) for c in ghost.colliders if isinstance(c.shape, CONVEX)
+        ]
+        arrays = [_shape_arrays(piece.shape) for _, piece in pieces]
+        self._owner = np.array([g for g, _ in pieces], dtype=np.int64)
+        self._local = np.array([matrix_pose7(piece.T_body_shape) for _, piece in pieces]).reshape(-1, 7)
+        self._kinds = np.array([kind for kind, *_ in arrays], dtype=np.int64)
+        self._sizes = np.array([size for _, size, _, _ in arrays]).reshape(-1, 3)
+        self._bounds = np.array([bound for *_, bound in arrays])
+        ends = np.cumsum([0, *(len(planes) for _, _, planes, _ in arrays)])
+        self._plane_range = np.column_stack([ends[:-1], ends[1:]]).astype(np.int64)
+        self._planes = np.vstack([np.zeros((0, 4)), *(planes for _, _, planes, _ in arrays)])
+
     def forget(self) -> None:
         """Ask again about every pair at the next update."""
         shape = (len(self._probes), len(self._solid), 7)
         self._seen_ghost, self._seen_body = np.full(shape, np.nan), np.full(shape, np.nan)
-        self._known = np.zeros(shape[:2], dtype=bool)
+        self._known, self._ask = np.zeros(shape[:2], dtype=bool), np.zeros(shape[:2], dtype=bool)
 
     def update(self, ghost_world: Array, body_pose: Array) -> None:
         """Sense again; ``ghost_world`` (ghosts, 7) and ``body_pose`` (bodies, 7) in world axes."""
         if not self._probes:
             return
-        self._update_bodies(ghost_world, body_pose[self._solid])
+        asking = _pairs_to_ask(
+            ghost_world, body_pose, self._solid, self._ghost_reach, self._reach, self._seen_ghost, self._seen_body,
+            self._known, self._ask,
+        )  # fmt: skip
+        if asking:
+            self._ask_about_bodies(ghost_world, body_pose[self._solid])
         self.sensed[:, self._solid] = self._known
         if len(self._elements):
-            self._update_elements(ghost_world, body_pose[self._elements])
+            _elements_inside(
+                self._kinds, self._sizes, self._planes, self._plane_range, self._local, self._bounds, self._owner,
+                ghost_world, body_pose, self._elements, self._half_lengths, self._radii, self.sensed,
+            )  # fmt: skip
 
-    def _update_bodies(self, ghost_world: Array, bodies: Array) -> None:
-        """Ask about the pairs that are near each other and moved since they were asked about."""
-        gap = np.linalg.norm(ghost_world[:, None, :3] - bodies[None, :, :3], axis=2)
-        near = gap <= self._ghost_reach[:, None] + self._reach[None, :]
-        self._known &= near
-        moved = np.abs(self._seen_ghost - ghost_world[:, None]) <= STILL
-        still = moved.all(axis=2) & (np.abs(self._seen_body - bodies[None]) <= STILL).all(axis=2)
-        for ghost in np.flatnonzero((near & ~still).any(axis=1)):
-            asked = np.flatnonzero(near[ghost] & ~still[ghost])
+    def _ask_about_bodies(self, ghost_world: Array, bodies: Array) -> None:
+        for ghost in np.flatnonzero(self._ask.any(axis=1)):
+            asked = np.flatnonzero(self._ask[ghost])
             found = self._queries.probe_overlaps(self._probes[ghost], ghost_world[ghost], self._solid[asked].tolist())
             self._known[ghost, asked] = np.isin(self._solid[asked], found)
             self._seen_ghost[ghost, asked] = ghost_world[ghost]
             self._seen_body[ghost, asked] = bodies[asked]
-
-    def _update_elements(self, ghost_world: Array, elements: Array) -> None:
-        for ghost, volumes in enumerate(self._volumes):
-            hit = np.zeros(len(elements), dtype=bool)
-            for volume in volumes:
-                compose(ghost_world[ghost], volume.local, volume.world)
-                _elements_inside(
-                    volume.kind, volume.size, volume.planes, volume.world, volume.bound,
-                    elements, self._half_lengths, self._radii, hit,
-                )  # fmt: skip
-            self.sensed[ghost, self._elements] = hit
 
 
 def _reach(colliders: tuple[Collider, ...]) -> float:
     """Radius of the ball about the body's origin that holds all its shapes; infinite for planes."""
     reach = 0.0
     for part in colliders:
-        if isinstance(part.shape, Box | Sphere | Cylinder | Capsule | Cone | Hull):
+        if isinstance(part.shape, CONVEX):
             bound = _shape_arrays(part.shape)[3]
         elif isinstance(part.shape, TriMesh):
             bound = float(np.linalg.norm(part.shape.vertices, axis=1).max())

@@ -66,3 +66,37 @@ def bounds(points, out):
         for i in range(1, points.shape[0]):
             out[0, a] = min(out[0, a], points[i, a])
             out[1, a] = max(out[1, a], points[i, a])
+
+
+@kernel
+def write_elements(first, x, q, v, w, inertial_to_body, tension, bodies, poses, twists, tensions, R):
+    """Poses of body frames, twists and tension of a rod's elements, to rows ``bodies`` (n,) of the last arrays.
+
+    The elements are the nodes from ``first`` on; ``inertial_to_body`` (n, 7) are their body frames in I.
+    """
+    for e in range(bodies.shape[0]):
+        i, b = first + e, bodies[e]
+        local, out = inertial_to_body[e], poses[b]
+        matrix_of(q[i, 0], q[i, 1], q[i, 2], q[i, 3], R)
+        px, py, pz = rotate(R, local[0], local[1], local[2])
+        out[0], out[1], out[2] = x[i, 0] + px, x[i, 1] + py, x[i, 2] + pz
+        out[3], out[4], out[5], out[6] = multiply(
+            q[i, 0], q[i, 1], q[i, 2], q[i, 3], local[3], local[4], local[5], local[6]
+        )
+        for a in range(3):
+            twists[b, a], twists[b, 3 + a] = v[i, a], w[i, a]
+        tensions[b] = tension[e]
+
+
+@kernel
+def sound(first, n, x, q, v, w, fastest):
+    """Whether the ``n`` nodes from ``first`` on are finite and slower than ``fastest``."""
+    for i in range(first, first + n):
+        total = q[i, 3]
+        for a in range(3):
+            if not abs(v[i, a]) < fastest:
+                return False
+            total += x[i, a] + q[i, a] + w[i, a]
+        if not math.isfinite(total):
+            return False
+    return True

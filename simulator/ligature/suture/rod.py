@@ -18,7 +18,7 @@ from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
-from ligature.suture.placing import bounds
+from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.substeps import run_tick
 from ligature.suture.tables import table_of
 
@@ -125,6 +125,7 @@ class Rod:
         self._tied = [tie.body for tie in description.ties]
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
+        self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
         self.impulse = np.zeros((self._total, 6))
         self.tension = np.zeros(n)
         self.newton_steps = 0
@@ -201,8 +202,16 @@ class Rod:
     def finite(self) -> bool:
         """Whether the state is usable."""
         nodes = self._nodes
-        sound = all(np.isfinite(getattr(nodes, name)[self._own]).all() for name in ("x", "q", "v", "w"))
-        return bool(sound and np.abs(nodes.v[self._own]).max() < MAX_SPEED)
+        n = len(self.description.mass)
+        return bool(sound(self._first, n, nodes.x, nodes.q, nodes.v, nodes.w, MAX_SPEED))
+
+    def write(self, poses: Array, twists: Array, tensions: Array) -> None:
+        """Write the elements' state to their bodies' rows: body frames (b, 7), twists (b, 6), tension (b,)."""
+        nodes = self._nodes
+        write_elements(
+            self._first, nodes.x, nodes.q, nodes.v, nodes.w, self._inertial_to_body, self.tension, self._bodies,
+            poses, twists, tensions, self._scratch,
+        )  # fmt: skip
 
     @property
     def positions(self) -> Array:

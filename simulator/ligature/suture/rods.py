@@ -86,10 +86,7 @@ class Rods:
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists and tension of the elements of every rod into a state record."""
         for rod in self.rods:
-            index = list(rod.description.bodies)
-            state["body_pose"][0, index] = rod.body_poses
-            state["body_twist"][0, index] = rod.twists
-            state["rod_tension"][0, index] = rod.tension
+            rod.write(state["body_pose"][0], state["body_twist"][0], state["rod_tension"][0])
 
     def reset(self) -> None:
         """Put every rod back to its initial shape, at rest."""
