@@ -6,7 +6,7 @@ import math
 
 import pytest
 from ligature.bus import Pacer, Throttle, Watchdog
-from ligature.bus.pacing import BACKLOG, DEFAULT_SKIP
+from ligature.bus.pacing import BACKLOG, DEFAULT_SKIP, MOST_AHEAD
 
 
 def test_updates_are_due_at_absolute_times() -> None:
@@ -55,6 +55,20 @@ def test_each_toggle_of_the_clock_releases_one_batch() -> None:
     assert updates(pacer) == 3
 
 
+def test_toggles_that_come_while_a_batch_runs_are_not_lost() -> None:
+    pacer = Pacer(0.01)
+    for clock in (False, True, False, True):
+        pacer.throttle(Throttle(True, clock, 5))
+    assert updates(pacer) == 15
+
+
+def test_a_clock_that_runs_away_is_followed_for_a_while_only() -> None:
+    pacer = Pacer(0.01)
+    for toggle in range(1000):
+        pacer.throttle(Throttle(True, toggle % 2 == 1, 5))
+    assert updates(pacer) == MOST_AHEAD * 5
+
+
 def test_zero_updates_keep_the_present_number() -> None:
     pacer = Pacer(0.01)
     pacer.throttle(Throttle(True, True, 0))
@@ -97,11 +111,3 @@ def test_throttling_that_begins_just_before_an_update_holds_it_back() -> None:
     assert pacer.wait(0.0) == math.inf
     pacer.throttle(Throttle(True, True, 4))
     assert updates(pacer) == 4
-
-
-def test_an_edge_during_a_batch_does_not_lengthen_it() -> None:
-    pacer = Pacer(0.01)
-    pacer.throttle(Throttle(True, True, 4))
-    pacer.done(0.0)
-    pacer.throttle(Throttle(True, False, 4))
-    assert updates(pacer) == 3

@@ -11,6 +11,9 @@ DEFAULT_SKIP = 10
 BACKLOG = 0.05
 """Seconds of delay that are made up for; what is later than that stays lost, and is reported."""
 
+MOST_AHEAD = 10
+"""Batches that a client's clock may be ahead, as many as a subscriber's queue holds; further edges are lost."""
+
 
 @dataclass(frozen=True)
 class Throttle:
@@ -34,7 +37,7 @@ class Pacer:
         self._budget = 0
 
     def throttle(self, command: Throttle) -> None:
-        """Take a world command; an edge of its clock allows ``skip`` more updates.
+        """Take a world command; an edge of its clock allows ``skip`` more updates, also while others still run.
 
         Clients repeat a world command at 120 Hz without meaning to change anything: only what differs from the
         last one has an effect.
@@ -49,8 +52,8 @@ class Pacer:
             return
         if not self._throttled:
             self._throttled, self._budget = True, 0
-        if edge and self._budget == 0:
-            self._budget = self._skip
+        if edge:
+            self._budget = min(self._budget + self._skip, MOST_AHEAD * self._skip)
 
     def wait(self, now: float) -> float:
         """Seconds until the next update may run: 0 for now, infinity while a client's clock rests."""

@@ -218,6 +218,6 @@ def _send(handle: BaseObject) -> None:
     try:
         handle.publish()
     except (rospy.ROSException, rospy.ROSSerializationException) as error:
-        if rospy.is_shutdown():
+        if rospy.core.is_shutdown_requested():
             return
         rospy.logerr_throttle(COMPLAINT_PAUSE, f"{handle.get_name()}: the command cannot be sent: {error}")
