@@ -35,7 +35,7 @@ from ligature.robots.mtm_arm import MtmArm
 from ligature.robots.operating_state import Refused
 from ligature.robots.plant import IdealPlant
 from ligature.robots.psm_arm import PsmArm
-from ligature.robots.record import write_arm
+from ligature.robots.record import ArmRecord
 
 Array = NDArray[np.float64]
 
@@ -56,6 +56,7 @@ class ArmSet(Mapping[str, Arm]):
         for description in scene.arms:
             self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
         self._by_name = {arm.name: arm for arm in self._arms}
+        self._records = [ArmRecord(arm) for arm in self._arms]
         self._ticks = 0
         self._written = -PERIOD
 
@@ -101,8 +102,8 @@ class ArmSet(Mapping[str, Arm]):
         if 0 <= self._ticks - self._written < PERIOD:
             return
         self._written = self._ticks
-        for arm, record in zip(self._arms, records, strict=True):
-            write_arm(arm, record)
+        for arm_record, record in zip(self._records, records, strict=True):
+            arm_record.write(record)
 
     def events(self) -> list[tuple[int, str, Any]]:
         """What happened since the last call: number of the arm, name and value."""
@@ -172,8 +173,8 @@ class JawPlant:
 
     def read(self) -> Array:
         """Opening, its speed, and effort (3, 1)."""
-        position, velocity, effort = self._drive.read()
-        return np.array([[position.sum()], [velocity.sum()], [effort.mean()]])
+        (q1, q2), (qd1, qd2), (tau1, tau2) = self._drive.read().tolist()
+        return np.array([[q1 + q2], [qd1 + qd2], [0.5 * (tau1 + tau2)]])
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Open to ``position`` (1,); below zero the fingers press."""

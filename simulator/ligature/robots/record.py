@@ -5,36 +5,56 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ligature.robots.arm import Arm
 from ligature.robots.mtm_arm import MtmArm
 from ligature.robots.poses import describe_tip
 from ligature.robots.psm_arm import PsmArm
 
+Array = NDArray[np.float64]
 
-def write_arm(arm: Arm, record: Any) -> None:
-    """Fill ``record``, of `ligature.model.state.ARM_DTYPE`, with the state of ``arm`` now."""
-    n, axes = arm.joints.n, arm.joints
-    measured, setpoint = axes.measured(), axes.setpoint
-    state = arm.operating_state
-    record["operating"], record["homed"], record["busy"] = state.state, state.is_homed, state.is_busy
-    record["ratio"] = axes.ratio_v, axes.ratio_a
-    record["reference"] = arm.reference.encode("utf-8")[:64]
-    record["measured_js"][:, :n] = measured
-    record["setpoint_js"][:, :n] = setpoint
-    tips = arm.kinematics.forward(np.array([measured[0], setpoint[0]]))
-    body = arm.kinematics.jacobian_body(measured[0])
-    record["body_jacobian"][:, :n], record["spatial_jacobian"][:, :n] = body, arm.spatial_jacobian()
-    poses, vectors = np.empty((4, 7)), np.empty((4, 6))
-    wrench = arm.spatial_measured_cf()
-    describe_tip(tips, arm.base_frame, body @ measured[1], wrench, poses, vectors)
-    record["local_measured_cp"], record["local_setpoint_cp"], record["measured_cp"], record["setpoint_cp"] = poses
-    record["local_measured_cv"], record["measured_cv"], record["spatial_measured_cf"], turned_back = vectors
-    record["body_measured_cf"] = wrench if arm.cf_orientation_absolute else turned_back
-    if isinstance(arm, PsmArm):
-        record["tool"], record["tool_present"] = arm.kinematics.instrument.id, arm.tool_present
-        if arm.jaw is not None:
-            record["jaw_measured_js"] = arm.jaw.axes.measured()[:, 0]
-            record["jaw_setpoint_js"] = arm.jaw.axes.setpoint[:, 0]
-    elif isinstance(arm, MtmArm):
-        record["jaw_measured_js"] = arm.gripper.measured()[:, 0]
+
+class ArmRecord:
+    """Keeps the part of one arm in the state record up to date."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._arm = arm
+        self._described: tuple[bytes, ...] = ()
+
+    def write(self, record: Any) -> None:
+        """Fill ``record``, of `ligature.model.state.ARM_DTYPE`, the same each time, with the arm's state now."""
+        arm, axes = self._arm, self._arm.joints
+        measured, setpoint = axes.measured(), axes.setpoint
+        state = arm.operating_state
+        record["operating"], record["homed"], record["busy"] = state.state, state.is_homed, state.is_busy
+        record["ratio"] = axes.ratio_v, axes.ratio_a
+        record["reference"] = arm.reference.encode("utf-8")[:64]
+        if isinstance(arm, PsmArm):
+            record["tool"], record["tool_present"] = arm.kinematics.instrument.id, arm.tool_present
+            if arm.jaw is not None:
+                record["jaw_measured_js"] = arm.jaw.axes.measured()[:, 0]
+                record["jaw_setpoint_js"] = arm.jaw.axes.setpoint[:, 0]
+        elif isinstance(arm, MtmArm):
+            record["jaw_measured_js"] = arm.gripper.measured()[:, 0]
+        wrench = arm.spatial_measured_cf()
+        kept = (measured, setpoint, wrench, arm.base_frame, record["tool"], np.bool_(arm.cf_orientation_absolute))
+        described = tuple(value.tobytes() for value in kept)
+        if described != self._described:
+            self._described = described
+            self._describe(record, measured, setpoint, wrench)
+
+    def _describe(self, record: Any, measured: Array, setpoint: Array, wrench: Array) -> None:
+        """Fill in what follows from joints (3, n) and wrench (6,), most of the work: only when they changed."""
+        arm, n = self._arm, self._arm.joints.n
+        record["measured_js"][:, :n] = measured
+        record["setpoint_js"][:, :n] = setpoint
+        tips = arm.kinematics.forward(np.array([measured[0], setpoint[0]]))
+        body = arm.kinematics.jacobian_body(measured[0])
+        spatial = arm.kinematics.jacobian_spatial(measured[0])
+        record["body_jacobian"][:, :n], record["spatial_jacobian"][:, :n] = body, spatial
+        poses, vectors = np.empty((4, 7)), np.empty((4, 6))
+        describe_tip(tips, arm.base_frame, body @ measured[1], wrench, poses, vectors)
+        record["local_measured_cp"], record["local_setpoint_cp"], record["measured_cp"], record["setpoint_cp"] = poses
+        record["local_measured_cv"], record["measured_cv"], record["spatial_measured_cf"], turned_back = vectors
+        record["body_measured_cf"] = wrench if arm.cf_orientation_absolute else turned_back
