@@ -48,15 +48,15 @@ def test_depth_of_a_sphere_follows_its_equation(drawn) -> None:
     x = (columns - K[0, 2]) / K[0, 0] * depth
     y = (rows - K[1, 2]) / K[1, 1] * depth
     radius = np.sqrt(x**2 + y**2 + (depth - 1.0) ** 2)
-    # the drawn sphere has 32 facets around: it lies within 0.5 % of the radius inside the true one
-    assert radius.max() < 0.3 + 1e-5 and radius.min() > 0.3 * 0.985
+    steep = frame.normals[rows, columns, 2] > 0.05
+    assert np.abs(radius - 0.3)[steep].max() < 1e-5
 
 
 def test_ids_split_the_picture_where_the_silhouette_is(drawn) -> None:
     frame, view = drawn
     pixels = (frame.ids == 2).sum()
     outline = view.intrinsics[0, 0] * 0.3 / np.sqrt(1 - 0.3**2)
-    assert pixels == pytest.approx(np.pi * outline**2, rel=0.02)
+    assert pixels == pytest.approx(np.pi * outline**2, rel=0.002)
 
 
 def test_a_known_point_is_seen_where_the_intrinsics_say(drawn) -> None:

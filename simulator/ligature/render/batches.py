@@ -34,6 +34,7 @@ class Batch:
         self.surface = surface
         self.closed = pieces[0].closed
         self.shaders = pieces[0].shaders
+        self.primitive = pieces[0].primitive
         self.rows = slice(first, first + len(pieces))
         self._tangents = surface.normal_map is not None
         self._instances = context.buffer(reserve=len(pieces) * INSTANCE.itemsize, dynamic=True)

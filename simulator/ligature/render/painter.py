@@ -51,11 +51,13 @@ class Brushes:
                 self._own[files] = None
         return None if files is None else self._own[files]
 
-    def built_in(self, surface: Surface, passes: Sequence[str]) -> Program:
-        """The program that writes ``passes`` of ``surface``."""
+    def built_in(self, batch: Batch, passes: Sequence[str]) -> Program:
+        """The program that writes ``passes`` of ``batch``; colour alone is drawn by facets, with smooth edges."""
         defines = {f"PASS_{name.upper()}": place for place, name in enumerate(passes)} | {"LIGHTS": 1}
         if "rgb" in passes:
-            defines |= self.lights.defines | dict.fromkeys(surface.defines, 1)
+            defines |= self.lights.defines | dict.fromkeys(batch.surface.defines, 1)
+        if batch.primitive is not None and list(passes) != ["rgb"]:
+            defines["ANALYTIC"] = batch.primitive[0]
         return self._programs.get("surface", defines)
 
 
@@ -96,8 +98,10 @@ class Painter:
             if own is not None:
                 self._draw_own(own, batch, rows)
                 return
-        view, program = self._view, self._brushes.built_in(batch.surface, passes)
+        view, program = self._view, self._brushes.built_in(batch, passes)
         program.write("uProjection", view.projection)
+        if batch.primitive is not None:
+            program.set("uShape", batch.primitive[1:])
         if "rgb" in passes:
             self._brushes.lights.bind(program)
             program.write("uWorldFromEye", view.view[:3, :3].T)

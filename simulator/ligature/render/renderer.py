@@ -80,6 +80,12 @@ class Renderer:
         return self._lights
 
     @property
+    def device(self) -> str:
+        """What draws, in the driver's words."""
+        with self._context:
+            return str(self._context.info["GL_RENDERER"])
+
+    @property
     def triangles(self) -> int:
         """Triangles of the whole scene, none of them culled."""
         return sum(len(batch.triangles.faces) * len(batch.pieces) for batch in self._batches)

@@ -17,7 +17,20 @@ from scipy.sparse.csgraph import connected_components
 from ligature.adf import AdfError, Resolver
 from ligature.mesh import Material, Mesh, MeshError, MeshPart, load_mesh
 from ligature.mesh.surface import joined, open_edges
-from ligature.model.scene import Colour, Hull, Plane, Scene, ShaderFiles, Shape, TriMesh, Visual
+from ligature.model.scene import (
+    Capsule,
+    Colour,
+    Cone,
+    Cylinder,
+    Hull,
+    Plane,
+    Scene,
+    ShaderFiles,
+    Shape,
+    Sphere,
+    TriMesh,
+    Visual,
+)
 from ligature.render.geometry import Triangles, flat_shaded, of_shape
 from ligature.render.surface import Surface, surface_of
 
@@ -41,6 +54,8 @@ class Piece:
     coarse: bool | None = None
     """False: fine, with a coarse alternative; True: that alternative; None: drawn at any distance."""
     shaders: ShaderFiles | None = None
+    primitive: tuple[int, float, float] | None = None
+    """Kind of an exactly drawn primitive as in ``analytic.glsl``, its radius and half height."""
 
 
 class VisualLoader:
@@ -63,7 +78,8 @@ class VisualLoader:
                 shape, surface = collider.shape, Surface(visual.colour or Colour())
                 closed = not isinstance(shape, Plane | TriMesh)
                 T = collider.T_body_shape
-                yield Piece(_key(shape), of_shape(shape), surface, owner, T, closed, None, visual.shaders)
+                exact = primitive_of(shape)
+                yield Piece(_key(shape), of_shape(shape), surface, owner, T, closed, None, visual.shaders, exact)
             return
         fine = self._mesh(visual.mesh)
         if fine is None:
@@ -140,6 +156,19 @@ def faces_outward(mesh: Mesh) -> bool:
     _, component = connected_components(joints, directed=False)
     volumes = np.einsum("ij,ij->i", vertices[a], np.cross(vertices[b], vertices[c]))
     return bool((np.bincount(component[a], weights=volumes)[np.unique(component[a])] > 0).all())
+
+
+def primitive_of(shape: Shape) -> tuple[int, float, float] | None:
+    """Kind, radius and half height of a round shape, whose depth and outline are drawn exactly."""
+    if isinstance(shape, Sphere):
+        return 1, shape.radius, shape.radius
+    if isinstance(shape, Cylinder):
+        return 2, shape.radius, shape.height / 2
+    if isinstance(shape, Capsule):
+        return 3, shape.radius, max(shape.height / 2, shape.radius)
+    if isinstance(shape, Cone):
+        return 4, shape.radius, shape.height / 2
+    return None
 
 
 def _key(shape: Shape) -> Hashable:

@@ -71,7 +71,7 @@ vec3 toneMapped(vec3 c) {
     return shownOf(clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0));
 }
 
-vec3 physical(vec3 shown, vec3 n, vec3 v) {
+vec3 physical(vec3 shown, vec3 eye, vec3 n, vec3 v) {
     vec3 base = linearOf(shown);
     float metallic = uMetallic;
     float roughness = uRoughness;
@@ -97,7 +97,7 @@ vec3 physical(vec3 shown, vec3 n, vec3 v) {
 #endif
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 l;
-        float strength = lightAt(i, vEye, n, l);
+        float strength = lightAt(i, eye, n, l);
         float nl = max(dot(n, l), 0.0);
         vec3 h = normalize(l + v);
         float nh = max(dot(n, h), 0.0), fresnel = schlick(max(dot(v, h), 0.0));

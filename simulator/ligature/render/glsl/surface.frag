@@ -15,6 +15,12 @@ uniform sampler2D uNormalMap;
 in vec4 vTangent;
 #endif
 
+#ifdef ANALYTIC
+#include "analytic.glsl"
+in vec3 vLocal;
+flat in mat3 vTurn;
+#endif
+
 in vec3 vEye;
 in vec3 vNormal;
 in vec2 vTexCoord;
@@ -60,12 +66,12 @@ vec3 shadedNormal(vec3 n) {
 #endif
 }
 
-vec3 phong(vec3 texel, vec3 n, vec3 toEye) {
+vec3 phong(vec3 texel, vec3 eye, vec3 n, vec3 toEye) {
     vec3 base = uDiffuse * texel;
     vec3 colour = (uEmission + AMBIENT_LIGHT * uAmbient) * texel;
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 toLight;
-        float strength = lightAt(i, vEye, n, toLight);
+        float strength = lightAt(i, eye, n, toLight);
         float facing = max(dot(n, toLight), 0.0);
         float shine = facing > 0.0 ? pow(max(dot(n, normalize(toLight + toEye)), 0.0), uShininess) : 0.0;
         colour += strength * (facing * base + shine * uSpecular);
@@ -76,7 +82,18 @@ vec3 phong(vec3 texel, vec3 n, vec3 toEye) {
 
 void main() {
     vec3 toEye = isPerspective() ? normalize(-vEye) : vec3(0.0, 0.0, 1.0);
+#ifdef ANALYTIC
+    float t;
+    vec3 outward;
+    if (!meet(vLocal, -toEye * vTurn, t, outward)) discard;
+    vec3 eye = vEye - t * toEye;
+    vec3 normal = normalize(vTurn * outward);
+    vec4 clip = uProjection * vec4(eye, 1.0);
+    gl_FragDepth = 0.5 + 0.5 * clip.z / clip.w;
+#else
+    vec3 eye = vEye;
     vec3 normal = normalize(vNormal);
+#endif
     if (dot(normal, toEye) < 0.0) normal = -normal;  // meshes of others are not always closed
 #ifdef PASS_RGB
 #ifdef TEXTURED
@@ -85,13 +102,13 @@ void main() {
     vec4 texel = vec4(1.0);
 #endif
 #ifdef PHYSICAL
-    fColour = vec4(physical(uDiffuse * texel.rgb, shadedNormal(normal), toEye), uAlpha * texel.a);
+    fColour = vec4(physical(uDiffuse * texel.rgb, eye, shadedNormal(normal), toEye), uAlpha * texel.a);
 #else
-    fColour = vec4(phong(texel.rgb, shadedNormal(normal), toEye), uAlpha * texel.a);
+    fColour = vec4(phong(texel.rgb, eye, shadedNormal(normal), toEye), uAlpha * texel.a);
 #endif
 #endif
 #ifdef PASS_DEPTH
-    fDepth = -vEye.z;
+    fDepth = -eye.z;
 #endif
 #ifdef PASS_IDS
     fId = vIds.x;

@@ -15,6 +15,12 @@ in ivec2 iIds;  // of the object, of the piece
 in mat4 iBefore;  // model-view-projection of the frame before
 #endif
 
+#ifdef ANALYTIC
+const float COVER = 1.02;  // facets of 32 to the circle cover the shape when they are this much larger
+out vec3 vLocal;
+flat out mat3 vTurn;
+#endif
+
 out vec3 vEye;
 out vec3 vNormal;
 out vec2 vTexCoord;
@@ -28,7 +34,14 @@ out vec4 vBefore;
 #endif
 
 void main() {
-    vec4 eye = iModelView * vec4(aPosition, 1.0);
+#ifdef ANALYTIC
+    vec3 place = aPosition * COVER;
+    vLocal = place;
+    vTurn = mat3(iModelView);
+#else
+    vec3 place = aPosition;
+#endif
+    vec4 eye = iModelView * vec4(place, 1.0);
     mat3 turn = mat3(iModelView);
     vEye = eye.xyz;
     vNormal = turn * aNormal;
@@ -40,6 +53,6 @@ void main() {
     gl_Position = uProjection * eye;
 #ifdef PASS_FLOW
     vNow = gl_Position;
-    vBefore = iBefore * vec4(aPosition, 1.0);
+    vBefore = iBefore * vec4(place, 1.0);
 #endif
 }
