@@ -7,8 +7,11 @@ from pathlib import Path
 import ligature
 import numpy as np
 import pytest
+from ligature import Simulation
+from ligature.model.commands import ArmCommand, BodyCommand, CommandType
+from ligature.model.frames import inverse, pose7_matrix, rpy_matrix
 from ligature.model.scene import ArmKind
-from ligature.simulation import Simulation
+from ligature.robots.arm import Arm
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENE = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -17,6 +20,7 @@ STEADY = np.deg2rad(0.1), 1e-4
 """Radians and metres of steady error without load."""
 
 OVERSHOOT = 0.02
+READY = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
@@ -164,3 +168,155 @@ def test_equal_commands_give_equal_hashes(scene):
         hashes.append(sim.state_hash())
         sim.close()
     assert hashes[0] == hashes[1]
+
+
+@pytest.fixture
+def whole() -> Simulation:
+    """The whole scene, with what the arms work on."""
+    return Simulation(ligature.load(SCENE))
+
+
+@pytest.fixture
+def psm(whole: Simulation) -> Arm:
+    """PSM1 of the whole scene, enabled, homed and idle."""
+    return placed(whole, "PSM1")
+
+
+def placed(sim: Simulation, name: str) -> Arm:
+    """An arm in its home pose without the way there."""
+    arm = sim.arms[name]
+    arm.place_jp(READY[: arm.joints.n])
+    arm.adopt()
+    return arm
+
+
+def tip_of_bodies(sim: Simulation, arm: Arm) -> np.ndarray:
+    """Pose (4, 4) of the tool in the base by the bodies' own poses (interface reference §6.2)."""
+    (description,) = [a for a in sim.scene.arms if a.name == arm.name]
+    base, tip = (pose7_matrix(sim.state["body_pose"][0, b]) for b in (description.base, description.tip))
+    T = inverse(base) @ tip
+    T[:3, :3] = T[:3, :3] @ rpy_matrix(-np.pi / 2, 0, -np.pi / 2).T
+    return T
+
+
+@pytest.mark.parametrize("q", [READY, [0.3, -0.2, 0.15, 1.0, 0.4, -0.6], [-0.5, 0.3, 0.2, -2.0, -0.8, 0.7]])
+def test_the_kinematics_are_those_of_the_bodies(whole: Simulation, psm: Arm, q: list[float]) -> None:
+    psm.servo_jp(q)
+    whole.step(500)
+    assert pose7_matrix(psm.local_measured_cp()) == pytest.approx(tip_of_bodies(whole, psm), abs=1e-6)
+
+
+@pytest.mark.corpus
+def test_the_kinematics_are_those_of_a_labs_bodies_as_well_as_its_file_has_them(corpus: Path) -> None:
+    sim = Simulation(ligature.load(corpus / "suturing_scene" / "launch.yaml", models=[10, 11, 6, 7, 8, 9]))
+    for name in ("PSM1", "PSM2"):
+        arm = placed(sim, name)
+        sim.step(2)
+        error = pose7_matrix(arm.local_measured_cp()) - tip_of_bodies(sim, arm)
+        assert np.abs(error[:3, 3]).max() < 1e-4
+        assert np.abs(error[:3, :3]).max() < 1e-3
+
+
+def test_a_moving_set_point_is_followed_within_milliseconds(whole: Simulation, psm: Arm) -> None:
+    worst = 0.0
+    for k in range(1000):
+        psm.servo_jp(READY + 0.2 * np.sin(2 * np.pi * 0.5 * k * 1e-3) * np.array([1, 1, 0, 1, 1, 1]))
+        whole.step()
+        worst = max(worst, float(np.abs(psm.measured_js().position - psm.setpoint_js().position).max()))
+    fastest = 0.2 * 2 * np.pi * 0.5
+    assert worst < fastest * 0.012
+
+
+def test_joint_commands_of_others_have_no_effect_while_the_arm_is_enabled(whole: Simulation, psm: Arm) -> None:
+    base = whole.scene.arms[0].base
+    command = BodyCommand(base, CommandType.FORCE, (0.0,) * 6, (CommandType.POSITION,) * 6, (0.5,) * 6)
+    whole.apply(command)
+    whole.step(300)
+    assert psm.measured_js().position == pytest.approx(READY, abs=1e-6)
+    assert any("have no effect: its arm is enabled" in str(problem) for problem in whole.problems)
+    psm.disable()
+    whole.apply(command)
+    whole.step(1500)
+    assert psm.measured_js().position[0] == pytest.approx(0.5, abs=0.01)
+
+
+def test_homing_goes_to_the_home_pose(whole: Simulation) -> None:
+    arm = whole.arms["PSM1"]
+    arm.home()
+    whole.step(2200)
+    assert arm.is_homed and not arm.is_busy
+    assert arm.measured_js().position == pytest.approx(READY, abs=1e-5)
+
+
+def test_a_disabled_arm_is_limp_and_reports_where_it_is(whole: Simulation, psm: Arm) -> None:
+    psm.disable()
+    (description,) = [a for a in whole.scene.arms if a.name == "PSM1"]
+    tip = whole.bodies[whole.scene.bodies[description.tip].identity.topic]
+    tip.command_wrench([5.0, 0, 0, 0, 0, 0])
+    whole.step(200)
+    assert np.abs(psm.measured_js().position - READY).max() > 1e-2
+    assert psm.setpoint_js().position == pytest.approx(psm.measured_js().position)
+
+
+def test_a_closing_jaw_presses_by_how_far_it_was_told_to_close(whole: Simulation, psm: Arm) -> None:
+    psm.jaw.servo_jp([0.0])
+    whole.step(300)
+    loose = psm.jaw.measured_js()
+    assert loose.position == pytest.approx([0.0], abs=5e-3)
+    psm.jaw.close()
+    whole.step(600)
+    pressed = psm.jaw.measured_js()
+    assert pressed.position == pytest.approx([0.0], abs=0.02)
+    assert pressed.effort[0] == pytest.approx(-0.5 * np.deg2rad(20) / 2, abs=0.01)
+
+
+def test_the_ecm_moves_the_cameras_about_its_remote_centre(whole: Simulation) -> None:
+    ecm = placed(whole, "ECM")
+    frame = whole.bodies["BODY CameraFrame"]
+    start, local = frame.pose, pose7_matrix(ecm.local_measured_cp())
+    ecm.move_jp([0.1, -0.1, 0.14, 0.2])
+    while ecm.is_busy:
+        whole.step(10)
+    moved = inverse(local) @ pose7_matrix(ecm.local_measured_cp())
+    flip = np.diag([1.0, -1.0, -1.0, 1.0])
+    assert pose7_matrix(frame.pose) == pytest.approx(pose7_matrix(start) @ flip @ moved @ flip, abs=1e-9)
+
+
+def test_a_reset_ends_moves_and_arms_stay_where_it_puts_them(whole: Simulation, psm: Arm) -> None:
+    psm.move_jp([0.5, 0.1, 0.15, 0, 0, 0])
+    whole.step(300)
+    whole.reset()
+    assert not psm.is_busy
+    whole.step(200)
+    assert psm.measured_js().position == pytest.approx(np.zeros(6), abs=1e-5)
+    assert psm.is_enabled and psm.is_homed
+
+
+def test_commands_that_travelled_do_what_calls_do_and_refusals_become_warnings(whole: Simulation, psm: Arm) -> None:
+    psm.events.clear()
+    whole.apply(ArmCommand(0, "move_jp", (0.1, 0, 0.12, 0, 0, 0)))
+    assert psm.is_busy
+    whole.apply(ArmCommand(0, "move_jp", (0.1,) * 4))
+    told = [(event.name, event.value) for event in psm.events]
+    assert ("goal_reached", False) in told
+    assert any(name == "warning" and "move_jp takes 6 numbers" in value for name, value in told)
+    with pytest.raises(ValueError, match="finite"):
+        whole.apply(ArmCommand(0, "servo_jp", (float("nan"),) * 6))
+
+
+def test_a_snapshot_in_the_middle_of_moves_continues_bit_for_bit(whole: Simulation, psm: Arm) -> None:
+    other = whole.arms["MTML"]
+    other.enable()
+    psm.move_jp([0.5, 0.1, 0.15, 0.5, 0.2, 0.1])
+    whole.step(150)
+    snapshot = whole.snapshot()
+    whole.step(400)
+    first = whole.state_hash()
+    whole.restore(snapshot)
+    whole.step(400)
+    assert whole.state_hash() == first
+
+
+def test_an_unknown_arm_is_named_with_the_known_ones(whole: Simulation) -> None:
+    with pytest.raises(KeyError, match="no arm is called 'PSM3'; there are PSM1, PSM2, ECM, MTML, MTMR"):
+        whole.arms["PSM3"]

@@ -210,8 +210,8 @@ class World(BulletQueries):
     # --- health, reset, snapshots -----------------------------------------------------------
 
     def heal(self) -> list[Diagnostic]:
-        """Put trees that diverged back to where the scene starts, and say so."""
-        found: list[Diagnostic] = []
+        """Put trees that diverged back to where the scene starts; what was found since the last call."""
+        found, self.problems = self.problems, []
         self._motions.everything()
         if self._motions.slower_than(MAX_SPEED):
             return found
