@@ -70,6 +70,11 @@ class Painter:
         self._context, self._brushes, self._seen, self._view = context, brushes, seen, view
         self._calls = [(batch, rows) for batch in batches if len(rows := seen.rows(batch))]
 
+    @property
+    def triangles(self) -> int:
+        """Triangles of all that is seen."""
+        return sum(len(batch.triangles.faces) * len(rows) for batch, rows in self._calls)
+
     def needs_colour_apart(self, shaders: ShaderFiles | None) -> bool:
         """Whether colour cannot be written together with the rest: by blending, or by scene files' programs."""
         own = self._brushes.own

@@ -68,7 +68,8 @@ class Renderer:
         rods = self._rod_pieces(loader)
         self._batches, ordered = self._batched(pieces, rods)
         self._instances = Instances(ordered)
-        self._before: dict[Hashable, Array] = {}
+        self.drawn_triangles = 0
+        """Triangles of the last picture, what lies outside it and what is drawn coarsely taken off."""
         self.problems: list[AdfError] = loader.problems
         resolver = Resolver(scene.roots) if scene.roots else None
         self._brushes = Brushes(self._context, self._programs, self._textures, self._lights, resolver, self.problems)
@@ -115,6 +116,7 @@ class Renderer:
             self._cast_shadows(seen, view)
         target.clear(BACKGROUND)
         painter = Painter(self._context, self._brushes, self._batches, seen, view)
+        self.drawn_triangles = painter.triangles
         if self._samples or painter.needs_colour_apart(shaders):
             if target.colour is not None:
                 painter.paint(target.colour, ["rgb"], shaders)
