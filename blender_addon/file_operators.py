@@ -4,6 +4,7 @@ from pathlib import Path
 
 import bpy
 
+from .launch_file import export_scene, import_launch
 from .ligature.adf import AdfError
 from .read_file import import_file
 from .write_file import ExportError, after_export, export_file
@@ -95,6 +96,71 @@ class ADF_OT_export(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ADF_OT_import_launch(bpy.types.Operator):
+    """Open a launch file with its world and all its models"""
+
+    bl_idname = "adf.import_launch"
+    bl_label = "Import ADF Launch File"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.yaml", options={"HIDDEN"})
+    indices: bpy.props.StringProperty(
+        name="Models", description="Indices of the models to open, such as 10,11,6; all when empty"
+    )
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        try:
+            chosen = tuple(int(word) for word in self.indices.replace(",", " ").split()) or None
+            done = import_launch(Path(bpy.path.abspath(self.filepath)), context.scene, chosen)
+        except ValueError:
+            self.report({"ERROR"}, f"'{self.indices}' are not indices; write them as 10,11,6")
+            return {"CANCELLED"}
+        except (AdfError, OSError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for problem in [problem for one in done for problem in one.problems][:20]:
+            self.report({"WARNING"}, problem)
+        self.report({"INFO"}, f"{len(done)} files opened")
+        return {"FINISHED"}
+
+
+class ADF_OT_export_scene(bpy.types.Operator):
+    """Write the launch file with its world and models"""
+
+    bl_idname = "adf.export_scene"
+    bl_label = "Export ADF Scene"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.yaml", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        if not len(context.scene.adf.models):
+            cls.poll_message_set("The scene has no model; open a launch file or make a model")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        self.filepath = context.scene.adf.filepath or "launch.yaml"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        try:
+            written = export_scene(context.scene, Path(bpy.path.abspath(self.filepath or context.scene.adf.filepath)))
+        except ExportError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{len(written)} files written")
+        return {"FINISHED"}
+
+
 def chosen_collection(context, name=""):
     """The collection of that name, else the active one or the one around the active object that is a file."""
     if name:
@@ -111,13 +177,15 @@ def chosen_collection(context, name=""):
 
 def _import_entry(self, context):
     self.layout.operator(ADF_OT_import.bl_idname, text="AMBF Description Format (.yaml)")
+    self.layout.operator(ADF_OT_import_launch.bl_idname, text="AMBF Launch File (.yaml)")
 
 
 def _export_entry(self, context):
     self.layout.operator(ADF_OT_export.bl_idname, text="AMBF Description Format (.yaml)")
+    self.layout.operator(ADF_OT_export_scene.bl_idname, text="AMBF Launch File with All Models (.yaml)")
 
 
-CLASSES = (ADF_OT_import, ADF_OT_export)
+CLASSES = (ADF_OT_import, ADF_OT_export, ADF_OT_import_launch, ADF_OT_export_scene)
 
 
 def attach() -> None:

@@ -14,15 +14,17 @@ import numpy as np
 from mathutils import Matrix
 
 from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any
+from .ligature.adf.reader import read_text
 from .ligature.adf.references import find_by_text, merged
-from .ligature.adf.update import given_values
+from .ligature.adf.update import Item, given_values, new_text
+from .ligature.authoring.generate import Parts
 from .ligature.authoring.placement import matrix_of
 from .ligature.authoring.shapes import Shape, shape_mesh
 from .ligature.mesh import Mesh, MeshError, load_mesh
 from .mesh_data import MeshMaker, mesh_print, shape_data
 from .placing import SHAPED, attach, place, place_joint, place_light, place_view, state_of
 from .properties import ROLE_OF_KIND
-from .schema_properties import identifier, state_text, store
+from .schema_properties import fetch, identifier, state_text, store
 
 EMPTY_LOOK = {"joint": "SINGLE_ARROW", "sensor": "CONE", "actuator": "SPHERE", "suture": "SINGLE_ARROW"}
 SHAPE_COLOUR = {"COLLISION": (0.95, 0.75, 0.1, 0.35), "VISUAL": (0.7, 0.7, 0.7, 1.0)}
@@ -56,10 +58,45 @@ def import_file(path: Path, scene: bpy.types.Scene, roots: tuple[Path, ...] = ()
     return done
 
 
+def add_parts(collection: bpy.types.Collection, parts: Parts) -> list[bpy.types.Object]:
+    """Make generated objects in the collection of a file; they are written with its next export."""
+    kind = {"MODEL": "model", "WORLD": "world"}[collection.adf.kind]
+    folder = Path(collection.adf.filepath or "new.yaml").resolve().parent
+    group = getattr(collection.adf, identifier(kind))
+    top = fetch(group, kind)
+    document = read_text(new_text(kind, top, _with_free_keys(collection, parts.items)), folder / "generated.yaml", kind)
+    importer = _Importer(document, Resolver([folder]), Import(collection, document))
+    importer.given_meshes = dict(parts.meshes)
+    made = importer.make()
+    for obj in made:
+        obj.adf.was = ""
+    return made
+
+
+def _with_free_keys(collection: bpy.types.Collection, items: tuple[Item, ...]) -> list[Item]:
+    """The items under identifiers that the file does not have yet, references among them changed too."""
+    taken = {obj.adf.key for obj in collection.all_objects}
+    new: dict[str, str] = {}
+    for item in items:
+        number = 1
+        key = item.key
+        while key in taken or key in new.values():
+            key, number = f"{item.key} {number}", number + 1
+        new[item.key] = key
+    changed = []
+    for item in items:
+        values = {path: new.get(v, v) if path in ("parent", "child") else v for path, v in item.values.items()}
+        if new[item.key] != item.key:
+            values["name"] = f"{values.get('name', '')}{new[item.key][len(item.key) :]}".replace(" ", "_")
+        changed.append(Item(item.kind, new[item.key], values))
+    return changed
+
+
 class _Importer:
     """Makes the objects of one document."""
 
     def __init__(self, document: Document, resolver: Resolver, done: Import) -> None:
+        self.given_meshes: dict[str, Mesh] = {}
         self.document, self.resolver, self.done = document, resolver, done
         self.collection = done.collection
         self.folder = document.path.parent
@@ -71,6 +108,16 @@ class _Importer:
         self.shape_collection: bpy.types.Collection | None = None
 
     def run(self) -> None:
+        """Make everything, and remember how it stood."""
+        made = self.make()
+        for obj in made:
+            obj.adf.imported = state_text(state_of(obj))
+            if obj.adf.role in SHAPED:
+                obj.adf.mesh_print = mesh_print(obj)
+        self.collection.adf.imported_keys = json.dumps([obj.adf.key for obj in made])
+
+    def make(self) -> list[bpy.types.Object]:
+        """Make the objects, bodies first, since others hang on them."""
         elements = {e.key: e for listed in self.document.lists.values() for e in listed}
         bodies_first = sorted(elements.values(), key=lambda e: (e.kind != "body", e.kind == "joint"))
         for element in bodies_first:
@@ -82,12 +129,7 @@ class _Importer:
                 self._make_joint(element)
             elif element.kind != "body":
                 self._hang(element)
-        for key in elements:
-            obj = self.objects[key]
-            obj.adf.imported = state_text(state_of(obj))
-            if obj.adf.role in SHAPED:
-                obj.adf.mesh_print = mesh_print(obj)
-        self.collection.adf.imported_keys = json.dumps(list(elements))
+        return [self.objects[key] for key in elements]
 
     def _new(self, name: str, data: bpy.types.ID | None, role: str, shapes: bool = False) -> bpy.types.Object:
         obj = bpy.data.objects.new(name, data)
@@ -147,8 +189,8 @@ class _Importer:
 
     def _mesh_file(self, element: Element, name: str, path_key: str) -> Mesh | None:
         """A mesh file of the element, from the folder that its own or the file's path names."""
-        if not name:
-            return None
+        if not name or name in self.given_meshes:
+            return self.given_meshes.get(name)
         folder = f"{self.document.top.text(path_key)}/{element.text(path_key)}"
         try:
             path = self.resolver.resolve(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import file_operators, properties, schema_properties
+from . import file_operators, generator_operators, object_operators, properties, schema_properties
 
-MODULES = (file_operators,)
+MODULES = (file_operators, object_operators, generator_operators)
 
 
 def register() -> None:

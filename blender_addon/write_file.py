@@ -23,7 +23,7 @@ from .ligature.authoring.save import SaveError, checked_text, save_all
 from .mesh_data import Textures, mesh_print, surfaces_of
 from .placing import SHAPED, children_with, placed_keys, state_of
 from .properties import KIND_OF_ROLE
-from .schema_properties import PLACED, fetch, identifier, keys_of, state_text
+from .schema_properties import PLACED, fetch, identifier, keys_of, state_text, store
 
 HIGH, LOW = "high resolution path", "low resolution path"
 
@@ -69,7 +69,7 @@ def text_of(collection: bpy.types.Collection, meshes: dict[str, dict] | None = N
     if root is None:
         top = {**top, **_default_paths(kind, top, objects)}
         return new_text(kind, top, items)
-    top = {**_unheld(kind, root), **top}
+    top = {**unheld_top(kind, stored.source), **top}
     kept = {obj.adf.was for obj in objects}
     removed = [key for key in json.loads(stored.imported_keys or "[]") if key not in kept]
     return updated(stored.source, kind, top, items, removed)
@@ -80,6 +80,13 @@ def after_export(collection: bpy.types.Collection, path: Path, text: str) -> Non
     stored = collection.adf
     stored.filepath, stored.source = str(path), text
     objects = members(collection)
+    if stored.kind == "OTHER":
+        return
+    root, kind = parse(text, path), _file_kind(stored.kind)
+    store(getattr(stored, identifier(kind)), kind, _top_values(kind, root))  # folders and file names that were chosen
+    for obj in objects:
+        own, node = KIND_OF_ROLE[obj.adf.role], root.get(obj.adf.key)
+        store(getattr(obj.adf, identifier(own)), own, given_values(Element(own, obj.adf.key, node)))
     stored.imported_keys = json.dumps([obj.adf.key for obj in objects])
     for obj in objects:
         obj.adf.was = obj.adf.key
@@ -138,11 +145,16 @@ def _unheld_paths(kind: str) -> list[str]:
     ]
 
 
-def _unheld(kind: str, root: Mapping) -> dict:
+def unheld_top(kind: str, source: str) -> dict:
+    """The file's own keys that neither properties nor the scene hold: they stay as they are."""
+    values = _top_values(kind, parse(source, Path()))
+    return {path: values[path] for path in _unheld_paths(kind) if path in values}
+
+
+def _top_values(kind: str, root: Mapping) -> dict:
     own = Mapping(root.mark, root.span, entries={n: e for n, e in root.entries.items() if n in BY_PATH[kind]})
     own.uses = root.uses
-    values = given_values(Element(kind, kind, own))
-    return {path: values[path] for path in _unheld_paths(kind) if path in values}
+    return given_values(Element(kind, kind, own))
 
 
 def _default_paths(kind: str, top: dict, objects: list[bpy.types.Object]) -> dict:

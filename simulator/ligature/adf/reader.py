@@ -102,6 +102,11 @@ def kind_of(root: Mapping) -> str:
     return "model"
 
 
+def read_text(text: str, path: Path, kind: str) -> Document:
+    """A world, model or input-devices file of ``kind`` from its text; ``path`` is where it would be."""
+    return _document(_Source(path, text, parse(text, path)), kind, strict=False)
+
+
 @dataclass(frozen=True)
 class _Source:
     """A file that was read and parsed."""
