@@ -10,8 +10,8 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
-from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, Release, Reset
-from ligature.model.frames import pose7_matrix
+from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, ParentCommand, Release, Reset
+from ligature.model.frames import matrix_pose7, pose7_matrix
 
 SMALL = Path(__file__).resolve().parents[1] / "scenes" / "suturing_small" / "launch.yaml"
 GOAL = [0.1, -0.1, 0.12, 0.3, 0.2, -0.2, 0.4, 0.4]
@@ -114,6 +114,19 @@ def test_a_snapshot_continues_with_the_same_bits(sim: Simulation) -> None:
     other.restore(snapshot)
     other.step(500)
     assert other.state_hash() == expected
+
+
+def test_a_camera_that_gets_another_parent_rides_on_it_and_snapshots_know(sim: Simulation) -> None:
+    camera, needle = sim.cameras["cameraL"], sim.bodies["Needle"]
+    before, local = sim.snapshot(), sim.state["camera_pose"][0, 0].copy()
+    sim.apply(ParentCommand("camera", 0, needle.body.index))
+    sim.step(50)
+    assert (sim.state["camera_pose"][0, 0] == local).all()
+    expected = matrix_pose7(pose7_matrix(needle.pose) @ pose7_matrix(local))
+    assert np.allclose(camera.pose[:3], expected[:3]) and abs(camera.pose[3:] @ expected[3:]) == pytest.approx(1)
+    sim.restore(before)
+    sim.step(50)
+    assert np.linalg.norm(camera.pose[:3] - needle.pose[:3]) > 0.01
 
 
 def test_a_reset_puts_everything_back_and_time_goes_on(sim: Simulation) -> None:

@@ -25,6 +25,7 @@ from ligature.model.commands import (
     BodyCommand,
     Command,
     CommandType,
+    ParentCommand,
     PlaceCommand,
     Release,
     Reset,
@@ -261,6 +262,8 @@ class Simulation:
                 self.problems.append(problem)
         elif isinstance(command, PlaceCommand):
             self._attachments.place(command.kind, command.index, command.pose)
+        elif isinstance(command, ParentCommand):
+            self._attachments.adopt(command.kind, command.index, command.parent)
         elif isinstance(command, ArmCommand):
             self.arms.apply(command)
         elif isinstance(command, Release):
@@ -301,7 +304,7 @@ class Simulation:
             "resets": self._resets,
             "world": self._world.snapshot(),
             "rods": self._rods.memory(),
-            "local": self._attachments.local.copy(),
+            "attachments": self._attachments.memory(),
             "arms": self.arms.memory(),
         }
         self._write_state()
@@ -313,7 +316,7 @@ class Simulation:
         self._tick, self._resets = parts["tick"], parts["resets"]
         self._world.restore(parts["world"])
         self._rods.recall(parts["rods"])
-        self._attachments.local[:] = parts["local"]
+        self._attachments.recall(parts["attachments"])
         self.arms.recall(parts["arms"])
         self._write_state()
 

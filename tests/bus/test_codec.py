@@ -7,7 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ligature.bus.codec import CodecError, Message, decode, encode
 from ligature.bus.pacing import Throttle
-from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, PlaceCommand, Release, Reset
+from ligature.model.commands import (
+    ActuatorCommand,
+    BodyCommand,
+    CommandType,
+    ParentCommand,
+    PlaceCommand,
+    Release,
+    Reset,
+)
 
 NUMBER = st.floats(allow_nan=False)
 POSE = st.tuples(*[NUMBER] * 7)
@@ -21,6 +29,7 @@ MESSAGES = st.one_of(
         st.none() | st.text(max_size=40),
     ),
     st.builds(PlaceCommand, st.sampled_from(["camera", "light"]), st.integers(0, 99), st.none() | POSE),
+    st.builds(ParentCommand, st.sampled_from(["camera", "light"]), st.integers(0, 99), st.none() | st.integers(0, 99)),
     st.builds(Release, st.sampled_from(["body", "actuator", "camera"]), st.integers(0, 99)),
     st.builds(Reset, st.booleans()),
     st.builds(Throttle, st.booleans(), st.booleans(), st.integers(0, 255)),

@@ -9,7 +9,7 @@ import pytest
 from ligature.bus import Mailbox, Throttle
 from ligature.bus.codec import encode
 from ligature.bus.ring import RING_BYTES, SLOTS, Ring
-from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, Release, Reset
+from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, ParentCommand, Release, Reset
 from ligature.model.scene import Scene
 
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -67,6 +67,13 @@ def test_an_object_that_is_not_there_is_rejected(scene: Scene, ring: Ring) -> No
     push(ring, force(len(scene.bodies), 1.0))
     assert box.take() == []
     assert f"there is no body number {len(scene.bodies)}" in box.last_rejection
+
+
+def test_a_parent_that_is_not_there_is_rejected(scene: Scene, ring: Ring) -> None:
+    box = Mailbox(scene, {"ros": ring})
+    push(ring, ParentCommand("camera", 0, len(scene.bodies)), ParentCommand("camera", 0, None))
+    assert box.take() == [ParentCommand("camera", 0, None)]
+    assert box.last_rejection == f"there is no body number {len(scene.bodies)} to hang a camera on"
 
 
 def test_bytes_that_are_no_command_are_rejected(scene: Scene, ring: Ring) -> None:

@@ -32,7 +32,7 @@ def test_a_lens_shows_known_points_where_its_coefficients_say(simulate: Make, le
         x, y, z = optical(simulation, "C", point)
         ray = distort(np.array([x / z, y / z]), lens)
         u, v, _ = calibration.K @ [*ray, 1.0]
-        assert np.abs(seen(simulation, "C", bead, **how) - (u, v)).max() < 0.25
+        assert np.abs(seen(simulation, "C", bead, **how) - (u, v)).max() < 0.2
 
 
 def test_a_lens_leaves_no_corner_empty(simulate: Make) -> None:

@@ -61,7 +61,12 @@ class Program:
         for line in listing.splitlines()[1:]:
             pid, parent, args = line.split(None, 2)
             if int(parent) == self.process.pid:
-                for name in ("ligature.cli.physics", "ligature.cli.ros_process", "rosmaster"):
+                for name in (
+                    "ligature.cli.physics",
+                    "ligature.cli.ros_process",
+                    "ligature.cli.render_process",
+                    "rosmaster",
+                ):
                     if name in args:
                         found[name.rpartition(".")[2]] = int(pid)
         return found

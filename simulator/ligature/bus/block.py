@@ -47,9 +47,15 @@ FIGURES = np.dtype(
         ("published", "u8"),
         ("publish_late", "u8"),
         ("malformed", "u8"),
+        ("frames", "u8"),
+        ("frames_dropped", "u8"),
+        ("frame_seconds", "f8"),
     ]
 )
-"""Figures of the running loop; times in seconds, ``physics_beat`` on the monotonic clock."""
+"""Figures of the running loop; times in seconds, ``physics_beat`` on the monotonic clock.
+
+``frames`` are pictures drawn for clients, ``frame_seconds`` is how long the last round of them took.
+"""
 
 _STATE_AT = 4096
 RETRIES = 1000

@@ -12,6 +12,7 @@ from ligature.model.commands import (
     BodyCommand,
     Command,
     CommandType,
+    ParentCommand,
     PlaceCommand,
     Release,
     Reset,
@@ -47,6 +48,9 @@ def encode(message: Message) -> bytes:
     if isinstance(message, PlaceCommand):
         pose = message.pose or ()
         return struct.pack(f"<BBiB{len(pose)}d", 3, _KINDS.index(message.kind), message.index, len(pose), *pose)
+    if isinstance(message, ParentCommand):
+        parent = -1 if message.parent is None else message.parent
+        return struct.pack("<BBii", 8, _KINDS.index(message.kind), message.index, parent)
     if isinstance(message, ArmCommand):
         return _arm(message)
     if isinstance(message, Release):
@@ -123,4 +127,7 @@ def _decode(data: bytes) -> Message:
         _, arm, verb, n = struct.unpack_from("<BiBB", data)
         values, at = struct.unpack_from(f"<{n}d", data, 7), 7 + 8 * n
         return ArmCommand(arm, VERBS[verb], values, data[at + 1 : at + 1 + data[at]].decode("utf-8"))
+    if kind == 8:
+        _, what, index, parent = struct.unpack_from("<BBii", data)
+        return ParentCommand(_KINDS[what], index, parent if parent != -1 else None)
     raise ValueError(f"unknown kind {kind}")

@@ -14,7 +14,7 @@ from ligature.bus.codec import CodecError, Message, decode
 from ligature.bus.newest import Newest, object_of
 from ligature.bus.pacing import Throttle
 from ligature.bus.ring import Ring
-from ligature.model.commands import Release, check
+from ligature.model.commands import ParentCommand, Release, check
 from ligature.model.scene import Scene
 
 SILENCE = 0.5
@@ -81,3 +81,5 @@ class Mailbox:
         item = object_of(message)
         if item is not None and not 0 <= item[1] < self._limits.get(item[0], 0):
             raise ValueError(f"there is no {item[0]} number {item[1]}")
+        if isinstance(message, ParentCommand) and not 0 <= (message.parent or 0) < self._limits["body"]:
+            raise ValueError(f"there is no body number {message.parent} to hang a {message.kind} on")

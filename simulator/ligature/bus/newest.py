@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from ligature.bus.codec import Message
-from ligature.model.commands import STREAMED, ActuatorCommand, ArmCommand, BodyCommand, PlaceCommand, Release
+from ligature.model.commands import (
+    STREAMED,
+    ActuatorCommand,
+    ArmCommand,
+    BodyCommand,
+    ParentCommand,
+    PlaceCommand,
+    Release,
+)
 
 
 def object_of(message: Message) -> tuple[str, int] | None:
@@ -16,7 +24,7 @@ def object_of(message: Message) -> tuple[str, int] | None:
         return "actuator", message.actuator
     if isinstance(message, ArmCommand):
         return "arm", message.arm
-    if isinstance(message, PlaceCommand | Release):
+    if isinstance(message, PlaceCommand | ParentCommand | Release):
         return message.kind, message.index
     return None
 
@@ -32,7 +40,7 @@ def _slot(message: Message) -> Hashable | None:
         return item, message.actuate
     if isinstance(message, ArmCommand):
         return (item, message.verb) if message.verb in STREAMED else None
-    return item
+    return (item, "parent") if isinstance(message, ParentCommand) else item
 
 
 class Newest:

@@ -37,6 +37,10 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
     flags.add_argument("--override_min_comm_freq", type=int, help="publishing rate without commands")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
+    flags.add_argument(
+        "--cameras", action=argparse.BooleanOptionalAction,
+        help="publish pictures of all cameras, or of none; else as the scene says (not an AMBF flag)",
+    )  # fmt: skip
     flags.add_argument("--root", action="append", default=[], help="further folder of scene files (not an AMBF flag)")
     for words, what in _WITHOUT_EFFECT.items():
         flags.add_argument(*words, dest=words[0].lstrip("-"), help=f"{what}; accepted, without effect")
@@ -61,7 +65,7 @@ def options_of(arguments: list[str]) -> RunOptions:
     return RunOptions(
         given.launch_file, models, tuple(f for f in (given.a or "").split(",") if f), tuple(given.root), given.ns,
         min(given.p, FASTEST), given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
-        names=given.names, notes=_notes(given),
+        names=given.names, cameras=given.cameras, notes=_notes(given),
     )  # fmt: skip
 
 

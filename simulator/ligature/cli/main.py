@@ -48,13 +48,19 @@ def run(
     names: Annotated[
         str, typer.Option(help="Name policy: ambf, or src for the suturing challenge's scripts.")
     ] = "ambf",
+    cameras: Annotated[
+        Optional[bool],  # noqa: UP045
+        typer.Option(
+            "--cameras/--no-cameras", help="Publish pictures of all cameras, or of none; else as the scene says."
+        ),
+    ] = None,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
         raise typer.BadParameter("--names is 'ambf' or 'src'")
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
-        min_hz=min_hz, max_hz=max_hz, names=names, notes=rate_notes(rate),
+        min_hz=min_hz, max_hz=max_hz, names=names, cameras=cameras, notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
 

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 
 import ligature
-from ligature.model.scene import Scene
+from ligature.model.scene import Camera, Scene
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,9 @@ class RunOptions:
 
     ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second,
     ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
-    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy, ``notes`` are
-    lines to tell the user at the start.
+    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy, ``cameras`` says
+    whether pictures are published (None: of the cameras for which the scene says so), ``notes`` are lines to
+    tell the user at the start.
     """
 
     scene: str
@@ -30,11 +31,18 @@ class RunOptions:
     min_hz: int | None = None
     max_hz: int | None = None
     names: str = "ambf"
+    cameras: bool | None = None
     notes: tuple[str, ...] = ()
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
         return ligature.load(self.scene, self.models, self.files, self.roots, self.prefix)
+
+    def shown_cameras(self, scene: Scene) -> tuple[Camera, ...]:
+        """The cameras whose pictures are published."""
+        if self.cameras is None:
+            return tuple(c for c in scene.cameras if (c.publish_image or c.publish_depth) and not c.identity.passive)
+        return scene.cameras if self.cameras else ()
 
     def to_text(self) -> str:
         """One line for the command line of a process."""

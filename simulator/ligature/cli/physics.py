@@ -55,6 +55,8 @@ def main() -> None:
         loop = Loop(simulation, block, options)
         simulation.step(simulation.ticks_per_update)
         loop.publish()
+        if options.shown_cameras(scene):
+            tell("cameras")
         gc.collect()
         gc.freeze()
         gc.disable()

@@ -122,6 +122,12 @@ class Supervisor:
                 "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
             )
 
+    def _start_cameras(self) -> None:
+        """Start the process that draws; without a ROS master there is nobody to draw for."""
+        if "ros" in self._children:
+            command = [sys.executable, "-m", "ligature.cli.render_process", self._options.to_text()]
+            self._children["render"] = Child("render", command, self._events, self._env)
+
     def _master_ready(self) -> bool:
         """Whether a ROS master answers, after one was started where there was none."""
         uri = self._env["ROS_MASTER_URI"] = self._env.get("ROS_MASTER_URI") or master.DEFAULT_MASTER
@@ -147,6 +153,8 @@ class Supervisor:
         if event == "ready":
             self._say(f"{process} ready: {text}")
             self._progress.update("connecting to ROS")
+        elif event == "cameras":
+            self._start_cameras()
         elif event == "first-state":
             self._progress.stop()
             if not self._published:
@@ -170,8 +178,13 @@ class Supervisor:
         if process == "physics":
             self._fail(f"the physics process ended with status {status}; the run is over")
             return
+        if process == "render" and status == 0:
+            return
         lived = time.monotonic() - child.started
         child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_DEATH else 0
+        if child.quick_deaths > MAX_QUICK_DEATHS and process == "render":
+            self._say(f"[yellow]the render process dies again and again (status {status}): no more pictures[/yellow]")
+            return
         if child.quick_deaths > MAX_QUICK_DEATHS:
             self._fail(f"the {process} process dies again and again (status {status})")
             return
@@ -188,7 +201,7 @@ class Supervisor:
         self._stop = True
         self._progress.stop()
         deadline = time.monotonic() + END_PATIENCE
-        order = [self._children[n] for n in ("ros", "physics", "master") if n in self._children]
+        order = [self._children[n] for n in ("render", "ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
             if child.process.poll() is None:
                 child.process.terminate()

@@ -76,6 +76,15 @@ VERBS = (*STREAMED, *ORDERED)
 
 
 @dataclass(frozen=True)
+class ParentCommand:
+    """Hang a camera or a light (``kind``) on body ``parent``, None for the world; its pose there stays what it was."""
+
+    kind: str
+    index: int
+    parent: int | None
+
+
+@dataclass(frozen=True)
 class ArmCommand:
     """One CRTK command to an arm (interface reference §5.4); ``verb`` is the topic's name below the arm's.
 
@@ -104,7 +113,7 @@ class Reset:
     bodies_only: bool = False
 
 
-Command = BodyCommand | ActuatorCommand | PlaceCommand | ArmCommand | Release | Reset
+Command = BodyCommand | ActuatorCommand | PlaceCommand | ParentCommand | ArmCommand | Release | Reset
 
 
 LARGEST = 1e9

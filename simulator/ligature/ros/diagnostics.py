@@ -45,6 +45,9 @@ class Diagnostics:
             "messages published": str(figures["published"]),
             "publications dropped": str(figures["publish_late"]),
             "messages missed by slow clients": str(self.missed),
+            "camera frames drawn": str(figures["frames"]),
+            "camera frames dropped": str(figures["frames_dropped"]),
+            "camera frame time (ms)": f"{1e3 * figures['frame_seconds']:.1f}",
         }
         status.values = [KeyValue(key=k, value=v) for k, v in rows.items()]
         array = DiagnosticArray(status=[status])

@@ -6,6 +6,7 @@ A master that hangs or restarts must not hold up publishing, so it is watched on
 from __future__ import annotations
 
 import http.client
+import re
 import threading
 import xmlrpc.client
 from collections.abc import Callable
@@ -15,12 +16,18 @@ import rosgraph
 import rospy
 from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager
 
+DEFAULT_WORLD = "/ambf/env/World"
 PERIOD = 1.0
 """Seconds between looks at the master."""
 
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 PATIENCE = 2.0
 """Seconds that another simulator is given to answer."""
+
+
+def node_name(world: str) -> str:
+    """The node's name: one for each world, so that simulators of different worlds live side by side."""
+    return "ligature" if world == DEFAULT_WORLD else "ligature" + re.sub(r"\W+", "_", world.rpartition("/")[0])
 
 
 class NameTaken(RuntimeError):

@@ -6,7 +6,6 @@ third. None of them ever waits for another process.
 
 from __future__ import annotations
 
-import re
 import threading
 import time
 from collections.abc import Callable
@@ -17,29 +16,24 @@ import rosgraph.names
 import rospy
 
 from ligature.bus import Block, Outbox
+from ligature.model.commands import ParentCommand
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from ligature.ros import conversion, names
 from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
-from ligature.ros.master import MasterWatch, require_free
+from ligature.ros.master import MasterWatch, node_name, require_free
 from ligature.ros.parameters import Parameters
 from ligature.ros.publisher import Publisher
 from ligature.ros.reception import Reception
 from ligature.ros.schedule import Key, Outlet, Schedule
 
 DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
-DEFAULT_WORLD = "/ambf/env/World"
 HOUSEKEEPING = 0.02
 """Seconds between looks at watchdogs and the physics process."""
 
 PHYSICS_SILENCE = 5.0
 """Seconds without a sign of life of the physics process after which this one ends."""
-
-
-def node_name(world: str) -> str:
-    """The node's name: one for each world, so that simulators of different worlds live side by side."""
-    return "ligature" if world == DEFAULT_WORLD else "ligature" + re.sub(r"\W+", "_", world.rpartition("/")[0])
 
 
 class Node:
@@ -54,8 +48,8 @@ class Node:
         name = node_name(scene.world.topic)
         require_free(f"/{name}")
         rospy.init_node(name, disable_signals=True)
-        prefix, outbox = scene.world.topic.rpartition("/ambf/")[0] + "/", Outbox(self._ring)
-        self._reception = Reception(scene, outbox, self._wake)
+        prefix, self._outbox = scene.world.topic.rpartition("/ambf/")[0] + "/", Outbox(self._ring)
+        self._reception = Reception(scene, self._outbox, self._wake)
         self._world = conversion.WorldTemplate()
         self._publishers: list[Publisher] = []
         outlets = self._advertise(min_hz, max_hz, policy)
@@ -63,11 +57,12 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
-        self._arms = ArmsNode(scene, self._block, outbox, prefix)
+        self._arms = ArmsNode(scene, self._block, self._outbox, prefix)
         arms = ", ".join(arm.name for arm in scene.arms) or "none"
         self.told = f"{2 * len(outlets)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block)
-        self._master = MasterWatch(Parameters(scene).poll)
+        self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
+        self._master = MasterWatch(Parameters(scene, self._adopt).poll)
 
     def run(self, stop: threading.Event, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
@@ -119,6 +114,14 @@ class Node:
     def _wake(self, key: Key, at_once: bool) -> None:
         self._schedule.wake(key, at_once)
         self._woken.set()
+
+    def _adopt(self, command: ParentCommand) -> None:
+        """A camera or light gets another parent; its messages say so."""
+        self._outbox.push(command)
+        template = self._placed.get((command.kind, command.index))
+        if template is not None:
+            body = None if command.parent is None else self._scene.bodies[command.parent]
+            template.message.parent_name.data = "" if body is None else body.identity.identifier
 
     def _publish(self, now: float) -> None:
         state = self._state[0]

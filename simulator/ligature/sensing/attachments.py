@@ -6,6 +6,9 @@ parent camera, light or ghost), ``world`` in world axes. Lengths in metres.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -67,9 +70,23 @@ class Attachments:
         if pose is not None:
             self.local[self._slices[kind].start + index] = pose
 
+    def adopt(self, kind: str, index: int, body: int | None) -> None:
+        """Hang one object on ``body``, or on the world; its pose in the parent's frame stays what it was."""
+        self._parents[self._slices[kind].start + index] = -1 if body is None else body
+        self._order = self._parents_first()
+
     def reset(self) -> None:
         """Put every object back to where the scene says."""
         self.local[:] = self._initial
+
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """What `recall` needs to continue from here."""
+        return {"local": self.local.copy(), "parents": self._parents.copy()}
+
+    def recall(self, memory: Mapping[str, NDArray[Any]]) -> None:
+        """Continue from a `memory`."""
+        self.local[:], self._parents[:] = memory["local"], memory["parents"]
+        self._order = self._parents_first()
 
     def _parent_index(self, attachment: Attachment) -> int:
         """Index of the parent among bodies followed by attached objects; -1 for the world."""

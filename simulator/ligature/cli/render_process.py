@@ -1,0 +1,172 @@
+"""The camera process: draws the newest state of the bus for whoever listens, and hands the pictures to ROS.
+
+It never holds up physics: it runs at a lower priority, takes the newest state, and leaves out what comes too late.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+import numpy as np
+
+import ligature
+from ligature.bus import Block, BusError
+from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.cli.options import RunOptions
+from ligature.model.optics import stereo_partners
+from ligature.model.scene import Camera, Scene
+from ligature.model.state import new_state, state_dtype
+from ligature.render import ImageSensor, Renderer, RenderUnavailable, unproject, view_of
+from ligature.render.calibration import calibrations
+from ligature.render.shutter import Shutter
+from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
+from ligature.ros.master import MasterWatch, NameTaken
+from ligature.ros.parameters import Follower
+
+NICENESS = 10
+"""Below physics and the ROS process: software that draws would leave nothing for them otherwise."""
+
+SCENE_PATIENCE = 10.0
+"""Seconds to wait for the end of the run, for which the physics process gives the reasons."""
+
+PHYSICS_SILENCE = 5.0
+"""Seconds without a sign of life of the physics process after which this one ends."""
+
+NAP = 0.05
+"""Longest sleep in seconds between two looks at the stop signal and the physics process."""
+
+
+def main() -> None:
+    """Entry point: one argument, the run's options as text."""
+    end_with_parent()
+    os.nice(NICENESS)
+    stop = stop_on_signal()
+    options = RunOptions.from_text(sys.argv[1])
+    try:
+        scene = options.load()
+        renderer = Renderer(scene)
+        block = Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set)
+        studio = Studio(scene, renderer, block, options)
+    except ligature.SceneError:
+        stop.wait(SCENE_PATIENCE)
+        sys.exit(2)
+    except (RenderUnavailable, NameTaken) as error:
+        tell("warning", f"no pictures: {error}")
+        sys.exit(0)
+    except BusError as error:
+        tell("warning", str(error))
+        sys.exit(0 if stop.is_set() else 1)
+    for problem in renderer.problems:
+        tell("finding", str(problem.diagnostics[0]))
+    tell("ready", f"pictures of {', '.join(camera.identity.name for camera in studio.cameras)}")
+    while not stop.is_set() and block.age < PHYSICS_SILENCE:
+        studio.turn(time.monotonic())
+
+
+class _Exposure:
+    """One camera or eye: its topics, and the shutters of its pictures and clouds."""
+
+    def __init__(self, topics: CameraTopics) -> None:
+        self.topics = topics
+        self.key = (topics.camera.index, topics.eye)
+        self._picture = Shutter(topics.image_interval)
+        self._cloud = None if topics.depth_interval is None else Shutter(topics.depth_interval)
+        self._drawn = False
+
+    @property
+    def due(self) -> float:
+        """The earliest deadline."""
+        return self._picture.due if self._cloud is None else min(self._picture.due, self._cloud.due)
+
+    def open(self, now: float, update: int) -> tuple[Wishes, int]:
+        """What clients want of what is due and new, and how many frames they did not get since the last time."""
+        missed = self._picture.missed(now) if self._drawn else 0
+        picture = self._picture.open(now, update)
+        cloud = self._cloud is not None and self._cloud.open(now, update)
+        wishes = self.topics.wishes(picture, cloud)
+        if picture:
+            self._drawn = wishes.pixels
+        return wishes, missed
+
+
+class Studio:
+    """One turn draws what is due and wanted from one reading of the state, so that all of it shows one moment."""
+
+    def __init__(self, scene: Scene, renderer: Renderer, block: Block, options: RunOptions) -> None:
+        self._scene, self._renderer, self._block = scene, renderer, block
+        self._state = new_state(scene)
+        self._partners = stereo_partners(scene)
+        self.cameras = options.shown_cameras(scene)
+        self._node = CameraNode(scene, self.cameras, bool(options.cameras))
+        self._follower = Follower(scene)
+        MasterWatch(self._follower.poll).start()
+        self._exposures = [_Exposure(topics) for topics in self._node.topics]
+
+    def turn(self, now: float) -> None:
+        """Wait for the next deadline, or draw what is due."""
+        nap = min(exposure.due for exposure in self._exposures) - now
+        if nap > 0.0:
+            time.sleep(min(nap, NAP))
+        elif self._block.read(self._state):
+            self._shoot(now)
+
+    def _shoot(self, now: float) -> None:
+        update, stamp = int(self._state["update"][0]), float(self._state["stamp"][0])
+        poses = self._state["camera_world"][0]
+        calls, missed = [], 0
+        for exposure in self._exposures:
+            if exposure.due <= now:
+                wishes, late = exposure.open(now, update)
+                calls.append((exposure, wishes))
+                missed += late
+        self._node.publish_frames(poses, [e.topics.camera for e, wishes in calls if wishes.picture_due], stamp)
+        if any(wishes.info for _, wishes in calls):
+            self._publish_infos(calls, poses, stamp)
+        wanted = [(exposure, wishes) for exposure, wishes in calls if wishes.drawing]
+        for exposure, wishes in wanted:
+            self._draw(exposure, wishes, stamp)
+        self._count(len(wanted), missed, time.monotonic() - now)
+
+    def _publish_infos(self, calls: list[tuple[_Exposure, Wishes]], poses: np.ndarray, stamp: float) -> None:
+        cameras = [self._camera(camera.index) for camera in self._scene.cameras]
+        lenses = {camera.index: self._follower.sensors[camera.index]["distortion"] for camera in cameras}
+        found = calibrations(cameras, poses, self._partners, lenses)
+        for exposure, wishes in calls:
+            if wishes.info:
+                exposure.topics.publish_info(found[exposure.key], stamp)
+
+    def _draw(self, exposure: _Exposure, wishes: Wishes, stamp: float) -> None:
+        index, eye = exposure.key
+        camera, sensor = self._camera(index), ImageSensor(**self._follower.sensors[index])
+        view = view_of(camera, self._state["camera_world"][0, index], eye=eye)
+        moment = (index, int(self._state["tick"][0]))
+        frame = sensor.expose(self._renderer.render(self._state, sensor.view(view)), view, moment)
+        if wishes.pixels:
+            exposure.topics.publish_picture(Picture(frame.rgb, frame.depth, frame.ids), stamp)
+        if wishes.points:
+            points = unproject(frame.depth, view)
+            if camera.depth_noise is not None:
+                mean, deviation, bias = camera.depth_noise
+                random = np.random.default_rng((sensor.seed, *moment))
+                grain = random.standard_normal(frame.depth.shape, dtype=np.float32)
+                points[..., 2] -= np.float32(mean + bias) + np.float32(deviation) * grain
+            exposure.topics.publish_cloud(points, frame.rgb, stamp)
+
+    def _camera(self, index: int) -> Camera:
+        """A camera as its parameters have it now; eyes exist from the start or not at all."""
+        camera = self._follower.cameras[index]
+        started = self._scene.cameras[index]
+        return camera if (camera.stereo is None) == (started.stereo is None) else started
+
+    def _count(self, drawn: int, missed: int, seconds: float) -> None:
+        figures = self._block.figures
+        figures["frames"] += np.uint64(drawn)
+        figures["frames_dropped"] += np.uint64(missed)
+        if drawn:
+            figures["frame_seconds"] = seconds
+
+
+if __name__ == "__main__":
+    main()
