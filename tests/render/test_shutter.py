@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from ligature.render.shutter import REPEAT, Shutter
 
 
@@ -14,7 +15,7 @@ def test_a_shutter_opens_once_every_interval_of_the_frame_clock() -> None:
 def test_shutters_of_one_interval_open_together_wherever_they_began() -> None:
     left, right = Shutter(4, 100.0), Shutter(4, 100.0)
     assert left.open(10.001, 1) and right.open(10.017, 2)
-    assert left.due == right.due == 10.04
+    assert left.due == right.due == pytest.approx(10.04)
 
 
 def test_deadlines_that_passed_are_counted_and_not_made_up_for() -> None:

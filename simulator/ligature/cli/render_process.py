@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ligature.cli.options import RunOptions
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Camera, Scene
 from ligature.model.state import new_state, state_dtype
-from ligature.render import ImageSensor, Renderer, RenderUnavailable, unproject, view_of
+from ligature.render import ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
 from ligature.render.calibration import calibrations
 from ligature.render.shutter import Shutter
 from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
@@ -87,7 +88,7 @@ class _Exposure:
         cloud = self._cloud is not None and self._cloud.open(now, update)
         wishes = self.topics.wishes(picture, cloud)
         if picture:
-            self._drawn = wishes.pixels
+            self._drawn = bool(wishes.passes)
         return wishes, missed
 
 
@@ -124,6 +125,7 @@ class Studio:
         self._node.publish_frames(poses, [e.topics.camera for e, wishes in calls if wishes.picture_due], stamp)
         if any(wishes.info for _, wishes in calls):
             self._publish_infos(calls, poses, stamp)
+        self._set_lights()
         wanted = [(exposure, wishes) for exposure, wishes in calls if wishes.drawing]
         for exposure, wishes in wanted:
             self._draw(exposure, wishes, stamp)
@@ -142,10 +144,11 @@ class Studio:
         camera, sensor = self._camera(index), ImageSensor(**self._follower.sensors[index])
         view = view_of(camera, self._state["camera_world"][0, index], eye=eye)
         moment = (index, int(self._state["tick"][0]))
-        frame = sensor.expose(self._renderer.render(self._state, sensor.view(view)), view, moment)
-        if wishes.pixels:
+        passes = wishes.passes | {"rgb", "depth"} if wishes.cloud else wishes.passes
+        frame = sensor.expose(self._renderer.render(self._state, sensor.view(view), sorted(passes)), view, moment)
+        if wishes.passes:
             exposure.topics.publish_picture(Picture(frame.rgb, frame.depth, frame.ids), stamp)
-        if wishes.points:
+        if wishes.cloud:
             points = unproject(frame.depth, view)
             if camera.depth_noise is not None:
                 mean, deviation, bias = camera.depth_noise
@@ -159,6 +162,15 @@ class Studio:
         camera = self._follower.cameras[index]
         started = self._scene.cameras[index]
         return camera if (camera.stereo is None) == (started.stereo is None) else started
+
+    def _set_lights(self) -> None:
+        """Give the lights what their parameters say now."""
+        settings = self._renderer.lights.settings
+        for index in range(len(settings)):
+            values = self._follower.lights[index]
+            settings[index] = replace(
+                settings[index], kind=LightKind(values.type), cutoff=values.cutoff, attenuation=values.attenuation
+            )
 
     def _count(self, drawn: int, missed: int, seconds: float) -> None:
         figures = self._block.figures

@@ -62,14 +62,22 @@ class CameraHandle:
         return view_of(self.camera, self.pose, resolution, eye)
 
     def capture(
-        self, resolution: tuple[int, int] | None = None, *, eye: str = "", sensor: ImageSensor = IDEAL
+        self,
+        resolution: tuple[int, int] | None = None,
+        *,
+        passes: Sequence[str] = ("rgb", "depth", "ids"),
+        eye: str = "",
+        sensor: ImageSensor = IDEAL,
     ) -> Frame:
-        """Take a picture of the state as it is: ``rgb``, ``depth``, ``ids`` and ``normals``.
+        """Take a picture of the state as it is.
 
         Parameters
         ----------
         resolution
             Width and height in pixels; the camera's own when not given.
+        passes
+            What the picture holds, of `ligature.render.PASSES`: ``rgb``, ``depth``, ``ids``, ``parts``, ``normals``,
+            ``flow``.
         eye
             ``"left"`` or ``"right"`` of a camera with a ``stereo`` block.
         sensor
@@ -82,7 +90,7 @@ class CameraHandle:
         """
         state = self._simulation.state
         view = self.view(resolution, eye)
-        frame = self._studio.renderer.render(state, sensor.view(view))
+        frame = self._studio.renderer.render(state, sensor.view(view), passes)
         return sensor.expose(frame, view, (self.camera.index, int(state["tick"][0])))
 
     def calibration(

@@ -5,8 +5,9 @@ The same seed, camera and tick give the same noise. Pixels have whole-number cen
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class ImageSensor:
             return frame
         if self._bends(view):
             frame = self._bent(frame, view)
-        rgb, depth = frame.rgb, frame.depth
+        rgb, depth = frame.rgb, frame.depth  # either is empty when it was not asked for
         random = np.random.default_rng((self.seed, *moment))
         if self.exposure:
             rgb = _brightness(self.exposure)[rgb]
@@ -80,19 +81,18 @@ class ImageSensor:
         return any(self.distortion) and not view.orthographic
 
     def _bent(self, frame: Frame, view: CameraView) -> Frame:
-        """Colour between pixels is mixed; depth, ids and normals are those of the nearest pixel."""
-        left, top, _, _ = _margins(self.distortion, _key(view), view.width, view.height)
+        """Colour between pixels is mixed; everything else is that of the nearest pixel."""
+        left, top, right, bottom = _margins(self.distortion, _key(view), view.width, view.height)
         u, v = _sources(self.distortion, _key(view), view.width, view.height)
-        height, width = frame.depth.shape
-        u, v = np.clip(u + left, 0, width - 1.001), np.clip(v + top, 0, height - 1.001)
-        x, y = u.astype(np.int32), v.astype(np.int32)
-        fx, fy = (u - x)[..., None], (v - y)[..., None]
-        rgb = frame.rgb
-        upper = rgb[y, x] * (1 - fx) + rgb[y, x + 1] * fx
-        lower = rgb[y + 1, x] * (1 - fx) + rgb[y + 1, x + 1] * fx
-        mixed = (upper * (1 - fy) + lower * fy + 0.5).astype(np.uint8)
-        near = np.rint(v).astype(np.int32), np.rint(u).astype(np.int32)
-        return replace(frame, rgb=mixed, depth=frame.depth[near], ids=frame.ids[near], normals=frame.normals[near])
+        u = np.clip(u + left, 0, view.width + left + right - 1.001)
+        v = np.clip(v + top, 0, view.height + top + bottom - 1.001)
+        nearest = np.rint(v).astype(np.int32), np.rint(u).astype(np.int32)
+        bent: dict[str, Any] = {}
+        for field in fields(frame):
+            values = getattr(frame, field.name)
+            if values.size:
+                bent[field.name] = _between(values, u, v) if field.name == "rgb" else values[nearest]
+        return replace(frame, **bent)
 
 
 IDEAL = ImageSensor()
@@ -120,6 +120,16 @@ def undistort(points: Array, distortion: tuple[float, ...]) -> Array:
     for _ in range(UNDISTORT_ROUNDS):
         ideal += points - distort(ideal, distortion)
     return ideal
+
+
+def _between(rgb: NDArray[np.uint8], u: Array, v: Array) -> NDArray[np.uint8]:
+    """Colours at columns ``u`` and rows ``v``, mixed from the four pixels around (bilinear)."""
+    x, y = u.astype(np.int32), v.astype(np.int32)
+    fx, fy = (u - x)[..., None], (v - y)[..., None]
+    upper = rgb[y, x] * (1 - fx) + rgb[y, x + 1] * fx
+    lower = rgb[y + 1, x] * (1 - fx) + rgb[y + 1, x + 1] * fx
+    mixed: NDArray[np.uint8] = (upper * (1 - fy) + lower * fy + 0.5).astype(np.uint8)
+    return mixed
 
 
 def _key(view: CameraView) -> tuple[float, ...]:

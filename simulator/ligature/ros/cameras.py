@@ -36,24 +36,28 @@ _PICTURES = {
 }
 
 
+_PASS = {"ImageData": "rgb", "ImageData/compressed": "rgb", "DepthImage": "depth", "IdImage": "ids"}
+"""What a topic shows."""
+
+
 @dataclass(frozen=True)
 class Wishes:
     """What clients of one camera listen to, of what is due."""
 
     picture_due: bool
     info: bool
-    pixels: bool
-    points: bool
+    passes: frozenset[str]
+    cloud: bool
 
     @property
     def drawing(self) -> bool:
         """Whether anything has to be drawn."""
-        return self.pixels or self.points
+        return bool(self.passes) or self.cloud
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What was seen: ``rgb`` (h, w, 3), ``depth`` (h, w) metres, ``ids`` (h, w), row 0 at the top."""
+    """What was seen: ``rgb`` (h, w, 3), ``depth`` (h, w) metres, ``ids`` (h, w), row 0 at the top; or empty arrays."""
 
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
@@ -82,24 +86,24 @@ class CameraTopics:
 
     def wishes(self, picture_due: bool, cloud_due: bool) -> Wishes:
         """What clients listen to, of what is due."""
-        heard = {topic: picture_due and _heard(publisher) for topic, publisher in self._pictures.items()}
-        points = cloud_due and self._cloud is not None and _heard(self._cloud)
-        return Wishes(picture_due, heard.pop("CameraInfo"), any(heard.values()), points)
+        heard = [topic for topic in self._pictures if picture_due and self._heard(topic)]
+        cloud = cloud_due and self._cloud is not None and _heard(self._cloud)
+        return Wishes(picture_due, "CameraInfo" in heard, frozenset(_PASS[t] for t in heard if t in _PASS), cloud)
 
     def publish_info(self, calibration: Calibration, stamp: float) -> None:
         """Publish the calibration; ``stamp`` in Unix seconds, as everywhere here."""
         self._send("CameraInfo", pictures.camera_info(calibration, _header(stamp, self.optical_frame)))
 
     def publish_picture(self, picture: Picture, stamp: float) -> None:
-        """Publish the pictures that somebody listens to."""
+        """Publish what was drawn to whoever listens."""
         header = _header(stamp, self.optical_frame)
-        if self._heard("ImageData"):
+        if picture.rgb.size and self._heard("ImageData"):
             self._send("ImageData", pictures.image(picture.rgb, "rgb8", header))
-        if self._heard("ImageData/compressed"):
+        if picture.rgb.size and self._heard("ImageData/compressed"):
             self._send("ImageData/compressed", pictures.compressed(picture.rgb, header))
-        if self._heard("DepthImage"):
+        if picture.depth.size and self._heard("DepthImage"):
             self._send("DepthImage", pictures.image(picture.depth, "32FC1", header))
-        if self._heard("IdImage"):
+        if picture.ids.size and self._heard("IdImage"):
             self._send("IdImage", pictures.image(picture.ids, "32SC1", header))
 
     def publish_cloud(self, points: NDArray[np.float32], rgb: NDArray[np.uint8], stamp: float) -> None:
