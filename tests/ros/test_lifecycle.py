@@ -78,7 +78,7 @@ def test_a_master_is_started_when_none_answers_and_all_ends_within_two_seconds(
     assert f"no ROS master answers at {own_env['ROS_MASTER_URI']}: starting one" in program.output
     assert master_answers(own_env["ROS_MASTER_URI"])
     pids = program.children()
-    assert set(pids) == {"physics", "ros_process", "rosmaster"}
+    assert set(pids) >= {"physics", "ros_process", "rosmaster"}
     begin = time.monotonic()
     assert program.end() == 0
     assert time.monotonic() - begin < 2.0

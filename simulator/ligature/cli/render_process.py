@@ -1,11 +1,10 @@
 """The camera process: draws the newest state of the bus for whoever listens, and hands the pictures to ROS.
 
-It never holds up physics: it runs at a lower priority, takes the newest state, and leaves out what comes too late.
+It never holds up physics: the supervisor gives it a lower priority, it takes the newest state, and leaves out what comes too late.
 """
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from dataclasses import replace
@@ -26,9 +25,6 @@ from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
 from ligature.ros.master import MasterWatch, NameTaken
 from ligature.ros.parameters import Follower
 
-NICENESS = 10
-"""Below physics and the ROS process: software that draws would leave nothing for them otherwise."""
-
 SCENE_PATIENCE = 10.0
 """Seconds to wait for the end of the run, for which the physics process gives the reasons."""
 
@@ -42,7 +38,6 @@ NAP = 0.05
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
     end_with_parent()
-    os.nice(NICENESS)
     stop = stop_on_signal()
     options = RunOptions.from_text(sys.argv[1])
     try:

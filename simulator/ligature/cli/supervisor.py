@@ -34,6 +34,9 @@ _ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
 }
+_BEHIND = ("nice", "-n", "10")
+"""For the process that draws: software would leave no processor time to physics otherwise."""
+
 _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
 Event = tuple[str, str, str]
@@ -126,7 +129,7 @@ class Supervisor:
         """Start the process that draws; without a ROS master there is nobody to draw for."""
         if "ros" in self._children:
             command = [sys.executable, "-m", "ligature.cli.render_process", self._options.to_text()]
-            self._children["render"] = Child("render", command, self._events, self._env)
+            self._children["render"] = Child("render", [*_BEHIND, *command], self._events, self._env)
 
     def _master_ready(self) -> bool:
         """Whether a ROS master answers, after one was started where there was none."""
