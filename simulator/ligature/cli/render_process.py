@@ -1,6 +1,6 @@
 """The camera process: draws the newest state of the bus for whoever listens, and hands the pictures to ROS.
 
-It never holds up physics: the supervisor gives it a lower priority, it takes the newest state, and leaves out what comes too late.
+It never holds up physics: it has a lower priority, takes the newest state, and leaves out what comes too late.
 """
 
 from __future__ import annotations
