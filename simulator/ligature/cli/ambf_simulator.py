@@ -36,6 +36,7 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--ns", default="", help="prefix of every namespace")
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
     flags.add_argument("--override_min_comm_freq", type=int, help="publishing rate without commands")
+    flags.add_argument("--src-crtk", action="store_true", help="arms under /CRTK too (not an AMBF flag)")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument(
         "--cameras", action=argparse.BooleanOptionalAction,
@@ -65,7 +66,7 @@ def options_of(arguments: list[str]) -> RunOptions:
     return RunOptions(
         given.launch_file, models, tuple(f for f in (given.a or "").split(",") if f), tuple(given.root), given.ns,
         min(given.p, FASTEST), given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
-        names=given.names, cameras=given.cameras, notes=_notes(given),
+        names=given.names, src_crtk=given.src_crtk, cameras=given.cameras, notes=_notes(given),
     )  # fmt: skip
 
 

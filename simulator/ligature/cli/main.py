@@ -45,6 +45,7 @@ def run(
     namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
     min_hz: Annotated[int | None, typer.Option("--min-hz", help="Publishing rate without commands.", min=1)] = None,  # noqa: UP045
     max_hz: Annotated[int | None, typer.Option("--max-hz", help="Publishing rate with commands.", min=1)] = None,  # noqa: UP045
+    src_crtk: Annotated[bool, typer.Option("--src-crtk", help="Arms under /CRTK too, as SRC's node.")] = False,
     names: Annotated[
         str, typer.Option(help="Name policy: ambf, or src for the suturing challenge's scripts.")
     ] = "ambf",
@@ -60,7 +61,7 @@ def run(
         raise typer.BadParameter("--names is 'ambf' or 'src'")
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
-        min_hz=min_hz, max_hz=max_hz, names=names, cameras=cameras, notes=rate_notes(rate),
+        min_hz=min_hz, max_hz=max_hz, names=names, src_crtk=src_crtk, cameras=cameras, notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
 

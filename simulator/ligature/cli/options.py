@@ -15,7 +15,8 @@ class RunOptions:
 
     ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second,
     ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
-    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy, ``cameras`` says
+    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy, ``src_crtk``
+    tells whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` says
     whether pictures are published (None: of the cameras for which the scene says so), ``notes`` are lines to
     tell the user at the start.
     """
@@ -31,6 +32,7 @@ class RunOptions:
     min_hz: int | None = None
     max_hz: int | None = None
     names: str = "ambf"
+    src_crtk: bool = False
     cameras: bool | None = None
     notes: tuple[str, ...] = ()
 

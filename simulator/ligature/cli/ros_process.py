@@ -32,7 +32,7 @@ def main() -> None:
     from ligature.ros.node import Node
 
     try:
-        node = Node(scene, options.bus, options.min_hz, options.max_hz, options.names)
+        node = Node(scene, options.bus, options.min_hz, options.max_hz, options.names, options.src_crtk)
     except NameTaken as error:
         tell("fatal", str(error))
         stop.wait(SCENE_PATIENCE)

@@ -39,7 +39,9 @@ PHYSICS_SILENCE = 5.0
 class Node:
     """The simulator on ROS; raises `ligature.ros.master.NameTaken` when another one is there already."""
 
-    def __init__(self, scene: Scene, bus: str, min_hz: int | None, max_hz: int | None, policy: str) -> None:
+    def __init__(
+        self, scene: Scene, bus: str, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool
+    ) -> None:
         self._scene = scene
         self._state = new_state(scene)
         self._block = Block.attach(bus, self._state.dtype)
@@ -57,7 +59,7 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
-        self._arms = ArmsNode(scene, self._block, self._outbox, prefix)
+        self._arms = ArmsNode(scene, self._block, self._outbox, prefix, challenge)
         arms = ", ".join(arm.name for arm in scene.arms) or "none"
         self.told = f"{2 * len(outlets)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block)

@@ -17,10 +17,11 @@ from tf2_msgs.msg import TFMessage
 from ligature.bus import Block, Outbox
 from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError
-from ligature.model.commands import ArmCommand, check
+from ligature.model.commands import ArmCommand, Command, check
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
 from ligature.robots.instruments import INSTRUMENTS
+from ligature.ros.arms.challenge import ChallengeFace
 from ligature.ros.arms.commands import listeners
 from ligature.ros.arms.console import Console, SetupJoints
 from ligature.ros.arms.outlet import ArmOutlet
@@ -41,9 +42,13 @@ QUEUE = 10
 
 
 class ArmsNode:
-    """The arms of a scene on ROS; topics begin with ``prefix``, which ends in a slash."""
+    """The arms of a scene on ROS.
 
-    def __init__(self, scene: Scene, block: Block, outbox: Outbox, prefix: str) -> None:
+    Topics begin with ``prefix``, which ends in a slash; with ``challenge`` they are there a second time, under the
+    names of the suturing challenge's own node.
+    """
+
+    def __init__(self, scene: Scene, block: Block, outbox: Outbox, prefix: str, challenge: bool) -> None:
         self._block, self._outbox = block, outbox
         self._base_body = [arm.base for arm in scene.arms]
         self._outlets: list[ArmOutlet] = []
@@ -59,6 +64,7 @@ class ArmsNode:
         if self._outlets:
             self._console = Console(prefix, self._outlets, self.push)
             self._setup_joints = SetupJoints(prefix, self._outlets)
+        self._challenge = ChallengeFace(prefix, scene, self._outlets, self.push) if challenge else None
 
     @property
     def outlets(self) -> list[ArmOutlet]:
@@ -99,6 +105,8 @@ class ArmsNode:
                 outlet.follow(state["arm"][outlet.index])
             self._setup_joints.publish(state, stamp)
         sent = sum(outlet.publish(state["arm"][outlet.index], stamp, self._count) for outlet in self._outlets)
+        if self._challenge is not None:
+            self._challenge.publish(now, state, stamp)
         if self._count % TF_PERIODS == 0:
             self._publish_tf(state, stamp)
         return sent
@@ -143,7 +151,7 @@ class ArmsNode:
 
         return listen
 
-    def push(self, command: ArmCommand) -> None:
+    def push(self, command: Command) -> None:
         """Send a command to the physics; raises ValueError when it may not go there."""
         check(command)
         check_bounds(command)
