@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -162,6 +163,32 @@ class Listener:
 
     def close(self) -> None:
         self._subscriber.unregister()
+
+
+CAMERA = """
+bodies: [BODY CameraFrame]
+joints: []
+namespace: /ambf/env/phantom/
+BODY CameraFrame:
+  name: CameraFrame
+  mesh: ''
+  mass: 0.0
+  location:
+    position: {x: 0.0307, y: 0.25102, z: 0.81025}
+    orientation: {r: 0.69813, p: 0.0, y: -3.14158}
+"""
+
+
+@pytest.fixture(scope="session")
+def arms_scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A launch file with the arms of the small scene and nothing that they could touch."""
+    folder = tmp_path_factory.mktemp("arms")
+    for name in ("world", "environment", "colors", "input_devices", "psm1", "psm2"):
+        shutil.copy(SMALL.parent / f"{name}.yaml", folder)
+    (folder / "camera.yaml").write_text(CAMERA)
+    launch = SMALL.read_text().partition("multibody configs")[0]
+    (folder / "launch.yaml").write_text(launch + "multibody configs: [camera.yaml, psm1.yaml, psm2.yaml]\n")
+    return folder / "launch.yaml"
 
 
 @pytest.fixture

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.ros.conftest import BIN, SMALL
+from tests.ros.conftest import BIN
 
 pytestmark = pytest.mark.ros
 
@@ -22,9 +23,9 @@ JOINTS = {
 
 
 @pytest.fixture(scope="module")
-def simulator(start: Callable[..., Any]) -> Any:
-    program = start(BIN / "ligature", "run", SMALL, "-p", "500")
-    program.wait_for("ligature is running")
+def simulator(start: Callable[..., Any], arms_scene: Path) -> Any:
+    program = start(BIN / "ligature", "run", arms_scene, "-p", "500")
+    program.wait_for("first state published")
     return program
 
 
@@ -102,12 +103,12 @@ def test_console_system_and_pedals_have_both_ends(simulator, node):
     assert [topic for topic in wanted if not published.get(topic)] == []
 
 
-def test_feedback_comes_at_a_hundred_hertz_with_rising_stamps(arm, listen):
+def test_feedback_comes_at_a_hundred_hertz_or_more_with_rising_stamps(arm, listen):
     from sensor_msgs.msg import JointState
 
     listener = listen(arm.topic("measured_js"), JointState)
     listener.wait()
-    assert listener.rate(1.0) == pytest.approx(100.0, rel=0.15)
+    assert listener.rate(1.0) > 90.0
     stamps = [message.header.stamp.to_sec() for message in listener.messages]
     assert min(np.diff(stamps)) >= 0.0
     assert abs(stamps[-1] - time.time()) < 0.1
