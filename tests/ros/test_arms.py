@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.ros.conftest import BIN
+from tests.ros.test_client_scripts import on_all
 
 pytestmark = pytest.mark.ros
 
@@ -42,13 +44,35 @@ def arms(simulator: Any, node: Any) -> Iterator[dict[str, Any]]:
         client.close()
 
 
+def at_home(client: Any) -> Any:
+    """The arm, enabled, homed and at its home pose."""
+    assert client.enable(5.0)
+    assert client.home(10.0)
+    home = np.zeros(len(JOINTS[client.name[:3]]))
+    if not client.name.startswith("MTM"):
+        home[2] = 0.12
+    if np.abs(client.setpoint_jp() - home).max() > 1e-9:
+        assert client.move_jp(home).wait()
+    return client
+
+
+def on_every_arm(check: Callable[..., None]) -> Callable[..., None]:
+    """A test that does ``check`` on all arms at the same time, each at its home pose."""
+    fixtures = list(inspect.signature(check).parameters)[1:]
+
+    def test(arms: dict[str, Any], **values: Any) -> None:
+        on_all(arms, lambda arm: check(at_home(arm), **values))
+
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    test.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in ("arms", *fixtures)])
+    test.__name__, test.__doc__ = check.__name__, check.__doc__
+    return test
+
+
 @pytest.fixture(params=ARMS)
 def arm(arms: dict[str, Any], request: pytest.FixtureRequest) -> Any:
-    """A client of each arm in turn, enabled and homed."""
-    client = arms[request.param]
-    assert client.enable(1.0)
-    assert client.home(5.0)
-    return client
+    """Each arm in turn, at its home pose."""
+    return at_home(arms[request.param])
 
 
 def table(node: Any) -> tuple[dict[str, str], dict[str, set[str]], dict[str, set[str]]]:
@@ -103,6 +127,7 @@ def test_console_system_and_pedals_have_both_ends(simulator, node):
     assert [topic for topic in wanted if not published.get(topic)] == []
 
 
+@on_every_arm
 def test_feedback_comes_at_a_hundred_hertz_or_more_with_rising_stamps(arm, listen):
     from sensor_msgs.msg import JointState
 
@@ -114,6 +139,7 @@ def test_feedback_comes_at_a_hundred_hertz_or_more_with_rising_stamps(arm, liste
     assert abs(stamps[-1] - time.time()) < 0.1
 
 
+@on_every_arm
 def test_joint_states_carry_names_and_arrays_of_one_length(arm):
     message = arm.hear("measured_js")
     assert list(message.name) == JOINTS[arm.name[:3]]
@@ -121,6 +147,7 @@ def test_joint_states_carry_names_and_arrays_of_one_length(arm):
     assert message.header.frame_id == ""
 
 
+@on_every_arm
 def test_poses_are_told_in_the_frame_of_the_base(arm):
     reference = "HRSV" if arm.name.startswith("MTM") else f"{arm.name}_base"
     assert arm.hear("measured_cp").header.frame_id == arm.hear("setpoint_cp").header.frame_id == reference
@@ -128,6 +155,7 @@ def test_poses_are_told_in_the_frame_of_the_base(arm):
         assert arm.hear(topic).header.frame_id == f"{arm.name}_base"
 
 
+@on_every_arm
 def test_measured_poses_are_the_forward_kinematics_of_measured_joints(arm):
     from tests.ros.crtk import pose7, pose_distance
 
@@ -139,6 +167,7 @@ def test_measured_poses_are_the_forward_kinematics_of_measured_joints(arm):
     assert (metres, radians) < (1e-5, 1e-4)
 
 
+@on_every_arm
 def test_inverse_kinematics_undoes_the_local_forward(arm):
     from tests.ros.crtk import pose7
 
@@ -148,6 +177,7 @@ def test_inverse_kinematics_undoes_the_local_forward(arm):
     np.testing.assert_allclose(answer.jp, q, atol=1e-6)
 
 
+@on_every_arm
 def test_queries_that_cannot_be_answered_say_why(arm):
     q = arm.measured_jp()
     answer = arm.forward_kinematics([*q, 0.0])
@@ -158,6 +188,7 @@ def test_queries_that_cannot_be_answered_say_why(arm):
     assert (answer.result, "inverse kinematics failed" in answer.message) == (False, True)
 
 
+@on_every_arm
 def test_jacobians_have_six_rows_and_a_column_a_joint(arm):
     for frame in ("body", "spatial"):
         assert arm.jacobian(frame).shape == (6, len(JOINTS[arm.name[:3]]))
@@ -173,6 +204,7 @@ def test_tf_has_a_frame_for_every_arm(arms, listen):
     assert wanted <= pairs
 
 
+@on_every_arm
 def test_the_operating_state_is_latched_for_whoever_comes_late(arm, node):
     from crtk_msgs.msg import OperatingState
 
@@ -182,6 +214,7 @@ def test_the_operating_state_is_latched_for_whoever_comes_late(arm, node):
     assert time.monotonic() - begin < 1.0
 
 
+@on_every_arm
 def test_services_tell_state_and_version(arm, node):
     from crtk_msgs.srv import TriggerOperatingState
     from std_srvs.srv import Trigger
@@ -195,22 +228,21 @@ def test_services_tell_state_and_version(arm, node):
 
 
 def test_an_arm_is_enabled_within_a_second_and_homed_within_five(arms):
-    for client in arms.values():
+    def start_anew(client: Any) -> None:
         assert client.disable(2.0)
         client.state.command("unhome")
-    for client in arms.values():
-        begin = time.monotonic()
-        assert client.enable(1.0)
-        assert time.monotonic() - begin < 1.0
-        begin = time.monotonic()
-        assert client.home(5.0)
-        assert time.monotonic() - begin < 5.0
+        assert client.enable(1.0), "not enabled within a second"
+        assert client.home(5.0), "not homed within five seconds"
+
+    on_all(arms, start_anew)
 
 
+@on_every_arm
 def test_enable_and_home_of_a_homed_arm_change_nothing(arm):
     from tests.ros.crtk import shifted
 
     assert arm.move_cp(shifted(arm.setpoint_cp(), [0.005, 0.0, 0.0])).wait()
+    time.sleep(0.1)
     before = arm.measured_jp()
     assert arm.enable(0.0)
     assert arm.home(0.0)
@@ -219,6 +251,7 @@ def test_enable_and_home_of_a_homed_arm_change_nothing(arm):
     assert arm.state.now.state == "ENABLED"
 
 
+@on_every_arm
 def test_states_follow_the_reference_sequence(arm):
     assert arm.disable(2.0)
     arm.state.command("unhome")
@@ -235,6 +268,7 @@ def test_states_follow_the_reference_sequence(arm):
     assert min(np.diff(stamps)) > 0.0
 
 
+@on_every_arm
 def test_pause_stops_motion_and_resume_allows_it(arm):
     start = arm.setpoint_jp()
     step = np.zeros(len(start))
@@ -252,13 +286,14 @@ def test_pause_stops_motion_and_resume_allows_it(arm):
     assert arm.move_jp(start).wait()
 
 
+@on_every_arm
 def test_an_unknown_state_command_is_a_warning_without_effect(arm, listen):
     from std_msgs.msg import String
 
     warnings = listen(arm.topic("warning"), String)
     time.sleep(0.3)
     arm.state.command("dance")
-    assert "dance" in warnings.wait().data
+    warnings.wait(lambda message: "dance" in message.data)
     assert arm.state.now.state == "ENABLED"
 
 
@@ -285,6 +320,7 @@ def test_a_servo_stream_is_followed(arm, rate):
     assert np.percentile(errors, 95) < 0.01
 
 
+@on_every_arm
 def test_a_move_of_no_length_ends(arm):
     begin = time.monotonic()
     assert arm.move_jp(arm.setpoint_jp()).wait(timeout=5.0)
@@ -292,6 +328,7 @@ def test_a_move_of_no_length_ends(arm):
     assert time.monotonic() - begin < 2.0
 
 
+@on_every_arm
 def test_a_newer_move_takes_over_and_only_its_goal_is_reached(arm, listen):
     from std_msgs.msg import Bool
 
@@ -303,11 +340,12 @@ def test_a_newer_move_takes_over_and_only_its_goal_is_reached(arm, listen):
     assert first.wait(is_busy=True, timeout=2.0)
     time.sleep(0.1)
     assert arm.move_jp(start).wait()
-    np.testing.assert_allclose(arm.setpoint_jp(), start, atol=1e-6)
     time.sleep(0.1)
+    np.testing.assert_allclose(arm.setpoint_jp(), start, atol=1e-6)
     assert [message.data for message in goals.messages][-2:] == [False, True]
 
 
+@on_every_arm
 def test_a_servo_command_ends_a_move(arm):
     start = arm.setpoint_jp()
     step = np.zeros(len(start))
@@ -323,6 +361,7 @@ def test_a_servo_command_ends_a_move(arm):
     assert arm.move_jp(start).wait()
 
 
+@on_every_arm
 def test_goals_beyond_the_limits_are_clipped_not_refused(arm):
     start = arm.setpoint_jp()
     goal = start.copy()
@@ -333,6 +372,7 @@ def test_goals_beyond_the_limits_are_clipped_not_refused(arm):
 
 
 @pytest.mark.parametrize("bad", ["short", "long", "empty", "nan", "infinite"])
+@on_every_arm
 def test_joint_commands_that_make_no_sense_change_nothing(arm, bad):
     start = arm.setpoint_jp()
     values = {
@@ -347,10 +387,15 @@ def test_joint_commands_that_make_no_sense_change_nothing(arm, bad):
     assert arm.move_jp(start).wait(timeout=5.0), "a good command works after a bad one"
 
 
-@pytest.mark.parametrize("pose", [[np.nan] * 7, [0.0] * 7, [0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0]], ids=str)
-def test_poses_that_cannot_be_reached_change_nothing(arm, pose, listen):
+@pytest.mark.parametrize("kind", ["nan", "no rotation", "base"])
+@on_every_arm
+def test_poses_that_cannot_be_reached_change_nothing(arm, kind, listen):
     from std_msgs.msg import Bool
 
+    from tests.ros.crtk import pose7
+
+    base = between(arm.measured_cp(), pose7(arm.hear("local/measured_cp").pose))
+    pose = {"nan": [np.nan] * 7, "no rotation": [0.0] * 7, "base": base}[kind]
     goals = listen(arm.topic("goal_reached"), Bool)
     start = arm.setpoint_jp()
     arm.servo_cp(pose)
@@ -360,6 +405,7 @@ def test_poses_that_cannot_be_reached_change_nothing(arm, pose, listen):
     assert goals.wait().data is False
 
 
+@on_every_arm
 def test_commands_to_an_arm_that_is_not_ready_are_ignored_with_a_warning(arm, listen):
     from std_msgs.msg import String
 
@@ -368,31 +414,34 @@ def test_commands_to_an_arm_that_is_not_ready_are_ignored_with_a_warning(arm, li
     assert arm.disable(2.0)
     arm.servo_jp(start + 0.05)
     assert not arm.move_jp(start + 0.05).wait(timeout=0.5)
-    assert "not ready" in warnings.wait().data
+    warnings.wait(lambda message: "not ready" in message.data)
     assert arm.state.now.state == "DISABLED"
 
 
+@on_every_arm
 def test_ratios_are_echoed_and_slow_moves_down(arm, listen):
+    from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64
 
     ratios = listen(arm.topic("trajectory_j/ratio"), Float64)
+    setpoints = listen(arm.topic("setpoint_js"), JointState)
     start = arm.setpoint_jp()
     step = np.zeros(len(start))
     step[0] = 0.2
-    times = {}
-    for ratio in (0.5, 1.0):
+    fastest = {}
+    for ratio, goal in ((0.25, start + step), (1.0, start)):
         arm.say("trajectory_j/set_ratio", Float64(ratio))
         ratios.wait(lambda message, ratio=ratio: message.data == ratio)
-        begin = time.monotonic()
-        assert arm.move_jp(start + step).wait()
-        times[ratio] = time.monotonic() - begin
-        assert arm.move_jp(start).wait()
-    assert times[0.5] > 1.3 * times[1.0]
+        setpoints.messages.clear()
+        assert arm.move_jp(goal).wait()
+        fastest[ratio] = max(abs(message.velocity[0]) for message in setpoints.messages)
+    assert fastest[0.25] < 0.6 * fastest[1.0]  # half of it where the move is too short for full speed
     arm.say("trajectory_j/set_ratio", Float64(1.5))
     time.sleep(0.2)
     assert ratios.messages[-1].data == 1.0
 
 
+@on_every_arm
 def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     from geometry_msgs.msg import PoseStamped
 
@@ -401,8 +450,8 @@ def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     base = PoseStamped(pose=pose_message([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0]))
     base.header.frame_id = "table"
     local, reference = arm.hear("local/measured_cp"), arm.hear("measured_cp").header.frame_id
-    before = arm.hear("measured_cp").pose
-    arm._said["set_base_frame"].publish(base)
+    before = arm.measured_cp()
+    arm.tell("set_base_frame", base)
     deadline = time.monotonic() + 2.0
     while arm.hear("measured_cp").header.frame_id != "table":
         assert time.monotonic() < deadline
@@ -411,19 +460,16 @@ def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     np.testing.assert_allclose(there[:3], pose7(arm.hear("local/setpoint_cp").pose)[:3] + [0.1, 0.2, 0.3], atol=1e-6)
     assert arm.hear("local/measured_cp").header.frame_id == local.header.frame_id
     assert arm.move_cp(shifted(there, [0.01, 0.0, 0.0])).wait()
-    np.testing.assert_allclose(arm.setpoint_cp()[:3], there[:3] + [0.01, 0.0, 0.0], atol=1e-5)
+    np.testing.assert_allclose(arm.setpoint_cp()[:3], there[:3] + [0.01, 0.0, 0.0], atol=1e-4)
     assert arm.move_cp(there).wait()
-    if reference.endswith("_base"):
-        back = PoseStamped(pose=pose_message([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
-    else:
-        T = pose7(before), pose7(local.pose)
-        back = PoseStamped(pose=pose_message(_between(*T)))
+    back = PoseStamped(pose=pose_message(between(before, pose7(local.pose))))
     back.header.frame_id = reference
-    arm._said["set_base_frame"].publish(back)
+    arm.tell("set_base_frame", back)
     time.sleep(0.3)
 
 
-def _between(pose: np.ndarray, local: np.ndarray) -> np.ndarray:
+def between(pose: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Pose (4, 4) of the base in the frame in which the tip has ``pose``, given that in the base it has ``local``."""
     from ligature.model.frames import inverse, pose7_matrix
 
     return pose7_matrix(pose) @ inverse(pose7_matrix(local))
@@ -431,13 +477,11 @@ def _between(pose: np.ndarray, local: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["PSM1", "PSM2"])
 def test_a_jaw_opens_and_closes(arms, name):
-    psm = arms[name]
-    assert psm.enable(1.0)
-    assert psm.home(5.0)
+    psm = at_home(arms[name])
     assert psm.jaw.open_jaw().wait(timeout=5.0)
     assert psm.jaw.measured_jp() == pytest.approx(np.deg2rad(60.0), abs=0.02)
     assert psm.jaw.close_jaw().wait(timeout=5.0)
-    assert psm.jaw.setpoint_jp() == pytest.approx(np.deg2rad(-20.0), abs=1e-6)
+    assert psm.jaw.setpoint_jp() == pytest.approx(np.deg2rad(-20.0), abs=1e-3)
     psm.jaw.servo_jp(0.3)
     time.sleep(0.5)
     assert psm.jaw.measured_jp() == pytest.approx(0.3, abs=0.02)

@@ -28,6 +28,13 @@ PULL_BACK = 1e-2
 """Damping of the inverse that turns twists into joint velocities: bounded near singular poses."""
 
 
+def damped_inverse(jacobian: Array, twist: Array) -> Array:
+    """Joint velocities (n,) whose twist (m,) by ``jacobian`` (m, n) comes closest, bounded near singular poses."""
+    damped = jacobian @ jacobian.T + PULL_BACK**2 * np.eye(len(twist))
+    velocity: Array = jacobian.T @ np.linalg.solve(damped, twist)
+    return velocity
+
+
 class JointState(NamedTuple):
     """Positions, velocities and efforts, each (n,)."""
 
@@ -278,13 +285,14 @@ class Arm(Device):
         self._require_cartesian("servo_cv")
         wanted = turned(self._T_reference_base[:3, :3].T, self._six(twist, "servo_cv"))
         q = self.joints.setpoint[0]
-        rotation = self.kinematics.forward(q)[:3, :3]
-        jacobian = self.kinematics.jacobian_body(q)
-        damped = jacobian @ jacobian.T + PULL_BACK**2 * np.eye(6)
-        speed = jacobian.T @ np.linalg.solve(damped, turned(rotation.T, wanted))
+        speed = self._joint_velocity(q, turned(self.kinematics.forward(q)[:3, :3].T, wanted))
         self._stop_for(self.joints)
         excess = float(np.max(np.abs(speed) / self.joints.fastest))
         self.joints.stream_velocity(speed / max(excess, 1.0))
+
+    def _joint_velocity(self, q: Array, twist: Array) -> Array:
+        """Joint velocities (n,) that give the tip a ``twist`` (6,) in its axes."""
+        return damped_inverse(self.kinematics.jacobian_body(q), twist)
 
     def spatial_servo_cf(self, wrench: ArrayLike) -> None:
         """Push with a wrench (6,) in axes of the reference frame, at the tip."""

@@ -99,6 +99,11 @@ class Ecm(Chain):
         """Insertion in metres at which the tip is at the RCM."""
         return RCC - SHAFT - float(self._tip[2, 3])
 
+    @property
+    def shaft_in_tip(self) -> Array:
+        """Direction (3,) of the shaft, away from the carriage, in axes of the tip."""
+        return self._tip[2, :3].copy()
+
     def depth(self, q: ArrayLike) -> float:
         """Distance in metres from the RCM to the tip along the shaft; negative above the RCM."""
         return float(np.asarray(q)[INSERTION]) - self.tool_to_rcm

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ligature.robots.arm import Arm
+from ligature.robots.arm import Arm, damped_inverse
 from ligature.robots.axes import Axes
 from ligature.robots.ecm import ENDOSCOPES, INSERTION, Ecm
 from ligature.robots.operating_state import Refused
@@ -50,3 +50,10 @@ class EcmArm(Arm):
         q = super()._solve(pose, what)
         q[INSERTION] = max(q[INSERTION], LEAST_INSERTION)
         return q
+
+    def _joint_velocity(self, q: Array, twist: Array) -> Array:
+        """As poses are met: the tip's velocity and the turn about the shaft, not the turns that four joints lack."""
+        shaft = self.kinematics.shaft_in_tip
+        jacobian = self.kinematics.jacobian_body(q)
+        rows = np.vstack([jacobian[:3], shaft @ jacobian[3:]])
+        return damped_inverse(rows, np.append(twist[:3], shaft @ twist[3:]))
