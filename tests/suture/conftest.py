@@ -57,8 +57,7 @@ class Bench:
             if each is not None:
                 each()
             for rod in self.rods:
-                low, high = rod.box()
-                near = self.colliders.update(self, low, high)
+                near = self.colliders.update(self, rod.box())
                 rod.meet(self.colliders, near, self)
                 rod.step()
                 for body, impulse in rod.pushes():

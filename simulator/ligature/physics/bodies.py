@@ -101,6 +101,12 @@ class Placement:
             physicsClientId=self.client,
         )
 
+    def load(self, wrench: list[float]) -> None:
+        """Apply force and torque (6,) at the centre of mass for one tick."""
+        at, uid, link, client = self.centre().tolist(), self.uid, self.link, self.client
+        pybullet.applyExternalForce(uid, link, wrench[:3], at, pybullet.WORLD_FRAME, physicsClientId=client)
+        pybullet.applyExternalTorque(uid, link, wrench[3:], pybullet.WORLD_FRAME, physicsClientId=client)
+
     def twist(self, torque: Array) -> None:
         """Apply ``torque`` (3,) for one tick."""
         pybullet.applyExternalTorque(

@@ -201,11 +201,10 @@ class World(BulletQueries):
 
         A driven body feels it and moves as commanded.
         """
-        place = self.place_of[body]
-        self._impulses[body] = self._impulses.get(body, 0.0) + np.concatenate([impulse, moment])
+        total, given = self._impulses.get(body), np.concatenate([impulse, moment])
+        self._impulses[body] = given if total is None else total + given
         if not self.driven(body):
-            place.push(impulse / self.dt)
-            place.twist(moment / self.dt)
+            self.place_of[body].load((given / self.dt).tolist())
 
     # --- health, reset, snapshots -----------------------------------------------------------
 

@@ -13,7 +13,7 @@ from ligature.model.frames import inverse, matrix_pose7
 from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Scene, Shape, Sphere, TriMesh
 from ligature.suture.bodies import Bodies
 from ligature.suture.layout import Shapes
-from ligature.suture.placing import near_bodies, place_parts
+from ligature.suture.placing import survey
 
 Array = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ _ROUND = {Cylinder: CYLINDER, Capsule: CAPSULE, Cone: CONE}
 class Colliders:
     """Convex parts of every body of a scene that is not an element of a rod.
 
-    ``bodies`` are those that have parts, in order; ``motion`` holds the pose (7,) of the inertial frame
-    and the twist (6,) that were last read of each.
+    ``bodies`` are those that have parts, in order, and ``row_of`` where each stands among them; ``motion`` (b, 13)
+    holds pose of the inertial frame and twist as they were last read.
     """
 
     def __init__(self, scene: Scene, dt: float) -> None:
@@ -57,7 +57,9 @@ class Colliders:
         self._ranges = np.array([[*np.flatnonzero(body == b)[[0, -1]]] for b in self.bodies], dtype=np.int64)
         self._ranges = self._ranges.reshape(-1, 2) + np.array([0, 1])
         self._slices = {b: slice(*r) for b, r in zip(self.bodies, self._ranges.tolist(), strict=True)}
-        self._still = np.array([scene.bodies[b].static for b in self.bodies], dtype=np.bool_)
+        self.row_of = {b: k for k, b in enumerate(self.bodies)}
+        self._static = [scene.bodies[b].static for b in self.bodies]
+        self._still = list(self._static)
         self._common = {
             "kind": np.array([part[2] for part in parts], dtype=np.int64),
             "size": np.array([part[3] for part in parts]).reshape(n, 3),
@@ -68,9 +70,10 @@ class Colliders:
             "sweep": np.zeros(n),
             "friction": np.array([scene.bodies[b].friction for b in body]),
         }
-        self._static = self._still.copy()
-        self._near = np.zeros(len(self.bodies), dtype=np.bool_)
-        self.motion: dict[int, tuple[Array, Array]] = {}
+        self._near, self._due, self._placed = np.zeros((3, len(self.bodies)), dtype=np.bool_)
+        self._watched: list[int] = []
+        self._nearby: list[int] = []
+        self.motion = np.zeros((len(self.bodies), 13))
         self._R = np.zeros((3, 3))
         self._turn = -1
 
@@ -84,34 +87,50 @@ class Colliders:
         """The rows of a body's parts in `shapes`; empty for a body without any."""
         return self._slices.get(body, slice(0, 0))
 
-    def update(self, bodies: Bodies, low: Array, high: Array) -> list[int]:
-        """Bring the poses of bodies near the box ``low`` … ``high`` (3,) up to date; returns those bodies."""
+    def update(self, bodies: Bodies, corners: Array) -> list[int]:
+        """Bring the motion of bodies near the box ``corners`` (2, 3) up to date; returns those bodies.
+
+        The list is another one as soon as it holds other bodies.
+        """
         n = len(self.bodies)
         if self._turn < 0:
-            fresh = set(range(n))
+            fresh = list(range(n))
+            self._placed[:] = False
         else:
-            fresh = {(self._turn + k) % n for k in range(min(LOOKS, n))}
-        for k in sorted(fresh):
-            self._read(bodies, k)
+            fresh = [k for k in self._watched if not self._still[k]]
+            fresh += [k for k in ((self._turn + i) % n for i in range(min(LOOKS, n))) if k not in fresh]
         self._turn = (self._turn + LOOKS) % n if n and self._turn >= 0 else 0
-        near_bodies(self._ranges, self._common["box"], low, high, NEAR, self._near)
-        near = np.flatnonzero(self._near).tolist()
-        for k in near:
-            if k not in fresh and not self._still[k]:
+        for k in fresh:
+            self._read(bodies, k)
+        if self._survey(corners):
+            self._watched = np.flatnonzero(self._near).tolist()
+            self._nearby = [self.bodies[k] for k in self._watched]
+            late = [k for k in self._watched if k not in fresh and not self._still[k]]
+            for k in late:
                 self._read(bodies, k)
-        return [self.bodies[k] for k in near]
+            if late:
+                self._survey(corners)
+                self._near[self._watched] = True
+        return self._nearby
+
+    def _survey(self, corners: Array) -> bool:
+        common = self._common
+        changed: bool = survey(
+            self._due, self._ranges, self._local, self._extent, self.motion, self._dt, common["pose"], common["box"],
+            common["sweep"], corners, NEAR, self._near, self._R,
+        )  # fmt: skip
+        return changed
 
     def _read(self, bodies: Bodies, k: int) -> None:
-        body, common = self.bodies[k], self._common
-        pose, twist = bodies.motion(body)
-        before = self.motion.get(body)
+        pose, twist = bodies.motion(self.bodies[k])
+        motion = self.motion[k]
         if self._static[k]:
             # A body without mass moves by commands alone; while it does, it is read every tick.
-            self._still[k] = before is None or bool((before[0] == pose).all())
-        self.motion[body] = pose, twist
-        begin, end = self._ranges[k]
-        place_parts(begin, end, self._local, self._extent, pose, twist, self._dt, common["pose"],
-                    common["box"], common["sweep"], self._R)  # fmt: skip
+            self._still[k] = not self._placed[k] or bool((motion[:7] == pose).all())
+            if self._placed[k] and self._still[k]:
+                return
+        motion[:7], motion[7:] = pose, twist
+        self._due[k] = self._placed[k] = True
 
     def restart(self) -> None:
         """Forget when poses were read, so that the next update reads all."""

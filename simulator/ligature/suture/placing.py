@@ -19,15 +19,41 @@ def _compose(pose, local, out_p, out_q, R):
 
 
 @kernel
-def place_parts(begin, end, local, extent, pose, twist, dt, out_pose, out_box, out_sweep, R):
-    """Pose, box and sweep of the parts ``begin`` … ``end`` of a body.
+def survey(due, ranges, local, extent, motion, dt, out_pose, out_box, out_sweep, corners, margin, near, R):
+    """Place the parts of the bodies that are ``due`` (b,), and flag in ``near`` (b,) those within ``margin`` of a box.
 
-    ``pose`` is that of the body's inertial frame, ``local`` (S, 7) are those of the parts in it, and
-    ``extent`` (S, 2, 3) their boxes in their own frames.
+    ``motion`` (b, 13) are pose and twist of the bodies' inertial frames, ``ranges`` (b, 2) their rows among
+    the parts; ``local`` (S, 7) are the parts' poses in those frames and ``extent`` (S, 2, 3) their boxes in their own.
+    ``corners`` (2, 3) is the box around all rods. Returns whether a flag changed; ``due`` is cleared.
     """
+    changed = False
+    for b in range(ranges.shape[0]):
+        begin, end = ranges[b, 0], ranges[b, 1]
+        if due[b]:
+            due[b] = False
+            _place_parts(begin, end, local, extent, motion[b], dt, out_pose, out_box, out_sweep, R)
+        close = False
+        for c in range(begin, end):
+            apart = False
+            for a in range(3):
+                if out_box[c, 0, a] > corners[1, a] + margin or out_box[c, 1, a] < corners[0, a] - margin:
+                    apart = True
+            if not apart:
+                close = True
+                break
+        changed = changed or close != near[b]
+        near[b] = close
+    return changed
+
+
+@inlined
+def _place_parts(begin, end, local, extent, motion, dt, out_pose, out_box, out_sweep, R):
+    """Pose, box and sweep of the parts ``begin`` … ``end`` of a body."""
+    speed = math.sqrt(motion[7] ** 2 + motion[8] ** 2 + motion[9] ** 2)
+    spin = math.sqrt(motion[10] ** 2 + motion[11] ** 2 + motion[12] ** 2)
     for c in range(begin, end):
         out = out_pose[c]
-        _compose(pose, local[c], out[0:3], out[3:7], R)
+        _compose(motion, local[c], out[0:3], out[3:7], R)
         matrix_of(out[3], out[4], out[5], out[6], R)
         far = 0.0
         for a in range(3):
@@ -37,25 +63,8 @@ def place_parts(begin, end, local, extent, pose, twist, dt, out_pose, out_box, o
                 low += min(u, v)
                 high += max(u, v)
             out_box[c, 0, a], out_box[c, 1, a] = low, high
-            far += max(abs(low - pose[a]), abs(high - pose[a])) ** 2
-        speed = math.sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
-        spin = math.sqrt(twist[3] ** 2 + twist[4] ** 2 + twist[5] ** 2)
+            far += max(abs(low - motion[a]), abs(high - motion[a])) ** 2
         out_sweep[c] = dt * (speed + spin * math.sqrt(far))
-
-
-@kernel
-def near_bodies(ranges, box, low, high, margin, near):
-    """Flag in ``near`` (b,) the bodies with a part whose box comes within ``margin`` of the box ``low`` … ``high``."""
-    for b in range(ranges.shape[0]):
-        near[b] = False
-        for c in range(ranges[b, 0], ranges[b, 1]):
-            apart = False
-            for a in range(3):
-                if box[c, 0, a] > high[a] + margin or box[c, 1, a] < low[a] - margin:
-                    apart = True
-            if not apart:
-                near[b] = True
-                break
 
 
 @kernel

@@ -121,7 +121,11 @@ class Rod:
         self._permanent = [self._grip_of(tie) for tie in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
         self._fixed = {p.body: p.fixed for p in partners}
-        self._near: list[int] = []
+        self._near: list[int] | None = None
+        self._met, self._motion = np.zeros((0, 2), np.int64), np.zeros((0, 13))
+        self._apart: list[int] = []
+        self._movable: list[tuple[int, int]] = []
+        self._pushed: list[tuple[int, int]] = []
         self._tied = [tie.body for tie in description.ties]
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
@@ -267,20 +271,29 @@ class Rod:
         i, nodes = self.node_of[body], self._nodes
         nodes.x[i], nodes.q[i], nodes.v[i], nodes.w[i] = pose[:3], pose[3:], twist[:3], twist[3:]
 
-    def meet(self, colliders: Colliders, near: Sequence[int], bodies: Bodies) -> None:
+    def meet(self, colliders: Colliders, near: list[int], bodies: Bodies) -> None:
         """Take the motion of the partners that matter in this tick: those near, tied or gripping."""
-        if near != self._near:
-            self._near = list(near)
-            self._shapes.node[:] = -1
-            for body in near:
-                self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
+        if near is not self._near:
+            self._gather_partners(colliders, near)
+        self._motion = colliders.motion
+        for body in self._apart:
+            self.place(body, *bodies.motion(body))
+        for body, node in self._movable:
+            self._nodes.fixed[node] = bodies.driven(body)
+
+    def _gather_partners(self, colliders: Colliders, near: list[int]) -> None:
+        """Sort the partners that matter: their shapes, where their motion comes from, which of them can be moved."""
+        self._near = near
+        self._shapes.node[:] = -1
         for body in near:
-            self.place(body, *colliders.motion[body])
-        for body in self._holding:
-            if body not in near:
-                self.place(body, *bodies.motion(body))
-        for body in {*near, *self._holding}:
-            self._nodes.fixed[self.node_of[body]] = self._fixed[body] or bodies.driven(body)
+            self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
+        rows = [(colliders.row_of[body], self.node_of[body]) for body in near]
+        self._met = np.array(rows, dtype=np.int64).reshape(-1, 2)
+        holding = sorted({*self._tied, *(g.body for g in self.grips)})
+        self._apart = [body for body in holding if body not in near]
+        partners = [(body, self.node_of[body]) for body in (*near, *self._apart)]
+        self._movable = [(body, node) for body, node in partners if not self._fixed[body]]
+        self._pushed = [(body, node) for body, node in partners if self._mobile[body]]
 
     def grip(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
         """Hold frame a of an element and frame b of a partner, (4, 4) in their frames B, together."""
@@ -301,19 +314,14 @@ class Rod:
 
     def _gather_bonds(self) -> tuple[NDArray[np.int64], Array]:
         """Nodes (g, 2) and points (g, 3, 2, 3) of all bonds."""
+        self._near = None
         held = (*self._permanent, *self.grips)
         nodes = np.array([(self._first + g.element, self.node_of[g.body]) for g in held], dtype=np.int64)
         return nodes.reshape(-1, 2), np.array([g.points for g in held]).reshape(-1, 3, 2, 3)
 
-    @property
-    def _holding(self) -> list[int]:
-        """Bodies that the rod is tied to or gripped by."""
-        return sorted({*self._tied, *(g.body for g in self.grips)})
-
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
-        met = (*self._near, *(body for body in self._holding if body not in self._near))
-        pushed = [(body, self.impulse[self.node_of[body]]) for body in met if self._mobile[body]]
+        pushed = [(body, self.impulse[node]) for body, node in self._pushed]
         return [(body, impulse) for body, impulse in pushed if impulse.any()]
 
     def step(self) -> None:
@@ -324,7 +332,8 @@ class Rod:
         grips, points = self._bonds
         run_tick(
             self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
-            work, grips, points, self._counts, self._self_skip, self._stiffness, self.impulse, self.tension, self.dt,
+            work, grips, points, self._motion, self._met, self._counts, self._self_skip, self._stiffness,
+            self.impulse, self.tension, self.dt,
         )  # fmt: skip
         self.newton_steps = int(self._counts[2])
         self._touches = (c, a, b) if self._counts[3] else (b, c, a)

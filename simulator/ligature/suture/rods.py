@@ -61,7 +61,7 @@ class Rods:
         for rod in self.rods[1:]:
             other = rod.box()
             box = np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
-        near = self._colliders.update(bodies, box[0], box[1])
+        near = self._colliders.update(bodies, box)
         for rod in self.rods:
             rod.meet(self._colliders, near, bodies)
             rod.step()

@@ -34,6 +34,17 @@ def _copy2(a, b):
 
 
 @inlined
+def _place(nodes, motion, met):
+    """Bring the nodes ``met[:, 1]`` to where ``motion`` (b, 13) has their bodies, in rows ``met[:, 0]``."""
+    for m in range(met.shape[0]):
+        row, i = motion[met[m, 0]], met[m, 1]
+        for a in range(3):
+            nodes.x[i, a], nodes.v[i, a], nodes.w[i, a] = row[a], row[7 + a], row[10 + a]
+        for a in range(4):
+            nodes.q[i, a] = row[3 + a]
+
+
+@inlined
 def _keep(nodes, joints, work):
     _copy2(nodes.x, work.kept_x)
     _copy2(nodes.q, work.kept_q)
@@ -87,7 +98,7 @@ def _one_step(
 @kernel
 def run_tick(
     first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, spare, work_table, grips,
-    points, counts, self_skip, stiffness, impulse, tension, dt,
+    points, motion, met, counts, self_skip, stiffness, impulse, tension, dt,
 ):  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``spare``.
 
@@ -96,6 +107,7 @@ def run_tick(
     """
     nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
     a, b, c, work = open_touches(last), open_touches(next_), open_touches(spare), open_work(work_table)
+    _place(nodes, motion, met)
     _keep(nodes, joints, work)
     _copy2(shapes.pose, shape_poses)
     parts, steps, settled, in_c = 1, 0, False, False

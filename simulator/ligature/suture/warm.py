@@ -37,8 +37,7 @@ def compile_kernels() -> None:
     points = np.array([[-0.002, 0.0, 0.0055], [0.0, 0.0, 0.0055], [0.002, 0.0, 0.0055]])
     partner = Partner(0, 0.0, np.ones(3), np.eye(4), np.zeros(3), fixed=True)
     rod = Rod(from_material(points, 1e-3, 1e8, 1100.0), [partner], colliders.shapes(2), DT)
-    low, high = rod.box()
-    rod.meet(colliders, colliders.update(_Still(), low, high), _Still())
+    rod.meet(colliders, colliders.update(_Still(), rod.box()), _Still())
     rod.step()
 
 
