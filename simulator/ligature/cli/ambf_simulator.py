@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ligature.cli.options import RunOptions, model_indices, rate_notes
+from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
 from ligature.cli.supervisor import Supervisor
 
 FASTEST = 1000.0
@@ -36,6 +36,7 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--ns", default="", help="prefix of every namespace")
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
     flags.add_argument("--override_min_comm_freq", type=int, help="publishing rate without commands")
+    flags.add_argument("--arm", action="append", default=[], type=_arm, help="NAME=KIND:BODY:TOOL (not an AMBF flag)")
     flags.add_argument("--src-crtk", action="store_true", help="arms under /CRTK too (not an AMBF flag)")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument(
@@ -46,6 +47,15 @@ def parser() -> argparse.ArgumentParser:
     for words, what in _WITHOUT_EFFECT.items():
         flags.add_argument(*words, dest=words[0].lstrip("-"), help=f"{what}; accepted, without effect")
     return flags
+
+
+def _arm(text: str) -> str:
+    """The text of an arm, unless it is none."""
+    try:
+        arm_entry(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return text
 
 
 def options_of(arguments: list[str]) -> RunOptions:
@@ -66,7 +76,7 @@ def options_of(arguments: list[str]) -> RunOptions:
     return RunOptions(
         given.launch_file, models, tuple(f for f in (given.a or "").split(",") if f), tuple(given.root), given.ns,
         min(given.p, FASTEST), given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
-        names=given.names, src_crtk=given.src_crtk, cameras=given.cameras, notes=_notes(given),
+        names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras, notes=_notes(given),
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from ligature.cli.bench import bench as run_bench
 from ligature.cli.check import check as run_check
-from ligature.cli.options import RunOptions, model_indices, rate_notes
+from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
 from ligature.cli.supervisor import Supervisor
 
 app = typer.Typer(
@@ -45,6 +45,10 @@ def run(
     namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
     min_hz: Annotated[int | None, typer.Option("--min-hz", help="Publishing rate without commands.", min=1)] = None,  # noqa: UP045
     max_hz: Annotated[int | None, typer.Option("--max-hz", help="Publishing rate with commands.", min=1)] = None,  # noqa: UP045
+    arm: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(help="An arm, NAME=KIND:BODY:TOOL, instead of those that are found; may be repeated."),
+    ] = None,
     src_crtk: Annotated[bool, typer.Option("--src-crtk", help="Arms under /CRTK too, as SRC's node.")] = False,
     names: Annotated[
         str, typer.Option(help="Name policy: ambf, or src for the suturing challenge's scripts.")
@@ -59,9 +63,16 @@ def run(
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
         raise typer.BadParameter("--names is 'ambf' or 'src'")
+    arms = tuple(arm or ())
+    try:
+        for text in arms:
+            arm_entry(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
-        min_hz=min_hz, max_hz=max_hz, names=names, src_crtk=src_crtk, cameras=cameras, notes=rate_notes(rate),
+        min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras,
+        notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
 

@@ -15,7 +15,8 @@ class RunOptions:
 
     ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second,
     ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
-    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy, ``src_crtk``
+    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy,
+    ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
     tells whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` says
     whether pictures are published (None: of the cameras for which the scene says so), ``notes`` are lines to
     tell the user at the start.
@@ -32,13 +33,15 @@ class RunOptions:
     min_hz: int | None = None
     max_hz: int | None = None
     names: str = "ambf"
+    arms: tuple[str, ...] = ()
     src_crtk: bool = False
     cameras: bool | None = None
     notes: tuple[str, ...] = ()
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
-        return ligature.load(self.scene, self.models, self.files, self.roots, self.prefix)
+        arms = [arm_entry(text) for text in self.arms] if self.arms else None
+        return ligature.load(self.scene, self.models, self.files, self.roots, self.prefix, arms)
 
     def shown_cameras(self, scene: Scene) -> tuple[Camera, ...]:
         """The cameras whose pictures are published."""
@@ -54,10 +57,27 @@ class RunOptions:
     def from_text(cls, text: str) -> RunOptions:
         """The options of `to_text`."""
         values = json.loads(text)
-        for name in ("models", "files", "roots", "notes"):
+        for name in ("models", "files", "roots", "arms", "notes"):
             if values[name] is not None:
                 values[name] = tuple(values[name])
         return cls(**values)
+
+
+def arm_entry(text: str) -> dict[str, str]:
+    """An arm from ``NAME=KIND[:BODY[:TOOL]]``, for example ``PSM1=psm:psm1/BODY base link:420006``.
+
+    ``BODY`` is the base of a PSM or of an ECM with joints (``ecm``), or what carries the cameras (``camera``). Raises
+    ValueError for a text that is none of this.
+    """
+    name, equals, rest = text.partition("=")
+    kind, _, place = rest.partition(":")
+    body, _, tool = place.partition(":")
+    if not equals or kind not in ("psm", "ecm", "camera", "mtm") or bool(body) is (kind == "mtm"):
+        raise ValueError(f"'{text}' is no arm; write PSM1=psm:BODY:TOOL, ECM=ecm:BODY, ECM=camera:BODY or MTML=mtm")
+    found = {"name": name, "kind": "ecm" if kind == "camera" else kind}
+    if body:
+        found["tip" if kind == "camera" else "base"] = body
+    return {**found, "tool": tool} if tool else found
 
 
 def model_indices(text: str) -> tuple[int, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,7 @@ def load(
     files: Sequence[str | Path] = (),
     roots: Sequence[str | Path] = (),
     namespace_prefix: str = "",
+    arms: Sequence[Mapping[str, str]] | None = None,
 ) -> Scene:
     """Load a scene.
 
@@ -57,6 +59,9 @@ def load(
         Folders below which files may be opened besides the scene's own.
     namespace_prefix
         Put before every namespace.
+    arms
+        Which bodies are arms, as the launch key ``ligature arms`` would say (`ligature.model.arms`), instead of
+        what the file says and what is found.
 
     Raises
     ------
@@ -71,9 +76,9 @@ def load(
         raise SceneError(*error.diagnostics) from error
     if document.kind == "launch":
         assert isinstance(document, LaunchDocument)
-        scene = _load_launch(document, models, files, resolver, namespace_prefix)
+        scene = _load_launch(document, models, files, resolver, namespace_prefix, arms)
     elif document.kind == "model":
-        scene = _load_models([document], files, resolver, namespace_prefix, start.stem)
+        scene = _load_models([document], files, resolver, namespace_prefix, start.stem, arms)
     else:
         message = f"'{start}' is {document.kind} file, not a launch or model file"
         raise SceneError(Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file"))
@@ -84,9 +89,15 @@ def load(
 
 
 def _load_models(
-    documents: Sequence[Document], files: Sequence[str | Path], resolver: Resolver, prefix: str, name: str
+    documents: Sequence[Document],
+    files: Sequence[str | Path],
+    resolver: Resolver,
+    prefix: str,
+    name: str,
+    arms: Sequence[Mapping[str, str]] | None,
 ) -> Scene:
-    builder = SceneBuilder(name, resolver, WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World")), prefix)
+    world = WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World"))
+    builder = SceneBuilder(name, resolver, _with_arms(world, arms), prefix)
     for document in [*_extra(files, resolver, builder), *documents]:
         builder.diagnostics += document.diagnostics
         builder.add_model(document, None)
@@ -109,11 +120,14 @@ def _load_launch(
     files: Sequence[str | Path],
     resolver: Resolver,
     prefix: str,
+    arms: Sequence[Mapping[str, str]] | None,
 ) -> Scene:
     found = list(launch.diagnostics)
     world = _world_document(launch, resolver, found)
     shaders = None if world is None else shader_files(world.top, "shaders", world.path.parent)
-    builder = SceneBuilder(launch.path.stem, resolver, _settings(world, shaders, prefix, launch), prefix)
+    builder = SceneBuilder(
+        launch.path.stem, resolver, _with_arms(_settings(world, shaders, prefix, launch), arms), prefix
+    )
     builder.diagnostics += found
     if world is not None:
         _add_environment(world, builder, resolver)
@@ -143,6 +157,13 @@ def _world_document(launch: LaunchDocument, resolver: Resolver, found: list[Diag
         return None
     found += world.diagnostics
     return world
+
+
+def _with_arms(settings: WorldSettings, arms: Sequence[Mapping[str, str]] | None) -> WorldSettings:
+    """The settings with other arms than the file's, where some are given."""
+    if arms is None:
+        return settings
+    return replace(settings, extra={**settings.extra, "ligature arms": [dict(arm) for arm in arms]})
 
 
 def _settings(
