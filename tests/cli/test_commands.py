@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 BIN = Path(sys.executable).parent
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
 
@@ -83,3 +85,30 @@ def test_decompose_of_nonsense_says_where(tmp_path: Path) -> None:
     (tmp_path / "bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
     done = ligature("decompose", tmp_path / "bad.obj")
     assert done.returncode == 1 and "bad.obj:2:1: error: a face names vertex 2, but 1 are defined" in done.stdout
+
+
+def test_render_writes_pictures_calibration_and_annotations(tmp_path: Path) -> None:
+    done = ligature(
+        "render", SMALL, "--camera", "cameraL", "--out", tmp_path / "out", "--width", 160, "--height", 120,
+        "--format", "exr", "--annotations", "coco,mask", "--noise", 0.01,
+    )  # fmt: skip
+    if "no OpenGL" in done.stdout:
+        pytest.skip(done.stdout)
+    assert done.returncode == 0, done.stdout
+    names = {"cameraL.png", "cameraL.exr", "cameraL_camera.json", "cameraL_coco.json", "cameraL_mask.png"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names | {"cameraL_mask.json"}
+    seen = json.loads((tmp_path / "out" / "cameraL_coco.json").read_text())
+    names_of = {c["id"]: c["name"] for c in seen["categories"]}
+    assert "/ambf/env/phantom/BODY Needle" in {names_of[a["category_id"]] for a in seen["annotations"]}
+    assert json.loads((tmp_path / "out" / "cameraL_camera.json").read_text())["width"] == 160
+
+
+def test_render_names_the_cameras_there_are(tmp_path: Path) -> None:
+    done = ligature("render", SMALL, "--camera", "cameraX", "--out", tmp_path)
+    assert done.returncode == 1
+    assert "no camera is called 'cameraX', or several are" in done.stdout and "cameras/cameraL" in done.stdout
+
+
+def test_render_refuses_what_it_cannot_write(tmp_path: Path) -> None:
+    assert "npy, png, exr" in ligature("render", SMALL, "--camera", "cameraL", "--format", "gif").stderr
+    assert "five numbers" in ligature("render", SMALL, "--camera", "cameraL", "--distortion", "1,2").stderr

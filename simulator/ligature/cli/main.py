@@ -111,13 +111,42 @@ def render(
     width: Annotated[int, typer.Option(help="Width in pixels; 0 for the camera's own.", min=0)] = 0,
     height: Annotated[int, typer.Option(help="Height in pixels; 0 for the camera's own.", min=0)] = 0,
     root: Roots = None,
+    format: Annotated[str, typer.Option(help="Of depth, ids and normals: npy, png or exr.")] = "npy",
+    annotations: Annotated[str, typer.Option(help="Any of coco,mask.")] = "",
+    exposure: Annotated[float, typer.Option(help="Stops brighter than drawn.")] = 0.0,
+    noise: Annotated[float, typer.Option(help="Standard deviation of colour, of full scale.", min=0)] = 0.0,
+    depth_noise: Annotated[float, typer.Option(help="Standard deviation of depth in metres.", min=0)] = 0.0,
+    distortion: Annotated[str, typer.Option(help="Lens: k1,k2,p1,p2,k3 as in OpenCV.")] = "0,0,0,0,0",
+    seed: Annotated[int, typer.Option(help="Seed of the noise.", min=0)] = 0,
 ) -> None:
-    """Draw one moment as a camera sees it, headless: colour, depth and ids."""
+    """Draw one moment as a camera sees it, headless: colour, depth, ids, normals, calibration, annotations."""
+    from ligature.cli.render import ANNOTATIONS
     from ligature.cli.render import render as run_render
+    from ligature.render import ImageSensor
+    from ligature.render.files import FORMATS
 
+    if format not in FORMATS:
+        raise typer.BadParameter(f"--format is one of {', '.join(FORMATS)}, not '{format}'")
+    kinds = [kind for kind in annotations.split(",") if kind]
+    if not set(kinds) <= set(ANNOTATIONS):
+        raise typer.BadParameter(f"--annotations is any of {', '.join(ANNOTATIONS)}, not '{annotations}'")
+    lens = _five_numbers(distortion)
+    sensor = ImageSensor(exposure, noise, lens, depth_noise, seed)
     resolution = (width, height) if width and height else None
     console = Console(highlight=False, soft_wrap=True)
-    raise typer.Exit(run_render(launch, indices(models), root or [], camera, out, seconds, resolution, console))
+    raise typer.Exit(
+        run_render(
+            launch, indices(models), root or [], camera, out, seconds, resolution, format, kinds, sensor, console
+        )
+    )
+
+
+def _five_numbers(text: str) -> tuple[float, float, float, float, float]:
+    try:
+        k1, k2, p1, p2, k3 = (float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"--distortion is five numbers k1,k2,p1,p2,k3, not '{text}'") from None
+    return k1, k2, p1, p2, k3
 
 
 @app.command()

@@ -1,17 +1,20 @@
-"""``ligature render``: one moment of a scene as a camera sees it, written as pictures and arrays."""
+"""``ligature render``: one moment of a scene as a camera sees it, written as pictures, arrays and annotations."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from PIL import Image
 from rich.console import Console
 
 import ligature
-from ligature.model.lookup import find_by_text
-from ligature.render import Renderer, RenderUnavailable, view_of
+from ligature.render import Frame, ImageSensor, RenderUnavailable
+from ligature.render.annotations import coco, mask_image
+from ligature.render.files import write_calibration, write_frame
+
+ANNOTATIONS = ("coco", "mask")
+PASSES = ("rgb", "depth", "ids", "normals")
 
 
 def render(
@@ -22,37 +25,43 @@ def render(
     out: Path,
     seconds: float,
     resolution: tuple[int, int] | None,
+    format: str,
+    annotations: Sequence[str],
+    sensor: ImageSensor,
     console: Console,
 ) -> int:
-    """Write colour as PNG, depth and ids as NPY below ``out``; returns the exit status."""
+    """Write what ``camera`` sees after ``seconds`` below ``out``; returns the exit status."""
     try:
         scene = ligature.load(launch, models, roots=roots)
-        index = find_by_text([c.identity.topic for c in scene.cameras], camera)
-        if index is None:
-            names = ", ".join(c.identity.topic for c in scene.cameras) or "none"
-            console.print(
-                f"no camera is called '{camera}', or several are; there are: {names}", style="red", markup=False
-            )
-            return 1
         simulation = ligature.Simulation(scene)
+        handle = simulation.cameras[camera]
         simulation.step(max(1, round(seconds / simulation.dt)))
-        renderer = Renderer(scene)
-        frame = renderer.render(
-            simulation.state, view_of(scene.cameras[index], simulation.state["camera_world"][0, index], resolution)
-        )
-        out.mkdir(parents=True, exist_ok=True)
-        name = scene.cameras[index].identity.name
-        Image.fromarray(frame.rgb).save(out / f"{name}.png")
-        np.save(out / f"{name}_depth.npy", frame.depth)
-        np.save(out / f"{name}_ids.npy", frame.ids)
+        frame = handle.capture(resolution, passes=PASSES, sensor=sensor)
+        name = handle.camera.identity.name
+        files = write_frame(frame, out, name, format)
+        calibration = handle.calibration(resolution, sensor=sensor)
+        files.append(write_calibration(calibration, handle.pose, out / f"{name}_camera.json"))
+        files += [_annotate(kind, frame, scene.drawn_names, out, name) for kind in annotations]
     except ligature.SceneError as error:
         for diagnostic in error.diagnostics:
             console.print(str(diagnostic), style="red", markup=False)
         return 2
-    except (RenderUnavailable, OSError) as error:
-        console.print(str(error), style="red", markup=False)
+    except (KeyError, RenderUnavailable, OSError) as error:
+        console.print(str(error.args[0] if isinstance(error, KeyError) else error), style="red", markup=False)
         return 1
-    for problem in renderer.problems:
+    for problem in handle.problems:
         console.print(str(problem.diagnostics[0]), style="yellow", markup=False)
-    console.print(f"{out / name}.png, {name}_depth.npy (metres), {name}_ids.npy (1 + body index)", markup=False)
+    console.print("\n".join(str(path) for path in files), markup=False)
     return 0
+
+
+def _annotate(kind: str, frame: Frame, names: dict[int, str], out: Path, name: str) -> Path:
+    if kind == "mask":
+        path = out / f"{name}_mask.png"
+        mask_image(frame.ids).save(path)
+        table = {str(number): names[number] for number in sorted(set(frame.ids[frame.ids > 0].tolist()))}
+        (out / f"{name}_mask.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
+        return path
+    path = out / f"{name}_coco.json"
+    path.write_text(json.dumps(coco(frame.ids, names, f"{name}.png")), encoding="utf-8")
+    return path

@@ -539,6 +539,12 @@ class Scene:
         return {body.identity.identifier: body.index for body in self.bodies}
 
     @cached_property
+    def drawn_names(self) -> dict[int, str]:
+        """Identifier by the number that pictures show: bodies from 1 on, then ghosts; 0 is the background."""
+        things = [body.identity for body in self.bodies] + [ghost.identity for ghost in self.ghosts]
+        return {number: identity.identifier for number, identity in enumerate(things, 1)}
+
+    @cached_property
     def rod_bodies(self) -> frozenset[int]:
         """Indices of the bodies that are elements of a rod."""
         return frozenset(index for rod in self.rods for index in rod.bodies)

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.adf import AdfError
 from ligature.model.commands import PlaceCommand
 from ligature.model.optics import Calibration, stereo_partners
 from ligature.model.scene import Camera, Scene
@@ -52,6 +53,11 @@ class CameraHandle:
     def pose(self) -> Array:
         """Pose (7,) in world axes."""
         return np.array(self._simulation.state["camera_world"][0, self.camera.index])
+
+    @property
+    def problems(self) -> list[AdfError]:
+        """What could not be drawn, after the first picture."""
+        return self._studio.renderer.problems
 
     def place(self, pose: Sequence[float]) -> None:
         """Put the camera at ``pose`` (7,) in its parent's frame, from the next tick on."""

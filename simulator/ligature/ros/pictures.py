@@ -68,8 +68,7 @@ def cloud(points: NDArray[np.float32], rgb: NDArray[np.uint8], header: Header) -
 
 def id_names(scene: Scene) -> String:
     """The table from the numbers of an id picture to identifiers, as JSON; 0 is the background."""
-    things = [b.identity.identifier for b in scene.bodies] + [g.identity.identifier for g in scene.ghosts]
-    return String(json.dumps({str(i + 1): name for i, name in enumerate(things)}))
+    return String(json.dumps({str(number): name for number, name in scene.drawn_names.items()}))
 
 
 def transform(parent: str, child: str, pose: NDArray[np.float64], stamp: Any) -> TransformStamped:
