@@ -31,6 +31,7 @@ from ligature.model.commands import (
     Reset,
     check,
 )
+from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
 from ligature.model.scene import Body, Camera, Joint, Scene
 from ligature.model.state import StateRecord, new_state
@@ -40,7 +41,7 @@ from ligature.sensing.attachments import Attachments
 from ligature.sensing.contacts import Contacts
 from ligature.sensing.ghosts import Ghosts
 from ligature.sensing.rays import Rays
-from ligature.suture import Rods
+from ligature.suture import Holes, Insertion, Rods
 
 Array = NDArray[np.float64]
 Handle = TypeVar("Handle")
@@ -201,6 +202,7 @@ class Simulation:
         self._resets = 0
         self._world = World(scene, dt)
         self._rods = Rods(scene, dt)
+        self._holes = Holes(scene, self._rods, self._world, dt)
         self._attachments = Attachments(scene)
         self._ghosts = Ghosts(scene, self._world)
         self._rays = Rays(scene, self._world)
@@ -236,7 +238,9 @@ class Simulation:
             self.arms.tick(self.dt)
             self._world.pre_step()
         with self.phases["suture"]:
+            self._holes.begin()
             self._rods.step(self._world)
+            self._holes.end()
         with self.phases["bodies"]:
             self._world.step()
         self._tick += 1
@@ -248,6 +252,11 @@ class Simulation:
         self._ghosts.update(self._attachments.world[self._attachments.of("ghost")], poses)
         self._rays.update(poses, self._world.apply_force)
         self._contacts.update()
+
+    @property
+    def insertions(self) -> tuple[Insertion, ...]:
+        """Needles and threads in tissue holes, as after the last tick; ``scene.holes`` names the holes."""
+        return self._holes.insertions
 
     # --- commands ---------------------------------------------------------------------------
 
@@ -280,15 +289,22 @@ class Simulation:
             self.arms.release(command.index)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Put the root body of a tree at ``pose`` (7,) at rest; raises ValueError for a link of an arm."""
+        """Put the root body of a tree at ``pose`` (7,) at rest, and a thread that hangs on it alone along with it.
+
+        Raises ValueError for a link of an arm.
+        """
         check(BodyCommand(body, CommandType.POSITION, tuple(pose)))
+        before = pose7_matrix(self._world.pose7(body))
         self._world.set_pose(body, pose)
+        self._rods.carry(body, pose7_matrix(pose) @ inverse(before))
+        self._holes.forget(body)
         self._write_state()
 
     def reset(self, bodies_only: bool = False) -> None:
         """Put everything back to where the scene starts; time goes on and commands hold."""
         self._world.reset()
         self._rods.reset()
+        self._holes.reset()
         self.arms.reset()
         if not bodies_only:
             self._attachments.reset()
@@ -304,9 +320,11 @@ class Simulation:
             "resets": self._resets,
             "world": self._world.snapshot(),
             "rods": self._rods.memory(),
+            "holes": self._holes.memory(),
             "attachments": self._attachments.memory(),
             "arms": self.arms.memory(),
         }
+        self._holes.restart()
         self._write_state()
         return Snapshot(copy.deepcopy(parts))
 
@@ -316,6 +334,7 @@ class Simulation:
         self._tick, self._resets = parts["tick"], parts["resets"]
         self._world.restore(parts["world"])
         self._rods.recall(parts["rods"])
+        self._holes.recall(parts["holes"])
         self._attachments.recall(parts["attachments"])
         self.arms.recall(parts["arms"])
         self._write_state()
@@ -326,9 +345,9 @@ class Simulation:
         for name in sorted(self.state.dtype.names or ()):
             if name not in ("wall_time", "stamp"):
                 digest.update(np.ascontiguousarray(self.state[name]).tobytes())
-        for rod in self._rods.memory():
-            for name in sorted(rod):
-                digest.update(np.ascontiguousarray(rod[name]).tobytes())
+        for kept in (*self._rods.memory(), self._holes.memory()):
+            for name in sorted(kept):
+                digest.update(np.ascontiguousarray(kept[name]).tobytes())
         return digest.hexdigest()
 
     def close(self) -> None:
@@ -341,6 +360,7 @@ class Simulation:
         self.problems += self._world.heal() + self._rods.heal()
         self._world.write_state(self.state)
         self._rods.write_state(self.state)
+        self._holes.write_state(self.state)
 
     def _write_state(self) -> None:
         """Fill the state record anew, after something was put elsewhere."""

@@ -15,6 +15,7 @@ from ligature.mesh import load_mesh
 from ligature.model.frames import Array, axis_rotation, pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
 from ligature.model.parts import camera_frame, light_frame
+from ligature.model.piercing import Tissue
 from ligature.model.scene import Attachment, Camera, Ghost, Identity, Light
 
 STATIC_CUTOFF = np.pi / 2
@@ -36,7 +37,15 @@ def ghost(element: Element, index: int, identity: Identity, context: FileContext
         visual(element, context, None),
         tuple(int(g) for g in element.numbers("collision groups")),
         element.number("collision margin"),
+        element.value("ligature hole"),
+        _tissue(element),
     )
+
+
+def _tissue(element: Element) -> Tissue:
+    """How the tissue at a ghost holds what passes through it."""
+    values = {name: element.value(f"ligature tissue.{name}") for name in ("stiffness", "strength", "friction", "drag")}
+    return Tissue(**{name: value for name, value in values.items() if value is not None})
 
 
 def light(element: Element, index: int, identity: Identity) -> Light:

@@ -16,10 +16,13 @@ from ligature.model import attached, trees
 from ligature.model.arms import find_arms
 from ligature.model.frames import pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, shader_files
+from ligature.model.holes import find_holes
 from ligature.model.lookup import candidates
 from ligature.model.naming import Names, merged
+from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
 from ligature.model.parts import body_of, joint_of, sensor_of
+from ligature.model.piercing import Hole, Needle
 from ligature.model.rods import rod_chains
 from ligature.model.scene import (
     Actuator,
@@ -135,13 +138,17 @@ class SceneBuilder:
         bodies = self._finished_bodies()
         arms, findings = find_arms(bodies, self.joints, self.world.extra.get("ligature arms"))
         self.diagnostics += findings
+        ghosts = self._attached("ghost", self.ghosts)
+        needles = find_needles(bodies, self.joints, forest, rods)
+        holes = find_holes(ghosts, bodies)
+        self._report_piercing(needles, holes)
         return Scene(
             name=self.name,
             world=self.world,
             models=tuple(self.models),
             bodies=bodies,
             joints=tuple(self.joints),
-            ghosts=self._attached("ghost", self.ghosts),
+            ghosts=ghosts,
             sensors=tuple(self.sensors),
             actuators=tuple(self.actuators),
             cameras=self._attached("camera", self.cameras),
@@ -150,10 +157,26 @@ class SceneBuilder:
             articulations=forest,
             loops=loops,
             rods=rods,
+            needles=needles,
+            holes=holes,
             arms=arms,
             diagnostics=tuple(self.diagnostics),
             roots=self.resolver.roots,
         )
+
+    def _report_piercing(self, needles: tuple[Needle, ...], holes: tuple[Hole, ...]) -> None:
+        """Name the recognised needles and tissue holes."""
+        for needle in needles:
+            identity, arc = self.bodies[needle.body].identity, needle.arc
+            size = f"{1e3 * arc.length:.1f} mm long, radius {1e3 * arc.radius:.1f} mm"
+            message = f"'{identity.identifier}' is a needle, {size}"
+            self.report(
+                Diagnostic(Severity.INFO, message, identity.mark, "opt out with 'ligature needle: false'", "needle")
+            )
+        for hole in holes:
+            message = f"'{hole.name}' is a tissue hole: it holds what passes through it"
+            mark = self.ghosts[hole.ghost].identity.mark
+            self.report(Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature hole: false'", "hole"))
 
     def _list(self, kind: str) -> list[Any]:
         lists: dict[str, list[Any]] = {

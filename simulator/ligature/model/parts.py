@@ -74,6 +74,8 @@ def body_of(
         publish_children_names=element.flag("publish children names"),
         publish_joint_names=element.flag("publish joint names"),
         publish_joint_positions=element.flag("publish joint positions"),
+        needle=element.value("ligature needle"),
+        inertia_estimated=not (inertial_block and element.has("inertia")),
     )
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Mark
+from ligature.model.piercing import Hole, Needle, Tissue
 
 Array = NDArray[np.float64]
 """A float64 array; the docstring beside each use gives its shape and frame."""
@@ -193,7 +194,8 @@ class Body:
     ``T_world_body`` the initial pose; ``gravity`` (3,) in world axes is already settled (body over
     model over world). ``joints`` are the active descendant joints in command-vector order (ADF
     specification §11), ``children`` the matching child bodies. ``no_collision_with`` holds the
-    bodies whose contacts with this one are switched off by joints, files or groups.
+    bodies whose contacts with this one are switched off by joints, files or groups. ``needle`` is what
+    the file says of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
     """
 
     index: int
@@ -218,6 +220,8 @@ class Body:
     joints: tuple[int, ...] = ()
     children: tuple[int, ...] = ()
     no_collision_with: frozenset[int] = frozenset()
+    needle: bool | None = None
+    inertia_estimated: bool = False
     extra: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -305,7 +309,10 @@ class Attachment:
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """A volume that senses what overlaps it and never produces a contact force (§16)."""
+    """A volume that senses what overlaps it and never produces a contact force (§16).
+
+    ``hole`` is what the file says of `ligature.model.holes`, None for nothing.
+    """
 
     index: int
     identity: Identity
@@ -314,6 +321,8 @@ class Ghost:
     visual: Visual
     collision_groups: tuple[int, ...] = ()
     collision_margin: float = 0.001
+    hole: bool | None = None
+    tissue: Tissue = Tissue()
 
 
 class SensorType(enum.Enum):
@@ -529,6 +538,8 @@ class Scene:
     articulations: tuple[Articulation, ...] = ()
     loops: tuple[int, ...] = ()
     rods: tuple[RodChain, ...] = ()
+    needles: tuple[Needle, ...] = ()
+    holes: tuple[Hole, ...] = ()
     arms: tuple[ArmDescription, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
     roots: tuple[Path, ...] = ()

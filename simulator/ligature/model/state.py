@@ -51,6 +51,9 @@ those of velocity and acceleration; ``reference`` is the frame of a base frame t
 the instrument's model number. Local poses are in the arm's base frame. Twists and wrenches are linear then angular.
 """
 
+MAX_INSERTIONS = 64
+"""Most passages of needles and threads through tissue holes in one state."""
+
 StateDtype = np.dtype[np.void]
 StateRecord = NDArray[np.void]
 """One-element record array of `state_dtype`; index fields by name, then ``[0]``."""
@@ -64,6 +67,8 @@ def state_dtype(scene: Scene) -> StateDtype:
     ``ghost_sensed[g, b]`` tells whether body b overlaps ghost g. ``ray_*`` are the rays of all
     sensors one after the other; ``ray_body`` is -1 for no hit. ``camera_pose`` and ``light_pose``
     are in the parent's frame, as the messages want them; ``*_world`` beside them in world axes.
+    Of ``insertion_*`` the first ``insertion_count`` rows count: hole of the scene, needle or element in
+    it, metres of it beyond the hole, where it passes and the force on it there, in world axes.
     """
     nb, nj = len(scene.bodies), len(scene.joints)
     ng, na = len(scene.ghosts), len(scene.actuators)
@@ -102,6 +107,12 @@ def state_dtype(scene: Scene) -> StateDtype:
             ("light_pose", "f8", (nl, 7)),
             ("light_world", "f8", (nl, 7)),
             ("rod_tension", "f8", (nb,)),
+            ("insertion_count", "i4"),
+            ("insertion_hole", "i4", (MAX_INSERTIONS,)),
+            ("insertion_body", "i4", (MAX_INSERTIONS,)),
+            ("insertion_depth", "f8", (MAX_INSERTIONS,)),
+            ("insertion_point", "f8", (MAX_INSERTIONS, 3)),
+            ("insertion_force", "f8", (MAX_INSERTIONS, 3)),
             ("arm", ARM_DTYPE, (len(scene.arms),)),
         ]
     )

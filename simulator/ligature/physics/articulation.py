@@ -8,6 +8,7 @@ Bullet would otherwise work through all links, in three rows a contact point.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,6 +31,10 @@ LEAST_INERTIA = 1e-12
 
 LIMIT_SLACK = 1e-9
 """Travel in metres or radians beyond a limit: a joint at rest exactly on it would cost Bullet a constraint row."""
+
+
+STIFFEST, MOST_DAMPED = 16.0, 0.8
+"""A spring acts in full up to m / (16 dt²), a damper up to 0.8 m / dt (ADF specification §15.4)."""
 
 
 @dataclass
@@ -114,8 +119,8 @@ class Tree:
         return (self.uid,) if self.stand == self.uid else (self.stand, self.uid)
 
 
-def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articulation) -> Tree:
-    """Create the multibody of ``articulation`` at the poses of the scene's files."""
+def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articulation, dt: float) -> Tree:
+    """Create the multibody of ``articulation`` at the poses of the scene's files, for ticks of ``dt``."""
     bodies, joints = scene.bodies, scene.joints
     root = bodies[articulation.links[0].body]
     plan = _Plan()
@@ -125,7 +130,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
     for link in articulation.links[1:]:
         assert link.joint is not None
         inner = articulation.links[link.parent_link].body
-        _append(plan, client, cache, bodies[link.body], joints[link.joint], inner, link_of, T_link_inertial, axes)
+        _append(plan, client, cache, bodies[link.body], joints[link.joint], inner, link_of, T_link_inertial, axes, dt)
     T_world_inertial = root.T_world_body @ root.T_body_inertial
     at = {
         "basePosition": T_world_inertial[:3, 3].tolist(),
@@ -168,6 +173,7 @@ def _append(
     link_of: dict[int, int],
     T_link_inertial: dict[int, Array],
     axes: list[tuple[int, int, Axis, float]],
+    dt: float,
 ) -> None:
     """Add the links of one joint and the body it carries away from the root."""
     forward = joint.parent == inner
@@ -177,17 +183,18 @@ def _append(
     steps = free if forward else tuple(axis.reversed() for axis in reversed(free))
     T_parent_link = T_link_inertial[inner] @ T_inner_frame
     parent = link_of[inner]
+    inertia = _inertia_on(outer, steps, dt)
     for axis in steps[:-1]:
         plan.masses.append(LIGHT * max(outer.mass, 1e-6))
-        plan.inertias.append(np.full(3, LIGHT * max(float(inertia_of(outer).max()), LEAST_INERTIA)))
+        plan.inertias.append(np.full(3, LIGHT * max(float(inertia.max()), LEAST_INERTIA)))
         plan.shapes.append(shapes.NO_SHAPE)
         plan.add(parent, _joint_type(axis), axis.direction, T_parent_link, np.eye(4))
         parent = len(plan.masses) - 1
-        axes.append((parent, joint.index, axis, _effective(outer, axis, T_outer_frame)))
+        axes.append((parent, joint.index, axis, _effective(outer, inertia, axis, T_outer_frame)))
         T_parent_link = np.eye(4)
     T_own = inverse(T_outer_frame)
     plan.masses.append(outer.mass)
-    plan.inertias.append(inertia_of(outer))
+    plan.inertias.append(inertia)
     plan.shapes.append(
         shapes.create(client, cache, outer.colliders, T_own @ inverse(outer.T_body_inertial), moving=True)
     )
@@ -198,7 +205,7 @@ def _append(
     link_of[outer.index] = len(plan.masses) - 1
     T_link_inertial[outer.index] = T_own
     if last is not None:
-        axes.append((link_of[outer.index], joint.index, last, _effective(outer, last, T_outer_frame)))
+        axes.append((link_of[outer.index], joint.index, last, _effective(outer, inertia, last, T_outer_frame)))
 
 
 def inertia_of(body: Body) -> Array:
@@ -207,13 +214,26 @@ def inertia_of(body: Body) -> Array:
     return np.where(body.inertia > LEAST_INERTIA, body.inertia, ball) if body.mass > 0 else np.zeros(3)
 
 
-def _effective(body: Body, axis: Axis, T_inertial_frame: Array) -> float:
+def _inertia_on(body: Body, steps: Sequence[Axis], dt: float) -> Array:
+    """`inertia_of` a body on the axes of its joint.
+
+    Where the file leaves the inertia open it is large enough for the springs and dampers to act in full in
+    ticks of ``dt``; else they are capped (§15.4), and a tissue hole swings where its file says it is stiff.
+    """
+    turning = [axis for axis in steps if not axis.prismatic]
+    if not body.inertia_estimated or body.mass == 0.0 or not turning:
+        return inertia_of(body)
+    needed = max(max(STIFFEST * dt * dt * axis.stiffness, dt * axis.damping / MOST_DAMPED) for axis in turning)
+    return np.maximum(inertia_of(body), needed)
+
+
+def _effective(body: Body, inertia: Array, axis: Axis, T_inertial_frame: Array) -> float:
     """Mass, or moment of inertia about the axis, that a spring on this axis moves."""
     if axis.prismatic:
         return body.mass
     direction = T_inertial_frame[:3, :3] @ axis.direction
     arm = np.cross(T_inertial_frame[:3, 3], direction)
-    return float(inertia_of(body) @ direction**2 + body.mass * (arm @ arm))
+    return float(inertia @ direction**2 + body.mass * (arm @ arm))
 
 
 def _joint_type(axis: Axis) -> int:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ligature.model.commands import CommandType
 from ligature.model.scene import Joint, JointType, OutputType
-from ligature.physics.articulation import Tree
+from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
 from ligature.physics.motions import Motions
 
 Array = NDArray[np.float64]
@@ -128,8 +128,8 @@ class TreeControl:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
         axes = [axis for _, _, axis, _ in self.tree.axes]
         moved = np.array([m for *_, m in self.tree.axes])
-        self._stiffness = np.minimum([a.stiffness for a in axes], moved / (16.0 * self._dt**2))
-        self._damping = np.minimum([a.damping for a in axes], 0.8 * moved / self._dt)
+        self._stiffness = np.minimum([a.stiffness for a in axes], moved / (STIFFEST * self._dt**2))
+        self._damping = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / self._dt)
         self._rest = np.array([a.rest for a in axes])
         self._sprung = np.array([a.sprung for a in axes], dtype=bool)
 

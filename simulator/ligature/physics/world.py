@@ -19,12 +19,13 @@ from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Body, Scene
 from ligature.model.state import StateRecord
-from ligature.physics.articulation import Tree, build, is_alone
+from ligature.physics.articulation import Tree, build, inertia_of, is_alone
 from ligature.physics.bodies import BodyControl, Placement
 from ligature.physics.closures import Closures
 from ligature.physics.control import TreeControl
 from ligature.physics.drive import Drive
 from ligature.physics.gravity import common_gravity, gravity_lifts
+from ligature.physics.mobility import mobility
 from ligature.physics.motions import Motions
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
@@ -39,6 +40,9 @@ CLOSING = 0.8
 
 NEAR = 0.002
 """Gap in metres up to which Bullet prepares contacts; its 20 mm takes half of the time of a needle on a phantom."""
+
+IMMOVABLE = 1e6
+"""Mass in kg, and inertia, that no thread or tissue moves in a tick."""
 
 MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
@@ -64,7 +68,7 @@ class World(BulletQueries):
             deterministicOverlappingPairs=1, contactBreakingThreshold=NEAR, physicsClientId=self.client,
         )  # fmt: skip
         pybullet.setGravity(*self._world_gravity.tolist(), physicsClientId=self.client)
-        self.trees = [build(self.client, self._cache, scene, a) for a in scene.articulations]
+        self.trees = [build(self.client, self._cache, scene, a, dt=self.dt) for a in scene.articulations]
         self._motions = Motions(self.client, self.trees)
         self.place_of = {
             body: Placement(self.client, tree, scene.bodies[body], self._motions, k)
@@ -205,6 +209,22 @@ class World(BulletQueries):
         self._impulses[body] = given if total is None else total + given
         if not self.driven(body):
             self.place_of[body].load((given / self.dt).tolist())
+
+    def mobility(self, body: int) -> Array:
+        """Change (6, 6) of a body's twist for a unit of impulse and moment at its centre of mass, at the start."""
+        tree = next(tree for tree in self.trees if body in tree.link_of)
+        return mobility(self.scene, tree, body, self.dt)
+
+    def burden(self, body: int) -> tuple[float, Array, Array]:
+        """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
+        if self.driven(body):
+            return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
+        holders = [self.scene.bodies[held.parent] for held in self._held.values() if held.child == body]
+        mass = sum(holder.mass for holder in holders)
+        inertia = sum((np.full(3, inertia_of(holder).max()) for holder in holders), np.zeros(3))
+        control = self._body_controls.get(body)
+        forced = control is not None and control.type is CommandType.FORCE
+        return mass, inertia, control.target.copy() if control is not None and forced else np.zeros(6)
 
     # --- health, reset, snapshots -----------------------------------------------------------
 

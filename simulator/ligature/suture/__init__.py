@@ -1,5 +1,6 @@
 """The rod that models a suture thread, its coupling to bodies, tissue holes and grasping."""
 
+from ligature.suture.holes import Holes, Insertion
 from ligature.suture.rods import Rods
 
-__all__ = ["Rods"]
+__all__ = ["Holes", "Insertion", "Rods"]

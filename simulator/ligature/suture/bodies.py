@@ -24,3 +24,16 @@ class Bodies(Protocol):
 
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,)."""
+
+
+class HeldBodies(Bodies, Protocol):
+    """The rigid bodies that tissue holds, and those it is part of."""
+
+    def mobility(self, body: int) -> Array:
+        """Change (6, 6) of a body's twist for a unit of impulse and moment at its centre of mass, at the start."""
+
+    def burden(self, body: int) -> tuple[float, Array, Array]:
+        """Mass and inertia (3,) of what holds a body, and what pulls at it in the coming tick besides gravity.
+
+        The pull (6,) is at its centre of mass.
+        """

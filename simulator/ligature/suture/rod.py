@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.frames import inverse, matrix_pose7
+from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, quaternion_matrix
 from ligature.model.poses import compose_rows
 from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
+from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.substeps import run_tick
 from ligature.suture.tables import table_of
@@ -130,6 +131,7 @@ class Rod:
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
+        self.take_passages(passages(1), 0)
         self.impulse = np.zeros((self._total, 6))
         self.tension = np.zeros(n)
         self.newton_steps = 0
@@ -238,9 +240,42 @@ class Rod:
         nodes.x[own], nodes.q[own] = poses[:, :3], poses[:, 3:]
         nodes.v[own], nodes.w[own] = twists[:, :3], twists[:, 3:]
 
+    def hangs_on(self, body: int) -> bool:
+        """Whether ``body`` and nothing else holds the rod."""
+        return set(self._holding) == {body}
+
+    def carry(self, T: Array) -> None:
+        """Move the whole rod by ``T`` (4, 4) in world axes, and leave it at rest, its contacts forgotten."""
+        nodes, own = self._nodes, self._own
+        nodes.x[own] = nodes.x[own] @ T[:3, :3].T + T[:3, 3]
+        for i in range(own.start, own.stop):
+            nodes.q[i] = matrix_quaternion(T[:3, :3] @ quaternion_matrix(nodes.q[i]))
+        nodes.v[own], nodes.w[own] = 0.0, 0.0
+        for touches in self._touches:
+            touches.count[0] = 0
+
     def hold_element(self, element: int, held: bool = True) -> None:
         """Make an element move with its present velocity, whatever pulls at it, or free it again."""
         self._nodes.fixed[self._first + element] = held
+
+    @property
+    def nodes(self) -> layout.Nodes:
+        """The arrays of all nodes; the elements begin at row ``first``."""
+        return self._nodes
+
+    @property
+    def first(self) -> int:
+        """Row of the first element in `nodes`."""
+        return self._first
+
+    def take_passages(self, held: Passages, owner: int) -> None:
+        """Feel the tissue holes of ``held`` whose ``owner`` is this number, from now on."""
+        self._passages, self._passage_table, self._owner = held, table_of(held), owner
+
+    def pull_partner(self, body: int, acceleration: Array, mass: float, inertia: Array) -> None:
+        """Let a movable partner fall with ``acceleration`` (3,), and resist with ``mass`` and ``inertia`` (3,)."""
+        i, nodes = self.node_of[body], self._nodes
+        nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = acceleration, mass, inertia
 
     def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
         """Let an element fall with ``acceleration`` (3,) from now on."""
@@ -332,7 +367,8 @@ class Rod:
         grips, points = self._bonds
         run_tick(
             self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
-            work, grips, points, self._motion, self._met, self._counts, self._self_skip, self._stiffness,
+            work, self._passage_table, self._owner, grips, points, self._motion, self._met, self._counts,
+            self._self_skip, self._stiffness,
             self.impulse, self.tension, self.dt,
         )  # fmt: skip
         self.newton_steps = int(self._counts[2])

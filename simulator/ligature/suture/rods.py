@@ -83,6 +83,12 @@ class Rods:
         rod, element = self._of_body[element_body]
         rod.release(element, body)
 
+    def carry(self, body: int, T: Array) -> None:
+        """Move the threads that hang on ``body`` alone by ``T`` (4, 4) in world axes, at rest: it was put elsewhere."""
+        for rod in self.rods:
+            if rod.hangs_on(body):
+                rod.carry(T)
+
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists and tension of the elements of every rod into a state record."""
         for rod in self.rods:

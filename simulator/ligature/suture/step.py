@@ -13,6 +13,7 @@ import math
 from ligature.suture.chain import factor, solve
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import add_contacts, conclude_contacts, couple, settle_contacts
+from ligature.suture.holding import add_holds, settle_holds
 from ligature.suture.rotations import (
     cross,
     left_jacobian_inverse_times,
@@ -213,8 +214,10 @@ def finish(n, total, nodes, joints, work, dt):
 
 
 @kernel
-def advance(n, total, nodes, joints, touches, work, stiffness, dt, damped):
+def advance(n, total, nodes, joints, touches, work, passages, owner, stiffness, dt, damped, elapsed):
     """One step of ``total`` nodes, the first ``n`` of them a chain.
+
+    It ends ``elapsed`` seconds after the tick began. ``passages`` are those of all rods; this one is ``owner``.
 
     Returns the Newton steps taken and whether contacts and shape settled. Contacts in ``touches`` were
     found at the poses of the step's start; ``stiffness`` is theirs (N/m).
@@ -226,6 +229,7 @@ def advance(n, total, nodes, joints, touches, work, stiffness, dt, damped):
         linearise(n, total, nodes, joints, work, dt)
         assemble(n, total, nodes, joints, work)
         coupled = add_contacts(nodes, touches, work, stiffness, dt)
+        add_holds(passages, owner, nodes, work, elapsed, dt)
         factor(n, nodes.fixed, work.H, work.lever[:, 0], work.lever[:, 1], work.B, work.compliance,
                work.Y, work.Z, work.six)  # fmt: skip
         solve(n, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, work.c, work.g, work.d,
@@ -234,6 +238,7 @@ def advance(n, total, nodes, joints, touches, work, stiffness, dt, damped):
             couple(n, total, nodes, touches, work)
         changed = settle_contacts(nodes, touches, work, stiffness, dt)
         largest = correct(n, total, nodes, work)
+        changed = settle_holds(passages, owner, nodes, elapsed) or changed
         for j in range(n - 1):
             for a in range(6):
                 joints.load[j, a] = work.load[j, a]

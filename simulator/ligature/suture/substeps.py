@@ -11,10 +11,12 @@ from ligature.suture import layout
 from ligature.suture.bonds import place_bonds
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.contacts import detect
+from ligature.suture.holding import add_hold_impulses, begin_holds
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
 from ligature.suture.tables import opener
+from ligature.suture.tracking import open_passages
 
 open_nodes = opener(layout.nodes(1))
 open_joints = opener(layout.joints(1))
@@ -87,18 +89,19 @@ def _scale_loads(joints, factor):
 
 @inlined
 def _one_step(
-    first, n, total, nodes, joints, shapes, old, new, work, grips, points, counts, self_skip, stiffness, h, damped
-):
+    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, counts, self_skip,
+    stiffness, h, part,
+):  # fmt: skip
     new.count[0] = 0
     place_bonds(nodes, work, new, grips, points)
     detect(first, work.segment.shape[0], nodes, shapes, old, new, work, counts, self_skip, h)
-    return advance(n, total, nodes, joints, new, work, stiffness, h, damped)
+    return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, part == 0, (part + 1) * h)
 
 
 @kernel
 def run_tick(
-    first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, spare, work_table, grips,
-    points, motion, met, counts, self_skip, stiffness, impulse, tension, dt,
+    first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, spare, work_table,
+    passage_table, owner, grips, points, motion, met, counts, self_skip, stiffness, impulse, tension, dt,
 ):  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``spare``.
 
@@ -107,6 +110,7 @@ def run_tick(
     """
     nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
     a, b, c, work = open_touches(last), open_touches(next_), open_touches(spare), open_work(work_table)
+    passages = open_passages(passage_table)
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
     _copy2(shapes.pose, shape_poses)
@@ -117,18 +121,20 @@ def run_tick(
                 impulse[i, k] = 0.0
         h = dt / parts
         _scale_loads(joints, 1.0 / (parts * parts))
+        begin_holds(passages, owner)
         steps, settled = 0, True
         old, new = a, b
         for part in range(parts):
             more, fine = _one_step(
-                first, n, total, nodes, joints, shapes, old, new, work, grips, points, counts, self_skip,
-                stiffness, h, part == 0,
+                first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, counts,
+                self_skip, stiffness, h, part,
             )  # fmt: skip
             steps += more
             settled = settled and fine
             if not settled and parts < MAX_PARTS:
                 break
             add_reactions(n, joints, new, work, impulse, h)
+            add_hold_impulses(passages, owner, impulse, h)
             if parts > 1:
                 _move_shapes(nodes, shapes, h)
             in_c = part % 2 == 1

@@ -35,6 +35,13 @@ JOINT_TYPES = {
 }
 ROD = Key("ligature rod", F, True, doc="false: never part of a rod", status=Status.OURS)
 
+TISSUE = (
+    Key("ligature tissue.stiffness", N, unit="N/m", doc="sideways", status=Status.OURS, least=0.0),
+    Key("ligature tissue.strength", N, unit="N", doc="sideways force that tears it", status=Status.OURS, least=0.0),
+    Key("ligature tissue.friction", N, unit="N", doc="along what passes", status=Status.OURS, least=0.0),
+    Key("ligature tissue.drag", N, unit="N s/m", doc="along what passes", status=Status.OURS, least=0.0),
+)
+
 BODY = (
     *IDENTITY,
     Key("parent", T, "", doc="reference to a parent object, of newer revisions of AMBF", status=Status.IGNORED),
@@ -66,6 +73,7 @@ BODY = (
     *ignored(("resistive surface", "resistive surface1"), "of AMBF 1.0; sensors of type Resistance replaced it"),
     *ignored(("enable feedback",), "belongs to joints"),
     ROD,
+    Key("ligature needle", F, doc="false: never taken for a needle; else recognised", status=Status.OURS),
 )
 
 
@@ -152,6 +160,9 @@ GHOST = (
     Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame"),
     Key("inertial offset", POSE, None, "m, rad", "taken when `collision offset` is absent"),
     *ignored(("mass", "inertia", "friction", "damping", "restitution"), "a ghost has no mechanics"),
+    Key("ligature hole", F, doc="whether needle and thread pass here; else recognised", status=Status.OURS),
+    Key("ligature tissue", MAP, doc="how a hole holds what passes through it", status=Status.OURS),
+    *TISSUE,
 )
 
 _STATUS = Status.NOT_SIMULATED

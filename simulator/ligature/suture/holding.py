@@ -1,0 +1,296 @@
+"""What tissue does to the needles and rods in its holes, inside the implicit solve of a tick.
+
+Each passage is a spring in six directions between a node and its hole, with drag along, evaluated at the
+end of the tick. Along the line (and about it) the spring is friction: it bears so much and no more.
+Which rows slip is found by repetition, as with contacts. The hole gives way by its own mobility,
+so that a light hole and a heavy needle stay stable: with S the springs and A the hole's mobility the
+node feels (S⁻¹ + dt² A)⁻¹. World axes, SI units.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ligature.suture.chain import invert_spd6
+from ligature.suture.compiled import inlined, kernel
+from ligature.suture.rotations import cross, matrix_of, multiply, quaternion_of, rotation_vector
+from ligature.suture.tracking import open_passages
+
+STICKS, SLIPS, YIELDS = 0, 1, 2
+"""How a limited row enters a solve: a spring, a constant load, a spring as stiff as the limit allows."""
+
+MAX_SWITCHES = 6
+"""Changes of mode in a tick after which a row yields for the rest of it."""
+
+FLOOR = 1e-9
+"""Stiffness of rows that have none, N/m or N m/rad."""
+
+MAX_STEPS = 8
+"""Most Newton steps of a needle alone."""
+
+
+@inlined
+def begin_hold(p, c):
+    """Springs of passage ``c`` as the last tick left them."""
+    p.switches[c] = 0
+    for r in range(6):
+        _set_row(p, c, r, p.stretch[c, r])
+
+
+@inlined
+def _set_row(p, c, r, stretch):
+    """Spring of row ``r`` in its mode, the row being stretched as given."""
+    k, limit = p.stiffness[c, r], p.limit[c, r]
+    p.secant[c, r], p.bias[c, r] = k, 0.0
+    if p.mode[c, r] == SLIPS:
+        p.secant[c, r], p.bias[c, r] = 0.0, (limit if stretch > 0.0 else -limit)
+    elif p.mode[c, r] == YIELDS and abs(k * stretch) > limit:
+        p.secant[c, r] = limit / abs(stretch)
+
+
+@inlined
+def respond(p, c, elapsed):
+    """What the node feels of passage ``c``: stiffness ``p.K`` and the load ``p.load`` where the tick began."""
+    T, K = p.T, p.K[c]
+    for i in range(6):
+        for j in range(6):
+            T[i, j] = elapsed * elapsed * p.recoil[c, i, j]
+        T[i, i] += 1.0 / max(p.secant[c, i] + p.damping[c, i] / elapsed, FLOOR)
+    invert_spd6(T, K)
+    for i in range(6):
+        spring = max(p.secant[c, i] + p.damping[c, i] / elapsed, FLOOR)
+        rest = p.secant[c, i] * p.stretch[c, i] + p.bias[c, i]
+        p.d[i] = rest / spring - elapsed * p.drift[c, i]
+    for i in range(6):
+        s = 0.0
+        for j in range(6):
+            s += K[i, j] * p.d[j]
+        p.load[c, i] = s
+
+
+@inlined
+def begin_holds(p, owner):
+    """Springs of the passages of a rod as the last tick left them."""
+    for c in range(p.filled[0]):
+        if p.owner[c] == owner:
+            begin_hold(p, c)
+            for a in range(6):
+                p.impulse[c, a] = 0.0
+
+
+@inlined
+def add_holds(p, owner, nodes, work, elapsed, h):
+    """Add what the passages of a rod do to the matrices and loads of its nodes."""
+    for c in range(p.filled[0]):
+        i = p.node[c]
+        if p.owner[c] == owner and nodes.fixed[i]:
+            respond(p, c, elapsed)
+        elif p.owner[c] == owner:
+            add_hold(p, c, nodes.x[i], nodes.q[i], work.H[i], work.g[i], elapsed, h)
+
+
+@inlined
+def settle_holds(p, owner, nodes, elapsed):
+    """Forces of the passages of a rod as solved; True when a solve with other modes has to follow."""
+    changed = False
+    for c in range(p.filled[0]):
+        i = p.node[c]
+        if p.owner[c] == owner:
+            changed = settle_hold(p, c, nodes.x[i], nodes.q[i], elapsed) or changed
+    return changed
+
+
+@inlined
+def add_hold_impulses(p, owner, impulse, h):
+    """Add what the passages of a rod did in ``h`` seconds to the impulses (N, 6) of its nodes."""
+    for c in range(p.filled[0]):
+        if p.owner[c] == owner:
+            add_hold_impulse(p, c, h)
+            for a in range(6):
+                impulse[p.node[c], a] += h * p.d[a]
+
+
+@inlined
+def move(p, c, x, q):
+    """How far passage ``c`` moved with its node, now at ``x`` (3,) and ``q`` (4,), to ``p.d`` in its axes."""
+    b, lever, A, d = p.q[c], p.lever[c], p.axes[c], p.d
+    tx, ty, tz, tw = multiply(q[0], q[1], q[2], q[3], -b[0], -b[1], -b[2], b[3])
+    rx, ry, rz = rotation_vector(tx, ty, tz, tw)
+    ux, uy, uz = cross(rx, ry, rz, lever[0], lever[1], lever[2])
+    ux, uy, uz = ux + x[0] - p.x[c, 0], uy + x[1] - p.x[c, 1], uz + x[2] - p.x[c, 2]
+    for k in range(3):
+        d[k] = A[0, k] * ux + A[1, k] * uy + A[2, k] * uz
+        d[3 + k] = A[0, k] * rx + A[1, k] * ry + A[2, k] * rz
+    d[4] -= p.bend[c] * d[0]
+
+
+@inlined
+def _press(p, c):
+    """Force of passage ``c`` on its line for the motion in ``p.d``."""
+    for i in range(6):
+        s = p.load[c, i]
+        for j in range(6):
+            s += p.K[c, i, j] * p.d[j]
+        p.force[c, i] = -s
+
+
+@inlined
+def _fill_jacobian(p, c):
+    """Motion at passage ``c``, in its axes, for one of the node, in world axes: ``p.J``."""
+    A, lever, J = p.axes[c], p.lever[c], p.J
+    for k in range(3):
+        ax, ay, az = A[0, k], A[1, k], A[2, k]
+        mx, my, mz = cross(lever[0], lever[1], lever[2], ax, ay, az)
+        J[k, 0], J[k, 1], J[k, 2], J[k, 3], J[k, 4], J[k, 5] = ax, ay, az, mx, my, mz
+        J[3 + k, 0], J[3 + k, 1], J[3 + k, 2] = 0.0, 0.0, 0.0
+        J[3 + k, 3], J[3 + k, 4], J[3 + k, 5] = ax, ay, az
+    for k in range(6):
+        J[4, k] -= p.bend[c] * J[0, k]
+
+
+@inlined
+def add_hold(p, c, x, q, H, g, elapsed, h):
+    """Add passage ``c`` to the matrix ``H`` (6, 6) and the load ``g`` (6,) of its node, both times h²."""
+    respond(p, c, elapsed)
+    move(p, c, x, q)
+    _press(p, c)
+    _fill_jacobian(p, c)
+    J, T, h2 = p.J, p.T, h * h
+    for i in range(6):
+        for j in range(6):
+            s = 0.0
+            for k in range(6):
+                s += p.K[c, i, k] * J[k, j]
+            T[i, j] = s
+    for i in range(6):
+        for j in range(6):
+            s = 0.0
+            for k in range(6):
+                s += J[k, i] * T[k, j]
+            H[i, j] += h2 * s
+        s = 0.0
+        for k in range(6):
+            s += J[k, i] * p.force[c, k]
+        g[i] += h2 * s
+
+
+@inlined
+def settle_hold(p, c, x, q, elapsed):
+    """Force of passage ``c`` with its node where the solve put it; True when rows stick or slip unlike assumed."""
+    move(p, c, x, q)
+    _press(p, c)
+    changed = False
+    for r in range(6):
+        k, limit = p.stiffness[c, r], p.limit[c, r]
+        if k == 0.0:
+            continue
+        recoil = 0.0
+        for j in range(6):
+            recoil += p.recoil[c, r, j] * p.force[c, j]
+        stretch = p.stretch[c, r] + p.d[r] - elapsed * p.drift[c, r] + elapsed * elapsed * recoil
+        before = p.mode[c, r]
+        if before == YIELDS:
+            continue
+        now = SLIPS if abs(k * stretch) > limit else STICKS
+        onward = p.bias[c, r] * stretch >= 0.0
+        if now == before and (now == STICKS or onward):
+            continue
+        p.switches[c] += 1
+        p.mode[c, r] = now if p.switches[c] < MAX_SWITCHES else YIELDS
+        _set_row(p, c, r, stretch)
+        changed = True
+    return changed
+
+
+@inlined
+def add_hold_impulse(p, c, h):
+    """Add what passage ``c`` did to its line in ``h`` seconds to ``p.impulse``; ``p.d`` has the force and moment.
+
+    Both are about the node's centre, in world axes.
+    """
+    _fill_jacobian(p, c)
+    for i in range(6):
+        s = 0.0
+        for k in range(6):
+            s += p.J[k, i] * p.force[c, k]
+        p.d[i] = s
+        p.impulse[c, i] += h * s
+
+
+@kernel
+def hold_alone(passage_table, line, pose, twist, mass, inertia, pull, H, Y, g, dt):
+    """Impulses in this tick of all passages of a needle that no rod solves for.
+
+    ``pose`` (7,) and ``twist`` (6,) are those of the needle, ``pull`` (6,) the force and moment that
+    will act on it besides; ``H``, ``Y`` (6, 6) and ``g`` (6,) are scratch.
+    """
+    p = open_passages(passage_table)
+    for c in range(p.filled[0]):
+        if p.line[c] == line:
+            begin_hold(p, c)
+    R, x, q = p.B, pose[0:3], pose[3:7]
+    matrix_of(q[0], q[1], q[2], q[3], R)
+    for a in range(3):
+        for b in range(3):
+            p.A[a, b] = R[a, 0] * inertia[0] * R[b, 0] + R[a, 1] * inertia[1] * R[b, 1] + R[a, 2] * inertia[2] * R[b, 2]
+    # Momentum that the free motion has, which the solve starts from.
+    for a in range(3):
+        g[a] = dt * (mass * twist[a] + dt * pull[a])
+        g[3 + a] = dt * (p.A[a, 0] * twist[3] + p.A[a, 1] * twist[4] + p.A[a, 2] * twist[5] + dt * pull[3 + a])
+    free = (g[0], g[1], g[2], g[3], g[4], g[5])
+    mx, my, mz = 0.0, 0.0, 0.0
+    rx, ry, rz = 0.0, 0.0, 0.0
+    for _ in range(MAX_STEPS):
+        for a in range(6):
+            for b in range(6):
+                H[a, b] = 0.0
+        for a in range(3):
+            H[a, a] = mass
+            for b in range(3):
+                H[3 + a, 3 + b] = p.A[a, b]
+            moment = p.A[a, 0] * rx + p.A[a, 1] * ry + p.A[a, 2] * rz
+            g[a] = free[a] - mass * (mx if a == 0 else (my if a == 1 else mz))
+            g[3 + a] = free[3 + a] - moment
+        for c in range(p.filled[0]):
+            if p.line[c] == line:
+                add_hold(p, c, x, q, H, g, dt, dt)
+        invert_spd6(H, Y)
+        for a in range(6):
+            s = 0.0
+            for b in range(6):
+                s += Y[a, b] * g[b]
+            H[0, a] = s
+        d = H[0]
+        mx, my, mz, rx, ry, rz = mx + d[0], my + d[1], mz + d[2], rx + d[3], ry + d[4], rz + d[5]
+        for a in range(3):
+            x[a] += d[a]
+        _turn_row(q, d[3], d[4], d[5])
+        changed = False
+        for c in range(p.filled[0]):
+            if p.line[c] == line:
+                changed = settle_hold(p, c, x, q, dt) or changed
+        if not changed:
+            break
+    for c in range(p.filled[0]):
+        if p.line[c] == line:
+            add_hold_impulse(p, c, dt)
+
+
+@inlined
+def _turn_row(q, vx, vy, vz):
+    """Turn the quaternion ``q`` (4,) by a rotation vector."""
+    ex, ey, ez, ew = quaternion_of(vx, vy, vz)
+    x, y, z, w = multiply(ex, ey, ez, ew, q[0], q[1], q[2], q[3])
+    s = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    q[0], q[1], q[2], q[3] = s * x, s * y, s * z, s * w
+
+
+@kernel
+def react(passage_table, site_pose, c, out):
+    """Impulse and moment (6,) of passage ``c`` on its hole's body, about that body's centre, to ``out``."""
+    p = open_passages(passage_table)
+    pose, x, i = site_pose[p.hole[c]], p.x[c], p.impulse[c]
+    mx, my, mz = cross(x[0] - pose[0], x[1] - pose[1], x[2] - pose[2], i[0], i[1], i[2])
+    out[0], out[1], out[2] = -i[0], -i[1], -i[2]
+    out[3], out[4], out[5] = -i[3] - mx, -i[4] - my, -i[5] - mz
+    return math.sqrt(i[0] * i[0] + i[1] * i[1] + i[2] * i[2])
