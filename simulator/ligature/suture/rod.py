@@ -242,7 +242,7 @@ class Rod:
 
     def hangs_on(self, body: int) -> bool:
         """Whether ``body`` and nothing else holds the rod."""
-        return set(self._holding) == {body}
+        return {*self._tied, *(grip.body for grip in self.grips)} == {body}
 
     def carry(self, T: Array) -> None:
         """Move the whole rod by ``T`` (4, 4) in world axes, and leave it at rest, its contacts forgotten."""
@@ -368,8 +368,7 @@ class Rod:
         run_tick(
             self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
             work, self._passage_table, self._owner, grips, points, self._motion, self._met, self._counts,
-            self._self_skip, self._stiffness,
-            self.impulse, self.tension, self.dt,
+            self._self_skip, self._stiffness, self.impulse, self.tension, self.dt,
         )  # fmt: skip
         self.newton_steps = int(self._counts[2])
         self._touches = (c, a, b) if self._counts[3] else (b, c, a)

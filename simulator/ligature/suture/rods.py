@@ -84,7 +84,11 @@ class Rods:
         rod.release(element, body)
 
     def carry(self, body: int, T: Array) -> None:
-        """Move the threads that hang on ``body`` alone by ``T`` (4, 4) in world axes, at rest: it was put elsewhere."""
+        """Take note that ``body`` was put elsewhere, moved by ``T`` (4, 4) in world axes.
+
+        Threads that hang on it alone go along, at rest.
+        """
+        self._colliders.restart()
         for rod in self.rods:
             if rod.hangs_on(body):
                 rod.carry(T)
