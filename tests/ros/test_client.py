@@ -16,6 +16,8 @@ from tests.ros.conftest import BIN, ROOT, SMALL, Listener, Program, free_port
 pytestmark = pytest.mark.ros
 NEEDLE = "/ambf/env/phantom/Needle"
 BASE = "/ambf/env/psm1/baselink"
+NAMES = ROOT / "simulator" / "ligature" / "client" / "names" / "ambf"
+SCRIPT_PATH = os.pathsep.join(map(str, [ROOT / "build" / "python", ROOT / "simulator", NAMES]))
 JOINTS = [0.1, -0.1, 0.1, 0.2, 0.1, -0.1, 0.3, 0.3]
 
 
@@ -291,9 +293,49 @@ def test_handles_live_on_when_the_simulator_dies_and_comes_back(
     assert client.get_obj_names() == [] and client.get_world_handle() is None
 
 
+FOLLOWER = """
+import time
+from ambf_client import Client
+client = Client("follower")
+client.connect()
+needle = client.get_obj_handle("phantom/Needle")
+last = 0
+while True:
+    if needle.get_sim_step() != last:
+        last = needle.get_sim_step()
+        print("step", last, flush=True)
+    time.sleep(0.1)
+"""
+
+
+def test_a_script_goes_on_when_simulator_and_master_were_started_again(
+    ros_env: dict[str, str], start: Callable[..., Program]
+) -> None:
+    own = dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}", PYTHONPATH=SCRIPT_PATH)
+
+    def run() -> Program:
+        program = start(BIN / "ligature", "run", SMALL, "-p", "200", env=own)
+        program.wait_for("first state published")
+        return program
+
+    first = run()
+    follower = start("/usr/bin/python3", "-c", FOLLOWER, env=own)
+    follower.wait_for("step", 20)
+    assert first.end() == 0
+    time.sleep(0.5)
+    seen = len(follower.lines)
+    second = run()
+    wait_for(lambda: len([line for line in follower.lines[seen:] if "step" in line]) > 5, 20)
+    follower.process.kill()
+    follower.process.wait()
+    assert second.end() == 0
+
+
 SCRIPT = """
 import sys
 from ambf_client import Client
+from ligature.client import layer
+layer.MASTER_PATIENCE = 0.5
 client = Client("alone", 1)
 try:
     client.connect()
@@ -305,10 +347,12 @@ print("objects:", client.get_obj_names(), "handle:", client.get_obj_handle("Need
 
 def alone(env: dict[str, str]) -> subprocess.CompletedProcess[str]:
     """A script with the system's own Python, none of whose packages is ours."""
-    names = ROOT / "simulator" / "ligature" / "client" / "names" / "ambf"
-    path = os.pathsep.join([str(ROOT / "build" / "python"), str(ROOT / "simulator"), str(names)])
     return subprocess.run(
-        ["/usr/bin/python3", "-c", SCRIPT], env=dict(env, PYTHONPATH=path), capture_output=True, text=True, timeout=60
+        ["/usr/bin/python3", "-c", SCRIPT],
+        env=dict(env, PYTHONPATH=SCRIPT_PATH),
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
 
 

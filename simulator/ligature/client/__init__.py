@@ -1,7 +1,7 @@
 """A drop-in ``ambf_client`` for machines without AMBF: object handles over ROS 1 topics.
 
 Poses of bodies are in the world, those of cameras, lights, ghosts and sensors in their parent's frame; SI units;
-quaternions x, y, z, w; roll, pitch, yaw about fixed x, y, z. Nothing of the simulator is imported here: rospy and the
+quaternions x, y, z, w; roll, pitch, yaw about fixed x, y, z. Nothing of the simulation is imported here: rospy and the
 message packages are enough. The top-level names that scripts import (``from ambf_client import Client``) are thin
 modules in ``names/``.
 """

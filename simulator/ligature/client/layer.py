@@ -6,7 +6,6 @@ client can be handed one. Times are seconds of ROS time; namespaces are written 
 
 from __future__ import annotations
 
-import http.client
 import threading
 import time
 import xmlrpc.client
@@ -16,10 +15,11 @@ from typing import Any
 import rosgraph
 import rospy
 
+from ligature.ros.master import NO_ANSWER, Hasty, MasterWatch
+
 MASTER_PATIENCE = 10.0
 """Seconds to wait for a ROS master; rospy alone would wait for ever."""
 
-_MASTER_ANSWERS_WITHIN = 2.0
 _POLL = 0.05
 _starting = threading.Lock()
 
@@ -28,7 +28,8 @@ class ral:  # noqa: N801 - the name that clients import
     """One view of this process's ROS node: topic names begin with ``namespace``.
 
     A process has one node. The first ``ral`` starts it, with an anonymous name made of ``node_name``; later ones
-    share it. Raises ConnectionError when no ROS master answers within `MASTER_PATIENCE`.
+    share it. A master that restarts is told about all topics again. Raises ConnectionError when no ROS master answers
+    within `MASTER_PATIENCE`.
     """
 
     def __init__(self, node_name: str, namespace: str = "", node: Any = None) -> None:
@@ -192,15 +193,7 @@ def _start_node(name: str) -> None:
         _await_master()
         in_main = threading.current_thread() is threading.main_thread()
         rospy.init_node(name, anonymous=True, disable_signals=not in_main)
-
-
-class _Transport(xmlrpc.client.Transport):
-    """XML-RPC that gives up: a port may be open while nobody answers on it."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = _MASTER_ANSWERS_WITHIN
-        return connection
+        MasterWatch().start()
 
 
 def _await_master() -> None:
@@ -217,7 +210,7 @@ def _await_master() -> None:
 
 def _answers(uri: str) -> bool:
     try:
-        xmlrpc.client.ServerProxy(uri, transport=_Transport()).getPid("/ligature_client")
-    except (OSError, xmlrpc.client.Error, http.client.HTTPException):
+        xmlrpc.client.ServerProxy(uri, transport=Hasty()).getPid("/ligature_client")
+    except NO_ANSWER:
         return False
     return True

@@ -1,6 +1,7 @@
 """The ROS master: is the name free, and does it still know this node.
 
-A master that hangs or restarts must not hold up publishing, so it is watched on a thread of its own.
+A master that hangs or restarts must not hold up publishing, so it is watched on a thread of its own. Of our rooms the
+client needs this too, so nothing of the simulator is imported here.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ PERIOD = 1.0
 
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 PATIENCE = 2.0
-"""Seconds that another simulator is given to answer."""
+"""Seconds that a master or another node is given to answer."""
 
 
 def node_name(world: str) -> str:
@@ -47,7 +48,7 @@ def require_free(name: str) -> None:
         )
 
 
-class _Hasty(xmlrpc.client.Transport):
+class Hasty(xmlrpc.client.Transport):
     """A transport that gives up after `PATIENCE`."""
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
@@ -59,7 +60,7 @@ class _Hasty(xmlrpc.client.Transport):
 
 def _lives(uri: str) -> bool:
     try:
-        code, _, _ = xmlrpc.client.ServerProxy(uri, _Hasty()).getPid("/ligature_start")  # type: ignore[misc]
+        code, _, _ = xmlrpc.client.ServerProxy(uri, Hasty()).getPid("/ligature_start")  # type: ignore[misc]
     except (*NO_ANSWER, ValueError):
         return False
     return bool(code == 1)
@@ -68,7 +69,7 @@ def _lives(uri: str) -> bool:
 class MasterWatch(threading.Thread):
     """Registers everything again with a master that has forgotten this node; ``also`` runs at every look."""
 
-    def __init__(self, also: Callable[[], None]) -> None:
+    def __init__(self, also: Callable[[], None] = lambda: None) -> None:
         super().__init__(name="master watch", daemon=True)
         self._also = also
         self._answers = True
