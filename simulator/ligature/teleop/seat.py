@@ -1,0 +1,191 @@
+"""The operator's seat: which leader moves which follower, pedals, and handing arms over while everything runs.
+
+Names are those of the arms and devices (``MTMR``, ``PSM1``). Any leader may be paired with several followers, of which
+it leads one at a time; a follower obeys one leader only. Seconds, metres, radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.teleop.camera import CameraDrive
+from ligature.teleop.pairing import Hand, Pairing, Settings, Status, Tip
+
+Array = NDArray[np.float64]
+
+
+class Conflict(ValueError):
+    """A pairing that cannot be: the message names who is in the way."""
+
+
+@dataclass
+class Leader:
+    """A device: the followers it may lead, the one that it leads, and its newest sample."""
+
+    name: str
+    followers: tuple[str, ...]
+    selected: str | None = None
+    hand: Hand | None = None
+    pairing: Pairing = field(default_factory=Pairing)
+
+
+@dataclass(frozen=True, eq=False)
+class Orders:
+    """What `Seat.update` asks of the arms: goals of followers by name, and of the camera in the world (4, 4)."""
+
+    tips: Mapping[str, Tip]
+    camera: Array | None = None
+
+
+class Seat:
+    """Leaders, followers and pedals.
+
+    Parameters
+    ----------
+    pairs
+        Followers that each leader may lead, the first is selected.
+    settings
+        Of all pairings.
+    camera_scale
+        See `CameraDrive`.
+
+    Raises
+    ------
+    Conflict
+        When two leaders would begin with the same follower.
+    """
+
+    def __init__(
+        self, pairs: Mapping[str, Sequence[str]], settings: Settings | None = None, camera_scale: float = 1.0
+    ) -> None:
+        self._settings = settings or Settings()
+        self._leaders = {
+            name: Leader(name, tuple(followers), pairing=Pairing(self._settings)) for name, followers in pairs.items()
+        }
+        self._enabled = False
+        self._clutched = False
+        self._camera = CameraDrive(camera_scale)
+        self._camera_hands: list[str] = []
+        for name, followers in pairs.items():
+            if followers:
+                self.select(name, followers[0])
+
+    @property
+    def leaders(self) -> Mapping[str, Leader]:
+        """Devices by name."""
+        return self._leaders
+
+    def status(self, leader: str) -> Status:
+        """What a leader does."""
+        return self._leader(leader).pairing.status
+
+    def _leader(self, name: str) -> Leader:
+        if name not in self._leaders:
+            raise Conflict(f"there is no leader '{name}'; there are {', '.join(self._leaders)}")
+        return self._leaders[name]
+
+    # --- pairing ----------------------------------------------------------------------------
+
+    def select(self, leader: str, follower: str | None) -> None:
+        """Have a leader lead another follower, or none; it begins where both are at the next `update`."""
+        chosen = self._leader(leader)
+        if follower is not None:
+            if follower not in chosen.followers:
+                raise Conflict(f"{leader} may lead {', '.join(chosen.followers)}, not {follower}")
+            other = next((each for each in self._leaders.values() if each.selected == follower), None)
+            if other is not None and other is not chosen:
+                raise Conflict(f"{follower} obeys {other.name}; unselect it there first")
+        chosen.pairing.release()
+        chosen.selected = follower
+
+    def next_follower(self, leader: str) -> str | None:
+        """Select the next follower of a leader that is free; returns it."""
+        chosen = self._leader(leader)
+        taken = {each.selected for each in self._leaders.values() if each is not chosen}
+        free = [name for name in chosen.followers if name not in taken]
+        if not free:
+            return chosen.selected
+        at = free.index(chosen.selected) if chosen.selected in free else -1
+        self.select(leader, free[(at + 1) % len(free)])
+        return chosen.selected
+
+    def change(self, **values: object) -> None:
+        """Change `Settings` of all pairings."""
+        self._settings = replace(self._settings, **values)  # type: ignore[arg-type]
+        for leader in self._leaders.values():
+            leader.pairing.settings = self._settings
+
+    # --- pedals -----------------------------------------------------------------------------
+
+    def enable(self, on: bool) -> None:
+        """Whether hands lead at all."""
+        self._enabled = on
+        if not on:
+            for leader in self._leaders.values():
+                leader.pairing.release()
+            self._camera.release()
+
+    def clutch(self, pressed: bool) -> None:
+        """The clutch pedal: hands move without followers while it is pressed."""
+        self._clutched = pressed
+        for leader in self._leaders.values():
+            if pressed:
+                leader.pairing.clutch()
+            elif leader.pairing.status is Status.CLUTCHED:
+                leader.pairing.release()
+
+    def camera(self, pressed: bool, hands: Sequence[str] = ()) -> None:
+        """The camera pedal: ``hands`` (all leaders, at most two, when empty) lead the camera instead of followers."""
+        self._camera.release()
+        self._camera_hands = [self._leader(name).name for name in hands or list(self._leaders)[:2]] if pressed else []
+        for leader in self._leaders.values():
+            leader.pairing.release()
+
+    def rearm(self, leader: str) -> None:
+        """Let a leader that fell silent, leapt or was broken lead again."""
+        self._leader(leader).pairing.release()
+
+    # --- time -------------------------------------------------------------------------------
+
+    def sample(self, leader: str, hand: Hand) -> None:
+        """Take a sample of a device."""
+        self._leader(leader).hand = hand
+
+    def update(self, now: float, tips: Mapping[str, Tip], T_world_camera: Array) -> Orders:
+        """Goals for ``now``, from the newest samples, the followers' set-points, and the camera's pose (4, 4)."""
+        if not self._enabled:
+            return Orders({})
+        if self._camera_hands:
+            return Orders({}, self._lead_camera(T_world_camera))
+        goals = {}
+        for leader in self._leaders.values():
+            goal = self._lead(leader, now, tips)
+            if goal is not None and leader.selected is not None:
+                goals[leader.selected] = goal
+        return Orders(goals)
+
+    def _lead(self, leader: Leader, now: float, tips: Mapping[str, Tip]) -> Tip | None:
+        if leader.hand is None or leader.selected is None or leader.selected not in tips:
+            return None
+        pairing = leader.pairing
+        if pairing.status is Status.IDLE and not self._clutched:
+            if now - leader.hand.time <= self._settings.patience:
+                pairing.engage(leader.hand, tips[leader.selected])
+            return None
+        goal = pairing.update(leader.hand)
+        if not pairing.watch(now) or pairing.status is not Status.FOLLOWING:
+            return None
+        return goal
+
+    def _lead_camera(self, T_world_camera: Array) -> Array | None:
+        hands = [self._leaders[name].hand for name in self._camera_hands]
+        poses = [hand.T_view_hand for hand in hands if hand is not None]
+        if len(poses) != len(self._camera_hands):
+            return None
+        if not self._camera.engaged:
+            self._camera.engage(poses, T_world_camera)
+        return self._camera.update(poses)
