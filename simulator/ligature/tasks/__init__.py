@@ -1,0 +1,25 @@
+"""Suturing tasks: what counts as done, how well, and everything that was measured on the way."""
+
+from ligature.tasks.monitor import Measures, Monitor
+from ligature.tasks.scenery import MissingBodies, Scenery
+from ligature.tasks.scores import (
+    EstimationScore,
+    InsertionScore,
+    SutureScore,
+    judge_estimate,
+    judge_insertion,
+    judge_suture,
+)
+
+__all__ = [
+    "EstimationScore",
+    "InsertionScore",
+    "Measures",
+    "MissingBodies",
+    "Monitor",
+    "Scenery",
+    "SutureScore",
+    "judge_estimate",
+    "judge_insertion",
+    "judge_suture",
+]

@@ -1,0 +1,147 @@
+"""How well a task was done: the challenge's three tasks, with what its reports say. Metres, seconds.
+
+Success and fields are those of interface reference §4.6; `lines` are what a person reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.frames import pose7_matrix
+from ligature.tasks.passages import Passage
+from ligature.tasks.scenery import Scenery
+
+Array = NDArray[np.float64]
+
+RECOMMENDED_AXIAL = 0.005
+"""How far the tip should have come out of the exit at the end."""
+
+SUTURE_PAIRS = 4
+
+
+@dataclass(frozen=True)
+class EstimationScore:
+    """Task 1: distances between reported and true points of the needle."""
+
+    completion_time: float
+    E_base: float
+    E_mid: float
+    E_tip: float
+
+    @property
+    def success(self) -> bool:
+        """A report that arrives counts."""
+        return True
+
+    @property
+    def total(self) -> float:
+        """Sum of the three."""
+        return self.E_base + self.E_mid + self.E_tip
+
+    def lines(self) -> list[str]:
+        """One figure a line."""
+        errors = zip(("base", "middle", "tip"), (self.E_base, self.E_mid, self.E_tip), strict=True)
+        return [f"needle {name} off by {1e3 * error:.2f} mm" for name, error in errors]
+
+
+def judge_estimate(
+    scenery: Scenery, body_pose: Array, T_world_camera: Array, T_camera_needle: Array, time: float
+) -> EstimationScore:
+    """Judge a reported pose (4, 4) of the needle's body in the camera frame against bodies at ``body_pose``."""
+    T = T_world_camera @ T_camera_needle
+    reported = scenery.points @ T[:3, :3].T + T[:3, 3]
+    errors = np.linalg.norm(reported - scenery.needle_points(body_pose), axis=1)
+    return EstimationScore(time, *(float(error) for error in errors))
+
+
+@dataclass(frozen=True)
+class InsertionScore:
+    """Task 2: the needle went in and out of one pair of holes."""
+
+    success: bool
+    completion_time: float
+    pair: int
+    axial: float
+    entry: Passage | None
+    exit: Passage | None
+    why: str = ""
+
+    def lines(self) -> list[str]:
+        """One figure a line."""
+        if not self.success:
+            return [f"not done: {self.why}"]
+        assert self.entry is not None and self.exit is not None
+        return [
+            f"pair {self.pair} in {self.completion_time:.1f} s",
+            f"tip {1e3 * self.axial:.1f} mm beyond the exit (recommended {1e3 * RECOMMENDED_AXIAL:.0f} mm)",
+            f"entry missed by {1e3 * self.entry.miss:.2f} mm, exit by {1e3 * self.exit.miss:.2f} mm",
+        ]
+
+
+def judge_insertion(scenery: Scenery, body_pose: Array, passages: Sequence[Passage], time: float) -> InsertionScore:
+    """Judge the newest insertion with bodies at ``body_pose`` (bodies, 7)."""
+    pair, is_exit, axial = _closest(scenery, body_pose)
+    failed = InsertionScore(False, time, pair, axial, None, None)
+    if not is_exit:
+        return _because(failed, "the hole closest to the tip is no exit")
+    if len(passages) < 2:
+        return _because(failed, f"the tip went through {len(passages)} holes, two are needed")
+    newest, before = passages[-1], passages[-2]
+    if not (newest.exit and newest.pair == pair):
+        return _because(failed, f"the last hole was not exit {pair}")
+    if before.exit or before.pair != pair:
+        return _because(failed, f"the hole before was not entry {pair}")
+    return InsertionScore(True, time, pair, axial, before, newest)
+
+
+def _because(score: InsertionScore, why: str) -> InsertionScore:
+    return InsertionScore(False, score.completion_time, score.pair, score.axial, None, None, why)
+
+
+def _closest(scenery: Scenery, body_pose: Array) -> tuple[int, bool, float]:
+    """Pair of the hole closest to the tip, whether it is an exit, and how far the tip is beyond it along its z."""
+    tip = scenery.needle_points(body_pose)[2]
+    holes = [(body, pair, False) for pair, body in enumerate(scenery.entries, 1)]
+    holes += [(body, pair, True) for pair, body in enumerate(scenery.exits, 1)]
+    body, pair, is_exit = min(holes, key=lambda hole: float(np.linalg.norm(body_pose[hole[0], :3] - tip)))
+    T = pose7_matrix(body_pose[body])
+    return pair, is_exit, float((T[:3, :3].T @ (tip - T[:3, 3]))[2])
+
+
+@dataclass(frozen=True)
+class SutureScore:
+    """Task 3: the needle went through several pairs of holes, one after the other."""
+
+    success: bool
+    completion_time: float
+    axial: float
+    misses: tuple[float, ...]
+    why: str = ""
+
+    def lines(self) -> list[str]:
+        """One figure a line."""
+        if not self.success:
+            return [f"not done: {self.why}"]
+        worst = 1e3 * max(self.misses)
+        return [
+            f"{len(self.misses) // 2} throws in {self.completion_time:.1f} s",
+            f"holes missed by {1e3 * float(np.mean(self.misses)):.2f} mm on average, {worst:.2f} mm at worst",
+        ]
+
+
+def judge_suture(
+    scenery: Scenery, body_pose: Array, passages: Sequence[Passage], time: float, pairs: int = SUTURE_PAIRS
+) -> SutureScore:
+    """Judge a suture of ``pairs`` throws, from pair 1 on, entry before exit."""
+    _, _, axial = _closest(scenery, body_pose)
+    wanted = [(pair, is_exit) for pair in range(1, pairs + 1) for is_exit in (False, True)]
+    newest = list(passages[-len(wanted) :])
+    got = [(passage.pair, passage.exit) for passage in newest]
+    if got != wanted:
+        said = ", ".join(f"{'exit' if e else 'entry'} {p}" for p, e in got) or "none"
+        return SutureScore(False, time, axial, (), f"the tip's last holes were {said}")
+    return SutureScore(True, time, axial, tuple(passage.miss for passage in newest))
