@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic
 from ligature.arms import ArmSet
-from ligature.grasping import Holder
+from ligature.grasping import Grasps, Holder
 from ligature.model.commands import (
     ActuatorCommand,
     ArmCommand,
@@ -210,6 +210,7 @@ class Simulation:
         self.arms = ArmSet(scene, self._world)
         self.problems += self.arms.problems
         self._actuators = Actuators(scene, Holder(scene, self._world, self._rods), self._rays)
+        self.grasps = Grasps(scene, self._world, self._rods, lambda: self._actuators.held)
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._write_state()
@@ -241,6 +242,7 @@ class Simulation:
             self._holes.begin()
             self._rods.step(self._world)
             self._holes.end()
+            self.grasps.step(self._tick)
         with self.phases["bodies"]:
             self._world.step()
         self._tick += 1
@@ -295,6 +297,7 @@ class Simulation:
         """
         check(BodyCommand(body, CommandType.POSITION, tuple(pose)))
         before = pose7_matrix(self._world.pose7(body))
+        self.grasps.let_go_of(body)
         self._world.set_pose(body, pose)
         self._rods.carry(body, pose7_matrix(pose) @ inverse(before))
         self._holes.forget(body)
@@ -302,6 +305,7 @@ class Simulation:
 
     def reset(self, bodies_only: bool = False) -> None:
         """Put everything back to where the scene starts; time goes on and commands hold."""
+        self.grasps.let_go_of()
         self._world.reset()
         self._rods.reset()
         self._holes.reset()
@@ -315,7 +319,7 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """The whole dynamic state; this simulation and a restored one continue with the same bits."""
-        parts = {
+        parts: dict[str, Any] = {
             "tick": self._tick,
             "resets": self._resets,
             "world": self._world.snapshot(),
@@ -323,8 +327,11 @@ class Simulation:
             "holes": self._holes.memory(),
             "attachments": self._attachments.memory(),
             "arms": self.arms.memory(),
+            "actuators": self._actuators.memory(),
+            "grasps": self.grasps.memory(),
         }
         self._holes.restart()
+        self.grasps.recall(parts["grasps"])
         self._write_state()
         return Snapshot(copy.deepcopy(parts))
 
@@ -337,6 +344,8 @@ class Simulation:
         self._holes.recall(parts["holes"])
         self._attachments.recall(parts["attachments"])
         self.arms.recall(parts["arms"])
+        self._actuators.recall(parts["actuators"])
+        self.grasps.recall(parts["grasps"])
         self._write_state()
 
     def state_hash(self) -> str:
@@ -388,6 +397,7 @@ class Simulation:
             hits.normal,
         )
         self._contacts.write(state)
+        self.grasps.write_state(state)
         self.arms.write(state["arm"][0])
         held = np.array(self._actuators.held, dtype=np.int32)
         state["actuator_body"][0], state["actuator_active"][0] = held, held >= 0

@@ -17,6 +17,7 @@ from ligature.model.arms import find_arms
 from ligature.model.frames import pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, shader_files
 from ligature.model.holes import find_holes
+from ligature.model.jaws import find_jaws
 from ligature.model.lookup import candidates
 from ligature.model.naming import Names, merged
 from ligature.model.needles import find_needles
@@ -160,6 +161,7 @@ class SceneBuilder:
             needles=needles,
             holes=holes,
             arms=arms,
+            jaws=find_jaws(bodies, self.joints, arms),
             diagnostics=tuple(self.diagnostics),
             roots=self.resolver.roots,
         )

@@ -514,14 +514,35 @@ class ArmDescription:
 
 
 @dataclass(frozen=True, eq=False)
+class Jaw:
+    """Two fingers on one body.
+
+    ``holder`` is that body, ``fingers`` the two others, ``joints`` theirs; ``opening`` (2,) is +1 where the jaw
+    opens as the joint's position grows, else -1. ``axis`` (3,) and ``pivot`` (3,) are the axis of the fingers in
+    the holder's inertial frame. ``half_width`` is half the width of the pads along it, ``reach`` the length of
+    the fingers. ``name`` is that of the arm, else the holder's identifier.
+    """
+
+    name: str
+    holder: int
+    fingers: tuple[int, int]
+    joints: tuple[int, int]
+    opening: tuple[float, float]
+    axis: Array
+    pivot: Array
+    half_width: float
+    reach: float
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
     """Everything a launch file describes, ready for physics, sensing, robots and drawing.
 
     ``articulations`` cover every non-rod body once (a lone body is an articulation of one link);
     ``loops`` are the joints that close a kinematic loop or that an articulation cannot express and
     that constraints must hold; ``rods`` are the recognised sutures, ``arms`` the recognised
-    manipulators. ``diagnostics`` are all the findings of reading and resolving, in order. ``roots`` are the
-    folders below which a scene file may have other files opened.
+    manipulators, ``jaws`` what can grasp. ``diagnostics`` are all the findings of reading and resolving,
+    in order. ``roots`` are the folders below which a scene file may have other files opened.
     """
 
     name: str
@@ -541,6 +562,7 @@ class Scene:
     needles: tuple[Needle, ...] = ()
     holes: tuple[Hole, ...] = ()
     arms: tuple[ArmDescription, ...] = ()
+    jaws: tuple[Jaw, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
     roots: tuple[Path, ...] = ()
 

@@ -69,6 +69,8 @@ def state_dtype(scene: Scene) -> StateDtype:
     are in the parent's frame, as the messages want them; ``*_world`` beside them in world axes.
     Of ``insertion_*`` the first ``insertion_count`` rows count: hole of the scene, needle or element in
     it, metres of it beyond the hole, where it passes and the force on it there, in world axes.
+    ``jaw_body`` is what each jaw holds by friction or -1; ``jaw_force`` presses its fingers together, ``jaw_wrench``
+    acts on the body about the patch, ``jaw_slip`` are metres and radians slipped since it was grasped.
     """
     nb, nj = len(scene.bodies), len(scene.joints)
     ng, na = len(scene.ghosts), len(scene.actuators)
@@ -113,6 +115,10 @@ def state_dtype(scene: Scene) -> StateDtype:
             ("insertion_depth", "f8", (MAX_INSERTIONS,)),
             ("insertion_point", "f8", (MAX_INSERTIONS, 3)),
             ("insertion_force", "f8", (MAX_INSERTIONS, 3)),
+            ("jaw_body", "i4", (len(scene.jaws),)),
+            ("jaw_force", "f8", (len(scene.jaws),)),
+            ("jaw_wrench", "f8", (len(scene.jaws), 6)),
+            ("jaw_slip", "f8", (len(scene.jaws), 2)),
             ("arm", ARM_DTYPE, (len(scene.arms),)),
         ]
     )
@@ -132,4 +138,5 @@ def new_state(scene: Scene) -> StateRecord:
         state[field_name][..., 6] = 1.0
     state["ray_body"] = -1
     state["actuator_body"] = -1
+    state["jaw_body"] = -1
     return state

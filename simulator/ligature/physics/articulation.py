@@ -137,7 +137,8 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         "baseOrientation": matrix_quaternion(T_world_inertial[:3, :3]).tolist(),
         "physicsClientId": client,
     }
-    shape = shapes.create(client, cache, root.colliders, inverse(root.T_body_inertial), not root.static)
+    T_own = inverse(root.T_body_inertial)
+    shape = shapes.create(client, cache, root.colliders, T_own, not root.static, root.collision_margin)
     stand = None
     if root.static and plan.masses and shape != shapes.NO_SHAPE:
         stand = pybullet.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape, **at)
@@ -195,9 +196,8 @@ def _append(
     T_own = inverse(T_outer_frame)
     plan.masses.append(outer.mass)
     plan.inertias.append(inertia)
-    plan.shapes.append(
-        shapes.create(client, cache, outer.colliders, T_own @ inverse(outer.T_body_inertial), moving=True)
-    )
+    T_link_body = T_own @ inverse(outer.T_body_inertial)
+    plan.shapes.append(shapes.create(client, cache, outer.colliders, T_link_body, True, outer.collision_margin))
     last = steps[-1] if steps else None
     type_ = pybullet.JOINT_FIXED if last is None else _joint_type(last)
     direction = np.array([0.0, 0.0, 1.0]) if last is None else last.direction
@@ -281,7 +281,7 @@ def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: tuple[Body, ...]
         body = bodies[index]
         pybullet.changeDynamics(
             *tree.place(index), lateralFriction=body.friction, rollingFriction=body.rolling_friction,
-            restitution=body.restitution, collisionMargin=body.collision_margin, physicsClientId=client,
+            restitution=body.restitution, physicsClientId=client,
         )  # fmt: skip
     links = [link for link, *_ in tree.axes]
     if links:

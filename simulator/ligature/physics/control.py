@@ -39,6 +39,12 @@ FREE, FORCE, POSITION, VELOCITY = (
 SERVO = 3
 """Mode of a joint that an arm of a robot drives: it follows a set-point and its velocity."""
 
+FREE_SPEED = 1e3
+"""Speed in rad/s or m/s that an effort alone would reach, were it not bounded otherwise."""
+
+STOP_GAIN = 0.2
+"""Share of its way back that a stopped joint goes in a tick."""
+
 SERVO_GAIN = 200.0
 """Closing speed over following error in 1/s: the set-point is reached with a time constant of 5 ms."""
 
@@ -120,6 +126,8 @@ class TreeControl:
         self._kick_ticks = np.zeros(n, dtype=np.int64)
         self._motor, self._effort = np.zeros(n), np.zeros(n)
         self._driven: list[int] = []
+        self._stops: dict[int, float] = {}
+        self._slowed: dict[int, tuple[float, float, float]] = {}
         rows = motions.slices[index]
         self.position, self.velocity = motions.position[rows], motions.velocity[rows]
         self._sort()
@@ -210,6 +218,49 @@ class TreeControl:
         if not self.owned[self.row[joint]]:
             self._switch(self.row[joint], FREE, 0.0)
 
+    def stop(self, joint: int, position: float, effort: float) -> None:
+        """Keep one joint at ``position``, whatever it is commanded to do, until `let`; it reports ``effort``."""
+        row = self.row[joint]
+        fresh = row not in self._stops
+        self._stops[row] = position
+        self._motions.told[self._motions.slices[self._index].start + row] = effort
+        self._slowed.pop(row, None)
+        if fresh:
+            self._sort()
+
+    def slow(self, joint: int, low: float, high: float, strength: float) -> None:
+        """Keep the velocity of one motor between ``low`` and ``high``, its effort below ``strength``, until `let`."""
+        row = self.row[joint]
+        fresh = row not in self._slowed
+        self._slowed[row] = low, high, strength
+        if fresh:
+            self._sort()
+
+    def let(self, joint: int) -> None:
+        """End `stop` and `slow`."""
+        row = self.row[joint]
+        self._motions.told.pop(self._motions.slices[self._index].start + row, None)
+        if (self._slowed.pop(row, None) or self._stops.pop(row, None)) is not None:
+            self._sort()
+
+    def pull(self, joint: int, stiffness: float) -> float:
+        """Effort that the command of one joint asks for, were the joint stopped where it is.
+
+        A motor with a set-point pulls in proportion to its following error, with ``stiffness`` (N·m/rad, N/m)
+        unless it was told how it gives; one with a velocity pulls with all its strength.
+        """
+        row = self.row[joint]
+        mode, behind = self.mode[row], self._way(row, self.target[row] - self.position[row])
+        if mode == FORCE:
+            return float(self.target[row])
+        if mode == VELOCITY:
+            return float(np.sign(self.target[row]) * self._strength[row])
+        if mode == SERVO:
+            return float((self._give[row] or stiffness) * behind)
+        if mode == POSITION:
+            return float(self._effort[row] if self._force_output[row] else stiffness * behind)
+        return 0.0
+
     def _switch(self, row: int, mode: int, target: float) -> None:
         before = self.mode[row]
         self.mode[row] = mode
@@ -243,6 +294,11 @@ class TreeControl:
             self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor,
             self._effort,
         )  # fmt: skip
+        for row, (low, high, _) in self._slowed.items():
+            wanted = np.sign(self.target[row]) * FREE_SPEED if self.mode[row] == FORCE else self._motor[row]
+            self._motor[row] = min(max(wanted, low), high)
+        for row, position in self._stops.items():
+            self._motor[row] = STOP_GAIN / self._dt * (position - self.position[row])
         if self._driven:
             pybullet.setJointMotorControlArray(
                 self.tree.uid,
@@ -263,19 +319,30 @@ class TreeControl:
 
     def _strengths(self) -> list[float]:
         """Largest effort of each driven motor; one that gives pulls in proportion to its following error."""
-        if not self._giving:
+        if not (self._giving or self._slowed):
             return self._driven_strength
         rows = self._driven
         spring = self._give[rows] * np.abs(self.target[rows] - self.position[rows])
         strength = self._strength[rows]
         giving = np.minimum(spring + GIVING_FRICTION, strength)
-        limits: list[float] = np.where(self._give[rows] > 0.0, giving, strength).tolist()
-        return limits
+        limits = np.where(self._give[rows] > 0.0, giving, strength)
+        for i, row in enumerate(rows):
+            if row in self._slowed:
+                low, high, most = self._slowed[row]
+                effort = abs(self.target[row]) if self.mode[row] == FORCE else limits[i]
+                limits[i] = min(effort, most) if low <= self.velocity[row] <= high else strength[i]
+            elif row in self._stops:
+                limits[i] = strength[i]
+        efforts: list[float] = limits.tolist()
+        return efforts
 
     def _sort(self) -> None:
         """Sort the axes into those that a motor drives and those that an effort pushes; stop idle motors."""
         by_motor = (self.mode == VELOCITY) | (self.mode == SERVO) | ((self.mode == POSITION) & ~self._force_output)
         by_effort = self._sprung | (self.mode == FORCE) | ((self.mode == POSITION) & self._force_output)
+        # An effort whose speed is bounded is a motor of that strength.
+        stopped = [*self._stops, *(row for row in self._slowed if self.mode[row] == FORCE)]
+        by_motor[stopped], by_effort[stopped] = True, False
         idle = [self.links[row] for row in self._driven if not by_motor[row]]
         if idle:
             pybullet.setJointMotorControlArray(

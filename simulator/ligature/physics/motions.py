@@ -92,6 +92,8 @@ class Motions:
         (r, 7) and (r, 6) of all rows.
     position, velocity, effort
         (a,) of all single axes of all trees.
+    told
+        Efforts of axes, by index, for which Bullet's motor is not the drive: what is reported instead.
     reaction
         (a, 6) force and moment that the joints of these axes carry, where Bullet measures them.
     """
@@ -112,6 +114,7 @@ class Motions:
         self._frame, self._speed = np.zeros((n, 7)), np.zeros((n, 6))
         self._joints = np.zeros((3, axes[-1]))
         self.position, self.velocity, self.effort = self._joints
+        self.told: dict[int, float] = {}
         self.reaction = np.zeros((axes[-1], 6))
         self._uids = [tree.uid for tree in trees]
         self._still = {k for k, tree in enumerate(trees) if tree.static}
@@ -178,6 +181,8 @@ class Motions:
             if links:
                 states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
                 self.position[rows], self.velocity[rows], reaction, self.effort[rows] = zip(*states, strict=True)
+                for axis, effort in self.told.items():
+                    self.effort[axis] = effort
                 if self._measured[tree]:
                     self.reaction[rows] = reaction
         return self._joints[:, self.slices[tree]]

@@ -61,9 +61,8 @@ class BulletQueries:
 
     def add_probe(self, colliders: Sequence[Collider], margin: float) -> int:
         """Register a volume that produces no contacts; returns its handle."""
-        shape = shapes.create(self.client, self._cache, colliders, np.eye(4), moving=True)
+        shape = shapes.create(self.client, self._cache, colliders, np.eye(4), True, margin)
         uid = pybullet.createMultiBody(0, shape, basePosition=_FAR, physicsClientId=self.client)
-        pybullet.changeDynamics(uid, -1, collisionMargin=margin, physicsClientId=self.client)
         pybullet.setCollisionFilterGroupMask(uid, -1, 0, 0, physicsClientId=self.client)
         self._probe_shapes.append((colliders, margin))
         self._probes.append(uid)

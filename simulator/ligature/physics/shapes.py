@@ -20,7 +20,9 @@ CONE_FACETS = 24
 NO_SHAPE = -1
 
 
-def create(client: int, cache: CollisionCache, parts: Sequence[Collider], T_link_body: Array, moving: bool) -> int:
+def create(
+    client: int, cache: CollisionCache, parts: Sequence[Collider], T_link_body: Array, moving: bool, margin: float
+) -> int:
     """One Bullet shape of all ``parts`` of a body, placed at ``T_link_body`` in the link frame; -1 for none."""
     kinds: list[int] = []
     columns: dict[str, list[Any]] = {
@@ -40,7 +42,20 @@ def create(client: int, cache: CollisionCache, parts: Sequence[Collider], T_link
         columns["collisionFrameOrientations"].append(matrix_quaternion(place[:3, :3]).tolist())
     if not kinds:
         return NO_SHAPE
-    return int(pybullet.createCollisionShapeArray(shapeTypes=kinds, physicsClientId=client, **columns))
+    shape = int(pybullet.createCollisionShapeArray(shapeTypes=kinds, physicsClientId=client, **columns))
+    _set_margin(client, shape, margin)
+    return shape
+
+
+def _set_margin(client: int, shape: int, margin: float) -> None:
+    """Give every part of ``shape`` its collision margin, while it is for a moment the base of a body.
+
+    Bullet's default of 1 mm turns parts thinner than twice that inside out, so that bodies fall through them;
+    on a link it cannot be changed any more.
+    """
+    uid = pybullet.createMultiBody(0, shape, physicsClientId=client)
+    pybullet.changeDynamics(uid, -1, collisionMargin=margin, physicsClientId=client)
+    pybullet.removeBody(uid, physicsClientId=client)
 
 
 def _rows(cache: CollisionCache, parts: Sequence[Collider], moving: bool) -> list[tuple[int, dict[str, Any], Array]]:

@@ -25,6 +25,7 @@ from ligature.physics.closures import Closures
 from ligature.physics.control import TreeControl
 from ligature.physics.drive import Drive
 from ligature.physics.gravity import common_gravity, gravity_lifts
+from ligature.physics.grips import BulletGrips
 from ligature.physics.mobility import mobility
 from ligature.physics.motions import Motions
 from ligature.physics.queries import BulletQueries
@@ -48,7 +49,7 @@ MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
 
 
-class World(BulletQueries):
+class World(BulletQueries, BulletGrips):
     """All rigid bodies of ``scene`` outside rods; one Bullet client of its own."""
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
@@ -88,6 +89,7 @@ class World(BulletQueries):
         self._closures = Closures(self.client, scene, self.place_of, self.report)
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
         self._setup_queries()
+        self._setup_grips()
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
@@ -146,6 +148,7 @@ class World(BulletQueries):
             place.slow_down(linear, angular)
         for lift in self._lifts:
             lift.push()
+        self._carry_burdens()
         for control_ in self._body_controls.values():
             control_.apply()
 
@@ -220,8 +223,11 @@ class World(BulletQueries):
         if self.driven(body):
             return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
         holders = [self.scene.bodies[held.parent] for held in self._held.values() if held.child == body]
-        mass = sum(holder.mass for holder in holders)
-        inertia = sum((np.full(3, inertia_of(holder).max()) for holder in holders), np.zeros(3))
+        held_mass, held_inertia = self.mass_of(body)
+        own = self.scene.bodies[body]
+        mass = held_mass - own.mass + sum(holder.mass for holder in holders)
+        inertia = held_inertia - inertia_of(own)
+        inertia += sum((np.full(3, inertia_of(holder).max()) for holder in holders), np.zeros(3))
         control = self._body_controls.get(body)
         forced = control is not None and control.type is CommandType.FORCE
         return mass, inertia, control.target.copy() if control is not None and forced else np.zeros(6)

@@ -71,6 +71,14 @@ class Actuators:
             self._holder.remove_fixed(hold.handle)
             self._holds[actuator] = None
 
+    def memory(self) -> list[_Hold | None]:
+        """What every actuator holds, for snapshots."""
+        return list(self._holds)
+
+    def recall(self, memory: list[_Hold | None]) -> None:
+        """Continue from `memory`; the constraints themselves are part of the physics."""
+        self._holds = list(memory)
+
     def _name(self, actuator: int) -> str:
         return self._scene.actuators[actuator].identity.identifier
 

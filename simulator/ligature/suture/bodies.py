@@ -37,3 +37,13 @@ class HeldBodies(Bodies, Protocol):
 
         The pull (6,) is at its centre of mass.
         """
+
+
+class Masses(Protocol):
+    """How bodies resist forces: more while they are held, see `ligature.physics.grips`."""
+
+    def mass_of(self, body: int) -> tuple[float, Array]:
+        """Mass and principal moments (3,) of a body."""
+
+    def is_held(self, body: int) -> bool:
+        """Whether something holds a body, so that it does not fall."""

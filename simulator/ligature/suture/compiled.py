@@ -18,8 +18,8 @@ import numba
 from ligature.mesh import distance
 
 SOURCES = (
-    "bonds", "chain", "contacts", "coupling", "holding", "layout", "passages", "placing", "reactions", "rotations",
-    "step", "substeps", "tables", "tracking",
+    "bonds", "chain", "contacts", "coupling", "holding", "layout", "pads", "passages", "placing", "reactions",
+    "rotations", "step", "substeps", "tables", "tracking",
 )  # fmt: skip
 """Modules of this room that hold kernels."""
 

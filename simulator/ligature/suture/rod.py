@@ -306,6 +306,12 @@ class Rod:
         i, nodes = self.node_of[body], self._nodes
         nodes.x[i], nodes.q[i], nodes.v[i], nodes.w[i] = pose[:3], pose[3:], twist[:3], twist[3:]
 
+    def weigh(self, partner: Partner, mass: float, inertia: Array, held: bool) -> None:
+        """Let a partner resist forces with ``mass`` and principal moments ``inertia`` (3,) from now on."""
+        i, nodes = self.node_of[partner.body], self._nodes
+        nodes.mass[i], nodes.inertia[i] = mass, inertia
+        nodes.gravity[i] = 0.0 if held else partner.gravity
+
     def meet(self, colliders: Colliders, near: list[int], bodies: Bodies) -> None:
         """Take the motion of the partners that matter in this tick: those near, tied or gripping."""
         if near is not self._near:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ligature.adf import Diagnostic, Severity
 from ligature.model.scene import Scene
 from ligature.model.state import StateRecord
-from ligature.suture.bodies import Bodies
+from ligature.suture.bodies import Bodies, Masses
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, from_chain
 from ligature.suture.rod import Partner, Rod
@@ -92,6 +92,15 @@ class Rods:
         for rod in self.rods:
             if rod.hangs_on(body):
                 rod.carry(T)
+
+    def weigh(self, masses: Masses) -> None:
+        """Take over how the bodies that may meet a rod resist forces now, and whether they are held or fall."""
+        for rod in self.rods:
+            for partner in rod.partners:
+                held = masses.is_held(partner.body)
+                mass, inertia = masses.mass_of(partner.body) if held else (partner.mass, partner.inertia)
+                if not partner.fixed:
+                    rod.weigh(partner, mass, inertia, held)
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists and tension of the elements of every rod into a state record."""

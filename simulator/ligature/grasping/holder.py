@@ -28,7 +28,9 @@ class Holder:
         if child in self._rod_bodies:
             self._rods.grip(parent, child, T_parent_frame, T_child_frame)
             return ("rod", parent, child)
-        return ("body", self._world.add_fixed(parent, child, T_parent_frame, T_child_frame))
+        handle = self._world.add_fixed(parent, child, T_parent_frame, T_child_frame)
+        self._weigh(child, True)
+        return ("body", handle, child)
 
     def remove_fixed(self, handle: Any) -> None:
         """Let go what `add_fixed` holds."""
@@ -36,3 +38,8 @@ class Holder:
             self._rods.release(handle[1], handle[2])
         else:
             self._world.remove_fixed(handle[1])
+            self._weigh(handle[2], False)
+
+    def _weigh(self, body: int, held: bool) -> None:
+        self._world.hold_up(body, held)
+        self._rods.weigh(self._world)

@@ -1,0 +1,6 @@
+"""Holds bodies: rigidly for actuators, by friction between the fingers of jaws."""
+
+from ligature.grasping.grasps import Grasps, Held
+from ligature.grasping.holder import Holder
+
+__all__ = ["Grasps", "Held", "Holder"]

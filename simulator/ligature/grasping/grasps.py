@@ -1,0 +1,271 @@
+"""Grasps of a running scene: jaws that close on a body hold it by friction, until they open or it slips out.
+
+Bullet's contacts move fingers and bodies until both pads touch. From then on the law of `ligature.suture.grasp`
+acts in their place: fingers stop where they are, their contacts with the body are off, and the force between
+them follows from the efforts that their commands ask for. World axes, SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.grasping.fingers import TOUCH, Facing, Fingers
+from ligature.model.frames import inverse, pose7_matrix
+from ligature.model.scene import Jaw, Scene
+from ligature.model.state import StateRecord
+from ligature.physics import World
+from ligature.suture import Rods
+from ligature.suture.grasp import Grasp, Patch, hold_together
+from ligature.suture.motion import Motion
+
+Array = NDArray[np.float64]
+
+LOOK = 4
+"""Ticks between two looks at what stands between open fingers."""
+
+CREEP = 0.2e-3
+"""Slip in metres after which a jaw looks whether the body is still between its pads."""
+
+PRESENT = 0.2e-3
+"""Gap in metres, that of both pads together, beyond which they have lost the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What one jaw holds.
+
+    ``body`` is the scene's index; ``normal_force`` (N) presses the fingers together; ``wrench`` (6,) acts on the
+    body about the patch, world axes; ``slip`` (2,) is how far it slipped since it was grasped, in metres and
+    radians; ``share`` how much of the friction is used, 1 while it slips.
+    """
+
+    jaw: str
+    body: int
+    normal_force: float
+    wrench: Array
+    slip: Array
+    share: float
+
+
+@dataclass
+class _Grip:
+    """A grasp and what it needs of its jaw: levers of the pads, joint positions at which the fingers stop."""
+
+    body: int
+    grasp: Grasp
+    levers: tuple[float, float]
+    positions: tuple[float, float]
+    checked: float = 0.0
+
+
+class Grasps(Mapping[str, Held | None]):
+    """What the jaws of a scene hold, by the jaw's name; None for nothing.
+
+    Parameters
+    ----------
+    actuated
+        Gives the body that each actuator of the scene holds, -1 for none: what a tool's own actuator holds
+        rigidly, its jaw does not hold by friction.
+    """
+
+    def __init__(self, scene: Scene, world: World, rods: Rods, actuated: Callable[[], list[int]]) -> None:
+        self._scene, self._world, self._rods, self._actuated = scene, world, rods, actuated
+        self._fingers = [Fingers(jaw, world) for jaw in scene.jaws]
+        tree_of = {link.body: tree for tree in scene.articulations for link in tree.links}
+        self._own = [{link.body for link in tree_of[jaw.holder].links} for jaw in scene.jaws]
+        self._actuators = [[a.index for a in scene.actuators if a.parent in own] for own in self._own]
+        self._grips: list[_Grip | None] = [None for _ in scene.jaws]
+        self._passing: list[list[int]] = [[] for _ in scene.jaws]
+        self._near = [False for _ in scene.jaws]
+
+    def __getitem__(self, name: str) -> Held | None:
+        for index, jaw in enumerate(self._scene.jaws):
+            if jaw.name == name:
+                return self._held(index)
+        known = ", ".join(jaw.name for jaw in self._scene.jaws) or "none"
+        raise KeyError(f"no jaw is called '{name}'; there are {known}")
+
+    def __iter__(self) -> Iterator[str]:
+        return (jaw.name for jaw in self._scene.jaws)
+
+    def __len__(self) -> int:
+        return len(self._scene.jaws)
+
+    def _held(self, index: int) -> Held | None:
+        grip = self._grips[index]
+        if grip is None:
+            return None
+        grasp = grip.grasp
+        R = grasp.world_patch(self._world.motion(self._scene.jaws[index].holder)[0])[:3, :3]
+        wrench = np.concatenate([R @ grasp.load[:3], R @ grasp.load[3:]])
+        name = self._scene.jaws[index].name
+        return Held(name, grip.body, grasp.normal_force, wrench, grasp.slipped.copy(), grasp.share())
+
+    # --- the tick ---------------------------------------------------------------------------
+
+    def step(self, tick: int) -> None:
+        """Look, close, hold, let go; the coming tick of the bodies moves by the impulses."""
+        for index, grip in enumerate(self._grips):
+            if grip is not None:
+                self._keep(index, grip)
+            elif self._near[index] or (tick + index) % LOOK == 0:
+                self._look(index)
+        self._hold()
+
+    def _look(self, index: int) -> None:
+        """Close gently on what is between the fingers; grasp it when both touch it."""
+        fingers, passing = self._fingers[index], self._passing[index]
+        around, _ = self._world.surroundings(fingers.jaw.fingers)
+        between: list[tuple[int, tuple[Facing, Facing]]] = []
+        for body in around:
+            if self._scene.bodies[body].static or body in self._own[index]:
+                continue
+            faces = fingers.facing(body, fingers.jaw.reach)
+            if faces is not None:
+                between.append((body, faces))
+        for body in [body for body in passing if not fingers.near(body)]:
+            self._let_pass(index, body, False)
+        self._near[index] = bool(between or passing)
+        if not between:
+            fingers.let()
+            return
+        body, faces = min(between, key=lambda item: item[1][0].gap + item[1][1].gap)
+        if max(faces[0].gap, faces[1].gap) <= TOUCH and min(fingers.efforts()) > 0.0:
+            self._grasp(index, body, faces)
+        else:
+            fingers.approach(faces)
+
+    def _grasp(self, index: int, body: int, faces: tuple[Facing, Facing]) -> None:
+        fingers, jaw = self._fingers[index], self._scene.jaws[index]
+        T_world_holder = pose7_matrix(self._world.motion(jaw.holder)[0])
+        T_world_body = pose7_matrix(self._world.motion(body)[0])
+        T_holder_patch = inverse(T_world_holder) @ _patch_pose(fingers, faces)
+        friction = self._friction(jaw, self._scene.bodies[body].friction)
+        grasp = Grasp(Patch(T_holder_patch, jaw.half_width, friction), inverse(T_world_holder) @ T_world_body)
+        self._grips[index] = grip = _Grip(body, grasp, (faces[0].lever, faces[1].lever), fingers.positions())
+        self._take(index, grip)
+        self._world.hold_up(body, True)
+        self._rods.weigh(self._world)
+        self._keep(index, grip)
+
+    def _friction(self, jaw: Jaw, other: float) -> float:
+        """Coefficient between the pads and something with the friction ``other``: the product, as for all contacts."""
+        return other * float(np.mean([self._scene.bodies[finger].friction for finger in jaw.fingers]))
+
+    def _take(self, index: int, grip: _Grip) -> None:
+        """Put the law in the place of Bullet's contacts and motors."""
+        self._let_pass(index, grip.body, True)
+        self._fingers[index].stop(grip.positions, (0.0, 0.0))
+
+    def _let_pass(self, index: int, body: int, passes: bool) -> None:
+        for finger in self._scene.jaws[index].fingers:
+            self._world.let_pass(finger, body, passes)
+        self._passing[index] = sorted({*self._passing[index], body} if passes else {*self._passing[index]} - {body})
+
+    def _keep(self, index: int, grip: _Grip) -> None:
+        """Press as hard as the commands ask; let go when they open, or when the body has slipped out."""
+        fingers = self._fingers[index]
+        efforts = fingers.efforts()
+        force = min(effort / max(lever, 1e-3) for effort, lever in zip(efforts, grip.levers, strict=True))
+        if force <= 0.0:
+            self._let_go(index)
+            return
+        grip.grasp.normal_force = force
+        fingers.stop(grip.positions, (force * grip.levers[0], force * grip.levers[1]))
+        if grip.grasp.slipped[0] > grip.checked + CREEP:
+            grip.checked = float(grip.grasp.slipped[0])
+            faces = fingers.facing(grip.body, fingers.jaw.reach)
+            if faces is None or faces[0].gap + faces[1].gap > PRESENT:
+                self._let_go(index)
+
+    def _let_go(self, index: int) -> None:
+        """End a grasp; contacts stay off until the fingers are clear of the body."""
+        grip = self._grips[index]
+        if grip is None:
+            return
+        self._grips[index] = None
+        self._fingers[index].let()
+        self._world.hold_up(grip.body, False)
+        self._rods.weigh(self._world)
+        self._near[index] = True
+
+    def _hold(self) -> None:
+        """Exchange impulses between held bodies and what holds them."""
+        by_body: dict[int, list[int]] = {}
+        for index, grip in enumerate(self._grips):
+            if grip is not None:
+                by_body.setdefault(grip.body, []).append(index)
+        for body, all_holding in by_body.items():
+            actuated = self._actuated()
+            holding = [i for i in all_holding if body not in [actuated[a] for a in self._actuators[i]]]
+            if not holding:
+                continue
+            grasps = [grip.grasp for grip in (self._grips[i] for i in holding) if grip is not None]
+            holders = [self._scene.jaws[i].holder for i in holding]
+            motions = [Motion(*self._world.motion(holder), 0.0, np.zeros(3)) for holder in holders]
+            impulses = hold_together(grasps, motions, self._free_motion(body), self._world.dt)
+            self._world.apply_impulse(body, impulses[0, :3], impulses[0, 3:])
+            for holder, impulse in zip(holders, impulses[1:], strict=True):
+                self._world.apply_impulse(holder, impulse[:3], impulse[3:])
+
+    def _free_motion(self, body: int) -> Motion:
+        """How a body would move after the tick were it let go now."""
+        pose, twist = self._world.motion(body)
+        mass, inertia = self._world.mass_of(body)
+        pending, dt = self._world.pending(body), self._world.dt
+        described = self._scene.bodies[body]
+        R = pose7_matrix(pose)[:3, :3]
+        twist[:3] += pending[:3] / mass + dt * described.mass / mass * described.gravity
+        twist[3:] += R @ ((R.T @ pending[3:]) / inertia)
+        return Motion(pose, twist, 1.0 / mass, 1.0 / inertia)
+
+    # --- state ------------------------------------------------------------------------------
+
+    def let_go_of(self, body: int | None = None) -> None:
+        """Release a body that is put elsewhere; all bodies for None."""
+        for index, grip in enumerate(self._grips):
+            if grip is not None and body in (None, grip.body):
+                self._let_go(index)
+
+    def write_state(self, state: StateRecord) -> None:
+        """Write what every jaw holds into a state record."""
+        for index in range(len(self)):
+            held = self._held(index)
+            state["jaw_body"][0, index] = -1 if held is None else held.body
+            state["jaw_force"][0, index] = 0.0 if held is None else held.normal_force
+            state["jaw_wrench"][0, index] = 0.0 if held is None else held.wrench
+            state["jaw_slip"][0, index] = 0.0 if held is None else held.slip
+
+    def memory(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        return {"grips": list(self._grips), "passing": [list(p) for p in self._passing], "near": list(self._near)}
+
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Continue from `memory`, with a world that was built anew."""
+        self._grips, self._near = list(memory["grips"]), list(memory["near"])
+        for index, passing in enumerate(memory["passing"]):
+            self._passing[index] = []
+            for body in passing:
+                self._let_pass(index, body, True)
+        for index, grip in enumerate(self._grips):
+            if grip is not None:
+                self._take(index, grip)
+        self._rods.weigh(self._world)
+
+
+def _patch_pose(fingers: Fingers, faces: tuple[Facing, Facing]) -> Array:
+    """Pose (4, 4) of the patch between two touching pads: z along the fingers' way, x along the fingers."""
+    axis, pivot = fingers.axis()
+    point = 0.5 * (faces[0].point + faces[1].point)
+    lever = point - pivot
+    lever = lever - (lever @ axis) * axis
+    z = fingers.closing(0, axis, lever)
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([np.cross(axis, z), axis, z])
+    T[:3, 3] = point
+    return T

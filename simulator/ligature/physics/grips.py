@@ -1,0 +1,158 @@
+"""What grasping asks of Bullet: what is near, how far apart, joints that stop, contacts off, added mass.
+
+Mixed into `World`. World axes, SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from ligature.model.scene import Scene
+from ligature.physics.articulation import Tree, inertia_of, is_alone
+from ligature.physics.bodies import Placement
+from ligature.physics.control import TreeControl
+
+Array = NDArray[np.float64]
+
+LEAST_HELD_MASS = 0.05
+"""Mass in kg that a held body has at least towards forces; its weight stays its own.
+
+What holds it is an arm of kilograms. A needle of 0.1 g between stiff pads and a taut thread would be thrown
+from one to the other within a tick: a force F meets the next reaction only after F dt²/m, 11 mm for 1 N.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Pairs of nearest points of one body with another, nearest first: ``distance`` (n,), ``point`` (n, 3) on the
+    one, and ``normal`` (n, 3) from the other to the one.
+    """
+
+    distance: Array
+    point: Array
+    normal: Array
+
+
+class BulletGrips:
+    """The part of a `World` that grasping needs."""
+
+    scene: Scene
+    client: int
+    place_of: dict[int, Placement]
+    trees: list[Tree]
+    _tree_of_joint: dict[int, TreeControl]
+    _body_at: dict[tuple[int, int], int]
+    _world_gravity: Array
+    _impulses: dict[int, Array]
+
+    def _setup_grips(self) -> None:
+        self._free_bodies = {tree.root for tree in self.trees if is_alone(tree, self.scene.bodies)}
+        self._burdens: dict[int, tuple[Placement, Array]] = {}
+        self._held_up: dict[int, int] = {}
+
+    def surroundings(self, bodies: Collection[int]) -> tuple[list[int], Array]:
+        """Bodies whose boxes meet the common box of ``bodies``, in order, and the corners (2, 3) of that."""
+        boxes = [
+            pybullet.getAABB(place.uid, place.link, physicsClientId=self.client)
+            for place in (self.place_of[body] for body in bodies)
+        ]
+        low = np.min([box[0] for box in boxes], axis=0)
+        high = np.max([box[1] for box in boxes], axis=0)
+        met = pybullet.getOverlappingObjects(low.tolist(), high.tolist(), physicsClientId=self.client) or ()
+        found = {self._body_at[at] for at in met if at in self._body_at}
+        return sorted(found - set(bodies)), np.array([low, high])
+
+    def gaps(self, body: int, other: int, within: float) -> Gaps | None:
+        """Nearest points of the convex parts of two bodies that are closer than ``within``; None without any."""
+        a, b = self.place_of[body], self.place_of[other]
+        found = pybullet.getClosestPoints(a.uid, b.uid, within, a.link, b.link, physicsClientId=self.client)
+        if not found:
+            return None
+        rows = sorted((row[8], row[5], row[7]) for row in found)
+        return Gaps(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
+
+    def let_pass(self, body: int, other: int, passes: bool) -> None:
+        """Switch contacts between two bodies off, or on again unless the scene has them off."""
+        a, b = self.place_of[body], self.place_of[other]
+        touch = not passes and other not in self.scene.bodies[body].no_collision_with
+        pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(touch), physicsClientId=self.client)
+
+    # --- joints -----------------------------------------------------------------------------
+
+    def stop_joint(self, joint: int, position: float, effort: float) -> None:
+        """Keep a joint at ``position`` however it is commanded; it reports ``effort``."""
+        self._tree_of_joint[joint].stop(joint, position, effort)
+
+    def slow_joint(self, joint: int, low: float, high: float, strength: float) -> None:
+        """Keep the velocity of a joint's motor between ``low`` and ``high``, and its effort below ``strength``."""
+        self._tree_of_joint[joint].slow(joint, low, high, strength)
+
+    def let_joint(self, joint: int) -> None:
+        """End `stop_joint` and `slow_joint`."""
+        self._tree_of_joint[joint].let(joint)
+
+    def joint_position(self, joint: int) -> float:
+        """Where a joint is now."""
+        control = self._tree_of_joint[joint]
+        return float(control.read(np.array([control.row[joint]]))[0, 0])
+
+    def pull(self, joint: int, stiffness: float) -> float:
+        """Effort that a joint's command asks for; see `TreeControl.pull`."""
+        return self._tree_of_joint[joint].pull(joint, stiffness)
+
+    def pending(self, body: int) -> Array:
+        """Impulse and moment (6,) about its centre that a body was given for the coming tick so far."""
+        return self._impulses.get(body, np.zeros(6))
+
+    # --- mass -------------------------------------------------------------------------------
+
+    def hold_up(self, body: int, held: bool) -> None:
+        """Note that one more, or one less, holds ``body``; a held body has at least `LEAST_HELD_MASS`."""
+        count = self._held_up.get(body, 0) + (1 if held else -1)
+        self._held_up[body] = count
+        if body in self._free_bodies and (count == 1 if held else count == 0):
+            self._weigh(body)
+        if count == 0:
+            del self._held_up[body]
+
+    def _weigh(self, body: int) -> None:
+        mass, inertia = self.mass_of(body)
+        place = self.place_of[body]
+        pybullet.changeDynamics(
+            place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self.client
+        )
+        extra = mass - place.body.mass
+        if extra > 0.0:
+            self._burdens[body] = place, -extra * self._world_gravity
+        else:
+            self._burdens.pop(body, None)
+
+    def mass_of(self, body: int) -> tuple[float, Array]:
+        """Mass and principal moments (3,) by which a body resists forces now."""
+        described = self.scene.bodies[body]
+        inertia = inertia_of(described)
+        if body in self._free_bodies and self._held_up.get(body, 0) > 0:
+            scale = max(1.0, LEAST_HELD_MASS / described.mass)
+            return scale * described.mass, scale * inertia
+        return described.mass, inertia
+
+    def is_held(self, body: int) -> bool:
+        """Whether something holds a body."""
+        return self._held_up.get(body, 0) > 0
+
+    def _carry_burdens(self) -> None:
+        """Take the weight of added mass off again, for the coming tick."""
+        for place, lift in self._burdens.values():
+            place.push(lift)
+
+    def _hold_up_again(self, counts: Mapping[int, int]) -> None:
+        """Take up the counts of `hold_up` after a rebuild."""
+        self._held_up = dict(counts)
+        for body in self._held_up:
+            if body in self._free_bodies:
+                self._weigh(body)

@@ -1,0 +1,287 @@
+"""Compiled: what the pads of several jaws do in one tick to the body that they hold together.
+
+World axes and SI units, but for what stands in the patch of a jaw: its z axis is normal to the pads. Rows of a
+patch are force along x, y, z and moment about x, y, z. Friction bounds rows 0, 1 and 5 by an ellipsoid, the
+force between the fingers bounds row 2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.suture.chain import invert_spd6
+from ligature.suture.compiled import inlined, kernel
+from ligature.suture.rotations import cross, matrix_of, multiply, rotate, rotate_back, rotation_vector
+
+Array = NDArray[np.float64]
+
+SWEEPS = 20
+"""Repetitions in which jaws that share a body, and rows that slide, agree."""
+
+MAX_NEWTON = 50
+
+STIFFNESS, DAMPING = 2e4, 60.0
+"""Of pads against translation, N/m and N s/m: two tools that disagree by 0.1 mm pull 1 N."""
+
+TURN_STIFFNESS, TURN_DAMPING = 2.0, 5e-3
+"""Of pads against rotation, N m/rad and N m s/rad: 1 N at the tip of a needle turns it by half a degree."""
+
+
+@inlined
+def _spring(row, dt):
+    """Bias per metre or radian and softness of an implicit spring and damper (Catto, Soft Constraints, 2011)."""
+    k, c = (STIFFNESS, DAMPING) if row < 3 else (TURN_STIFFNESS, TURN_DAMPING)
+    return k / (c + dt * k), 1.0 / (dt * (c + dt * k))
+
+
+class Pads(NamedTuple):
+    """The jaws that hold one body, g of them."""
+
+    patch: Array  # (g, 7) pose of the patch in the inertial frame of the jaw's holder
+    held: Array  # (g, 7) pose of the body's inertial frame in the patch, as held
+    limits: Array  # (g, 3) largest tangential force, moment about the normal, and normal force
+    load: Array  # (g, 6) on the body, in patch axes: N, N m
+    slid: Array  # (g, 2) way and angle that the body has slipped: m, rad
+    slides: NDArray[np.bool_]  # (g, 2) whether it slides along the pads, and pries them apart
+
+
+class Scratch(NamedTuple):
+    """Room for one tick of g jaws."""
+
+    at: Array  # (g, 3) patches in the world
+    R: Array  # (g, 3, 3)
+    error: Array  # (g, 6) of the body off its held pose
+    drift: Array  # (g, 6) velocity of the holders there, in patch axes
+    Y: Array  # (g, 6, 6) impulse for a unit of velocity
+    twist: Array  # (6,) of the body
+    W: Array  # (3, 3) its inverse inertia
+    S: Array  # (3, 3)
+    K: Array  # (6, 6)
+    ask: Array  # (6,)
+    step: Array  # (6,)
+    scale3: Array  # (3,) and so on
+    x3: Array
+    y3: Array
+
+
+def scratch(g: int) -> Scratch:
+    """Room for ``g`` jaws."""
+    z = np.zeros
+    return Scratch(z((g, 3)), z((g, 3, 3)), z((g, 6)), z((g, 6)), z((g, 6, 6)), z(6), z((3, 3)), z((3, 3)), z((6, 6)),
+                   z(6), z(6), z(3), z(3), z(3))  # fmt: skip
+
+
+@inlined
+def _place(g, body_pose, holder_pose, pads, room):
+    """Where patch ``g`` is in the world, and how far the body is off its held pose."""
+    h, p, b, held, R, S, at = holder_pose[g], pads.patch[g], body_pose, pads.held[g], room.R[g], room.S, room.at[g]
+    matrix_of(h[3], h[4], h[5], h[6], S)
+    x, y, z = rotate(S, p[0], p[1], p[2])
+    at[0], at[1], at[2] = h[0] + x, h[1] + y, h[2] + z
+    qx, qy, qz, qw = multiply(h[3], h[4], h[5], h[6], p[3], p[4], p[5], p[6])
+    matrix_of(qx, qy, qz, qw, R)
+    qx, qy, qz, qw = multiply(-qx, -qy, -qz, qw, b[3], b[4], b[5], b[6])
+    ex, ey, ez, ew = multiply(qx, qy, qz, qw, -held[3], -held[4], -held[5], held[6])
+    matrix_of(ex, ey, ez, ew, S)
+    hx, hy, hz = rotate(S, held[0], held[1], held[2])
+    x, y, z = rotate_back(R, b[0] - at[0], b[1] - at[1], b[2] - at[2])
+    error = room.error[g]
+    error[0], error[1], error[2] = x - hx, y - hy, z - hz
+    error[3], error[4], error[5] = rotation_vector(ex, ey, ez, ew)
+
+
+@inlined
+def _inverse_inertia(q, moments, S, W):
+    """W (3, 3): inverse inertia in world axes of a body with principal inverse ``moments``."""
+    matrix_of(q[3], q[4], q[5], q[6], S)
+    for i in range(3):
+        for k in range(3):
+            W[i, k] = S[i, 0] * moments[0] * S[k, 0] + S[i, 1] * moments[1] * S[k, 1] + S[i, 2] * moments[2] * S[k, 2]
+
+
+@inlined
+def _velocity(R, twist, rx, ry, rz, out):
+    """Velocity (6,) in patch axes of a body's material at the lever r."""
+    vx, vy, vz = cross(twist[3], twist[4], twist[5], rx, ry, rz)
+    out[0], out[1], out[2] = rotate_back(R, twist[0] + vx, twist[1] + vy, twist[2] + vz)
+    out[3], out[4], out[5] = rotate_back(R, twist[3], twist[4], twist[5])
+
+
+@inlined
+def _push(twist, inverse_mass, W, R, rx, ry, rz, impulse):
+    """Change a body's twist (6,) by an ``impulse`` (6,) in patch axes at the lever r."""
+    fx, fy, fz = rotate(R, impulse[0], impulse[1], impulse[2])
+    mx, my, mz = rotate(R, impulse[3], impulse[4], impulse[5])
+    ax, ay, az = cross(rx, ry, rz, fx, fy, fz)
+    wx, wy, wz = rotate(W, mx + ax, my + ay, mz + az)
+    twist[0], twist[1], twist[2] = (
+        twist[0] + inverse_mass * fx,
+        twist[1] + inverse_mass * fy,
+        twist[2] + inverse_mass * fz,
+    )
+    twist[3], twist[4], twist[5] = twist[3] + wx, twist[4] + wy, twist[5] + wz
+
+
+@inlined
+def _soften(g, inverse_mass, rx, ry, rz, room, dt):
+    """Impulse of patch ``g`` for a unit of velocity, the softness of its pads included."""
+    ask, step, K = room.ask, room.step, room.K
+    for row in range(6):
+        for k in range(6):
+            ask[k], step[k] = 0.0, 0.0
+        step[row] = 1.0
+        _push(ask, inverse_mass, room.W, room.R[g], rx, ry, rz, step)
+        _velocity(room.R[g], ask, rx, ry, rz, step)
+        for k in range(6):
+            K[k, row] = step[k]
+    for row in range(6):
+        _, soft = _spring(row, dt)
+        K[row, row] += soft
+    invert_spd6(K, room.Y[g])
+
+
+@inlined
+def _solve3(B, more, u, out):
+    """out = (1 + more B)⁻¹ u for a symmetric B (3, 3), by Cramer's rule."""
+    a, b, c = 1.0 + more * B[0, 0], more * B[0, 1], more * B[0, 2]
+    d, e, f = 1.0 + more * B[1, 1], more * B[1, 2], 1.0 + more * B[2, 2]
+    p, q, r = d * f - e * e, c * e - b * f, b * e - c * d
+    per = 1.0 / (a * p + b * q + c * r)
+    out[0] = per * (p * u[0] + q * u[1] + r * u[2])
+    out[1] = per * (q * u[0] + (a * f - c * c) * u[1] + (b * c - a * e) * u[2])
+    out[2] = per * (r * u[0] + (b * c - a * e) * u[1] + (a * d - b * b) * u[2])
+
+
+@inlined
+def _slide(row, Y, force, moment, room):
+    """Bring the impulse ``row`` (6,) to the ellipsoid of friction, so that the body slips against it.
+
+    Of all impulses within, the one of largest dissipation: the slip is normal to the ellipsoid (Goyal, Ruina
+    and Papadopoulos, Planar sliding with dry friction, 1991). With rows scaled to a unit ball, u is the
+    solution of (1 + m B) u = u* with |u| = 1; m is found by Newton's method on 1 / |u|.
+    """
+    B, u, v, w = room.S, room.ask[0:3], room.ask[3:6], room.scale3
+    for a in range(3):
+        i = a if a < 2 else 5
+        w[a] = 1.0 / force if a < 2 else 1.0 / moment
+        u[a] = row[i] * w[a]
+    for a in range(3):
+        for b in range(3):
+            B[a, b] = w[a] * Y[a if a < 2 else 5, b if b < 2 else 5] * w[b]
+    more = 0.0
+    for _ in range(MAX_NEWTON):
+        _solve3(B, more, u, v)
+        size = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        if abs(size - 1.0) < 1e-12:
+            break
+        room.x3[0] = B[0, 0] * v[0] + B[0, 1] * v[1] + B[0, 2] * v[2]
+        room.x3[1] = B[1, 0] * v[0] + B[1, 1] * v[1] + B[1, 2] * v[2]
+        room.x3[2] = B[2, 0] * v[0] + B[2, 1] * v[1] + B[2, 2] * v[2]
+        _solve3(B, more, room.x3, room.y3)
+        slope = v[0] * room.y3[0] + v[1] * room.y3[1] + v[2] * room.y3[2]
+        more = max(more + size * size * (size - 1.0) / slope, 0.0)
+    row[0], row[1], row[5] = v[0] / w[0], v[1] / w[1], v[2] / w[2]
+    for i in range(2, 5):
+        row[i] -= more * (Y[i, 0] * w[0] * v[0] + Y[i, 1] * w[1] * v[1] + Y[i, 5] * w[2] * v[2])
+
+
+@inlined
+def _bound(row, Y, limits, room, dt):
+    """Bring an impulse (6,) back to what the pads can carry; returns whether it slides, and whether it pries them."""
+    force, moment, press = dt * limits[0], dt * limits[1], dt * limits[2]
+    slides = (row[0] / force) ** 2 + (row[1] / force) ** 2 + (row[5] / moment) ** 2 > 1.0
+    if slides:
+        _slide(row, Y, force, moment, room)
+    pries = abs(row[2]) > press
+    row[2] = min(max(row[2], -press), press)
+    return slides, pries
+
+
+@inlined
+def _follow(g, error, velocity, load, held, slid, slides, pries, dt):
+    """Let the held pose of a patch that slips follow, so that its springs carry what the pads can."""
+    sx, sy, sz, turned = 0.0, 0.0, 0.0, 0.0
+    if slides:
+        sx = error[0] + dt * velocity[0] + load[0] / STIFFNESS
+        sy = error[1] + dt * velocity[1] + load[1] / STIFFNESS
+        turned = error[5] + dt * velocity[5] + load[5] / TURN_STIFFNESS
+    if pries:
+        sz = error[2] + dt * velocity[2] + load[2] / STIFFNESS
+    h, c, s = held[g], math.cos(turned), math.sin(turned)
+    h[0], h[1], h[2] = c * h[0] - s * h[1] + sx, s * h[0] + c * h[1] + sy, h[2] + sz
+    h[3], h[4], h[5], h[6] = multiply(0.0, 0.0, math.sin(0.5 * turned), math.cos(0.5 * turned), h[3], h[4], h[5], h[6])
+    slid[g, 0] += math.sqrt(sx * sx + sy * sy + sz * sz)
+    slid[g, 1] += abs(turned)
+
+
+@inlined
+def _sweep(g, body_pose, inverse_mass, pads, room, dt):
+    """Bring the impulse of one patch, kept in its load, to where its springs want it; whether it was bounded."""
+    at, load, ask, step = room.at[g], pads.load[g], room.ask, room.step
+    rx, ry, rz = at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2]
+    _velocity(room.R[g], room.twist, rx, ry, rz, ask)
+    for row in range(6):
+        stiff, soft = _spring(row, dt)
+        ask[row] += stiff * room.error[g, row] - room.drift[g, row] + soft * load[row]
+    for row in range(6):
+        step[row] = -load[row]
+    for row in range(6):
+        change = 0.0
+        for k in range(6):
+            change += room.Y[g, row, k] * ask[k]
+        load[row] -= change
+    slides, pries = _bound(load, room.Y[g], pads.limits[g], room, dt)
+    for row in range(6):
+        step[row] += load[row]
+    _push(room.twist, inverse_mass, room.W, room.R[g], rx, ry, rz, step)
+    pads.slides[g, 0], pads.slides[g, 1] = slides, pries
+    return slides or pries
+
+
+@kernel
+def hold(body_pose, body_twist, inverse_mass, inverse_inertia, holder_pose, holder_twist, pads, room, impulse, dt):
+    """Impulses of one tick: ``impulse[0]`` (6,) on the body, ``impulse[1 + g]`` on the holder of jaw g.
+
+    All are about the centres of mass, in world axes. ``body_twist`` (6,) is as it would be after the tick were
+    the body let go. Holders move as they do. Loads, held poses and slips of ``pads`` are brought up to date.
+    """
+    n = pads.patch.shape[0]
+    _inverse_inertia(body_pose, inverse_inertia, room.S, room.W)
+    for k in range(6):
+        room.twist[k] = body_twist[k]
+    for g in range(n):
+        _place(g, body_pose, holder_pose, pads, room)
+        at, h = room.at[g], holder_pose[g]
+        _velocity(room.R[g], holder_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
+        _soften(g, inverse_mass, at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
+        for row in range(6):
+            pads.load[g, row] = 0.0
+    for _ in range(SWEEPS):
+        bounded = False
+        for g in range(n):
+            bounded = _sweep(g, body_pose, inverse_mass, pads, room, dt) or bounded
+        if n == 1 and not bounded:
+            break
+    for k in range(6):
+        impulse[0, k] = 0.0
+    for g in range(n):
+        at, h, load, total = room.at[g], holder_pose[g], pads.load[g], room.step
+        fx, fy, fz = rotate(room.R[g], load[0], load[1], load[2])
+        mx, my, mz = rotate(room.R[g], load[3], load[4], load[5])
+        for side in range(2):
+            i, c, sign = (0, body_pose, 1.0) if side == 0 else (1 + g, h, -1.0)
+            ax, ay, az = cross(at[0] - c[0], at[1] - c[1], at[2] - c[2], fx, fy, fz)
+            total[0], total[1], total[2], total[3], total[4], total[5] = fx, fy, fz, mx + ax, my + ay, mz + az
+            for k in range(6):
+                impulse[i, k] = sign * total[k] + (impulse[0, k] if side == 0 else 0.0)
+        for row in range(6):
+            load[row] /= dt
+        rx, ry, rz = at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2]
+        _velocity(room.R[g], room.twist, rx, ry, rz, room.ask)
+        for row in range(6):
+            room.ask[row] -= room.drift[g, row]
+        _follow(g, room.error[g], room.ask, load, pads.held, pads.slid, pads.slides[g, 0], pads.slides[g, 1], dt)
