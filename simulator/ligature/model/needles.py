@@ -36,8 +36,8 @@ SLENDER = 5.0
 FIT_STEPS = 5
 """Newton steps of a fit; the first guess is off by tenths of a millimetre where the needle is thick."""
 
-LONGEST, WIDEST_TURN = 0.1, np.radians(330.0)
-"""A longer or more closed arc is no needle."""
+LONGEST, WIDEST_TURN = 0.1, np.radians(240.0)
+"""A longer or more closed arc is no needle; the widest in use are five eighths of a circle."""
 
 
 def fit_arc(points: Array) -> Arc:
