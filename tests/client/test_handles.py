@@ -171,6 +171,20 @@ def test_what_is_not_a_number_is_refused_where_it_is_set() -> None:
     assert body._cmd.joint_cmds == [] and body._cmd.cartesian_cmd_type == FORCE
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_number_that_is_not_finite_leaves_the_last_command(bad: float, caplog: Any) -> None:
+    body = body_with_joints()
+    body.set_joint_pos(1, 0.5)
+    body.set_joint_pos(1, bad)
+    body.set_force(1, 0, 0)
+    body.set_force(bad, 0, 0)
+    body.set_linear_vel(0, bad, 0)
+    body.set_rot([0, 0, 0, bad])
+    assert body._cmd.joint_cmds == [0, 0.5] and body._cmd.wrench.force.x == 1 and body._cmd.twist.linear.y == 0
+    assert body._cmd.cartesian_cmd_type == FORCE
+    assert f"/ambf/env/arm: {bad} cannot be commanded; the last command holds" in caplog.text
+
+
 def test_active_bodies_ask_for_their_lists() -> None:
     body = RigidBody("/a/b")
     assert not body.is_active() and not body.get_publish_joint_positions_flag()

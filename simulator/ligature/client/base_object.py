@@ -6,6 +6,7 @@ Poses of bodies are in the world, all others in the parent's frame; metres and r
 from __future__ import annotations
 
 import copy
+import math
 import threading
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -147,6 +148,21 @@ class BaseObject:
     def clear_command(self) -> None:
         """What is published when the command has become stale; bodies keep theirs."""
 
+    def connect(self, ral: Any) -> None:
+        """Advertise the command and subscribe to the state, below the object's name."""
+        self.ral = ral
+        self._pub = ral.publisher(f"{self._name}/Command", self.Command)
+        self._sub = ral.subscriber(f"{self._name}/State", self.State, self.ros_cb)
+
+    def disconnect(self) -> None:
+        """Leave all topics."""
+        for end in self.ends():
+            self.ral.forget(end)
+
+    def await_state(self, seconds: float) -> bool:
+        """Wait for the first state; whether there is one."""
+        return self._received.wait(seconds)
+
     def ends(self) -> list[Any]:
         """The publishers and subscribers of this handle; empty until a client has connected it."""
         return [end for end in (self._sub, self._pub) if end is not None]
@@ -163,10 +179,23 @@ class BaseObject:
     def _move(self, position: Point, orientation: Quaternion) -> None:
         if not hasattr(self._cmd, "pose"):
             raise TypeError(f"{self._name}: a {type(self).__name__} cannot be moved, its command has no pose")
+        p, q = position, orientation
+        if not self._takes(p.x, p.y, p.z, q.x, q.y, q.z, q.w):
+            return
         with self._lock:
             self._cmd.pose = Pose(copy.copy(position), copy.copy(orientation))
             self._posed = True
             self._pose_commanded()
+
+    def _takes(self, *values: float) -> bool:
+        """Whether all numbers of a command are finite; a message when not, and the command before stays.
+
+        The simulator would refuse the whole message, and release the object when nothing better follows.
+        """
+        if all(map(math.isfinite, values)):
+            return True
+        rospy.logwarn(f"{self._name}: {', '.join(map(str, values))} cannot be commanded; the last command holds")
+        return False
 
     def _pose_commanded(self) -> None:
         """Mark the command as one of a pose."""

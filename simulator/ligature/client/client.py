@@ -8,7 +8,6 @@ import time
 from typing import Any
 
 import rospy
-from std_msgs.msg import Empty
 
 from ligature.client import layer
 from ligature.client.actuator import Actuator
@@ -77,11 +76,12 @@ class Client:
             raise ValueError(f"a publish rate of {default_publish_rate} Hz: must be above 0")
         self._period = 1.0 / float(default_publish_rate)
         kinds = self._discover()
-        for name in [name for name in self._objects if name not in kinds]:
-            self._disconnect(self._objects.pop(name))
-        for name, kind in kinds.items():
-            if not isinstance(self._objects.get(name), kind):
-                self._objects[name] = self._connected(kind, name)
+        for name, handle in list(self._objects.items()):
+            if kinds.get(name) is not type(handle):
+                self._objects.pop(name).disconnect()
+        for name in kinds.keys() - self._objects.keys():
+            self._objects[name] = kinds[name](self.ral, name)
+            self._objects[name].connect(self.ral)
         self._await_connections()
         self._common_namespace = os.path.commonprefix(list(self._objects))
         if self._thread is None:
@@ -102,7 +102,7 @@ class Client:
 
     def get_obj_names(self) -> list[str]:
         """Names of all objects: their topics without ``/State``."""
-        return list(self._objects)
+        return sorted(self._objects)
 
     def get_obj_handle(self, name: str) -> Any:
         """The object of that name, or the only one whose name contains ``name``, made active; None for none or many.
@@ -112,14 +112,14 @@ class Client:
         handle = self._find(name)
         if handle is not None:
             handle.set_active()
-            handle._received.wait(FIRST_STATE_PATIENCE)
+            handle.await_state(FIRST_STATE_PATIENCE)
         return handle
 
     def get_world_handle(self) -> World | None:
         """The world, not made active; None when no simulator was found."""
         world = next((handle for handle in self._objects.values() if isinstance(handle, World)), None)
         if world is not None:
-            world._received.wait(FIRST_STATE_PATIENCE)
+            world.await_state(FIRST_STATE_PATIENCE)
         return world
 
     def get_obj_pose(self, name: str) -> Any:
@@ -165,15 +165,6 @@ class Client:
                 found[topic[: -len(STATE)]] = KINDS[type_]
         return found
 
-    def _connected(self, kind: type[BaseObject], name: str) -> BaseObject:
-        handle = kind(self.ral, name)
-        handle._pub = self.ral.publisher(f"{name}/Command", kind.Command)
-        if isinstance(handle, World):
-            handle._reset_pub = self.ral.publisher(f"{name}/Command/Reset", Empty)
-            handle._reset_bodies_pub = self.ral.publisher(f"{name}/Command/Reset/Bodies", Empty)
-        handle._sub = self.ral.subscriber(f"{name}{STATE}", kind.State, handle.ros_cb)
-        return handle
-
     def _await_connections(self) -> None:
         ends = [end for handle in self._objects.values() for end in handle.ends()]
         deadline = time.monotonic() + CONNECTING
@@ -182,10 +173,6 @@ class Client:
                 rospy.logwarn(f"not connected within {CONNECTING:g} s: {', '.join(missing)}")
                 return
             time.sleep(POLL)
-
-    def _disconnect(self, handle: BaseObject) -> None:
-        for end in handle.ends():
-            self.ral.forget(end)
 
     def _find(self, name: str) -> BaseObject | None:
         if name in self._objects:

@@ -1,4 +1,4 @@
-"""Reading of joint lists by name or index, shared by rigid bodies and the legacy objects; radians or metres."""
+"""What rigid bodies and the legacy objects share: joint lists by name or index, in radians or metres, and vectors."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import rospy
+from geometry_msgs.msg import Vector3
 
 from ligature.client.base_object import BaseObject
 
@@ -108,3 +109,13 @@ class JointedObject(BaseObject):
 def grown(values: Sequence[Any], length: int, fill: Any) -> list[Any]:
     """``values`` with at least ``length`` entries; never shorter than it was."""
     return [*values, *[fill] * (length - len(values))]
+
+
+def vector(x: float, y: float, z: float) -> Vector3:
+    """A vector message of three numbers; TypeError or ValueError for what is none."""
+    return Vector3(float(x), float(y), float(z))
+
+
+def components(v: Vector3) -> tuple[float, float, float]:
+    """The numbers of a vector message."""
+    return v.x, v.y, v.z

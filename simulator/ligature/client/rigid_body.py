@@ -12,7 +12,7 @@ from ambf_msgs.msg import RigidBodyCmd, RigidBodyState
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
 
 from ligature.client.euler import quaternion_from_euler
-from ligature.client.joints import JointedObject, grown
+from ligature.client.joints import JointedObject, components, grown, vector
 
 FORCE, POSITION, VELOCITY = RigidBodyCmd.TYPE_FORCE, RigidBodyCmd.TYPE_POSITION, RigidBodyCmd.TYPE_VELOCITY
 
@@ -37,32 +37,36 @@ class RigidBody(JointedObject):
 
     def set_force(self, fx: float, fy: float, fz: float) -> None:
         """Command a force on the centre of mass; the torque stays the commanded one."""
-        self.set_wrench(Wrench(_vector(fx, fy, fz), self._cmd.wrench.torque))
+        self.set_wrench(Wrench(vector(fx, fy, fz), self._cmd.wrench.torque))
 
     def set_torque(self, nx: float, ny: float, nz: float) -> None:
         """Command a torque; the force stays the commanded one."""
-        self.set_wrench(Wrench(self._cmd.wrench.force, _vector(nx, ny, nz)))
+        self.set_wrench(Wrench(self._cmd.wrench.force, vector(nx, ny, nz)))
 
     def set_wrench(self, wrench: Wrench) -> None:
         """Command force and torque."""
+        if not self._takes(*components(wrench.force), *components(wrench.torque)):
+            return
         with self._lock:
             self._cmd.wrench = copy.deepcopy(wrench)
             self._cmd.cartesian_cmd_type = FORCE
 
     def wrench_command(self, fx: float, fy: float, fz: float, nx: float, ny: float, nz: float) -> None:
         """Command force and torque by their components."""
-        self.set_wrench(Wrench(_vector(fx, fy, fz), _vector(nx, ny, nz)))
+        self.set_wrench(Wrench(vector(fx, fy, fz), vector(nx, ny, nz)))
 
     def set_linear_vel(self, vx: float, vy: float, vz: float) -> None:
         """Command a velocity; the angular one stays the commanded one."""
-        self.set_twist(Twist(_vector(vx, vy, vz), self._cmd.twist.angular))
+        self.set_twist(Twist(vector(vx, vy, vz), self._cmd.twist.angular))
 
     def set_angular_vel(self, ax: float, ay: float, az: float) -> None:
         """Command an angular velocity; the linear one stays the commanded one."""
-        self.set_twist(Twist(self._cmd.twist.linear, _vector(ax, ay, az)))
+        self.set_twist(Twist(self._cmd.twist.linear, vector(ax, ay, az)))
 
     def set_twist(self, twist: Twist) -> None:
         """Command linear and angular velocity."""
+        if not self._takes(*components(twist.linear), *components(twist.angular)):
+            return
         with self._lock:
             self._cmd.twist = copy.deepcopy(twist)
             self._cmd.cartesian_cmd_type = VELOCITY
@@ -71,7 +75,7 @@ class RigidBody(JointedObject):
         self, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, *_joints: float
     ) -> None:
         """Command linear and angular velocity by their components."""
-        self.set_twist(Twist(_vector(vx, vy, vz), _vector(ax, ay, az)))
+        self.set_twist(Twist(vector(vx, vy, vz), vector(ax, ay, az)))
 
     def pose_command(
         self, px: float, py: float, pz: float, roll: float, pitch: float, yaw: float, *_joints: float
@@ -141,14 +145,10 @@ class RigidBody(JointedObject):
 
     def _command_joint(self, joint: str | int, value: float, kind: int) -> None:
         value, index = float(value), self._index(joint)
-        if index is None:
+        if index is None or not self._takes(value):
             return
         with self._lock:
             cmd = self._cmd
             cmd.joint_cmds = grown(cmd.joint_cmds, index + 1, 0.0)
             cmd.joint_cmds_types = grown(cmd.joint_cmds_types, index + 1, FORCE)
             cmd.joint_cmds[index], cmd.joint_cmds_types[index] = value, kind
-
-
-def _vector(x: float, y: float, z: float) -> Vector3:
-    return Vector3(float(x), float(y), float(z))

@@ -86,6 +86,8 @@ class Vehicle(BaseObject):
 
     def _set(self, field: str, wheel: int, value: float) -> None:
         value = float(value)
+        if not self._takes(value):
+            return
         with self._lock:
             values = grown(getattr(self._cmd, field), max(wheel + 1, self.get_wheel_count()), 0.0)
             values[wheel] = value

@@ -32,6 +32,12 @@ class World(BaseObject):
         self._reset_pub: Any = None
         self._reset_bodies_pub: Any = None
 
+    def connect(self, ral: Any) -> None:
+        """Advertise command and resets, and subscribe to the state."""
+        super().connect(ral)
+        self._reset_pub = ral.publisher(f"{self._name}/Command/Reset", Empty)
+        self._reset_bodies_pub = ral.publisher(f"{self._name}/Command/Reset/Bodies", Empty)
+
     def ends(self) -> list[Any]:
         """The publishers and subscribers, with those of the resets."""
         return [*super().ends(), *(end for end in (self._reset_pub, self._reset_bodies_pub) if end is not None)]
