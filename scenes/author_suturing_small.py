@@ -94,12 +94,13 @@ def shape(
     return {"shape": kind, "geometry": geometry, "offset": pose(pose_matrix(at, rpy))}
 
 
-def colour(r: float, g: float, b: float, specular: float = 0.3) -> dict[str, Any]:
-    """An ADF colour block."""
+def colour(r: float, g: float, b: float, specular: float = 0.3, shininess: int | None = None) -> dict[str, Any]:
+    """An ADF colour block; a grey with a strong and sharp highlight is drawn as bare metal."""
     return {
         "ambient": {"level": 0.5},
         "diffuse": {"r": r, "g": g, "b": b},
         "specular": {"r": specular, "g": specular, "b": specular},
+        **({} if shininess is None else {"shininess": shininess}),
         "transparency": 1.0,
     }
 
@@ -143,7 +144,7 @@ def structure(shapes: list[dict[str, Any]], T_link_base: Matrix) -> dict[str, An
 def psm(name: str) -> dict[str, Any]:
     """One arm: base, six joints of the instrument, two jaws and the body that names the tool."""
     T_world_base = pose_matrix(*BASE_POSES[name])
-    steel, white = colour(0.55, 0.56, 0.6, 0.8), colour(0.9, 0.9, 0.92)
+    steel, white = colour(0.60, 0.60, 0.61, 0.8, 250), colour(0.9, 0.9, 0.92)
     table = [
         ("yaw link", dh(HALF_PI, 0, 0, HALF_PI)),
         ("pitch end link", dh(-HALF_PI, 0, 0, -HALF_PI)),
@@ -318,9 +319,7 @@ def phantom() -> dict[str, Any]:
     top = 0.715
     T_world_block = pose_matrix((0.03, 0.18, top - 0.015), (0, 0, 0))
     block_shape = [shape("BOX", (0, 0, 0), x=0.1, y=0.2, z=0.03)]
-    bodies: dict[str, Any] = {
-        "BODY Block": body("Block", T_world_block, 0.0, block_shape, **{"color components": colour(0.85, 0.6, 0.5)})
-    }
+    bodies: dict[str, Any] = {"BODY Block": body("Block", T_world_block, 0.0, block_shape)}
     T_world_camera = pose_matrix((0.0307, 0.25102, 0.81025), (0.69813, 0, -3.14158))
     bodies["BODY CameraFrame"] = body("CameraFrame", T_world_camera, 0.0, [])
 
@@ -331,9 +330,11 @@ def phantom() -> dict[str, Any]:
         **{
             "inertial offset": pose(pose_matrix(tuple(centre), (0, 0, 0))),
             "damping": {"linear": 0.1, "angular": 0.1},
-            "color components": colour(0.7, 0.7, 0.75, 0.9),
         },
     )  # fmt: skip
+    for name, mesh in (("Block", "block.obj"), ("Needle", "needle.obj")):  # looks: author_looks.py
+        del bodies[f"BODY {name}"]["compound shape"]
+        bodies[f"BODY {name}"]["mesh"] = mesh
 
     length = THREAD_LENGTH / THREAD_ELEMENTS
     area = np.pi * THREAD_RADIUS**2
@@ -382,6 +383,7 @@ def phantom() -> dict[str, Any]:
     return {
         "bodies": list(bodies),
         "joints": list(joints),
+        "high resolution path": "high_res/",
         "ignore inter-collision": False,
         "namespace": "/ambf/env/phantom/",
         **bodies,
@@ -411,7 +413,7 @@ def world() -> dict[str, Any]:
         "light2": {
             "namespace": "lights/", "name": "light2", "parent": "BODY CameraFrame",
             "location": vector((0, 0, 0)), "direction": vector((0, 0, -1)),
-            "spot exponent": 0.9, "cutoff angle": 1.5, "shadow quality": 0,
+            "spot exponent": 0.9, "cutoff angle": 1.5, "shadow quality": 4,
         },
     }  # fmt: skip
     for side, x in (("L", -0.002), ("R", 0.002)):

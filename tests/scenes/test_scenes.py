@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
+from types import ModuleType
 
 import ligature
 import numpy as np
 import pytest
 from ligature.adf import Severity
+from PIL import Image
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 LAUNCHES = sorted(SCENES.glob("*/launch.yaml"))
@@ -41,11 +43,25 @@ def test_repeats_bit_for_bit(launch: Path) -> None:
     assert run(launch, 300).state_hash() == run(launch, 300).state_hash()
 
 
-def test_files_are_what_their_script_writes() -> None:
-    script = SCENES / "author_suturing_small.py"
-    spec = importlib.util.spec_from_file_location("author_suturing_small", script)
+def authored_by(name: str) -> ModuleType:
+    """An authoring script, imported."""
+    spec = importlib.util.spec_from_file_location(name, SCENES / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def test_files_are_what_their_script_writes() -> None:
+    module = authored_by("author_suturing_small")
     for name, document in module.documents().items():
         assert (SCENES / "suturing_small" / name).read_text(encoding="utf-8") == module.text(document), name
+
+
+def test_looks_are_what_their_script_writes() -> None:
+    module = authored_by("author_looks")
+    for name, text in module.files().items():
+        assert (module.HERE / name).read_text(encoding="utf-8") == text, name
+    for name, pixels in module.pictures().items():
+        with Image.open(module.HERE / name) as image:
+            assert np.abs(np.asarray(image, dtype=float) - pixels).mean() < 3.0, name  # of 255, by compression

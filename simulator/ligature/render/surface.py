@@ -64,10 +64,11 @@ class Surface:
 
 def surface_of(override: Colour | None, material: Material | None) -> Surface:
     """The surface of a mesh part: ADF colours replace the material's, textures stay (specification §10.2)."""
-    if material is None:
-        return Surface(override or Colour())
     if override is not None:
-        return Surface(override, material.texture, material.normal_map)
+        texture, normal_map = (material.texture, material.normal_map) if material else (None, None)
+        return Surface(override, texture, normal_map, evident(override, texture is not None))
+    if material is None:
+        return Surface()
     colour = Colour(
         diffuse=material.diffuse,
         ambient=material.ambient,
@@ -76,24 +77,31 @@ def surface_of(override: Colour | None, material: Material | None) -> Surface:
         shininess=int(material.shininess),
         alpha=material.alpha,
     )
-    return Surface(colour, material.texture, material.normal_map, physical_of(material))
+    return Surface(
+        colour, material.texture, material.normal_map, _asked(material) or evident(colour, material.texture is not None)
+    )
 
 
-def physical_of(material: Material) -> Physical | None:
-    """Reflectance of a mesh file's material, if it asks for one or is evidently metal or wet tissue."""
+def _asked(material: Material) -> Physical | None:
+    """Reflectance that a mesh file's material asks for."""
     maps = material.metallic_map, material.roughness_map
-    if any(value is not None for value in (material.roughness, material.metallic, material.coat, *maps)):
-        return Physical(
-            min(_given(material.metallic, 1.0 if maps[0] else 0.0), 1.0),
-            min(_given(material.roughness, 1.0 if maps[1] else 0.5), 1.0),
-            min(material.coat or 0.0, 1.0),
-            min(material.coat_roughness, 1.0),
-            *maps,
-        )
-    red, green, blue = material.diffuse
-    chroma = max(material.diffuse) - min(material.diffuse)
-    strong, sharp = min(material.specular), material.shininess
-    if material.texture is None and chroma <= METAL_CHROMA and max(material.diffuse) >= METAL_LIGHTNESS:
+    if all(value is None for value in (material.roughness, material.metallic, material.coat, *maps)):
+        return None
+    return Physical(
+        min(_given(material.metallic, 1.0 if maps[0] else 0.0), 1.0),
+        min(_given(material.roughness, 1.0 if maps[1] else 0.5), 1.0),
+        min(material.coat or 0.0, 1.0),
+        min(material.coat_roughness, 1.0),
+        *maps,
+    )
+
+
+def evident(colour: Colour, textured: bool) -> Physical | None:
+    """Reflectance of a colour that is evidently bare metal or wet tissue, for which neither ADF nor MTL has a word."""
+    red, green, blue = colour.diffuse
+    chroma = max(colour.diffuse) - min(colour.diffuse)
+    strong, sharp = min(colour.specular), colour.shininess
+    if not textured and chroma <= METAL_CHROMA and red >= METAL_LIGHTNESS:
         if strong >= METAL_SPECULAR and sharp >= METAL_SHININESS:
             return Physical(metallic=1.0, roughness=roughness_of(sharp))
     elif red - max(green, blue) >= WET_REDNESS and strong >= WET_SPECULAR and sharp >= WET_SHININESS:

@@ -19,7 +19,6 @@ from ligature.mesh import Material, Mesh, MeshError, MeshPart, load_mesh
 from ligature.mesh.surface import joined, open_edges
 from ligature.model.scene import (
     Capsule,
-    Colour,
     Cone,
     Cylinder,
     Hull,
@@ -75,7 +74,7 @@ class VisualLoader:
         """Pieces of one owner, fine and, where there is one, coarse."""
         if visual.mesh is None:
             for collider in visual.shapes:
-                shape, surface = collider.shape, Surface(visual.colour or Colour())
+                shape, surface = collider.shape, surface_of(visual.colour, None)
                 closed = not isinstance(shape, Plane | TriMesh)
                 T = collider.T_body_shape
                 exact = primitive_of(shape)

@@ -24,11 +24,11 @@ const vec4 LOBE_AXIS[LOBES] = vec4[](
     vec4(0.00, 0.00, 1.00, 2.0));   // wide light from above
 const vec3 LOBE_COLOUR[LOBES] = vec3[](
     vec3(3.2, 3.1, 3.0), vec3(1.8, 1.9, 2.0), vec3(0.35, 0.34, 0.33), vec3(0.35, 0.36, 0.38));
-const vec3 GLOOM = vec3(0.06, 0.045, 0.043);
+const vec3 HAZE = vec3(0.19, 0.16, 0.155), UPWARD = vec3(-0.03, 0.02, 0.03);  // and tissue all around, redder below
 
 // The surrounding seen in direction d through a lobe of `sharpness` (Wang et al. 2009, eq. 12: lobes convolved).
 vec3 surrounding(vec3 d, float sharpness) {
-    vec3 sum = GLOOM;
+    vec3 sum = HAZE + UPWARD * d.z;
     for (int i = 0; i < LOBES; ++i) {
         float own = LOBE_AXIS[i].w;
         float joint = own * sharpness / (own + sharpness);
@@ -38,7 +38,7 @@ vec3 surrounding(vec3 d, float sharpness) {
 }
 
 // What a matt surface with normal n gathers of it: the same through a cosine lobe, which is wide enough for a line in z.
-vec3 gathered(vec3 n) { return vec3(0.26, 0.25, 0.255) + vec3(0.20, 0.205, 0.21) * n.z; }
+vec3 gathered(vec3 n) { return vec3(0.34, 0.315, 0.31) + vec3(0.18, 0.20, 0.21) * n.z; }
 
 // Sharpness of the reflection lobe of a GGX distribution with alpha squared a2.
 float sharpnessOf(float a2) { return 0.5 / max(a2, 1e-3); }
