@@ -149,7 +149,7 @@ def main() -> None:
     for name, text in files().items():
         (HERE / name).write_text(text, encoding="utf-8")
     for name, pixels in pictures().items():
-        Image.fromarray(pixels).save(HERE / name, quality=88, optimize=True)
+        Image.fromarray(pixels).save(HERE / name, quality=88, subsampling=0, optimize=True)
 
 
 if __name__ == "__main__":
