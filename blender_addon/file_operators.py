@@ -6,6 +6,7 @@ import bpy
 
 from .launch_file import export_scene, import_launch
 from .ligature.adf import AdfError
+from .preview_operators import is_previewing
 from .read_file import import_file
 from .write_file import ExportError, after_export, export_file
 
@@ -83,6 +84,9 @@ class ADF_OT_export(bpy.types.Operator):
         if collection is None:
             self.report({"ERROR"}, "No collection is an ADF file; make the one to be written active")
             return {"CANCELLED"}
+        if is_previewing(context.scene):
+            self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
+            return {"CANCELLED"}
         path = Path(bpy.path.abspath(self.filepath or collection.adf.filepath))
         try:
             done = export_file(collection, path)
@@ -152,6 +156,9 @@ class ADF_OT_export_scene(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
+        if is_previewing(context.scene):
+            self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
+            return {"CANCELLED"}
         try:
             written = export_scene(context.scene, Path(bpy.path.abspath(self.filepath or context.scene.adf.filepath)))
         except ExportError as error:

@@ -4,7 +4,6 @@ from math import pi
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from . import making
 from .ligature.authoring.generate import (
@@ -19,7 +18,7 @@ from .ligature.authoring.generate import (
     suture_hole,
 )
 from .object_operators import active_body, target_file
-from .placing import place, rest_pose
+from .placing import hang, place, rest_pose
 from .read_file import add_parts, find_open
 
 THREADS = [
@@ -178,8 +177,7 @@ def hang_by_text(collection):
         if obj.adf.role in making.HANGING and obj.adf.parent_text and obj.parent is None:
             parent = find_open(obj.adf.parent_text, ("body",))
             if parent is not None:
-                obj.parent = parent
-                obj.matrix_parent_inverse = Matrix.Identity(4)
+                hang(obj, parent, rest_pose(obj))
 
 
 CLASSES = (ADF_OT_add_needle, ADF_OT_add_suture, ADF_OT_add_hole, ADF_OT_add_grasp, ADF_OT_add_endoscope)

@@ -58,8 +58,11 @@ def _opened(reference, scene: bpy.types.Scene, done: list[Import]) -> Import | N
     return made
 
 
-def export_scene(scene: bpy.types.Scene, path: Path) -> list[Path]:
-    """Write the launch file, its world and all its models; raises `ExportError`, which names the file."""
+def export_scene(scene: bpy.types.Scene, path: Path, remember: bool = True) -> list[Path]:
+    """Write the launch file, its world and all its models; raises `ExportError`, which names the file.
+
+    ``remember`` makes the written files the scene's own; a copy for a simulation is not remembered.
+    """
     stored = scene.adf
     folder = path.parent
     written: list[Path] = []
@@ -81,6 +84,8 @@ def export_scene(scene: bpy.types.Scene, path: Path) -> list[Path]:
         written += save_all({**files, path: checked_text(text, path)})
     except (SaveError, PatchError) as error:
         raise ExportError(str(error)) from error
+    if not remember:
+        return written
     for collection, file, content in texts:
         after_export(collection, file, content)
     stored.filepath, stored.source = str(path), text

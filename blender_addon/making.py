@@ -14,7 +14,7 @@ import numpy as np
 from .ligature.authoring.placement import rigid
 from .ligature.authoring.shapes import Shape, shape_mesh
 from .mesh_data import shape_data
-from .placing import attach, place, rest_pose
+from .placing import hang, place, rest_pose
 from .properties import KIND_OF_ROLE
 from .read_file import SHAPE_COLOUR, set_shape
 
@@ -85,7 +85,7 @@ def new_object(
     if parent is None:
         place(obj, T_world)
     else:
-        attach(obj, parent, np.linalg.inv(rest_pose(parent)) @ T_world)
+        hang(obj, parent, np.linalg.inv(rest_pose(parent)) @ T_world)
     return obj
 
 
@@ -112,7 +112,7 @@ def add_shape(
     collection.objects.link(obj)
     obj.adf.role = "SHAPE"
     set_shape(obj, shape, use, 1 + max((c.adf.shape.order for c in body.children if c.adf.role == "SHAPE"), default=-1))
-    attach(obj, body, np.eye(4) if T_body is None else T_body)
+    hang(obj, body, np.eye(4) if T_body is None else T_body)
     return obj
 
 
@@ -133,7 +133,7 @@ def add_hull(body: bpy.types.Object, points: np.ndarray, order: int | None = Non
     others = [c.adf.shape.order for c in body.children if c.adf.role == "HULL"]
     obj.adf.shape.order = max(others, default=-1) + 1 if order is None else order
     obj.display_type, obj.hide_render, obj.color = "WIRE", True, SHAPE_COLOUR["COLLISION"]
-    attach(obj, body, np.eye(4))
+    hang(obj, body, np.eye(4))
     return obj
 
 
@@ -167,7 +167,7 @@ def inertial_of(body: bpy.types.Object, T_body: np.ndarray) -> bpy.types.Object:
         (file_of(body) or bpy.context.scene.collection).objects.link(frame)
         frame.adf.role = "INERTIAL"
         frame.empty_display_type, frame.empty_display_size = "ARROWS", 0.01
-    attach(frame, body, T_body)
+    hang(frame, body, T_body)
     return frame
 
 

@@ -66,10 +66,10 @@ def place(obj: bpy.types.Object, T: np.ndarray) -> None:
     obj.rotation_quaternion = (w, x, y, z)
 
 
-def attach(obj: bpy.types.Object, parent: bpy.types.Object, T: np.ndarray) -> None:
-    """Parent an object without an inverse, at a pose in the parent's frame."""
+def hang(obj: bpy.types.Object, parent: bpy.types.Object, T: np.ndarray) -> None:
+    """Parent an object at a pose in the parent's rigid frame; the parent's scale is taken out."""
     obj.parent = parent
-    obj.matrix_parent_inverse = Matrix.Identity(4)
+    obj.matrix_parent_inverse = Matrix(np.linalg.inv(scaling(parent)).tolist())
     place(obj, T)
 
 

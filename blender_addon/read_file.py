@@ -11,7 +11,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any
 from .ligature.adf.reader import read_text
@@ -22,7 +21,7 @@ from .ligature.authoring.placement import matrix_of
 from .ligature.authoring.shapes import Shape, shape_mesh
 from .ligature.mesh import Mesh, MeshError, load_mesh
 from .mesh_data import MeshMaker, mesh_print, shape_data
-from .placing import SHAPED, attach, place, place_joint, place_light, place_view, state_of
+from .placing import SHAPED, hang, place, place_joint, place_light, place_view, rest_pose, state_of
 from .properties import ROLE_OF_KIND
 from .schema_properties import fetch, identifier, state_text, store
 
@@ -218,7 +217,7 @@ class _Importer:
         frame = self._new(f"{obj.name} inertial", None, "INERTIAL", shapes=True)
         frame.empty_display_type = "ARROWS"
         frame.empty_display_size = 0.01
-        attach(frame, obj, T)
+        hang(frame, obj, T)
 
     def _add_shapes(self, obj: bpy.types.Object, values: dict) -> None:
         inertial = matrix_of(values.get("inertial offset")) if obj.adf.role != "SOFT_BODY" else np.eye(4)
@@ -241,7 +240,7 @@ class _Importer:
             self.shapes[shape] = shape_data(*shape_mesh(shape), kind.title())
         child = self._new(f"{obj.name} {use.lower()}", self.shapes[shape], "SHAPE", shapes=True)
         set_shape(child, shape, use, order)
-        attach(child, obj, T)
+        hang(child, obj, T)
 
     def _add_collision_mesh(self, element: Element, obj: bpy.types.Object, values: dict) -> None:
         if "collision shape" in values or "compound collision shape" in values or not values.get("collision mesh"):
@@ -256,7 +255,7 @@ class _Importer:
             hull.display_type = "WIRE"
             hull.hide_render = True
             hull.color = SHAPE_COLOUR["COLLISION"]
-            attach(hull, obj, np.eye(4))
+            hang(hull, obj, np.eye(4))
 
     def _find(self, text: str, kinds: tuple[str, ...] = ("body",)) -> bpy.types.Object | None:
         """The object that a reference means: of this file first, then of any other that is open."""
@@ -282,7 +281,7 @@ class _Importer:
         self.objects[element.key] = obj
         T = place_joint(values, parent, child)
         if parent is not None:
-            attach(obj, parent, T)
+            hang(obj, parent, T)
         else:
             place(obj, T)
 
@@ -291,8 +290,7 @@ class _Importer:
         obj = self.objects[element.key]
         parent = self._find(obj.adf.parent_text, tuple(ROLE_OF_KIND))
         if parent is not None and parent is not obj:
-            obj.parent = parent
-            obj.matrix_parent_inverse = Matrix.Identity(4)
+            hang(obj, parent, rest_pose(obj))
 
 
 def find_open(text: str, kinds: tuple[str, ...]) -> bpy.types.Object | None:

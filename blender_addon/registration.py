@@ -4,28 +4,60 @@ from __future__ import annotations
 
 import bpy
 
-from . import file_operators, generator_operators, object_operators, properties, schema_properties
+from . import (
+    check_operators,
+    decompose_operators,
+    file_operators,
+    generator_operators,
+    object_operators,
+    overlay,
+    panels,
+    preview_operators,
+    properties,
+    schema_properties,
+    simulate_operators,
+)
 
-MODULES = (file_operators, object_operators, generator_operators)
+MODULES = (
+    file_operators,
+    object_operators,
+    generator_operators,
+    check_operators,
+    decompose_operators,
+    preview_operators,
+    simulate_operators,
+    panels,
+    overlay,
+)
+
+
+_undo: list = []
+"""What takes the registered things away again, latest last."""
 
 
 def register() -> None:
-    """Groups first, since classes refer to them; then each module's classes and hooks."""
-    for cls in (*schema_properties.classes(), *properties.CLASSES):
-        bpy.utils.register_class(cls)
-    properties.attach()
-    for module in MODULES:
-        for cls in module.CLASSES:
-            bpy.utils.register_class(cls)
-        module.attach()
+    """Groups first, since classes refer to them; a failure takes back what was added before it."""
+    try:
+        for cls in (*schema_properties.classes(), *properties.CLASSES):
+            _class(cls)
+        properties.attach()
+        _undo.append(properties.detach)
+        for module in MODULES:
+            for cls in module.CLASSES:
+                _class(cls)
+            module.attach()
+            _undo.append(module.detach)
+    except Exception:
+        unregister()
+        raise
 
 
 def unregister() -> None:
-    """The same backwards."""
-    for module in reversed(MODULES):
-        module.detach()
-        for cls in reversed(module.CLASSES):
-            bpy.utils.unregister_class(cls)
-    properties.detach()
-    for cls in (*reversed(properties.CLASSES), *reversed(schema_properties.classes())):
-        bpy.utils.unregister_class(cls)
+    """Everything backwards."""
+    while _undo:
+        _undo.pop()()
+
+
+def _class(cls: type) -> None:
+    bpy.utils.register_class(cls)
+    _undo.append(lambda: bpy.utils.unregister_class(cls))

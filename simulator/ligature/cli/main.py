@@ -11,6 +11,7 @@ from rich.console import Console
 from ligature.cli.bench import bench as run_bench
 from ligature.cli.check import check as run_check
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
+from ligature.cli.poses import poses as run_poses
 from ligature.cli.supervisor import Supervisor
 
 app = typer.Typer(
@@ -162,6 +163,19 @@ def decompose(
     from ligature.cli.decompose import decompose as run_decompose
 
     raise typer.Exit(run_decompose(mesh, out, threshold, max_hulls, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def poses(
+    file: Launch,
+    out: Annotated[Path, typer.Option(help="The npz file to write.")],
+    models: Models = None,
+    seconds: Annotated[float, typer.Option(help="Simulated seconds.", min=0.001)] = 2.0,
+    rate: Annotated[float, typer.Option(help="Poses per simulated second.", min=1, max=1000)] = 60.0,
+    root: Roots = None,
+) -> None:
+    """Simulate and write where all bodies are over time, for editors that play it back."""
+    raise typer.Exit(run_poses(file, indices(models), root or [], seconds, rate, out, Console(highlight=False)))
 
 
 def main() -> None:

@@ -1,0 +1,164 @@
+"""Check Scene: the findings of all files, with the object of each, and fixes where there are some."""
+
+from pathlib import Path
+
+import bpy
+
+from .ligature.adf import AdfError, Resolver
+from .ligature.adf.diagnostics import Severity
+from .ligature.adf.reader import read_text
+from .ligature.adf.schema import BY_PATH
+from .ligature.authoring.lint import Finding, lint
+from .placing import rest_pose
+from .properties import KIND_OF_ROLE
+from .schema_properties import identifier, store, unset
+from .write_file import ExportError, has_mesh, members, text_of
+
+ICONS = {"ERROR": "ERROR", "WARNING": "INFO", "INFO": "DOT"}
+
+
+def check_file(collection):
+    """Findings of one file as it would be written now, each with its object."""
+    objects = {obj.adf.key: obj for obj in members(collection)}
+    broken = [finding for obj in objects.values() for finding in _unplaced(obj)]
+    if broken:
+        return [(finding, objects.get(finding.key)) for finding in broken]
+    try:
+        text = text_of(collection)
+    except (ExportError, ValueError) as error:
+        return [(Finding("export", Severity.ERROR, "", str(error)), None)]
+    path = Path(bpy.path.abspath(collection.adf.filepath) or "new.yaml").resolve()
+    kind = {"MODEL": "model", "WORLD": "world", "INPUT_DEVICES": "input devices"}[collection.adf.kind]
+    try:
+        document = read_text(text, path, kind)
+    except AdfError as error:
+        return [(Finding("reader", Severity.ERROR, "", str(error)), None)]
+    unsaved = {f"{obj.name}.OBJ" for obj in objects.values() if has_mesh(obj)}
+    inflated = {obj.adf.key for obj in objects.values() if obj.adf.inertia_factor != 1.0}
+    found = lint(document, Resolver.for_file(path), frozenset(unsaved), frozenset(inflated))
+    return [(finding, objects.get(finding.key)) for finding in found]
+
+
+def _unplaced(obj):
+    try:
+        rest_pose(obj)
+    except ValueError as error:
+        yield Finding("transform", Severity.ERROR, obj.adf.key, str(error), "clear its transform")
+
+
+class ADF_OT_check(bpy.types.Operator):
+    """Check all files of the scene; findings are listed below"""
+
+    bl_idname = "adf.check"
+    bl_label = "Check Scene"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not any(c.adf.kind not in ("NONE", "OTHER") for c in bpy.data.collections):
+            cls.poll_message_set("No collection is an ADF file")
+            return False
+        return True
+
+    def execute(self, context):
+        listed = context.scene.adf.findings
+        listed.clear()
+        errors = 0
+        for collection in bpy.data.collections:
+            if collection.adf.kind in ("NONE", "OTHER"):
+                continue
+            for finding, obj in check_file(collection):
+                item = listed.add()
+                item.severity, item.rule = finding.severity.name, finding.rule
+                item.message = f"{obj.name if obj else finding.key or collection.name}: {finding.message}"
+                item.hint, item.object, item.fixable = finding.hint, obj, bool(finding.fix and obj)
+                errors += finding.severity >= Severity.ERROR
+        self.report({"WARNING"} if errors else {"INFO"}, f"{len(listed)} findings, {errors} errors")
+        return {"FINISHED"}
+
+
+class ADF_OT_fix(bpy.types.Operator):
+    """Mend the active finding, or all that can be mended"""
+
+    bl_idname = "adf.fix"
+    bl_label = "Fix"
+    bl_options = {"REGISTER", "UNDO"}
+
+    everything: bpy.props.BoolProperty(name="All", description="Mend everything that has a fix")
+
+    @classmethod
+    def poll(cls, context):
+        if not any(item.fixable for item in context.scene.adf.findings):
+            cls.poll_message_set("No finding can be mended by itself")
+            return False
+        return True
+
+    def execute(self, context):
+        scene = context.scene.adf
+        chosen = scene.findings[scene.active_finding] if len(scene.findings) > scene.active_finding else None
+        wanted = [(i.rule, i.object) for i in scene.findings if i.fixable and (self.everything or i == chosen)]
+        mended = 0
+        for collection in [c for c in bpy.data.collections if c.adf.kind not in ("NONE", "OTHER")]:
+            for finding, obj in check_file(collection):
+                if finding.fix and (finding.rule, obj) in wanted:
+                    mend(obj, finding.fix)
+                    mended += 1
+        bpy.ops.adf.check()
+        self.report({"INFO"}, f"{mended} findings mended")
+        return {"FINISHED"} if mended else {"CANCELLED"}
+
+
+def mend(obj, fix):
+    """Give an object the values of a fix."""
+    kind = KIND_OF_ROLE[obj.adf.role]
+    group = getattr(obj.adf, identifier(kind))
+    store(group, kind, {path: value for path, value in fix.items() if value is not None})
+    for path, value in fix.items():
+        if value is None and path in BY_PATH[kind] and hasattr(group, identifier(path)):
+            unset(group, identifier(path))
+
+
+class ADF_OT_select_finding(bpy.types.Operator):
+    """Make the finding's object active and select it"""
+
+    bl_idname = "adf.select_finding"
+    bl_label = "Select"
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: bpy.props.IntProperty()
+
+    def execute(self, context):
+        scene = context.scene.adf
+        obj = scene.findings[self.index].object if self.index < len(scene.findings) else None
+        if obj is None or obj.name not in context.view_layer.objects:
+            self.report({"WARNING"}, "The finding has no object in this view layer")
+            return {"CANCELLED"}
+        for other in context.selected_objects:
+            other.select_set(False)
+        obj.select_set(True)
+        context.view_layer.objects.active = obj
+        scene.active_finding = self.index
+        return {"FINISHED"}
+
+
+class ADF_OT_copy_findings(bpy.types.Operator):
+    """Copy the findings as text"""
+
+    bl_idname = "adf.copy_findings"
+    bl_label = "Copy Report"
+
+    def execute(self, context):
+        lines = [f"{i.severity.lower()}: {i.message}; {i.hint}" for i in context.scene.adf.findings]
+        context.window_manager.clipboard = "\n".join(lines)
+        return {"FINISHED"}
+
+
+CLASSES = (ADF_OT_check, ADF_OT_fix, ADF_OT_select_finding, ADF_OT_copy_findings)
+
+
+def attach() -> None:
+    """Nothing but the classes."""
+
+
+def detach() -> None:
+    """Nothing but the classes."""

@@ -1,0 +1,34 @@
+"""Checks of a model for authors: what would surprise them in the simulator, with what would be right."""
+
+from __future__ import annotations
+
+from ligature.adf import Document, Resolver, Severity
+from ligature.authoring.lint import bodies, files, joints
+from ligature.authoring.lint.subject import RULES, Finding, Subject
+
+
+def lint(
+    document: Document,
+    resolver: Resolver,
+    unsaved: frozenset[str] = frozenset(),
+    inflated: frozenset[str] = frozenset(),
+) -> list[Finding]:
+    """All findings of a model file, the reader's first; ``unsaved`` and ``inflated`` are as in `Subject`."""
+    found = [
+        Finding(f"reader:{d.code}", d.severity, _key_of(document, d.message), d.message, d.hint)
+        for d in document.diagnostics
+        if d.severity >= Severity.WARNING
+    ]
+    subject = Subject(document, resolver, unsaved, inflated)
+    for check in RULES.values():
+        found += check(subject)
+    return found
+
+
+def _key_of(document: Document, message: str) -> str:
+    """The object that a finding of the reader names."""
+    keys = {element.key for listed in document.lists.values() for element in listed}
+    return next((key for key in sorted(keys, key=len, reverse=True) if f"'{key}'" in message), "")
+
+
+__all__ = ["RULES", "Finding", "Subject", "bodies", "files", "joints", "lint"]

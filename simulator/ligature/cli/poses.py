@@ -1,0 +1,45 @@
+"""``ligature poses``: where the bodies of a scene are over time, for editors that play them back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+import ligature
+from ligature.adf import AdfError
+
+
+def poses(
+    file: Path,
+    models: Sequence[int] | None,
+    roots: Sequence[Path],
+    seconds: float,
+    rate: float,
+    out: Path,
+    console: Console,
+) -> int:
+    """Simulate and write an npz file; returns the exit status.
+
+    It holds ``identifiers`` (n,), ``times`` (t,) in seconds, and ``poses`` (t, n, 7): x y z qx qy qz
+    qw in the world.
+    """
+    try:
+        scene = ligature.load(file, models=models, roots=roots)
+    except AdfError as error:
+        for diagnostic in error.diagnostics:
+            console.print(str(diagnostic), style="red", markup=False)
+        return 1
+    simulation = ligature.Simulation(scene, dt=1e-3)
+    names = list(simulation.bodies)
+    steps = max(round(1000.0 / rate), 1)
+    frames = [np.array([simulation.bodies[name].pose for name in names])]
+    while len(frames) * steps <= round(1000.0 * seconds):
+        simulation.step(steps)
+        frames.append(np.array([simulation.bodies[name].pose for name in names]))
+    times = np.arange(len(frames)) * steps * 1e-3
+    np.savez(out, identifiers=np.array(names), times=times, poses=np.array(frames))
+    console.print(f"{out}: {len(names)} bodies, {len(frames)} frames", markup=False)
+    return 0

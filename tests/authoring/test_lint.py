@@ -1,0 +1,193 @@
+"""Every seeded fault is found by its own rule, and a sound model draws no finding."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ligature.adf import Resolver, Severity, read_any
+from ligature.adf.writer import write_document
+from ligature.authoring.lint import RULES, Finding, lint
+from ligature.authoring.objfile import Paint, Surface, obj_texts
+from ligature.authoring.shapes import Shape, shape_mesh
+
+ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+UP = {"x": 0.0, "y": 0.0, "z": 1.0}
+SOUND: dict[str, Any] = {
+    "bodies": ["BODY a", "BODY b"],
+    "joints": ["JOINT j"],
+    "namespace": "/x/",
+    "high resolution path": "./high/",
+    "low resolution path": "./low/",
+    "BODY a": {
+        "name": "a", "mass": 1.0, "mesh": "a.obj", "collision mesh": "a_hull.obj", "collision mesh type": "CONVEX_HULL",
+        "location": {"position": ZERO, "orientation": {"r": 0.0, "p": 0.0, "y": 0.0}},
+    },
+    "BODY b": {
+        "name": "b", "mass": 2.0, "inertia": {"ix": 0.002, "iy": 0.002, "iz": 0.002}, "collision shape": "BOX",
+        "collision geometry": {"x": 0.1, "y": 0.1, "z": 0.1}, "collision margin": 0.0001,
+        "location": {"position": {"x": 0.0, "y": 0.0, "z": 0.5}, "orientation": {"r": 0.0, "p": 0.0, "y": 0.0}},
+    },
+    "JOINT j": {
+        "name": "j", "parent": "BODY a", "child": "BODY b", "type": "revolute", "parent pivot": {**UP, "z": 0.5},
+        "child pivot": ZERO, "parent axis": UP, "child axis": UP, "joint limits": {"low": -1.0, "high": 1.0},
+    },
+}  # fmt: skip
+SIX = {"linear": {"low": ZERO, "high": ZERO}, "angular": {"low": ZERO, "high": ZERO}}
+
+
+def write_mesh(folder: Path, name: str, shape: Shape, material: str = "") -> None:
+    folder.mkdir(exist_ok=True)
+    vertices, faces = shape_mesh(shape)
+    triangles = np.array([(f[0], f[i], f[i + 1]) for f in faces for i in range(1, len(f) - 1)], dtype=np.int32)
+    obj, mtl = obj_texts([Surface(Paint("m"), vertices, triangles)], name.replace(".obj", ".mtl"), name)
+    (folder / name).write_text(obj)
+    (folder / name.replace(".obj", ".mtl")).write_text(mtl + material)
+
+
+@pytest.fixture
+def model(tmp_path: Path):
+    write_mesh(tmp_path / "high", "a.obj", Shape("SPHERE", radius=0.05))
+    write_mesh(tmp_path / "low", "a_hull.obj", Shape("BOX", size=(0.1, 0.1, 0.1)))
+
+    def found(changes: dict[str, Any] | None = None, **settings: Any) -> list[Finding]:
+        values = copy.deepcopy(SOUND)
+        for path, value in (changes or {}).items():
+            *inner, name = path.split("/")
+            target = values
+            for part in inner:
+                target = target.setdefault(part, {})
+            if value is None:
+                target.pop(name, None)
+            else:
+                target[name] = value
+        (tmp_path / "m.yaml").write_text(write_document("model", values) + settings.pop("more", ""))
+        resolver = Resolver([tmp_path])
+        return lint(read_any(tmp_path / "m.yaml", resolver), resolver, **settings)
+
+    found.folder = tmp_path  # type: ignore[attr-defined]
+    return found
+
+
+def test_a_sound_model_draws_no_finding(model) -> None:
+    assert model() == []
+
+
+CASES: list[tuple[str, dict[str, Any]]] = [
+    ("mass-missing", {"BODY a/mass": None}),
+    ("inertia-impossible", {"BODY b/inertia": {"ix": 1.0, "iy": 1.0, "iz": 5.0}}),
+    ("inertia-impossible", {"BODY b/inertia": {"ix": 0.0, "iy": 1.0, "iz": 1.0}}),
+    ("inertia-unlike-geometry", {"BODY b/inertia": {"ix": 1.0, "iy": 1.0, "iz": 1.0}}),
+    ("capsule-too-short", {"BODY b/collision shape": "CAPSULE", "BODY b/collision geometry": {"radius": 0.1, "height": 0.1}}),
+    ("plane-in-compound", {"BODY b/collision shape": None, "BODY b/compound collision shape": [
+        {"shape": "PLANE", "geometry": {"normal": UP, "offset": 0.0}}, {"shape": "SPHERE", "geometry": {"radius": 0.1}}]}),
+    ("group-out-of-range", {"BODY b/collision groups": [1, 1000]}),
+    ("groups-without-effect", {"ignore inter-collision": True, "BODY a/collision groups": [1], "BODY b/collision groups": [1]}),
+    ("concave-moving", {"BODY a/collision mesh type": "CONCAVE_MESH"}),
+    ("thin-for-margin", {"BODY b/collision margin": 0.05}),
+    ("name-clash", {"BODY b/name": " a"}),
+    ("overlap-at-rest", {"BODY b/location/position": {"x": 0.0, "y": 0.0, "z": 0.9}, "bodies": ["BODY a", "BODY b", "BODY c"],
+                         "BODY c": {"name": "c", "mass": 1.0, "collision shape": "SPHERE", "collision geometry": {"radius": 0.1},
+                                    "location": {"position": {"x": 0.0, "y": 0.0, "z": 0.9}}}}),
+    ("reference-unresolved", {"JOINT j/parent": "BODY nowhere"}),
+    ("reference-elsewhere", {"JOINT j/parent": "psm1/BODY nowhere"}),
+    ("static-child", {"BODY b/mass": 0.0}),
+    ("mass-ratio", {"BODY b/mass": 200.0}),
+    ("limits-reversed", {"JOINT j/joint limits": {"low": 1.0, "high": -1.0}}),
+    ("limits-reversed", {"JOINT j/type": "six dof", "JOINT j/joint limits": {**SIX, "linear": {"low": UP, "high": ZERO}}}),
+    ("spring-without-stiffness", {"JOINT j/type": "six dof spring", "JOINT j/joint limits": SIX}),
+    ("equilibrium-outside", {"JOINT j/type": "linear spring", "JOINT j/stiffness": 1.0, "JOINT j/equilibrium point": 5.0}),
+    ("travel-too-long", {"JOINT j/type": "prismatic", "JOINT j/joint limits": {"low": -60.0, "high": 60.0}}),
+    ("axes-nearly-antiparallel", {"JOINT j/child axis": {"x": 0.005, "y": 0.0, "z": -1.0}}),
+    ("axis-zero", {"JOINT j/child axis": ZERO}),
+    ("joint-residual", {"BODY b/location/position": {"x": 0.0, "y": 0.1, "z": 0.5}}),
+    ("mesh-missing", {"BODY a/mesh": "nowhere.obj"}),
+    ("path-outside", {"high resolution path": "../../../../"}),
+    ("unit-smell", {"BODY b/location/position": {"x": 0.0, "y": 0.0, "z": 500.0}}),
+    ("clipping-ratio", {"cameras": ["cam"], "cam": {"name": "cam", "look at": UP, "up": {"x": 1.0, "y": 0.0, "z": 0.0},
+                                                    "clipping plane": {"near": 1e-5, "far": 10.0}}}),
+    ("legacy-key", {"JOINT j/controller gains": {"P": 1}}),
+    ("float-noise", {"BODY b/location/orientation": {"r": 1e-8, "p": 0.0, "y": 0.0}}),
+    ("reader:unknown", {"BODY b/masss": 1.0}),
+    ("reader:value", {"BODY b/scale": "big"}),
+    ("reader:range", {"BODY b/scale": float("nan")}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "changes"), CASES, ids=[f"{i}-{name}" for i, (name, _) in enumerate(CASES)])
+def test_a_seeded_fault_is_found_by_its_rule(model, name: str, changes: dict[str, Any]) -> None:
+    found = [finding for finding in model(changes) if finding.rule == name]
+    assert found, [str(f) for f in model(changes)]
+    assert found[0].message and (found[0].hint or name.startswith("reader"))
+
+
+def test_faults_of_meshes_are_found(model) -> None:
+    def rules() -> set[str]:
+        return {finding.rule for finding in model()}
+
+    high, low = model.folder / "high", model.folder / "low"
+    write_mesh(low, "a_hull.obj", Shape("PLANE"))
+    assert rules() == {"hull-flat"}
+    write_mesh(low, "a_hull.obj", Shape("SPHERE", radius=0.05))
+    assert rules() >= {"hull-too-fine"}
+    (low / "a_hull.obj").write_bytes((high / "a.obj").read_bytes())
+    assert "low-equals-high" in rules()
+    (low / "a_hull.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    assert "mesh-empty" in rules()
+    write_mesh(low, "a_hull.obj", Shape("BOX"))
+    for line, name in (("map_Bump -bm 1.0 n.png", "material-dialect"), ("map_Kd /home/me/t.png", "material-dialect")):
+        write_mesh(high, "a.obj", Shape("SPHERE", radius=0.05), line + "\n")
+        assert name in rules()
+    (high / "n.png").write_bytes(b"x")
+    write_mesh(high, "a.obj", Shape("SPHERE", radius=0.05), "map_Bump n.png\n")
+    assert rules() == {"normal-map-without-uv"}
+    write_mesh(high, "a.obj", Shape("SPHERE", radius=0.05))
+    write_mesh(high, "left_over.obj", Shape("BOX"))
+    assert rules() == {"file-unreferenced"}
+
+
+def test_two_definitions_of_one_body_are_found(model) -> None:
+    assert "duplicate-identifier" in {f.rule for f in model(more="BODY a:\n  name: again\n  mass: 1\n")}
+
+
+def test_inertia_inflated_on_purpose_is_no_fault(model) -> None:
+    changes = {"BODY b/inertia": {"ix": 1.0, "iy": 1.0, "iz": 1.0}}
+    assert model(changes, inflated=frozenset({"BODY b"})) == []
+
+
+def test_a_mesh_that_is_about_to_be_written_is_no_fault(model) -> None:
+    assert model({"BODY a/mesh": "new.obj"}, unsaved=frozenset({"new.obj"})) == [
+        f for f in model({"BODY a/mesh": "new.obj"}) if f.rule == "file-unreferenced"
+    ]
+
+
+def test_fixes_mend_what_they_claim_to(model) -> None:
+    for name, changes in CASES:
+        for finding in model(changes):
+            if finding.rule == name and finding.fix:
+                mended = {**changes}
+                for path, value in finding.fix.items():
+                    mended["/".join((finding.key, *path.split(".")))] = (
+                        list(value) if isinstance(value, tuple) else value
+                    )
+                assert name not in {f.rule for f in model(mended) if f.key == finding.key}, name
+
+
+def test_every_rule_has_a_seeded_fault() -> None:
+    seeded = {name for name, _ in CASES} | {
+        "hull-flat", "hull-too-fine", "low-equals-high", "mesh-empty", "material-dialect", "normal-map-without-uv",
+        "file-unreferenced", "duplicate-identifier",
+    }  # fmt: skip
+    assert set(RULES) <= seeded
+
+
+def test_real_models_are_checked_without_a_crash(corpus: Path) -> None:
+    resolver, severe = Resolver([corpus]), 0
+    for file in sorted((corpus / "suturing_scene").rglob("*.yaml")):
+        document = read_any(file, resolver)
+        if document.kind == "model":
+            severe += sum(f.severity >= Severity.ERROR for f in lint(document, resolver))
+    assert severe < 60
