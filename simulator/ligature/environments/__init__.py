@@ -1,0 +1,14 @@
+"""Gymnasium environments; importing this room registers ``ligature/Reach-v0`` and ``ligature/Pick-v0``."""
+
+import gymnasium
+
+from ligature.environments.suturing import SuturingEnv
+
+__all__ = ["SuturingEnv"]
+
+for _task in ("reach", "pick"):
+    gymnasium.register(
+        id=f"ligature/{_task.capitalize()}-v0",
+        entry_point="ligature.environments.suturing:SuturingEnv",
+        kwargs={"task": _task},
+    )
