@@ -53,7 +53,6 @@ def test_flags_without_effect_are_accepted_and_told() -> None:
         "-n (number of input devices) has no effect here",
         "--plugins (simulator plug-ins) has no effect here",
         "-t 0: the step is fixed all the same; simulated time falls behind on a machine that is too slow",
-        "-g 1: no window is shown",
     )
 
 

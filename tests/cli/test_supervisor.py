@@ -61,7 +61,7 @@ def test_a_run_that_cannot_have_a_master_says_why_and_leaves_nothing(
 ) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "foo")
     text = io.StringIO()
-    options = RunOptions(str(tmp_path / "[red]launch.yaml"), notes=("-g 1: no window is shown",))
+    options = RunOptions(str(tmp_path / "[red]launch.yaml"), notes=("-t 0: the step is fixed",))
     supervisor = Supervisor(options, Console(file=text, soft_wrap=True))
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -72,7 +72,7 @@ def test_a_run_that_cannot_have_a_master_says_why_and_leaves_nothing(
     lines = text.getvalue().splitlines()
     assert lines == [
         f"loading {tmp_path}/[red]launch.yaml",
-        "-g 1: no window is shown",
+        "-t 0: the step is fixed",
         "ROS_MASTER_URI 'foo' is no address such as http://127.0.0.1:11311",
         "ended",
     ]

@@ -24,7 +24,7 @@ from ligature.bus.ring import RING_BYTES, Ring
 from ligature.model.state import StateDtype, StateRecord
 
 FOLDER = Path("/dev/shm")
-PRODUCERS = ("ros", "cockpit", "teleop", "spare")
+PRODUCERS = ("ros", "cockpit", "teleop", "window", "spare")
 MAGIC = 0x4C494741
 _NAME = re.compile(r"ligature-(\d+)-[0-9a-f]+\Z")
 

@@ -32,7 +32,9 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("-p", "--phx_frequency", dest="p", type=float, default=1000.0, help="updates per second")
     flags.add_argument("-t", "--fixed_phx_timestep", dest="t", type=_switch, help="the step is always fixed here")
     flags.add_argument("-s", "--sim_speed_factor", dest="s", type=float, default=1.0, help="simulated over wall time")
-    flags.add_argument("-g", "--show_gui", dest="g", type=_switch, help="graphics; no window is shown here")
+    flags.add_argument(
+        "-g", "--show_gui", dest="g", type=_switch, help="1 shows a window; without this flag there is none"
+    )
     flags.add_argument("--ns", default="", help="prefix of every namespace")
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
     flags.add_argument("--override_min_comm_freq", type=int, help="publishing rate without commands")
@@ -76,7 +78,8 @@ def options_of(arguments: list[str]) -> RunOptions:
     return RunOptions(
         given.launch_file, models, tuple(f for f in (given.a or "").split(",") if f), tuple(given.root), given.ns,
         min(given.p, FASTEST), given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
-        names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras, notes=_notes(given),
+        names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
+        window=bool(given.g), notes=_notes(given),
     )  # fmt: skip
 
 
@@ -103,8 +106,6 @@ def _notes(given: argparse.Namespace) -> tuple[str, ...]:
     ]
     if given.t is False:
         notes.append("-t 0: the step is fixed all the same; simulated time falls behind on a machine that is too slow")
-    if given.g:
-        notes.append("-g 1: no window is shown")
     if given.p > FASTEST:
         notes.append(f"-p {given.p:g}: a tick has 1 ms; {FASTEST:g} updates per second are made")
         return tuple(notes)

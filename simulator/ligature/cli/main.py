@@ -60,6 +60,7 @@ def run(
             "--cameras/--no-cameras", help="Publish pictures of all cameras, or of none; else as the scene says."
         ),
     ] = None,
+    window: Annotated[bool, typer.Option("--window", help="Show the scene in a window.")] = False,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -72,7 +73,7 @@ def run(
         raise typer.BadParameter(str(error)) from error
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
-        min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras,
+        min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
         notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())

@@ -18,8 +18,8 @@ class RunOptions:
     ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy,
     ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
     tells whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` says
-    whether pictures are published (None: of the cameras for which the scene says so), ``notes`` are lines to
-    tell the user at the start.
+    whether pictures are published (None: of the cameras for which the scene says so), ``window`` whether
+    one is shown, ``notes`` are lines to tell the user at the start.
     """
 
     scene: str
@@ -36,6 +36,7 @@ class RunOptions:
     arms: tuple[str, ...] = ()
     src_crtk: bool = False
     cameras: bool | None = None
+    window: bool = False
     notes: tuple[str, ...] = ()
 
     def load(self) -> Scene:

@@ -34,8 +34,11 @@ _ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
 }
+_DRAWING = ("window", "render")
+"""Processes that a run can do without; status 0 means that they have nothing to draw, or nowhere."""
+
 _BEHIND = ("nice", "-n", "10")
-"""For the process that draws: software would leave no processor time to physics otherwise."""
+"""For the processes that draw: software would leave no processor time to physics otherwise."""
 
 _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
@@ -125,11 +128,11 @@ class Supervisor:
                 "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
             )
 
-    def _start_cameras(self) -> None:
-        """Start the process that draws; without a ROS master there is nobody to draw for."""
+    def _start_drawing(self, name: str, module: str) -> None:
+        """Start a process that draws, behind all others; without a ROS master the run is over."""
         if "ros" in self._children:
-            command = [sys.executable, "-m", "ligature.cli.render_process", self._options.to_text()]
-            self._children["render"] = Child("render", [*_BEHIND, *command], self._events, self._env)
+            command = [*_BEHIND, sys.executable, "-m", module, self._options.to_text()]
+            self._children[name] = Child(name, command, self._events, self._env)
 
     def _master_ready(self) -> bool:
         """Whether a ROS master answers, after one was started where there was none."""
@@ -155,9 +158,11 @@ class Supervisor:
     def _handle(self, process: str, event: str, text: str) -> None:
         if event == "ready":
             self._say(f"{process} ready: {text}")
+            if process == "physics" and self._options.window:
+                self._start_drawing("window", "ligature.cli.window_process")
             self._progress.update("connecting to ROS")
         elif event == "cameras":
-            self._start_cameras()
+            self._start_drawing("render", "ligature.cli.render_process")
         elif event == "first-state":
             self._progress.stop()
             if not self._published:
@@ -181,12 +186,14 @@ class Supervisor:
         if process == "physics":
             self._fail(f"the physics process ended with status {status}; the run is over")
             return
-        if process == "render" and status == 0:
+        if process in _DRAWING and status == 0:
             return
         lived = time.monotonic() - child.started
         child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_DEATH else 0
-        if child.quick_deaths > MAX_QUICK_DEATHS and process == "render":
-            self._say(f"[yellow]the render process dies again and again (status {status}): no more pictures[/yellow]")
+        if child.quick_deaths > MAX_QUICK_DEATHS and process in _DRAWING:
+            self._say(
+                f"[yellow]the {process} process dies again and again (status {status}): no more pictures[/yellow]"
+            )
             return
         if child.quick_deaths > MAX_QUICK_DEATHS:
             self._fail(f"the {process} process dies again and again (status {status})")
@@ -204,7 +211,7 @@ class Supervisor:
         self._stop = True
         self._progress.stop()
         deadline = time.monotonic() + END_PATIENCE
-        order = [self._children[n] for n in ("render", "ros", "physics", "master") if n in self._children]
+        order = [self._children[n] for n in (*_DRAWING, "ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
             if child.process.poll() is None:
                 child.process.terminate()

@@ -52,11 +52,13 @@ class Renderer:
         What to draw.
     samples
         Samples a pixel of the colour picture; 0 draws colour without anti-aliasing, in one pass with the rest.
+    context
+        The OpenGL context of a window; one without a display when not given.
     """
 
-    def __init__(self, scene: Scene, samples: int = SAMPLES) -> None:
+    def __init__(self, scene: Scene, samples: int = SAMPLES, context: moderngl.Context | None = None) -> None:
         self._scene = scene
-        self._context = create_context()
+        self._context = context or create_context()
         self._samples = min(samples, self._context.max_samples)
         self._programs = Programs(self._context)
         self._textures = Textures(self._context)

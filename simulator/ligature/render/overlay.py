@@ -1,0 +1,104 @@
+"""Lines and words over a picture: frames, joint axes, contacts, tension, figures.
+
+Points are in world axes and metres; what lies behind the eye is left out, nothing hides behind surfaces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from ligature.model.frames import pose7_matrix
+from ligature.model.scene import Scene
+from ligature.render.camera import CameraView
+
+Array = NDArray[np.float64]
+Colour = tuple[int, int, int]
+Segment = tuple[Array, Array, Colour]
+
+RED, GREEN, BLUE, YELLOW, MAGENTA = (230, 60, 60), (70, 200, 70), (80, 120, 255), (255, 210, 60), (240, 90, 240)
+AXES = (RED, GREEN, BLUE)
+FONT_SIZE = 14
+LOOSE, TIGHT = np.array([60, 120, 255]), np.array([255, 60, 40])
+
+
+def project(points: Array, view: CameraView) -> tuple[Array, NDArray[np.bool_]]:
+    """Pixels (n, 2) of world ``points`` (n, 3), and which of them lie before the eye."""
+    homogeneous = np.hstack([points, np.ones((len(points), 1))])
+    clip = homogeneous @ (view.projection @ view.view).T
+    before = clip[:, 3] > 1e-9
+    w = np.where(before, clip[:, 3], 1.0)[:, None]
+    ndc = clip[:, :2] / w
+    return (ndc * (0.5, -0.5) + 0.5) * (view.width, view.height), before
+
+
+def draw_segments(rgb: NDArray[np.uint8], segments: Sequence[Segment], view: CameraView) -> NDArray[np.uint8]:
+    """``rgb`` with lines between pairs of world points."""
+    if not segments:
+        return rgb
+    ends = np.array([[a, b] for a, b, _ in segments]).reshape(-1, 3)
+    pixels, before = project(ends, view)
+    pixels = np.clip(pixels, -1e4, 1e4)
+    image = Image.fromarray(rgb)
+    pen = ImageDraw.Draw(image)
+    for i, (_, _, colour) in enumerate(segments):
+        if before[2 * i] and before[2 * i + 1]:
+            pen.line([*pixels[2 * i], *pixels[2 * i + 1]], fill=colour, width=2)
+    return np.asarray(image)
+
+
+def draw_words(rgb: NDArray[np.uint8], lines: Iterable[str]) -> NDArray[np.uint8]:
+    """``rgb`` with ``lines`` of text in its upper left corner."""
+    image = Image.fromarray(rgb)
+    pen = ImageDraw.Draw(image)
+    font = ImageFont.load_default(FONT_SIZE)
+    for i, line in enumerate(lines):
+        at = (8, 6 + i * (FONT_SIZE + 4))
+        pen.text(at, line, fill=(255, 255, 255), font=font, stroke_width=2, stroke_fill=(0, 0, 0))
+    return np.asarray(image)
+
+
+def frames(scene: Scene, state: NDArray[np.void], size: float) -> list[Segment]:
+    """The three axes of every body frame, ``size`` metres long."""
+    found = []
+    for body in scene.bodies:
+        if body.index not in scene.rod_bodies:
+            T = pose7_matrix(state["body_pose"][0, body.index])
+            found += [(T[:3, 3], T[:3, 3] + size * T[:3, i], AXES[i]) for i in range(3)]
+    return found
+
+
+def joint_axes(scene: Scene, state: NDArray[np.void], size: float) -> list[Segment]:
+    """The axis of every joint outside rods, ``size`` metres to either side of its pivot."""
+    found = []
+    in_rods = {joint for rod in scene.rods for joint in rod.joints}
+    for joint in scene.joints:
+        if joint.index not in in_rods:
+            parent = scene.bodies[joint.parent]
+            T = pose7_matrix(state["body_pose"][0, joint.parent]) @ parent.T_body_inertial
+            pivot, axis = (T @ joint.T_parent_a)[:3, 3], T[:3, :3] @ joint.axis
+            found.append((pivot - size * axis, pivot + size * axis, YELLOW))
+    return found
+
+
+def contacts(state: NDArray[np.void], size: float) -> list[Segment]:
+    """The normal of every contact that a contact sensor feels."""
+    count = min(int(state["contact_count"][0]), state["contact_point"].shape[1])
+    points, normals = state["contact_point"][0, :count], state["contact_normal"][0, :count]
+    return [(p, p + size * n, MAGENTA) for p, n in zip(points, normals, strict=True)]
+
+
+def tension(scene: Scene, state: NDArray[np.void]) -> tuple[list[Segment], float]:
+    """Every thread from element to element, blue where it is loose and red where it is tightest; that tension in N."""
+    most = float(np.abs(state["rod_tension"][0]).max(initial=0.0))
+    found = []
+    for rod in scene.rods:
+        places = state["body_pose"][0, list(rod.bodies), :3]
+        share = np.abs(state["rod_tension"][0, list(rod.bodies)]) / max(most, 1e-9)
+        for i in range(len(places) - 1):
+            r, g, b = (LOOSE + (TIGHT - LOOSE) * share[i]).astype(int).tolist()
+            found.append((places[i], places[i + 1], (r, g, b)))
+    return found, most

@@ -1,0 +1,339 @@
+"""What the window shows and does, without a window: views, toggles, picking and dragging, pause and resets.
+
+World axes, metres; mouse positions in pixels from the top left corner of the picture. Commands go out through a
+callable, as every front end's do.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.bus.codec import Message
+from ligature.bus.pacing import Throttle
+from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release, Reset
+from ligature.model.frames import matrix_pose7, pose7_matrix
+from ligature.model.optics import stereo_partners
+from ligature.model.scene import Colour, Scene, Visual
+from ligature.render import overlay
+from ligature.render.camera import CameraView, perspective, view_matrix, view_of
+from ligature.render.renderer import Renderer
+from ligature.render.viewpoint import Viewpoint
+
+Array = NDArray[np.float64]
+
+FREE_ANGLE = 0.8
+"""Vertical field of view of the free viewpoint in radians."""
+
+EYE_SHARE = 0.03
+"""Distance of the eyes of the free viewpoint, as a part of its distance."""
+
+MARK_SHARE = 0.06
+"""Length of drawn axes, as a part of the distance to what is looked at."""
+
+ORBIT_RATE, PAN_RATE = 0.008, 0.0015
+"""Radians, and parts of the distance, per pixel of the mouse."""
+
+PULL_RATE = 2 * np.pi * 1.5
+"""Natural frequency in rad/s of the spring between a dragged body and the mouse."""
+
+MOST_PULL = 50.0
+"""Largest force on a dragged body, in units of its mass: m/s²."""
+
+TOGGLES = {
+    "C": ("collision", "collision shapes"),
+    "F": ("frames", "frames"),
+    "J": ("joints", "joint axes"),
+    "N": ("contacts", "contact forces"),
+    "T": ("tension", "thread tension"),
+    "S": ("stereo", "stereo side by side"),
+    "H": ("help", "this help"),
+}
+"""Key, name and meaning of what can be switched on and off."""
+
+HELP = (
+    "drag: turn   right drag: move   wheel: nearer   Ctrl+drag: pull a body",
+    "Space: pause   .: one update   Ctrl+R: reset bodies   Ctrl+V: reset cameras   V: next camera",
+    "   ".join(f"{key}: {meaning}" for key, (_, meaning) in TOGGLES.items()),
+)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What is told on the screen: frames a second, and simulated over wall time."""
+
+    frame_rate: float = 0.0
+    real_time_factor: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Hold:
+    """A body that is pulled: the point held in its frame (3,), and the point of the mouse in world axes (3,)."""
+
+    body: int
+    point: Array
+    target: Array
+    depth: float
+
+
+class Viewer:
+    """Draws a scene for people; ``send`` takes the commands that they give."""
+
+    def __init__(self, scene: Scene, send: Callable[[Message], None], context: moderngl.Context | None = None) -> None:
+        self.scene = scene
+        self._send = send
+        self._context = context
+        self._renderer = Renderer(scene, context=context)
+        self._shapes: Renderer | None = None
+        self._partners = stereo_partners(scene)
+        self.shown: set[str] = set()
+        self.paused = False
+        self._clock = False
+        self.camera: int | None = 0 if scene.cameras else None
+        self._viewpoint, self._angle = Viewpoint(_middle(scene), 1.0), FREE_ANGLE
+        self._hold: _Hold | None = None
+        self._view: CameraView | None = None
+        self._state: NDArray[np.void] | None = None
+
+    # --- pictures ---------------------------------------------------------------------------
+
+    def picture(self, state: NDArray[np.void], size: tuple[int, int], figures: Figures) -> NDArray[np.uint8]:
+        """What the window shows of ``state`` (1,): (height, width, 3) for ``size`` (width, height)."""
+        self._state = state
+        if "stereo" in self.shown:
+            half = (size[0] // 2, size[1])
+            eyes = [self._draw(state, view) for view in self._eyes(state, half)]
+            rgb = np.concatenate([*eyes, np.zeros((size[1], size[0] % 2, 3), np.uint8)], axis=1)
+        else:
+            self._view = self._mono(state, size)
+            rgb = self._draw(state, self._view)
+        return overlay.draw_words(rgb, self._words(state, figures))
+
+    def _draw(self, state: NDArray[np.void], view: CameraView) -> NDArray[np.uint8]:
+        renderer = self._collision_renderer() if "collision" in self.shown else self._renderer
+        rgb = renderer.render(state, view, ("rgb",)).rgb
+        return overlay.draw_segments(rgb, self._segments(state), view)
+
+    def _segments(self, state: NDArray[np.void]) -> list[overlay.Segment]:
+        size = MARK_SHARE * self._reach(state)
+        found: list[overlay.Segment] = []
+        if "frames" in self.shown:
+            found += overlay.frames(self.scene, state, size)
+        if "joints" in self.shown:
+            found += overlay.joint_axes(self.scene, state, size)
+        if "contacts" in self.shown:
+            found += overlay.contacts(state, size)
+        if "tension" in self.shown:
+            found += overlay.tension(self.scene, state)[0]
+        if self._hold is not None:
+            T = pose7_matrix(state["body_pose"][0, self._hold.body])
+            found.append((T[:3, :3] @ self._hold.point + T[:3, 3], self._hold.target, overlay.GREEN))
+        return found
+
+    def _words(self, state: NDArray[np.void], figures: Figures) -> list[str]:
+        view = "free view" if self.camera is None else self.scene.cameras[self.camera].identity.name
+        pace = "paused" if self.paused else f"real-time factor {figures.real_time_factor:.2f}"
+        words = [f"{view}   {figures.frame_rate:.0f} frames/s   {pace}   {float(state['sim_time'][0]):.2f} s"]
+        if "tension" in self.shown:
+            words.append(f"largest thread tension {overlay.tension(self.scene, state)[1]:.3g} N")
+        return words + (list(HELP) if "help" in self.shown else ["H: help"])
+
+    def _collision_renderer(self) -> Renderer:
+        """Draws collision shapes in place of visual meshes; made when it is wanted first."""
+        if self._shapes is None:
+            bodies = tuple(
+                replace(body, visual=Visual(shapes=body.colliders, colour=_tint(body.index)))
+                for body in self.scene.bodies
+            )
+            self._shapes = Renderer(replace(self.scene, bodies=bodies), context=self._context)
+        return self._shapes
+
+    # --- views ------------------------------------------------------------------------------
+
+    def _mono(self, state: NDArray[np.void], size: tuple[int, int]) -> CameraView:
+        if self.camera is None:
+            return self._free(self._viewpoint.pose, size)
+        return view_of(self.scene.cameras[self.camera], state["camera_world"][0, self.camera], size)
+
+    def _eyes(self, state: NDArray[np.void], size: tuple[int, int]) -> tuple[CameraView, CameraView]:
+        """Left and right: a pair of cameras, the eyes of a stereo camera, or two eyes at the free viewpoint."""
+        cameras, index = self.scene.cameras, self.camera
+        poses = state["camera_world"][0]
+        if index is not None:
+            for left, right in self._partners.items():
+                if index in (left, right):
+                    return view_of(cameras[left], poses[left], size), view_of(cameras[right], poses[right], size)
+            if cameras[index].stereo is not None:
+                left_eye, right_eye = (view_of(cameras[index], poses[index], size, eye) for eye in ("left", "right"))
+                return left_eye, right_eye
+        T = pose7_matrix(self._viewpoint.pose if index is None else poses[index])
+        aside = 0.5 * EYE_SHARE * self._reach(state) * T[:3, 1]
+        views = []
+        for sign in (-1.0, 1.0):
+            stand = T.copy()
+            stand[:3, 3] += sign * aside
+            views.append(self._free(matrix_pose7(stand), size))
+        return views[0], views[1]
+
+    def _free(self, pose: Array, size: tuple[int, int]) -> CameraView:
+        near, far = 0.01 * self._viewpoint.distance, 100.0 * self._viewpoint.distance + 10.0
+        projection = perspective(self._angle, size[0] / size[1], near, far)
+        return CameraView(view_matrix(pose7_matrix(pose)), projection, near, far, *size)
+
+    def _reach(self, state: NDArray[np.void]) -> float:
+        """Metres from the eye to what is looked at."""
+        if self.camera is None:
+            return self._viewpoint.distance
+        eye = state["camera_world"][0, self.camera, :3]
+        return float(np.clip(np.linalg.norm(eye - _middle(self.scene, state)), 0.05, 5.0))
+
+    def next_camera(self) -> None:
+        """Show the next camera of the scene, and after the last one the free view."""
+        following = 0 if self.camera is None else self.camera + 1
+        self.camera = following if following < len(self.scene.cameras) else None
+
+    def _leave_camera(self) -> None:
+        """Take the free viewpoint to where the shown camera stands, turning about what it looks at."""
+        if self.camera is not None and self._state is not None and self._view is not None:
+            found = self._at(self._view.width // 2, self._view.height // 2)
+            distance = 0.2 if found is None else found[2]
+            self._viewpoint = Viewpoint.at(self._state["camera_world"][0, self.camera], distance)
+            self._angle = self.scene.cameras[self.camera].field_of_view
+        self.camera = None
+
+    # --- mouse ------------------------------------------------------------------------------
+
+    def orbit(self, right: float, down: float) -> None:
+        """Turn the view by a mouse movement in pixels."""
+        self._leave_camera()
+        self._viewpoint = self._viewpoint.orbit(ORBIT_RATE * right, -ORBIT_RATE * down)
+
+    def pan(self, right: float, down: float) -> None:
+        """Move the view by a mouse movement in pixels."""
+        self._leave_camera()
+        self._viewpoint = self._viewpoint.pan(PAN_RATE * right, -PAN_RATE * down)
+
+    def zoom(self, steps: float) -> None:
+        """Go nearer by steps of the wheel."""
+        self._leave_camera()
+        self._viewpoint = self._viewpoint.zoom(steps)
+
+    @property
+    def holds(self) -> bool:
+        """Whether a body is held."""
+        return self._hold is not None
+
+    def grab(self, x: float, y: float) -> str | None:
+        """Take hold of the body at a pixel; its identifier, or None when nothing there can move."""
+        found = self._at(int(x), int(y))
+        if found is None or self._state is None:
+            return None
+        number, point, depth = found
+        if number > len(self.scene.bodies) or self.scene.bodies[number - 1].static:
+            return None
+        body = self.scene.bodies[number - 1]
+        T = pose7_matrix(self._state["body_pose"][0, body.index])
+        self._hold = _Hold(body.index, T[:3, :3].T @ (point - T[:3, 3]), point, depth)
+        return body.identity.identifier
+
+    def drag(self, x: float, y: float) -> None:
+        """Move what is held to a pixel, at the depth where it was taken."""
+        if self._hold is not None and self._view is not None:
+            self._hold = replace(self._hold, target=_point(self._view, x, y, self._hold.depth))
+
+    def pull(self) -> None:
+        """Command the force of the hold for the state shown last: a damped spring, and the body's weight."""
+        if self._hold is None or self._state is None:
+            return
+        body = self.scene.bodies[self._hold.body]
+        T = pose7_matrix(self._state["body_pose"][0, body.index])
+        centre = (T @ body.T_body_inertial)[:3, 3]
+        arm = T[:3, :3] @ self._hold.point + T[:3, 3] - centre
+        twist = self._state["body_twist"][0, body.index]
+        velocity = twist[:3] + np.cross(twist[3:], arm)
+        acceleration = PULL_RATE**2 * (self._hold.target - centre - arm) - 2.0 * PULL_RATE * velocity
+        acceleration *= min(1.0, MOST_PULL / max(float(np.linalg.norm(acceleration)), 1e-12))
+        force = body.mass * acceleration
+        wrench = (*(force - body.mass * body.gravity).tolist(), *np.cross(arm, force).tolist())
+        self._send(BodyCommand(body.index, CommandType.FORCE, wrench))
+
+    def let_go(self) -> None:
+        """Release what is held."""
+        if self._hold is not None:
+            self._send(Release("body", self._hold.body))
+        self._hold = None
+
+    def _at(self, x: int, y: int) -> tuple[int, Array, float] | None:
+        """Number, world point (3,) and depth of what is shown at a pixel; None for the background."""
+        view, state = self._view, self._state
+        if view is None or state is None or not (0 <= x < view.width and 0 <= y < view.height):
+            return None
+        frame = self._renderer.render(state, view, ("depth", "ids"))
+        if frame.ids[y, x] == 0:
+            return None
+        depth = float(frame.depth[y, x])
+        return int(frame.ids[y, x]), _point(view, x, y, depth), depth
+
+    # --- keys -------------------------------------------------------------------------------
+
+    def key(self, key: str, control: bool = False) -> None:
+        """A key: a letter, ``" "`` or ``"."``."""
+        if control and key == "R":
+            self._send(Reset(bodies_only=True))
+        elif control and key == "V":
+            self._reset_cameras()
+        elif control:
+            return
+        elif key == " ":
+            self.paused = not self.paused
+            self._send(Throttle(self.paused, self._clock, 1 if self.paused else 0))
+        elif key == "." and self.paused:
+            self._clock = not self._clock
+            self._send(Throttle(True, self._clock, 1))
+        elif key == "V":
+            self.next_camera()
+        elif key in TOGGLES:
+            self.shown ^= {TOGGLES[key][0]}
+
+    def _reset_cameras(self) -> None:
+        """Put the cameras, and the free view, back to where they were at the start."""
+        for camera in self.scene.cameras:
+            pose = matrix_pose7(camera.attachment.T_parent_object)
+            self._send(PlaceCommand("camera", camera.index, tuple(pose.tolist())))
+        self.camera = 0 if self.scene.cameras else None
+        self._viewpoint, self._angle = Viewpoint(_middle(self.scene), 1.0), FREE_ANGLE
+
+
+def _tint(index: int) -> Colour:
+    """A colour that tells one body's collision shapes from its neighbours'; hues a golden angle apart."""
+    r, g, b = colorsys.hsv_to_rgb(0.618034 * index % 1.0, 0.55, 0.9)
+    return Colour(diffuse=(r, g, b), ambient=(0.5 * r, 0.5 * g, 0.5 * b), specular=(0.2, 0.2, 0.2))
+
+
+def _middle(scene: Scene, state: NDArray[np.void] | None = None) -> tuple[float, float, float]:
+    """The middle of what moves, or of everything when nothing does."""
+    moving = [body.index for body in scene.bodies if not body.static] or [body.index for body in scene.bodies]
+    if not moving:
+        return (0.0, 0.0, 0.0)
+    places = (
+        np.array([scene.bodies[i].T_world_body[:3, 3] for i in moving])
+        if state is None
+        else state["body_pose"][0, moving, :3]
+    )
+    x, y, z = np.median(places, axis=0).tolist()
+    return x, y, z
+
+
+def _point(view: CameraView, x: float, y: float, depth: float) -> Array:
+    """World point (3,) at a pixel and a depth."""
+    K = view.intrinsics
+    reach = 1.0 if view.orthographic else depth
+    v = (y - K[1, 2]) / K[1, 1]
+    u = (x - K[0, 2] - K[0, 1] * v) / K[0, 0]
+    eye = np.array([u * reach, -v * reach, -depth, 1.0])
+    return np.linalg.inv(view.view)[:3] @ eye

@@ -1,0 +1,128 @@
+"""The window: shows pictures and hands mouse and keys to a `Viewer`."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import glfw
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.render.context import RenderUnavailable
+from ligature.render.viewer import Viewer
+
+SIZE = (960, 600)
+"""Width and height at start."""
+
+_VERTEX = """#version 330 core
+out vec2 vAt;
+void main() {
+    vAt = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
+    gl_Position = vec4(2.0 * vAt - 1.0, 0.0, 1.0);
+}
+"""
+_FRAGMENT = """#version 330 core
+uniform sampler2D uPicture;
+in vec2 vAt;
+out vec4 fColour;
+void main() { fColour = texture(uPicture, vec2(vAt.x, 1.0 - vAt.y)); }
+"""
+_KEYS = {glfw.KEY_SPACE: " ", glfw.KEY_PERIOD: "."} | {getattr(glfw, f"KEY_{c}"): c for c in "CFHJNRSTV"}
+
+
+class Window:
+    """One window with its OpenGL context; raises `RenderUnavailable` without a display."""
+
+    def __init__(self, title: str) -> None:
+        if not os.environ.get("DISPLAY"):
+            raise RenderUnavailable("no window: there is no display; set DISPLAY, or run without '--window'")
+        glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_X11)  # moderngl finds contexts of X11 only
+        if not glfw.init():
+            raise RenderUnavailable(f"no window: the display '{os.environ['DISPLAY']}' cannot be opened")
+        for hint, value in (
+            (glfw.CONTEXT_VERSION_MAJOR, 3),
+            (glfw.CONTEXT_VERSION_MINOR, 3),
+            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+        ):
+            glfw.window_hint(hint, value)
+        self._window = glfw.create_window(*SIZE, title, None, None)
+        if not self._window:
+            glfw.terminate()
+            raise RenderUnavailable("no window: the display has no OpenGL 3.3")
+        glfw.make_context_current(self._window)
+        glfw.swap_interval(1)
+        self.context = moderngl.create_context(require=330)
+        self._program = self.context.program(_VERTEX, _FRAGMENT)
+        self._quad = self.context.vertex_array(self._program, [])
+        self._texture: moderngl.Texture | None = None
+        self._last = (0.0, 0.0)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture in pixels, at least 2 x 1."""
+        width, height = glfw.get_framebuffer_size(self._window)
+        return max(width, 2), max(height, 1)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the user closed it."""
+        return bool(glfw.window_should_close(self._window))
+
+    def listen(self, viewer: Viewer) -> None:
+        """Hand mouse and keys to ``viewer``."""
+        self._viewer = viewer
+        glfw.set_key_callback(self._window, self._on_key)
+        glfw.set_mouse_button_callback(self._window, self._on_button)
+        glfw.set_cursor_pos_callback(self._window, self._on_move)
+        glfw.set_scroll_callback(self._window, lambda _window, _x, y: viewer.zoom(y))
+
+    def show(self, rgb: NDArray[np.uint8]) -> None:
+        """Show a picture (h, w, 3) and take what mouse and keys have done meanwhile."""
+        height, width = rgb.shape[:2]
+        if self._texture is None or self._texture.size != (width, height):
+            self._texture = self.context.texture((width, height), 3, alignment=1)
+        self._texture.write(np.ascontiguousarray(rgb).tobytes(), alignment=1)
+        self.context.screen.use()
+        self.context.screen.viewport = (0, 0, *self.size)
+        self.context.enable_only(moderngl.NOTHING)
+        self._texture.use(0)
+        self._quad.render(moderngl.TRIANGLES, vertices=3)
+        glfw.swap_buffers(self._window)
+        glfw.poll_events()
+
+    def close(self) -> None:
+        """Give the window back."""
+        glfw.terminate()
+
+    def _on_key(self, _window: Any, key: int, _code: int, action: int, modifiers: int) -> None:
+        if action != glfw.RELEASE and key in _KEYS:
+            self._viewer.key(_KEYS[key], bool(modifiers & glfw.MOD_CONTROL))
+
+    def _on_button(self, _window: Any, button: int, action: int, modifiers: int) -> None:
+        if button == glfw.MOUSE_BUTTON_LEFT:
+            if action == glfw.PRESS and modifiers & glfw.MOD_CONTROL:
+                self._viewer.grab(*self._pixel())
+            elif action == glfw.RELEASE:
+                self._viewer.let_go()
+
+    def _on_move(self, _window: Any, x: float, y: float) -> None:
+        right, down = x - self._last[0], y - self._last[1]
+        self._last = (x, y)
+        if self._pressed(glfw.MOUSE_BUTTON_LEFT):
+            if self._viewer.holds:
+                self._viewer.drag(*self._pixel())
+            else:
+                self._viewer.orbit(right, down)
+        elif self._pressed(glfw.MOUSE_BUTTON_RIGHT) or self._pressed(glfw.MOUSE_BUTTON_MIDDLE):
+            self._viewer.pan(right, down)
+
+    def _pressed(self, button: int) -> bool:
+        return bool(glfw.get_mouse_button(self._window, button) == glfw.PRESS)
+
+    def _pixel(self) -> tuple[float, float]:
+        """Where the mouse is in the picture; window units differ from pixels on some screens."""
+        x, y = glfw.get_cursor_pos(self._window)
+        width, height = glfw.get_window_size(self._window)
+        return x * self.size[0] / max(width, 1), y * self.size[1] / max(height, 1)

@@ -1,0 +1,144 @@
+"""What the window shows and does: views, toggles, dragging, pause, resets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import ligature
+import numpy as np
+import pytest
+from ligature import Simulation
+from ligature.bus.pacing import Throttle
+from ligature.model.commands import BodyCommand, PlaceCommand, Release, Reset
+from ligature.render import RenderUnavailable
+from ligature.render.viewer import Figures, Viewer
+
+SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
+SIZE = (320, 200)
+
+
+@pytest.fixture(scope="module")
+def small() -> Simulation:
+    simulation = Simulation(ligature.load(SMALL))
+    simulation.step(5)
+    return simulation
+
+
+@pytest.fixture
+def sent() -> list[Any]:
+    return []
+
+
+@pytest.fixture
+def viewer(small: Simulation, sent: list[Any]) -> Viewer:
+    try:
+        return Viewer(small.scene, sent.append)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def shown(viewer: Viewer, small: Simulation) -> Callable[[], np.ndarray]:
+    return lambda: viewer.picture(small.state, SIZE, Figures(25.0, 1.0))
+
+
+def test_every_camera_and_the_free_view_come_in_turn(viewer: Viewer, shown: Callable[[], np.ndarray]) -> None:
+    seen = []
+    for _ in range(4):
+        seen.append(viewer.camera)
+        assert shown().shape == (200, 320, 3)
+        viewer.key("V")
+    assert seen == [0, 1, None, 0]
+
+
+@pytest.mark.parametrize("key", "CFJTSH")
+def test_every_toggle_changes_the_picture_and_changes_it_back(
+    viewer: Viewer, shown: Callable[[], np.ndarray], key: str
+) -> None:
+    before = shown()
+    viewer.key(key)
+    assert (shown() != before).any(axis=2).sum() > 30
+    viewer.key(key)
+    assert (shown() == before).all()
+
+
+def test_stereo_shows_the_pair_of_cameras_side_by_side(viewer: Viewer, small: Simulation) -> None:
+    viewer.key("S")
+    picture = viewer.picture(small.state, (321, 200), Figures())
+    for side, name in ((slice(0, 160), "cameraL"), (slice(160, 320), "cameraR")):
+        half = small.cameras[name].capture((160, 200), passes=("rgb",)).rgb
+        assert np.abs(picture[60:, side].astype(int) - half[60:]).max() <= 2
+
+
+def test_a_mouse_that_turns_the_view_leaves_the_camera_where_it_is(
+    viewer: Viewer, shown: Callable[[], np.ndarray], sent: list[Any]
+) -> None:
+    before = shown()
+    viewer.orbit(0, 0)
+    assert viewer.camera is None and sent == []
+    same = shown()
+    changed = np.abs(same[60:].astype(int) - before[60:]).max(axis=2) > 40
+    assert changed.mean() < 0.05, "the free view begins where the camera stands"
+    for move in (viewer.orbit, viewer.pan):
+        move(40, 20)
+        after = shown()
+        assert (after != same).any()
+        same = after
+    viewer.zoom(2)
+    assert (shown() != same).any()
+
+
+def test_pause_step_and_go_on_are_world_commands(viewer: Viewer, sent: list[Any]) -> None:
+    viewer.key(".")
+    assert sent == []
+    for key in " .. ":
+        viewer.key(key)
+    assert sent == [
+        Throttle(True, False, 1),
+        Throttle(True, True, 1),
+        Throttle(True, False, 1),
+        Throttle(False, False, 0),
+    ]
+
+
+def test_the_references_keys_reset_bodies_and_cameras(viewer: Viewer, small: Simulation, sent: list[Any]) -> None:
+    viewer.key("R")
+    assert sent == []
+    viewer.key("R", control=True)
+    assert sent == [Reset(bodies_only=True)]
+    viewer.key("V", control=True)
+    assert [type(c) for c in sent[1:]] == [PlaceCommand, PlaceCommand]
+    assert sent[1].pose == pytest.approx(small.state["camera_pose"][0, 0])
+
+
+def test_a_body_follows_the_mouse_against_its_weight_and_is_let_go(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "bodies: [Ball, Wall]\ncameras: [C]\nnamespace: /ambf/env/\n"
+        "Ball: {name: Ball, mass: 0.3, shape: SPHERE, geometry: {radius: 0.1}, inertia: {ix: 0.01, iy: 0.01, iz: 0.01}}\n"
+        "Wall: {name: Wall, mass: 0, shape: BOX, geometry: {x: 0.1, y: 9, z: 9}, location: {position: {x: -3, y: 0, z: 0}}}\n"
+        "C: {name: C, location: {x: 2, y: 0, z: 0}, look at: {x: 0, y: 0, z: 0}, up: {x: 0, y: 0, z: 1}, field view angle: 0.9}\n"
+    )
+    simulation, sent = Simulation(ligature.load(path)), []
+    try:
+        viewer = Viewer(simulation.scene, lambda message: (sent.append(message), simulation.apply(message)))
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    viewer.picture(simulation.state, SIZE, Figures())
+    assert viewer.grab(5, 5) is None, "a wall does not move"
+    assert viewer.grab(160, 100) == "/ambf/env/Ball"
+    viewer.drag(200, 60)
+    for _ in range(60):
+        simulation.step(33)
+        viewer.picture(simulation.state, SIZE, Figures())
+        viewer.pull()
+    f = 100 / np.tan(0.45)
+    wanted = np.array([(200 - 160) / f * 1.9, (100 - 60) / f * 1.9])
+    assert simulation.bodies["Ball"].pose[1:3] == pytest.approx(wanted, abs=0.1)  # it hangs by a point of its surface
+    assert isinstance(sent[-1], BodyCommand)
+    viewer.let_go()
+    assert sent[-1] == Release("body", simulation.bodies["Ball"].body.index) and not viewer.holds
+    simulation.step(300)
+    assert simulation.bodies["Ball"].pose[2] < wanted[1] - 0.2
