@@ -19,6 +19,10 @@ from ligature.model.frames import matrix_pose7, pose7_matrix
 
 TASK_3_JOINTS = [-0.4, -0.22, 0.139, -1.64, -0.37, -0.11]
 TIP_IN_NEEDLE = np.array([0.006617809, 0.006973457, 0.0, 1.0])
+CLOSING = {420006: 0.3, 400006: 0.6}
+"""Seconds for which jaws are told to close. The scripts take 0.3 s; on a 400006 pad the needle lies first beside the
+ghost, which names it 0.38 s after the jaws began to close."""
+
 CAMERA_STEP = 0.002
 NEEDLE_STEP = 0.01
 
@@ -164,7 +168,7 @@ def set_up_task_3(stage: Stage, psm: Psm, needle: Any) -> None:
     psm.set_jaw_angle(0.8)
     stage.until(lambda: np.allclose(psm.measured_jp(), TASK_3_JOINTS, atol=5e-3), 5.0)
     lead(stage, needle, lambda: measured(psm.yaw_link) @ NEEDLE_IN_JAWS, NEEDLE_STEP, 0.0005)
-    for _ in range(30):
+    for _ in range(round(CLOSING[psm.tool_id] / 0.01)):
         psm.set_jaw_angle(0.0)
         stage.sleep(0.01)
     needle.set_force(0.0, 0.0, 0.0)

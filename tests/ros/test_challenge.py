@@ -56,12 +56,14 @@ def stage(request: Any, ros_env: dict[str, str], node: Any) -> Iterator[Stage]:
     if request.param == "lab":
         launch, models = request.getfixturevalue("corpus") / "suturing_scene" / "launch.yaml", "10,11,6,7,8,9"
     program = Program([str(BIN / "ambf_simulator"), "--launch_file", str(launch), "-l", models, *FLAGS], ros_env)
-    program.wait_for("first state published")
-    client = Client("challenge")
-    client.connect()
-    yield Stage(client, client.get_world_handle())
-    client.clean_up()
-    program.end()
+    try:
+        program.wait_for("first state published")
+        client = Client("challenge")
+        client.connect()
+        yield Stage(client, client.get_world_handle())
+        client.clean_up()
+    finally:
+        program.end()
 
 
 @pytest.fixture(scope="module")

@@ -39,12 +39,14 @@ def client(tmp_path_factory: Any, ros_env: dict[str, str], node: Any) -> Iterato
     file = tmp_path_factory.mktemp("scene") / "probe.yaml"
     Path(file).write_text(SCENE)
     program = Program([str(BIN / "ligature"), "run", str(file), "-p", "500"], ros_env)
-    program.wait_for("first state published")
-    client = Client("sensing")
-    client.connect()
-    yield client
-    client.clean_up()
-    program.end()
+    try:
+        program.wait_for("first state published")
+        client = Client("sensing")
+        client.connect()
+        yield client
+        client.clean_up()
+    finally:
+        program.end()
 
 
 def wait_for(condition: Callable[[], Any], seconds: float = 10.0) -> None:
