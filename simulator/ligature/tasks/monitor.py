@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 STILL = 1e-5
 """Metres that a tip must move to count: less is the trembling of a standing arm."""
 
-FALLING = 0.05
-"""Speed in m/s of a needle that nobody holds, from which on it counts as dropped."""
+FALLING = 0.2
+"""Speed in m/s with which a needle sinks that was let go in the air: after 20 ms of free fall."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Monitor:
         self._ways = np.zeros(len(self._tips))
         self._force = self._sum = self._tension = 0.0
         self._inserted = self.drops = 0
-        self._falling = False
+        self._held = False
 
     @property
     def passages(self) -> list[Passage]:
@@ -105,12 +105,13 @@ class Monitor:
             self._tension = max(self._tension, tension)
 
     def _look_for_drops(self, state: Any) -> None:
-        """A needle that falls freely was dropped; it must come to rest before it can be dropped again."""
-        sinking = float(state["body_twist"][self.scenery.needle, 2]) < -FALLING * 4
-        loose = sinking and not int(state["insertion_count"])
-        if loose and not self._falling and float(np.abs(state["body_twist"][self.scenery.needle, :2]).max()) < FALLING:
+        """A needle was dropped when it was held, and now falls."""
+        needle = self.scenery.needle
+        if needle in state["jaw_body"] or needle in state["actuator_body"]:
+            self._held = True
+        elif self._held and float(state["body_twist"][needle, 2]) < -FALLING:
+            self._held = False
             self.drops += 1
-        self._falling = loose
 
     def measures(self) -> Measures:
         """What was measured so far."""
