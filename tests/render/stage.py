@@ -126,19 +126,26 @@ def difference(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
 
     Cells, since half a pixel of an edge more or less is not seen; the percentile, since a missing detail is.
     """
-    h, w = a.shape[0] // 2 * 2, a.shape[1] // 2 * 2
-    cells = [p[:h, :w].astype(float).reshape(h // 2, 2, w // 2, 2, 3).mean(axis=(1, 3)) for p in (a, b)]
-    gap = np.abs(cells[0] - cells[1]).max(axis=2)
+    gap = _gap(a, b)
     return float(gap.mean()), float(np.percentile(gap, 99.5))
 
 
-def assert_looks_like(rgb: np.ndarray, path: Path) -> None:
-    """Compare with the picture at ``path``, or draw it anew when asked to."""
+def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    h, w = a.shape[0] // 2 * 2, a.shape[1] // 2 * 2
+    cells = [p[:h, :w].astype(float).reshape(h // 2, 2, w // 2, 2, 3).mean(axis=(1, 3)) for p in (a, b)]
+    return np.abs(cells[0] - cells[1]).max(axis=2)
+
+
+def assert_looks_like(rgb: np.ndarray, path: Path, moved: float = 0.005) -> None:
+    """Compare with the picture at ``path``, of which a share may have ``moved``; or draw it anew when asked to."""
     if os.environ.get("LIGATURE_UPDATE_PICTURES"):
         path.parent.mkdir(exist_ok=True, parents=True)
         Image.fromarray(rgb).save(path, optimize=True)
     with Image.open(path) as image:
         expected = np.asarray(image.convert("RGB"))
     assert rgb.shape == expected.shape
-    mean, worst = difference(rgb, expected)
-    assert mean < 1.0 and worst < 12.0, f"{path.name} looks different: mean {mean:.2f}, 99.5 % {worst:.1f} of 255"
+    gap = _gap(rgb, expected)
+    still = np.sort(gap, axis=None)[: int(gap.size * (1 - moved))]
+    assert still.mean() < 1.0 and still.max() < 12.0, (
+        f"{path.name} looks different: mean {still.mean():.2f}, {1 - moved:.1%} within {still.max():.1f} of 255"
+    )

@@ -13,7 +13,7 @@ import numpy as np
 from ligature.mesh import Material
 from ligature.model.scene import Colour
 
-METAL_SPECULAR, METAL_SHININESS, METAL_LIGHTNESS, METAL_CHROMA = 0.4, 250.0, 0.2, 0.03
+METAL_SPECULAR, METAL_SHININESS, METAL_LIGHTNESS, METAL_CHROMA = 0.4, 250.0, 0.55, 0.03
 """An untextured grey at least this bright, with at most this chroma and a highlight at least this strong and sharp,
 is bare metal: MTL has no word for metal, and steel of needles and instruments is exported so."""
 
