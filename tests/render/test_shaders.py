@@ -10,7 +10,7 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
-from ligature.render import CameraView, Renderer, RenderUnavailable, view_of
+from ligature.render import CameraView, Frame, Renderer, RenderUnavailable, view_of
 from ligature.render.context import create_context
 from ligature.render.translate import translate
 
@@ -137,6 +137,16 @@ def shader(name: str) -> str:
     return (SHADERS / name).read_text()
 
 
+def well_inside(frame: Frame, owner: int) -> np.ndarray:
+    """Pixels (h, w) of an object that lie off its outline: scene files' programs draw facets, ids are exact."""
+    mask = np.pad(frame.ids == owner, 1)
+    inside = mask[1:-1, 1:-1].copy()
+    for axis in (0, 1):
+        for step in (-1, 1):
+            inside &= np.roll(mask, step, axis)[1:-1, 1:-1]
+    return inside
+
+
 def test_the_test_shaders_use_every_name_of_the_reference() -> None:
     text = "\n".join(re.sub(r"/\*.*?\*/|//[^\n]*", "", path.read_text(), flags=re.S) for path in SHADERS.iterdir())
     assert [name for name in NAMES if name not in text] == []
@@ -166,9 +176,9 @@ def test_a_scene_is_drawn_with_its_own_shader(stage: Callable[..., Drawn], name:
 def test_lights_materials_and_shadows_mean_to_an_old_shader_what_they_mean_to_the_built_in_one(stage) -> None:
     renderer, simulation, view = stage(shader("phong.vert"), shader("phong.frag"))
     plain, *_ = stage()
-    own = renderer.render(simulation.state, view).rgb.astype(int)
+    frame = renderer.render(simulation.state, view)
     built_in = plain.render(simulation.state, view).rgb.astype(int)
-    difference = np.abs(own - built_in).max(axis=2)
+    difference = np.abs(frame.rgb - built_in).max(axis=2)[well_inside(frame, 1) | well_inside(frame, 2)]
     assert built_in.std() > 20
     assert (difference > 2).mean() < 0.02  # the edge of the shadow is smoothed by the built-in one only
 
@@ -180,8 +190,8 @@ def test_a_preprocessing_shader_paints_labels_and_nothing_between_them(tmp_path:
     files = ligature.model.scene.ShaderFiles(tmp_path / "labels.vert", tmp_path / "labels.frag")
     frame = renderer.render(simulation.state, view, ("rgb", "ids"), shaders=files)
     assert renderer.problems == []
-    assert set(map(tuple, frame.rgb[frame.ids == 1])) == {(128, 64, 191)}
-    assert set(map(tuple, frame.rgb[frame.ids == 2])) == {(153, 102, 26)}
+    assert set(map(tuple, frame.rgb[well_inside(frame, 1)])) == {(128, 64, 191)}
+    assert set(map(tuple, frame.rgb[well_inside(frame, 2)])) == {(153, 102, 26)}
 
 
 PROBES = {
@@ -216,7 +226,7 @@ def test_fixed_function_state_has_its_value(stage: Callable[..., Drawn], express
     renderer, simulation, view = stage("void main() { gl_Position = ftransform(); }\n", fragment)
     frame = renderer.render(simulation.state, view, ("rgb", "ids"))
     assert renderer.problems == []
-    ball = frame.rgb[frame.ids == 2]
+    ball = frame.rgb[well_inside(frame, 2)]
     assert np.abs(ball - 255.0 * np.clip(PROBES[expression], 0, 1)).max() <= 1.01
 
 
@@ -233,7 +243,7 @@ def test_a_directional_light_has_no_position_and_no_cone(stage: Callable[..., Dr
     renderer.lights.settings[0] = replace(renderer.lights.settings[0], kind=LightKind.DIRECTIONAL)
     frame = renderer.render(simulation.state, view, ("rgb", "ids"))
     towards = 0.3 / np.linalg.norm([0.3, 0.25, 0.9])
-    assert np.abs(frame.rgb[frame.ids == 2] - np.array([255 * towards, 0, 255])).max() <= 1.01
+    assert np.abs(frame.rgb[well_inside(frame, 2)] - np.array([255 * towards, 0, 255])).max() <= 1.01
 
 
 def test_a_shader_that_does_not_compile_is_named_by_file_and_line_and_the_picture_is_drawn(stage) -> None:
@@ -303,4 +313,4 @@ def test_colours_reach_the_fragment_shader_as_in_old_opengl(stage: Callable[...,
     renderer, simulation, view = stage(vertex, "void main() { gl_FragData[0] = gl_Color; }\n")
     frame = renderer.render(simulation.state, view, ("rgb", "ids"))
     assert renderer.problems == []
-    assert set(map(tuple, frame.rgb[frame.ids == 2])) == {(51, 102, 153)}
+    assert set(map(tuple, frame.rgb[well_inside(frame, 2)])) == {(51, 102, 153)}
