@@ -10,7 +10,8 @@ with X = [[1, -[r]], [0, -B]] of the lever r from the node's centre to the pivot
 and joints in turn from the first to the last leaves 6 x 6 blocks alone: the block-tridiagonal solver
 of Deul et al. (Direct Position-Based Solver for Stiff Rods, 2018), written with the admittance Y of
 each node and the impedance Z of each joint, so that nodes of infinite mass (Y = 0) need no special
-case. World axes.
+case. Elimination goes from both ends to one node, the top, so that the motion of the nodes between the
+first that is loaded and the top follows from these nodes alone. World axes.
 """
 
 from __future__ import annotations
@@ -131,55 +132,109 @@ def _times6(A, v, out):
         out[i] = A[i, 0] * v[0] + A[i, 1] * v[1] + A[i, 2] * v[2] + A[i, 3] * v[3] + A[i, 4] * v[4] + A[i, 5] * v[5]
 
 
-@kernel
-def factor(n, fixed, H, r_near, r_far, B, compliance, Y, Z, scratch):
-    """Eliminate the chain's ``n`` nodes: fills ``Y`` (n, 6, 6) and ``Z`` (n - 1, 6, 6); ``H`` is used up.
+@inlined
+def _clear_admittance(compliance, Z):
+    for a in range(6):
+        for b in range(6):
+            Z[a, b] = 0.0
+        Z[a, a] = 1.0 / compliance[a]
 
-    ``r_near[j]``, ``r_far[j]`` are the levers of joint j on its nodes j and j + 1; nodes with
+
+@inlined
+def _invert_node(fixed, H, Y):
+    if fixed:
+        for a in range(6):
+            for b in range(6):
+                Y[a, b] = 0.0
+    else:
+        invert_spd6(H, Y)
+
+
+@inlined
+def _join(Y, fixed, r, B, compliance, Z, scratch):
+    """Impedance ``Z`` of a joint with the eliminated node of admittance ``Y`` behind it, at its lever ``r``."""
+    if fixed:
+        _clear_admittance(compliance, Z)
+    else:
+        _carry_admittance(Y, r, B, scratch)
+        for a in range(6):
+            scratch[a, a] += compliance[a]
+        invert_spd6(scratch, Z)
+
+
+@kernel
+def factor(n, top, fixed, H, r_near, r_far, B, compliance, Y, Z, scratch):
+    """Eliminate the chain's ``n`` nodes from both ends towards ``top``: fills ``Y`` (n, 6, 6), ``Z`` (n - 1, 6, 6).
+
+    ``H`` is used up. ``r_near[j]``, ``r_far[j]`` are the levers of joint j on its nodes j and j + 1; nodes with
     ``fixed`` do not move.
     """
-    for i in range(n):
-        if i > 0:
-            j = i - 1
-            if fixed[j]:
-                for a in range(6):
-                    for b in range(6):
-                        Z[j, a, b] = 0.0
-                    Z[j, a, a] = 1.0 / compliance[j, a]
-            else:
-                _carry_admittance(Y[j], r_near[j], B[j], scratch)
-                for a in range(6):
-                    scratch[a, a] += compliance[j, a]
-                invert_spd6(scratch, Z[j])
-            if not fixed[i]:
-                _add_impedance(Z[j], r_far[j], B[j], H[i], scratch)
-        if fixed[i]:
-            for a in range(6):
-                for b in range(6):
-                    Y[i, a, b] = 0.0
-        else:
-            invert_spd6(H[i], Y[i])
+    for i in range(top):
+        _invert_node(fixed[i], H[i], Y[i])
+        _join(Y[i], fixed[i], r_near[i], B[i], compliance[i], Z[i], scratch)
+        if not fixed[i + 1]:
+            _add_impedance(Z[i], r_far[i], B[i], H[i + 1], scratch)
+    for i in range(n - 1, top, -1):
+        j = i - 1
+        _invert_node(fixed[i], H[i], Y[i])
+        _join(Y[i], fixed[i], r_far[j], B[j], compliance[j], Z[j], scratch)
+        if not fixed[j]:
+            _add_impedance(Z[j], r_near[j], B[j], H[j], scratch)
+    _invert_node(fixed[top], H[top], Y[top])
 
 
 @kernel
-def solve(n, r_near, r_far, B, Y, Z, c, g, d, load, scratch):
+def solve(n, top, r_near, r_far, B, Y, Z, c, g, d, load, scratch):
     """Corrections ``d`` (n, 6) and multipliers ``load`` (n - 1, 6) for the rows ``c`` and loads ``g`` of the nodes.
 
-    ``g`` is left as it came.
+    ``top`` is that of `factor`; ``g`` is left as it came.
     """
     u, w, far = scratch[0], scratch[1], scratch[2]
-    for i in range(n):
+    for i in range(top):
         for a in range(6):
             w[a] = g[i, a]
         if i > 0:
             add_joint_force(load[i - 1], r_far[i - 1], B[i - 1], -1.0, w)
         _times6(Y[i], w, d[i])
+        apply_lever(d[i], r_near[i], B[i], u)
+        for a in range(6):
+            u[a] = -(u[a] + c[i, a])
+        _times6(Z[i], u, load[i])
+    for i in range(n - 1, top, -1):
+        for a in range(6):
+            w[a] = g[i, a]
         if i < n - 1:
-            apply_lever(d[i], r_near[i], B[i], u)
-            for a in range(6):
-                u[a] = -(u[a] + c[i, a])
-            _times6(Z[i], u, load[i])
-    for i in range(n - 2, -1, -1):
+            add_joint_force(load[i], r_near[i], B[i], 1.0, w)
+        _times6(Y[i], w, d[i])
+        apply_lever(d[i], r_far[i - 1], B[i - 1], u)
+        for a in range(6):
+            u[a] -= c[i - 1, a]
+        _times6(Z[i - 1], u, load[i - 1])
+    for a in range(6):
+        w[a] = g[top, a]
+    if top > 0:
+        add_joint_force(load[top - 1], r_far[top - 1], B[top - 1], -1.0, w)
+    if top < n - 1:
+        add_joint_force(load[top], r_near[top], B[top], 1.0, w)
+    _times6(Y[top], w, d[top])
+    _substitute_back(0, top, r_near, r_far, B, Y, Z, d, load, u, w, far)
+    for i in range(top + 1, n):
+        j = i - 1
+        apply_lever(d[j], r_near[j], B[j], far)
+        _times6(Z[j], far, u)
+        for a in range(6):
+            load[j, a] -= u[a]
+            w[a] = 0.0
+        add_joint_force(load[j], r_far[j], B[j], -1.0, w)
+        _times6(Y[i], w, u)
+        for a in range(6):
+            d[i, a] += u[a]
+
+
+@inlined
+def _substitute_back(low, top, r_near, r_far, B, Y, Z, d, load, u, w, far):
+    """Complete nodes and joints below ``top``, down to ``low``, from what is above them."""
+    for i in range(top - 1, low - 1, -1):
         apply_lever(d[i + 1], r_far[i], B[i], far)
         _times6(Z[i], far, u)
         for a in range(6):
@@ -189,3 +244,24 @@ def solve(n, r_near, r_far, B, Y, Z, c, g, d, load, scratch):
         _times6(Y[i], w, u)
         for a in range(6):
             d[i, a] += u[a]
+
+
+@kernel
+def solve_within(low, top, r_near, r_far, B, Y, Z, g, d, load, scratch):
+    """Corrections ``d`` of the nodes ``low`` … ``top`` for loads ``g`` on them alone; what lies outside yields along.
+
+    Outside, nothing is computed; ``load`` is scratch.
+    """
+    u, w, far = scratch[0], scratch[1], scratch[2]
+    for i in range(low, top + 1):
+        for a in range(6):
+            w[a] = g[i, a]
+        if i > low:
+            add_joint_force(load[i - 1], r_far[i - 1], B[i - 1], -1.0, w)
+        _times6(Y[i], w, d[i])
+        if i < top:
+            apply_lever(d[i], r_near[i], B[i], u)
+            for a in range(6):
+                u[a] = -u[a]
+            _times6(Z[i], u, load[i])
+    _substitute_back(low, top, r_near, r_far, B, Y, Z, d, load, u, w, far)

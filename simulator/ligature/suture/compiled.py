@@ -19,7 +19,7 @@ from ligature.mesh import distance
 
 SOURCES = (
     "bonds", "chain", "contacts", "coupling", "holding", "layout", "pads", "passages", "placing", "reactions",
-    "rotations", "step", "substeps", "tables", "tracking",
+    "rotations", "step", "substeps", "tables", "ties", "tracking",
 )  # fmt: skip
 """Modules of this room that hold kernels."""
 

@@ -4,19 +4,17 @@ A contact is a stiff spring along its normal and a bristle across it: elastic wh
 constant force against the motion while it slips, all evaluated at the end of the tick. Which contacts
 touch and which stick is found by repetition (an active-set Newton method), starting from the last
 tick. What each contact does to its two nodes apart goes into their matrices; what ties the nodes
-together is solved by conjugate gradients, with the chain's direct solver as preconditioner, to
-rounding. World axes, SI units; `Touches.push` and the matrices K are times dt².
+together is solved in `ligature.suture.ties`. World axes, SI units; `Touches.push` and the matrices K
+are times dt².
 """
 
 from __future__ import annotations
 
 import math
 
-from ligature.suture.chain import invert_spd6, solve
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
 
-MAX_CG = 40
 SLIPS, STICKS, YIELDS = 0, 1, 2
 """How a contact's friction enters a solve: a constant force, a spring, a spring as stiff as the limit allows."""
 
@@ -28,9 +26,6 @@ STICTION = 1.001
 
 PRESSURE = 0.1
 """Change of the normal force, as a share of it, that a solve with the old friction limit may leave."""
-
-CG_TOLERANCE = 1e-9
-"""Residual energy, relative to the first, at which the coupling is solved."""
 
 
 @inlined
@@ -113,7 +108,7 @@ def _add_spring(K, rx, ry, rz, H):
 
 
 @inlined
-def _push(g, sign, fx, fy, fz, rx, ry, rz):
+def push(g, sign, fx, fy, fz, rx, ry, rz):
     """g += sign (f, r x f)."""
     mx, my, mz = cross(rx, ry, rz, fx, fy, fz)
     g[0] += sign * fx
@@ -137,8 +132,7 @@ def _friction(touches, c, wx, wy, wz, scale, dt):
 
 @kernel
 def add_contacts(nodes, touches, work, stiffness, dt):
-    """Add all closed contacts to ``work.H`` and ``work.g``; returns whether any ties two movable nodes."""
-    coupled = False
+    """Add all closed contacts to ``work.H`` and ``work.g``."""
     scale = stiffness * dt * dt
     for c in range(touches.count[0]):
         K, f, begun, n = work.K[c], touches.push[c], touches.begun[c], touches.normal[c]
@@ -161,129 +155,16 @@ def add_contacts(nodes, touches, work, stiffness, dt):
             f[a] = -normal * room * n[a] - s * begun[a]
         if not touches.closed[c]:
             continue
+        arms = work.arms[c]
+        arms[0, 0], arms[0, 1], arms[0, 2] = ax, ay, az
+        arms[1, 0], arms[1, 1], arms[1, 2] = bx, by, bz
         i, k = touches.node[c, 0], touches.node[c, 1]
         if not nodes.fixed[i]:
             _add_spring(K, ax, ay, az, work.H[i])
-            _push(work.g[i], 1.0, f[0], f[1], f[2], ax, ay, az)
+            push(work.g[i], 1.0, f[0], f[1], f[2], ax, ay, az)
         if not nodes.fixed[k]:
             _add_spring(K, bx, by, bz, work.H[k])
-            _push(work.g[k], -1.0, f[0], f[1], f[2], bx, by, bz)
-            coupled = coupled or not nodes.fixed[i]
-    return coupled
-
-
-@inlined
-def _apply_ties(total, nodes, touches, work, p, out):
-    """out = E p: what each movable node of a contact feels of the other's motion."""
-    for i in range(total):
-        for a in range(6):
-            out[i, a] = 0.0
-    for c in range(touches.count[0]):
-        i, k = touches.node[c, 0], touches.node[c, 1]
-        if not touches.closed[c] or nodes.fixed[i] or nodes.fixed[k]:
-            continue
-        K = work.K[c]
-        ax, ay, az = lever_of(work, touches, c, 0)
-        bx, by, bz = lever_of(work, touches, c, 1)
-        ux, uy, uz = cross(p[i, 3], p[i, 4], p[i, 5], ax, ay, az)
-        vx, vy, vz = cross(p[k, 3], p[k, 4], p[k, 5], bx, by, bz)
-        fx, fy, fz = rotate(K, p[k, 0] + vx, p[k, 1] + vy, p[k, 2] + vz)
-        _push(out[i], -1.0, fx, fy, fz, ax, ay, az)
-        fx, fy, fz = rotate(K, p[i, 0] + ux, p[i, 1] + uy, p[i, 2] + uz)
-        _push(out[k], -1.0, fx, fy, fz, bx, by, bz)
-
-
-@inlined
-def _precondition(n, total, nodes, work, g, d, load):
-    """d = S⁻¹ g: the chain by its direct solver, every other body alone."""
-    solve(n, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, work.zero, g, d, load, work.six)
-    _move_bodies(n, total, nodes, work, g, d)
-
-
-@inlined
-def _move_bodies(n, total, nodes, work, g, d):
-    for i in range(n, total):
-        for a in range(6):
-            s = 0.0
-            if not nodes.fixed[i]:
-                for b in range(6):
-                    s += work.Y[i, a, b] * g[i, b]
-            d[i, a] = s
-
-
-@inlined
-def _dot(total, a, b):
-    s = 0.0
-    for i in range(total):
-        for k in range(6):
-            s += a[i, k] * b[i, k]
-    return s
-
-
-@kernel
-def factor_bodies(n, total, nodes, work):
-    """Admittance of the bodies behind the chain."""
-    for i in range(n, total):
-        if not nodes.fixed[i]:
-            invert_spd6(work.H[i], work.Y[i])
-
-
-@kernel
-def couple(n, total, nodes, touches, work):
-    """Complete ``work.d`` and ``work.load`` by what contacts between movable nodes carry across."""
-    p, r, z, s = work.cg[0], work.cg[1], work.cg[2], work.cg[3]
-    p_load, z_load = work.cg_load[0], work.cg_load[1]
-    factor_bodies(n, total, nodes, work)
-    _move_bodies(n, total, nodes, work, work.g, work.d)
-    _apply_ties(total, nodes, touches, work, work.d, r)
-    for i in range(total):
-        for a in range(6):
-            r[i, a] = -r[i, a]
-    _precondition(n, total, nodes, work, r, z, z_load)
-    energy = _dot(total, r, z)
-    first = energy
-    if energy <= 0.0:
-        return 0
-    # s keeps S p by recurrence, so that S itself is never applied.
-    for i in range(total):
-        for a in range(6):
-            p[i, a], s[i, a] = z[i, a], r[i, a]
-    for j in range(n - 1):
-        for a in range(6):
-            p_load[j, a] = z_load[j, a]
-    iterations = 0
-    for _ in range(MAX_CG):
-        iterations += 1
-        q = z
-        _apply_ties(total, nodes, touches, work, p, q)
-        for i in range(total):
-            for a in range(6):
-                q[i, a] += s[i, a]
-        curvature = _dot(total, p, q)
-        if curvature <= 0.0:
-            break
-        step = energy / curvature
-        for i in range(total):
-            for a in range(6):
-                work.d[i, a] += step * p[i, a]
-                r[i, a] -= step * q[i, a]
-        for j in range(n - 1):
-            for a in range(6):
-                work.load[j, a] += step * p_load[j, a]
-        _precondition(n, total, nodes, work, r, z, z_load)
-        fresh = _dot(total, r, z)
-        if fresh <= CG_TOLERANCE * first:
-            break
-        beta = fresh / energy
-        energy = fresh
-        for i in range(total):
-            for a in range(6):
-                p[i, a] = z[i, a] + beta * p[i, a]
-                s[i, a] = r[i, a] + beta * s[i, a]
-        for j in range(n - 1):
-            for a in range(6):
-                p_load[j, a] = z_load[j, a] + beta * p_load[j, a]
-    return iterations
+            push(work.g[k], -1.0, f[0], f[1], f[2], bx, by, bz)
 
 
 @inlined

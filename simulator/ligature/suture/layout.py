@@ -108,9 +108,11 @@ class Work(NamedTuple):
     d: Array  # (N, 6)
     load: Array  # (n - 1, 6)
     cg: Array  # (4, N, 6)
-    cg_load: Array  # (2, n - 1, 6)
-    zero: Array  # (n - 1, 6)
+    tied_load: Array  # (n - 1, 6)
+    rows: NDArray[np.int64]  # (N,) of what contacts tie together
+    pushed: NDArray[np.bool_]  # (N,) bodies that contacts push
     K: Array  # (C, 3, 3) contact stiffness times dt²
+    arms: Array  # (C, 2, 3) levers of each contact on its nodes
     six: Array  # (6, 6)
     sum6: Array  # (6,)
     kept_x: Array  # (N, 3) state at the start of the tick, and so on
@@ -164,7 +166,8 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         x=z((total, 3)), q=z((total, 4)), xp=z((total, 3)), qp=z((total, 4)), R=z((total + 1, 3, 3)),
         lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
         Y=z((total, 6, 6)), Z=z((j, 6, 6)), g=z((total, 6)), d=z((total, 6)), load=z((j, 6)),
-        cg=z((4, total, 6)), cg_load=z((2, j, 6)), zero=z((j, 6)), K=z((contacts, 3, 3)), six=z((6, 6)),
+        cg=z((4, total, 6)), tied_load=z((j, 6)), rows=np.zeros(total, np.int64),
+        pushed=np.zeros(total, np.bool_), K=z((contacts, 3, 3)), arms=z((contacts, 2, 3)), six=z((6, 6)),
         sum6=z(6), kept_x=z((total, 3)), kept_q=z((total, 4)), kept_v=z((total, 3)), kept_w=z((total, 3)),
         kept_angle=z((j, 3)), kept_load=z((j, 6)),
         three=z((3, 3)), segment=z((elements, 2, 3)), ahead=z((elements, 2, 3)), reach=z(elements),

@@ -12,7 +12,7 @@ import math
 
 from ligature.suture.chain import factor, solve
 from ligature.suture.compiled import inlined, kernel
-from ligature.suture.coupling import add_contacts, conclude_contacts, couple, settle_contacts
+from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
 from ligature.suture.holding import add_holds, settle_holds
 from ligature.suture.rotations import (
     cross,
@@ -23,6 +23,7 @@ from ligature.suture.rotations import (
     rotation_vector,
     turn,
 )
+from ligature.suture.ties import couple, gather
 
 MAX_NEWTON = 8
 """Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
@@ -228,14 +229,16 @@ def advance(n, total, nodes, joints, touches, work, passages, owner, stiffness, 
         steps += 1
         linearise(n, total, nodes, joints, work, dt)
         assemble(n, total, nodes, joints, work)
-        coupled = add_contacts(nodes, touches, work, stiffness, dt)
+        add_contacts(nodes, touches, work, stiffness, dt)
         add_holds(passages, owner, nodes, work, elapsed, dt)
-        factor(n, nodes.fixed, work.H, work.lever[:, 0], work.lever[:, 1], work.B, work.compliance,
+        low, high, rows = gather(n, total, nodes, touches, work)
+        top = high if high >= 0 else n - 1
+        factor(n, top, nodes.fixed, work.H, work.lever[:, 0], work.lever[:, 1], work.B, work.compliance,
                work.Y, work.Z, work.six)  # fmt: skip
-        solve(n, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, work.c, work.g, work.d,
+        solve(n, top, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, work.c, work.g, work.d,
               work.load, work.six)  # fmt: skip
-        if coupled:
-            couple(n, total, nodes, touches, work)
+        if rows > 0:
+            couple(n, low, high, rows, nodes, touches, work)
         changed = settle_contacts(nodes, touches, work, stiffness, dt)
         largest = correct(n, total, nodes, work)
         changed = settle_holds(passages, owner, nodes, elapsed) or changed
