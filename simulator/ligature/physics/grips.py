@@ -61,9 +61,9 @@ class BulletGrips:
             pybullet.getAABB(place.uid, place.link, physicsClientId=self.client)
             for place in (self.place_of[body] for body in bodies)
         ]
-        low = np.min([box[0] for box in boxes], axis=0)
-        high = np.max([box[1] for box in boxes], axis=0)
-        met = pybullet.getOverlappingObjects(low.tolist(), high.tolist(), physicsClientId=self.client) or ()
+        low = [min(corner) for corner in zip(*(box[0] for box in boxes), strict=True)]
+        high = [max(corner) for corner in zip(*(box[1] for box in boxes), strict=True)]
+        met = pybullet.getOverlappingObjects(low, high, physicsClientId=self.client) or ()
         found = {self._body_at[at] for at in met if at in self._body_at}
         return sorted(found - set(bodies)), np.array([low, high])
 

@@ -82,6 +82,7 @@ class World(BulletQueries, BulletGrips):
         ]
         for control in self._controls:
             self._tree_of_joint.update(dict.fromkeys(control.row, control))
+        self._jointed = [control for control in self._controls if control.links]
         self._body_controls: dict[int, BodyControl] = {}
         self._lifts = gravity_lifts(self.client, self.trees, self.place_of, self._world_gravity)
         self._damped = self._damping_factors()
@@ -141,7 +142,7 @@ class World(BulletQueries, BulletGrips):
     def pre_step(self) -> None:
         """Controllers, springs and gravity of the coming tick."""
         self._impulses.clear()
-        for control in self._controls:
+        for control in self._jointed:
             if control.active:
                 control.apply()
         for place, linear, angular in self._damped:
