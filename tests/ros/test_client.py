@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import time
@@ -18,6 +19,7 @@ NEEDLE = "/ambf/env/phantom/Needle"
 BASE = "/ambf/env/psm1/baselink"
 NAMES = ROOT / "simulator" / "ligature" / "client" / "names" / "ambf"
 SCRIPT_PATH = os.pathsep.join(map(str, [ROOT / "build" / "python", ROOT / "simulator", NAMES]))
+CLIENTS = ROOT / "docs" / "clients.md"
 JOINTS = [0.1, -0.1, 0.1, 0.2, 0.1, -0.1, 0.3, 0.3]
 
 
@@ -83,6 +85,9 @@ def test_a_handle_knows_its_state_when_it_is_given_out(client: Any) -> None:
 
     fresh = Client("fresh")
     fresh.connect()
+    arm = fresh.get_obj_handle("psm2/baselink")
+    arm.set_joint_pos(7, 0.2)
+    assert arm.get_joint_pos(7) is not None and len(arm._cmd.joint_cmds) == 8
     needle = fresh.get_obj_handle("phantom/Needle")
     assert needle.get_pos().z == pytest.approx(0.7154, abs=2e-3)
     assert needle.get_identifier() == "/ambf/env/phantom/BODY Needle"
@@ -93,7 +98,7 @@ def test_a_handle_knows_its_state_when_it_is_given_out(client: Any) -> None:
 
 def test_joints_appear_within_half_a_second_and_follow(client: Any) -> None:
     arm = client.get_obj_handle("psm1/baselink")
-    wait_for(lambda: arm.get_num_joints() == 8, 0.5)
+    assert arm.get_num_joints() == 8
     assert arm.get_joint_names()[2] == "pitchendlink-maininsertionlink"
     assert arm.get_num_of_children() == len(arm.get_children_names()) > 0
     for index, value in enumerate(JOINTS):
@@ -212,13 +217,14 @@ def test_an_active_world_is_kept_throttled_for_two_seconds_after_the_last_update
     own.clean_up()
 
 
-def test_an_actuator_grasps_what_the_ghosts_name_and_lets_go(client: Any) -> None:
+@pytest.mark.parametrize("name", ["/ambf/env/phantom/BODY Needle", "BODY Needle", "Needle"])
+def test_an_actuator_grasps_what_the_ghosts_name_and_lets_go(client: Any, name: str) -> None:
     actuator = client.get_obj_handle("psm2/Actuator0")
     ghost = client.get_obj_handle("psm2/left_finger_ghost")
     assert ghost.get_all_sensed_obj_names() == [] or "/ambf/env/" in ghost.get_sensed_obj_name(0)
-    actuator.actuate("/ambf/env/phantom/BODY Needle")
+    actuator.actuate(name)
     wait_for(lambda: actuator._state.actuated)
-    time.sleep(1.0)
+    time.sleep(0.7)  # longer than the simulator's time-out
     assert actuator._state.actuated
     actuator.deactuate()
     wait_for(lambda: not actuator._state.actuated)
@@ -266,6 +272,16 @@ def test_a_ral_tells_time_stamps_messages_and_runs_functions(client: Any) -> Non
     for _ in range(20):
         rate.sleep()
     assert time.monotonic() - begin == pytest.approx(0.2, abs=0.08)
+
+
+@pytest.mark.parametrize("example", re.findall(r"```python\n(.*?)```", CLIENTS.read_text(), re.DOTALL))
+def test_the_examples_of_the_documentation_run(example: str, client: Any, ros_env: dict[str, str]) -> None:
+    done = subprocess.run(
+        ["/usr/bin/python3", "-c", example], env=dict(ros_env, PYTHONPATH=SCRIPT_PATH), capture_output=True, text=True,
+        timeout=30,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "no object" not in done.stdout + done.stderr and "nobody listens" not in done.stdout + done.stderr
 
 
 def test_handles_live_on_when_the_simulator_dies_and_comes_back(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import operator
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,25 +13,35 @@ from geometry_msgs.msg import Vector3
 
 from ligature.client.base_object import BaseObject
 
+LISTS_PATIENCE = 0.5
+"""Seconds after a handle became active within which a simulator lists its children and joints."""
+POLL = 0.005
+
 
 class JointedObject(BaseObject):
-    """A handle whose messages list children and joints, once a command has asked for them."""
+    """A handle whose messages list children and joints, once a command has asked for them.
+
+    Who reads or commands joints right after getting a handle is kept waiting for the lists, for `LISTS_PATIENCE` at
+    most.
+    """
+
+    _asked = -math.inf
 
     def get_children_names(self) -> list[str]:
         """Names of all bodies below this one."""
-        return list(self._state.children_names)
+        return list(self._listed.children_names)
 
     def get_num_of_children(self) -> int:
         """How many bodies are below this one."""
-        return len(self._state.children_names)
+        return len(self._listed.children_names)
 
     def get_joint_names(self) -> list[str]:
         """Names of the joints below this body."""
-        return list(self._state.joint_names)
+        return list(self._listed.joint_names)
 
     def get_num_joints(self) -> int:
         """How many joints there are below this body."""
-        return len(self._state.joint_positions)
+        return len(self._listed.joint_positions)
 
     def is_joint_idx_valid(self, joint_idx: int) -> bool:
         """Whether there is a joint of that index; tells which there are when not."""
@@ -40,22 +52,22 @@ class JointedObject(BaseObject):
 
     def get_joint_idx_from_name(self, joint_name: str) -> int | None:
         """Index of a joint; None, with a message, when there is none of that name."""
-        if joint_name in self._state.joint_names:
-            return int(self._state.joint_names.index(joint_name))
+        if joint_name in self._listed.joint_names:
+            return int(self._listed.joint_names.index(joint_name))
         rospy.logwarn(f"{self._name}: no joint {joint_name!r}; {self._extent()}")
         return None
 
     def get_joint_name_from_idx(self, joint_idx: int) -> str | None:
         """Name of a joint; None, with a message, when there is none of that index."""
-        return self._state.joint_names[joint_idx] if self.is_joint_idx_valid(joint_idx) else None
+        return self._listed.joint_names[joint_idx] if self.is_joint_idx_valid(joint_idx) else None
 
     def get_joint_pos(self, joint_name_or_idx: str | int) -> float | None:
         """Position of a joint; None, with a message, when there is none of that name or index."""
-        return self._value(self._state.joint_positions, joint_name_or_idx)
+        return self._value(self._listed.joint_positions, joint_name_or_idx)
 
     def get_all_joint_pos(self) -> list[float]:
         """Positions of all joints."""
-        return list(self._state.joint_positions)
+        return list(self._listed.joint_positions)
 
     def get_publish_children_names_flag(self) -> bool:
         """Whether the command asks for the names of children."""
@@ -87,7 +99,16 @@ class JointedObject(BaseObject):
             self.set_publish_children_names_flag(True)
             self.set_publish_joint_names_flag(True)
             self.set_publish_joint_positions_flag(True)
+        if not self.is_active():
+            self._asked = time.monotonic()
         super().set_active()
+
+    @property
+    def _listed(self) -> Any:
+        """The newest state, with the lists that were asked for."""
+        while not self._state.joint_names and time.monotonic() < self._asked + LISTS_PATIENCE:
+            time.sleep(POLL)
+        return self._state
 
     def _index(self, joint: str | int) -> int | None:
         if isinstance(joint, str):
@@ -100,7 +121,7 @@ class JointedObject(BaseObject):
         return None if index is None or index >= len(values) else values[index]
 
     def _extent(self) -> str:
-        names = self._state.joint_names
+        names = self._listed.joint_names
         if not names:
             return "its state lists no joints yet, or it has none"
         return "it has " + ", ".join(f"{index} {name}" for index, name in enumerate(names))

@@ -89,19 +89,19 @@ class RigidBody(JointedObject):
 
     def get_joint_vel(self, joint_name_or_idx: str | int) -> float | None:
         """Velocity of a joint; None, with a message, when there is none of that name or index."""
-        return self._value(self._state.joint_velocities, joint_name_or_idx)
+        return self._value(self._listed.joint_velocities, joint_name_or_idx)
 
     def get_joint_effort(self, joint_name_or_idx: str | int) -> float | None:
         """Torque or force of a joint; None, with a message, when there is none of that name or index."""
-        return self._value(self._state.joint_efforts, joint_name_or_idx)
+        return self._value(self._listed.joint_efforts, joint_name_or_idx)
 
     def get_all_joint_vel(self) -> list[float]:
         """Velocities of all joints."""
-        return list(self._state.joint_velocities)
+        return list(self._listed.joint_velocities)
 
     def get_all_joint_effort(self) -> list[float]:
         """Torques and forces of all joints."""
-        return list(self._state.joint_efforts)
+        return list(self._listed.joint_efforts)
 
     def set_joint_pos(self, joint_name_or_idx: str | int, pos: float) -> None:
         """Command the position of a joint.
