@@ -42,8 +42,8 @@ Array = NDArray[np.float64]
 JAW_STIFFNESS = 0.5
 """N·m per radian of following error with which each finger presses: 9 N at the tips of a needle driver at −20°."""
 
-PERIOD = 5
-"""Ticks between two looks at following errors and two writings of an arm's state."""
+WATCH_PERIOD = 5
+"""Ticks between two looks at following errors."""
 
 
 class ArmSet(Mapping[str, Arm]):
@@ -58,7 +58,6 @@ class ArmSet(Mapping[str, Arm]):
         self._by_name = {arm.name: arm for arm in self._arms}
         self._records = [ArmRecord(arm) for arm in self._arms]
         self._ticks = 0
-        self._written = -PERIOD
 
     def __getitem__(self, name: str) -> Arm:
         if name not in self._by_name:
@@ -93,15 +92,12 @@ class ArmSet(Mapping[str, Arm]):
         self._ticks += 1
         for arm in self._arms:
             arm.tick(dt)
-        if self._ticks % PERIOD == 0:
+        if self._ticks % WATCH_PERIOD == 0:
             for arm in self._arms:
-                arm.watch(PERIOD * dt)
+                arm.watch(WATCH_PERIOD * dt)
 
     def write(self, records: NDArray[np.void]) -> None:
-        """Write the state of all arms, ``records`` (arms,), unless that was done less than `PERIOD` ticks ago."""
-        if 0 <= self._ticks - self._written < PERIOD:
-            return
-        self._written = self._ticks
+        """Write the state of all arms, ``records`` (arms,)."""
         for arm_record, record in zip(self._records, records, strict=True):
             arm_record.write(record)
 
@@ -120,11 +116,11 @@ class ArmSet(Mapping[str, Arm]):
 
     def memory(self) -> list[dict[str, Any]]:
         """For snapshots."""
-        return [{"ticks": self._ticks, "written": self._written}, *(arm.memory() for arm in self._arms)]
+        return [{"ticks": self._ticks}, *(arm.memory() for arm in self._arms)]
 
     def recall(self, memory: Sequence[dict[str, Any]]) -> None:
         """Continue from `memory`."""
-        self._ticks, self._written = memory[0]["ticks"], memory[0]["written"]
+        self._ticks = memory[0]["ticks"]
         for arm, kept in zip(self._arms, memory[1:], strict=True):
             arm.recall(kept)
 

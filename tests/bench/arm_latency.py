@@ -83,7 +83,7 @@ def measure() -> tuple[Array, Array]:
     while publisher.get_num_connections() == 0 or not watcher.arrivals:
         time.sleep(0.05)
     latencies = []
-    for k in range(STEPS):
+    for k in range(1, STEPS + 1):
         goal = PoseStamped(pose=crtk.pose_message(crtk.shifted(start, [STEP * (k % 2), 0.0, 0.0])))
         watcher.expect()
         begin = time.perf_counter()

@@ -16,33 +16,41 @@ Array = NDArray[np.float64]
 
 
 class ArmRecord:
-    """Keeps the part of one arm in the state record up to date."""
+    """Keeps the part of one arm in the state record up to date.
+
+    Assigning to a field of a record takes longer than all arithmetic here, so that only what changed is assigned.
+    """
 
     def __init__(self, arm: Arm) -> None:
         self._arm = arm
-        self._described: tuple[bytes, ...] = ()
+        self._status: tuple[Any, ...] = ()
+        self._described: tuple[Any, ...] = ()
 
     def write(self, record: Any) -> None:
         """Fill ``record``, of `ligature.model.state.ARM_DTYPE`, the same each time, with the arm's state now."""
         arm, axes = self._arm, self._arm.joints
-        measured, setpoint = axes.measured(), axes.setpoint
-        state = arm.operating_state
-        record["operating"], record["homed"], record["busy"] = state.state, state.is_homed, state.is_busy
-        record["ratio"] = axes.ratio_v, axes.ratio_a
-        record["reference"] = arm.reference.encode("utf-8")[:64]
-        if isinstance(arm, PsmArm):
-            record["tool"], record["tool_present"] = arm.kinematics.instrument.id, arm.tool_present
-            if arm.jaw is not None:
-                record["jaw_measured_js"] = arm.jaw.axes.measured()[:, 0]
-                record["jaw_setpoint_js"] = arm.jaw.axes.setpoint[:, 0]
-        elif isinstance(arm, MtmArm):
-            record["jaw_measured_js"] = arm.gripper.measured()[:, 0]
-        wrench = arm.spatial_measured_cf()
-        kept = (measured, setpoint, wrench, arm.base_frame, record["tool"], np.bool_(arm.cf_orientation_absolute))
-        described = tuple(value.tobytes() for value in kept)
+        measured, setpoint, wrench = axes.measured(), axes.setpoint, arm.spatial_measured_cf()
+        tool = arm.kinematics.instrument.id if isinstance(arm, PsmArm) else 0
+        present = isinstance(arm, PsmArm) and arm.tool_present
+        status = (arm.operating_state, axes.ratio_v, axes.ratio_a, arm.reference, tool, present)
+        if status != self._status:
+            self._status = status
+            self._tell(record)
+        grip = arm.gripper if isinstance(arm, MtmArm) else arm.jaw.axes if isinstance(arm, PsmArm) and arm.jaw else None
+        if grip is not None:
+            record["jaw_measured_js"], record["jaw_setpoint_js"] = grip.measured()[:, 0], grip.setpoint[:, 0]
+        placed = arm.base_frame.tobytes(), tool, arm.cf_orientation_absolute
+        described = (measured.tobytes(), setpoint.tobytes(), wrench.tobytes(), *placed)
         if described != self._described:
             self._described = described
             self._describe(record, measured, setpoint, wrench)
+
+    def _tell(self, record: Any) -> None:
+        """Fill in what changes seldom."""
+        state, *ratio, reference, record["tool"], record["tool_present"] = self._status
+        record["operating"], record["homed"], record["busy"] = state.state, state.is_homed, state.is_busy
+        record["ratio"] = ratio
+        record["reference"] = reference.encode("utf-8")[:64]
 
     def _describe(self, record: Any, measured: Array, setpoint: Array, wrench: Array) -> None:
         """Fill in what follows from joints (3, n) and wrench (6,), most of the work: only when they changed."""
