@@ -6,8 +6,10 @@ from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
+import ligature
 import numpy as np
 import pytest
+from ligature import Simulation
 from ligature.render import Frame, LightKind, LightSettings, view_of
 from PIL import Image
 
@@ -168,14 +170,65 @@ def test_a_scene_without_lights_is_lit_from_the_eye(tmp_path: Path) -> None:
     text = path.read_text()
     lit = scene.draw().rgb
     path.write_text(text.replace("lights: [L]", "lights: []"))
-    import ligature
-    from ligature import Simulation
     from ligature.render import Renderer
 
     simulation = Simulation(ligature.load(path))
     view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
     unlit = Renderer(simulation.scene).render(simulation.state, view).rgb
     assert unlit.max() > 100 and difference(lit, unlit)[0] > 2
+
+
+def test_a_sky_box_fills_what_is_empty_with_the_right_face(tmp_path: Path) -> None:
+    colours = {"right": (200, 0, 0), "left": (0, 200, 0), "bottom": (0, 0, 200), "top": (200, 200, 0),
+               "front": (0, 200, 200), "back": (200, 0, 200)}  # fmt: skip
+    for name, colour in colours.items():
+        Image.new("RGB", (8, 8), colour).save(tmp_path / f"{name}.png")
+    faces = ", ".join(f"{name}: {name}.png" for name in colours)
+    looks = {"A": ("1, y: 0, z: 0", "right"), "B": ("0, y: -1, z: 0", "top"), "D": ("0, y: 0.01, z: 1", "front")}
+    cameras = "".join(
+        f"{name}: {{name: {name}, location: {{x: 0, y: 0, z: 0}}, look at: {{x: {at}}}, up: {{x: 0, y: 0.1, z: 1}}, "
+        "field view angle: 0.5, publish image resolution: {width: 40, height: 30}}\n"
+        for name, (at, _) in looks.items()
+    )
+    (tmp_path / "world.yaml").write_text(f"cameras: [{', '.join(looks)}]\nskybox: {{path: ./, {faces}}}\n" + cameras)
+    (tmp_path / "model.yaml").write_text(
+        "bodies: [A]\nA: {name: A, mass: 0, shape: SPHERE, geometry: {radius: 0.01}, location: {position: {x: -3, y: 3, z: -3}}}\n"
+    )
+    (tmp_path / "colors.yaml").write_text("white: {r: 255, g: 255, b: 255, a: 255}\n")
+    (tmp_path / "devices.yaml").write_text("input devices: []\n")
+    (tmp_path / "launch.yaml").write_text(
+        "world config: world.yaml\ncolor config: colors.yaml\ninput devices config: devices.yaml\n"
+        "multibody configs: [model.yaml]\n"
+    )
+    simulation = Simulation(ligature.load(tmp_path / "launch.yaml"))
+    for name, (_, face) in looks.items():
+        frame = simulation.cameras[name].capture()
+        assert tuple(frame.rgb[15, 20]) == colours[face]
+        assert (frame.ids == 0).all()
+
+
+def test_optical_flow_is_how_far_pixels_move(tmp_path: Path) -> None:
+    scene = Stage(tmp_path, [ball(RED)], table=None)
+    renderer, simulation = scene.renderer()
+    camera = simulation.scene.cameras[0]
+    view = view_of(camera, simulation.state["camera_world"][0, 0])
+    passes = ("depth", "ids", "flow")
+    assert np.abs(renderer.render(simulation.state, view, passes).flow).max() < 1e-3
+    simulation.bodies["B0"].set_pose([0.01, 0.0, 0.1, 0, 0, 0, 1])
+    simulation.step(1)
+    frame = renderer.render(simulation.state, view, passes)
+    seen = frame.ids == 1
+    expected = view.intrinsics[0, 0] * 0.01 / frame.depth[seen]
+    assert np.abs(frame.flow[seen][:, 0] - expected).max() < 0.02
+    assert np.abs(frame.flow[seen][:, 1]).max() < 0.02
+
+
+def test_parts_tell_materials_of_one_body_apart(tmp_path: Path) -> None:
+    renderer, simulation = Stage(tmp_path, [ball(RED), ball(RED, (0.2, 0, 0.1))]).renderer()
+    view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
+    frame = renderer.render(simulation.state, view, ("ids", "parts"))
+    pairs = set(zip(frame.ids.ravel().tolist(), frame.parts.ravel().tolist(), strict=True))
+    assert len(pairs) == 4 and (0, 0) in pairs and len({part for _, part in pairs}) == 4
 
 
 def brightness(frame: Frame, view, point: np.ndarray) -> float:

@@ -194,6 +194,31 @@ def test_a_preprocessing_shader_paints_labels_and_nothing_between_them(tmp_path:
     assert set(map(tuple, frame.rgb[well_inside(frame, 2)])) == {(153, 102, 26)}
 
 
+def test_a_camera_draws_with_its_preprocessing_shaders(tmp_path: Path, stage) -> None:
+    for ending in ("vert", "frag"):
+        (tmp_path / f"labels.{ending}").write_text(shader(f"labels.{ending}"))
+    block = "preprocessing shaders: {path: ./, vertex: labels.vert, fragment: labels.frag}, clipping plane"
+    _, simulation, _ = stage(scene=SCENE.replace("clipping plane", block))
+    frame = simulation.cameras["C"].capture()
+    assert set(map(tuple, frame.rgb[well_inside(frame, 2)])) == {(153, 102, 26)}
+
+
+def test_depth_compute_shaders_turn_depth_into_points(tmp_path: Path, stage) -> None:
+    from ligature.render import unproject
+
+    for ending in ("vert", "frag"):
+        (tmp_path / f"depth.{ending}").write_text(shader(f"depth.{ending}"))
+    block = "depth compute shaders: {path: ./, vertex: depth.vert, fragment: depth.frag}, clipping plane"
+    renderer, simulation, view = stage(scene=SCENE.replace("clipping plane", block))
+    depth = renderer.render(simulation.state, view, ("depth",)).depth
+    points = renderer.points(depth, view, simulation.scene.cameras[0].depth_shaders)
+    assert renderer.problems == []
+    known = unproject(depth, view)
+    seen = np.isfinite(depth)
+    # the shader writes back, right, up in place of right, down, forward; its depth buffer is in single precision
+    assert np.abs(points[seen] - known[seen][:, [2, 0, 1]] * [-1, 1, -1]).max() < 2e-4
+
+
 PROBES = {
     "gl_LightSource[0].spotCosCutoff": [np.cos(0.6)] * 3,
     "gl_LightSource[0].spotExponent / 2.0": [0.75] * 3,

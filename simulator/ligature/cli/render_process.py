@@ -18,7 +18,7 @@ from ligature.cli.options import RunOptions
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Camera, Scene
 from ligature.model.state import new_state, state_dtype
-from ligature.render import ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
+from ligature.render import CameraView, ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
 from ligature.render.calibration import calibrations
 from ligature.render.shutter import Shutter
 from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
@@ -140,17 +140,26 @@ class Studio:
         view = view_of(camera, self._state["camera_world"][0, index], eye=eye)
         moment = (index, int(self._state["tick"][0]))
         passes = wishes.passes | {"rgb", "depth"} if wishes.cloud else wishes.passes
-        frame = sensor.expose(self._renderer.render(self._state, sensor.view(view), sorted(passes)), view, moment)
+        drawn = self._renderer.render(self._state, sensor.view(view), sorted(passes), camera.preprocessing_shaders)
+        frame = sensor.expose(drawn, view, moment)
         if wishes.passes:
             exposure.topics.publish_picture(Picture(frame.rgb, frame.depth, frame.ids), stamp)
         if wishes.cloud:
-            points = unproject(frame.depth, view)
+            points = self._points(camera, frame.depth, view)
             if camera.depth_noise is not None:
                 mean, deviation, bias = camera.depth_noise
                 random = np.random.default_rng((sensor.seed, *moment))
                 grain = random.standard_normal(frame.depth.shape, dtype=np.float32)
                 points[..., 2] -= np.float32(mean + bias) + np.float32(deviation) * grain
             exposure.topics.publish_cloud(points, frame.rgb, stamp)
+
+    def _points(self, camera: Camera, depth: np.ndarray, view: CameraView) -> np.ndarray:
+        """Points (h, w, 3) in the optical frame, by the camera's own ``depth compute shaders`` where it has some."""
+        if camera.depth_shaders is not None:
+            own = self._renderer.points(depth, view, camera.depth_shaders)
+            if own is not None:
+                return own[..., [1, 2, 0]] * np.array([1, -1, -1], dtype=np.float32)  # from the camera frame (§18.1)
+        return unproject(depth, view)
 
     def _camera(self, index: int) -> Camera:
         """A camera as its parameters have it now; eyes exist from the start or not at all."""

@@ -96,7 +96,8 @@ class CameraHandle:
         """
         state = self._simulation.state
         view = self.view(resolution, eye)
-        frame = self._studio.renderer.render(state, sensor.view(view), passes)
+        shaders = self.camera.preprocessing_shaders
+        frame = self._studio.renderer.render(state, sensor.view(view), passes, shaders)
         return sensor.expose(frame, view, (self.camera.index, int(state["tick"][0])))
 
     def calibration(

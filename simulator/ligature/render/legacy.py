@@ -46,7 +46,7 @@ _UNITS = {"diffuseMap": 0, "albedoMap": 0, "normalMap": 1, "metallicMap": 2, "ro
           "uMatcapMap": 5, "shadowMap": 8, "skybox": 9, "uVolume": 10}  # fmt: skip
 """Texture unit of each sampler that authors use."""
 
-_FIRST_FREE_UNIT = 11
+DIFFUSE_UNIT, _FIRST_FREE_UNIT = _UNITS["diffuseMap"], 11
 
 
 class ShaderError(AdfError):

@@ -65,9 +65,16 @@ class Painter:
     """One picture while it is painted."""
 
     def __init__(
-        self, context: moderngl.Context, brushes: Brushes, batches: Sequence[Batch], seen: Seen, view: CameraView
+        self,
+        context: moderngl.Context,
+        brushes: Brushes,
+        batches: Sequence[Batch],
+        seen: Seen,
+        view: CameraView,
+        before: NDArray[np.float32] | None = None,
     ) -> None:
         self._context, self._brushes, self._seen, self._view = context, brushes, seen, view
+        self._before = before
         self._calls = [(batch, rows) for batch in batches if len(rows := seen.rows(batch))]
 
     @property
@@ -111,7 +118,8 @@ class Painter:
             self._brushes.lights.bind(program)
             program.write("uWorldFromEye", view.view[:3, :3].T)
             bind_surface(program, batch.surface, self._brushes.textures)
-        batch.draw(program, self._seen.instances[rows])
+        program.set("uHalfSize", (view.width / 2, view.height / 2))
+        batch.draw(program, self._seen.instances[rows], None if self._before is None else self._before[rows])
 
     def _draw_own(self, program: Program, batch: Batch, rows: NDArray[np.int64]) -> None:
         """Draw with a scene file's program, which knows no instances."""

@@ -19,8 +19,11 @@ from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
 from ligature.render.context import create_context
 from ligature.render.lights import Lights
+from ligature.render.movement import Movement
 from ligature.render.painter import Brushes, Painter
+from ligature.render.points import computed_points
 from ligature.render.programs import Programs
+from ligature.render.sky import Sky
 from ligature.render.surface import Physical, Surface, surface_of
 from ligature.render.target import PASSES, Frame, Target
 from ligature.render.textures import Textures
@@ -76,6 +79,9 @@ class Renderer:
         resolver = Resolver(scene.roots) if scene.roots else None
         self._brushes = Brushes(self._context, self._programs, self._textures, self._lights, resolver, self.problems)
         self._brushes.prepare(batch.shaders for batch in self._batches)
+        self._brushes.prepare(camera.preprocessing_shaders for camera in scene.cameras)
+        self._sky = Sky.of(self._context, scene, resolver, self.problems)
+        self._movement = Movement()
 
     @property
     def lights(self) -> Lights:
@@ -103,7 +109,8 @@ class Renderer:
         """Draw ``state`` (one-element record) as seen by ``view``; only the ``passes`` that are named.
 
         ``shaders`` draw the colour of every object in place of its own, a camera's ``preprocessing shaders``;
-        such a picture is not smoothed, since its colours may be labels.
+        such a picture is not smoothed, since its colours may be labels. ``flow`` counts from the last picture
+        of the same size that had this pass.
         """
         with self._context:  # several renderers may live in one process
             return self._drawn(state, view, passes, shaders)
@@ -117,16 +124,28 @@ class Renderer:
         if "rgb" in target.passes:
             self._cast_shadows(seen, view)
         target.clear(BACKGROUND)
-        painter = Painter(self._context, self._brushes, self._batches, seen, view)
+        before = self._movement.before(self._instances, view) if "flow" in target.passes else None
+        painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
         self.drawn_triangles = painter.triangles
-        if self._samples or painter.needs_colour_apart(shaders):
+        if self._samples or self._sky is not None or painter.needs_colour_apart(shaders):
             if target.colour is not None:
                 painter.paint(target.colour, ["rgb"], shaders)
+                if self._sky is not None and shaders is None:
+                    self._sky.draw(target.colour, view)
             if target.geometry is not None:
                 painter.paint(target.geometry, [name for name in target.passes if name != "rgb"])
         else:
             painter.paint(target.whole, target.passes)
         return target.read()
+
+    def points(self, depth: NDArray[np.float32], view: CameraView, shaders: ShaderFiles) -> NDArray[np.float32] | None:
+        """What ``depth compute shaders`` make of linear ``depth`` (h, w): the x, y, z (h, w, 3) that they write.
+
+        None when the shaders cannot be used, which `problems` then says.
+        """
+        with self._context:
+            program = self._brushes.own(shaders)
+            return None if program is None else computed_points(self._context, program, depth, view)
 
     def release(self) -> None:
         """Give the OpenGL objects back."""
