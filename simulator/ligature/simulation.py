@@ -29,12 +29,13 @@ from ligature.model.commands import (
     PlaceCommand,
     Release,
     Reset,
+    WatchContacts,
     check,
 )
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
 from ligature.model.scene import Body, Camera, Joint, Scene
-from ligature.model.state import StateRecord, new_state
+from ligature.model.state import MAX_TOUCHES, StateRecord, new_state
 from ligature.physics import World
 from ligature.sensing.actuators import Actuators
 from ligature.sensing.attachments import Attachments
@@ -48,6 +49,9 @@ Handle = TypeVar("Handle")
 
 PHASES = ("control", "suture", "bodies", "sensing", "state")
 """What the time of a tick is spent on, in order."""
+
+LOOK_TICKS = 16
+"""Ticks between two looks at contacts that are watched."""
 
 
 class Stopwatch:
@@ -200,6 +204,7 @@ class Simulation:
         self.problems: list[Diagnostic] = []
         self._tick = 0
         self._resets = 0
+        self._watching = False
         self._world = World(scene, dt)
         self._rods = Rods(scene, dt)
         self._holes = Holes(scene, self._rods, self._world, dt)
@@ -273,6 +278,8 @@ class Simulation:
                 self.problems.append(problem)
         elif isinstance(command, PlaceCommand):
             self._attachments.place(command.kind, command.index, command.pose)
+        elif isinstance(command, WatchContacts):
+            self._watching = command.enabled
         elif isinstance(command, ParentCommand):
             self._attachments.adopt(command.kind, command.index, command.parent)
         elif isinstance(command, ArmCommand):
@@ -377,6 +384,15 @@ class Simulation:
         self._attachments.update(self.state["body_pose"][0])
         self._write_rest()
 
+    def _write_touches(self) -> None:
+        """Contact points and forces for whoever looks at them, as often as eyes can see."""
+        if self._watching and self._tick % LOOK_TICKS < self.ticks_per_update:
+            points, forces = self._world.touches(MAX_TOUCHES)
+            count = self.state["touch_count"][0] = len(points)
+            self.state["touch_point"][0, :count], self.state["touch_force"][0, :count] = points, forces
+        elif not self._watching:
+            self.state["touch_count"] = 0
+
     def _write_rest(self) -> None:
         """Fill everything of the state record but the bodies."""
         state, attachments = self.state, self._attachments
@@ -397,6 +413,7 @@ class Simulation:
             hits.normal,
         )
         self._contacts.write(state)
+        self._write_touches()
         self.grasps.write_state(state)
         self.arms.write(state["arm"][0])
         held = np.array(self._actuators.held, dtype=np.int32)

@@ -15,6 +15,7 @@ from ligature.model.commands import (
     PlaceCommand,
     Release,
     Reset,
+    WatchContacts,
 )
 
 NUMBER = st.floats(allow_nan=False)
@@ -32,6 +33,7 @@ MESSAGES = st.one_of(
     st.builds(ParentCommand, st.sampled_from(["camera", "light"]), st.integers(0, 99), st.none() | st.integers(0, 99)),
     st.builds(Release, st.sampled_from(["body", "actuator", "camera"]), st.integers(0, 99)),
     st.builds(Reset, st.booleans()),
+    st.builds(WatchContacts, st.booleans()),
     st.builds(Throttle, st.booleans(), st.booleans(), st.integers(0, 255)),
 )  # fmt: skip
 

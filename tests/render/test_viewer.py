@@ -90,6 +90,33 @@ def test_a_mouse_that_turns_the_view_leaves_the_camera_where_it_is(
     assert (shown() != same).any()
 
 
+def test_contact_forces_are_asked_for_and_carry_the_weight_of_what_lies_there(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "bodies: [Cube, Floor]\nnamespace: /ambf/env/\n"
+        "Cube: {name: Cube, mass: 0.5, shape: BOX, geometry: {x: 0.1, y: 0.1, z: 0.1}, collision shape: BOX, collision geometry: {x: 0.1, y: 0.1, z: 0.1}, inertia: {ix: 0.01, iy: 0.01, iz: 0.01}, location: {position: {x: 0, y: 0, z: 0.05}}}\n"
+        "Floor: {name: Floor, mass: 0, shape: BOX, geometry: {x: 1, y: 1, z: 0.1}, collision shape: BOX, collision geometry: {x: 1, y: 1, z: 0.1}, location: {position: {x: 0, y: 0, z: -0.05}}}\n"
+    )
+    simulation = Simulation(ligature.load(path))
+    try:
+        viewer = Viewer(simulation.scene, simulation.apply)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    viewer.camera = None
+    simulation.step(300)
+    assert simulation.state["touch_count"][0] == 0
+    before = viewer.picture(simulation.state, SIZE, Figures())
+    viewer.key("N")
+    for _ in range(16):
+        simulation.step()
+    count = int(simulation.state["touch_count"][0])
+    assert abs(simulation.state["touch_force"][0, :count].sum(axis=0)[2]) == pytest.approx(0.5 * 9.8, rel=0.05)
+    assert (viewer.picture(simulation.state, SIZE, Figures()) != before).any(axis=2).sum() > 60
+    viewer.key("N")
+    simulation.step()
+    assert simulation.state["touch_count"][0] == 0
+
+
 def test_pause_step_and_go_on_are_world_commands(viewer: Viewer, sent: list[Any]) -> None:
     viewer.key(".")
     assert sent == []

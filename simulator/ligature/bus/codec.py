@@ -16,6 +16,7 @@ from ligature.model.commands import (
     PlaceCommand,
     Release,
     Reset,
+    WatchContacts,
 )
 
 MAX_JOINTS = 64
@@ -51,6 +52,8 @@ def encode(message: Message) -> bytes:
     if isinstance(message, ParentCommand):
         parent = -1 if message.parent is None else message.parent
         return struct.pack("<BBii", 8, _KINDS.index(message.kind), message.index, parent)
+    if isinstance(message, WatchContacts):
+        return struct.pack("<BB", 9, message.enabled)
     if isinstance(message, ArmCommand):
         return _arm(message)
     if isinstance(message, Release):
@@ -130,4 +133,6 @@ def _decode(data: bytes) -> Message:
     if kind == 8:
         _, what, index, parent = struct.unpack_from("<BBii", data)
         return ParentCommand(_KINDS[what], index, parent if parent != -1 else None)
+    if kind == 9:
+        return WatchContacts(bool(data[1]))
     raise ValueError(f"unknown kind {kind}")

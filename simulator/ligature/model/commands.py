@@ -113,7 +113,14 @@ class Reset:
     bodies_only: bool = False
 
 
-Command = BodyCommand | ActuatorCommand | PlaceCommand | ParentCommand | ArmCommand | Release | Reset
+@dataclass(frozen=True)
+class WatchContacts:
+    """Write contact points and forces into states from now on, or no longer: somebody looks at them."""
+
+    enabled: bool
+
+
+Command = BodyCommand | ActuatorCommand | PlaceCommand | ParentCommand | ArmCommand | Release | Reset | WatchContacts
 
 
 LARGEST = 1e9

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from ligature.model.scene import Scene
 
+MAX_TOUCHES = 64
+"""Most contact points that a watched state lists."""
+
 MAX_CONTACT_EVENTS = 64
 """Most contact points that contact sensors report in one state; more are counted, not listed."""
 
@@ -67,6 +70,8 @@ def state_dtype(scene: Scene) -> StateDtype:
     ``ghost_sensed[g, b]`` tells whether body b overlaps ghost g. ``ray_*`` are the rays of all
     sensors one after the other; ``ray_body`` is -1 for no hit. ``camera_pose`` and ``light_pose``
     are in the parent's frame, as the messages want them; ``*_world`` beside them in world axes.
+    Of ``touch_*`` the first ``touch_count`` rows count, while contacts are watched (`WatchContacts`): where bodies
+    touch, and the force on one of the two.
     Of ``insertion_*`` the first ``insertion_count`` rows count: hole of the scene, needle or element in
     it, metres of it beyond the hole, where it passes and the force on it there, in world axes.
     ``jaw_body`` is what each jaw holds by friction or -1; ``jaw_force`` presses its fingers together, ``jaw_wrench``
@@ -102,6 +107,9 @@ def state_dtype(scene: Scene) -> StateDtype:
             ("contact_distance", "f8", (MAX_CONTACT_EVENTS,)),
             ("contact_point", "f8", (MAX_CONTACT_EVENTS, 3)),
             ("contact_normal", "f8", (MAX_CONTACT_EVENTS, 3)),
+            ("touch_count", "i4"),
+            ("touch_point", "f8", (MAX_TOUCHES, 3)),
+            ("touch_force", "f8", (MAX_TOUCHES, 3)),
             ("actuator_active", "?", (na,)),
             ("actuator_body", "i4", (na,)),
             ("camera_pose", "f8", (nc, 7)),

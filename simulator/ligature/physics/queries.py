@@ -19,7 +19,7 @@ from ligature.model.hits import Contact, RayHits
 from ligature.model.scene import Collider, Scene
 from ligature.physics import shapes
 from ligature.physics.bodies import Placement
-from ligature.physics.wrenches import about, contact_wrench, fixed_wrench
+from ligature.physics.wrenches import about, contact_forces, contact_wrench, fixed_wrench
 
 Array = NDArray[np.float64]
 
@@ -149,6 +149,13 @@ class BulletQueries:
             for uid in {uid for uid, _ in own}
             for found in pybullet.getContactPoints(bodyA=uid, physicsClientId=self.client)
         )
+
+    def touches(self, most: int) -> tuple[Array, Array]:
+        """Where bodies touched in the last tick, (n, 3), and the forces on one of the two, (n, 3); ``most`` of them."""
+        found = [c for c in pybullet.getContactPoints(physicsClientId=self.client) if c[9] > 0.0][:most]
+        if not found:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        return np.array([c[5] for c in found]), contact_forces(found)
 
     def contact_wrench(self, bodies: Sequence[int], point: Array) -> Array:
         """Force and moment (6,) about ``point`` (3,) that the rest of the world exerted on ``bodies`` in the last tick.

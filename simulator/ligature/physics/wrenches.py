@@ -6,7 +6,8 @@ handedness of the three directions of a contact tells which order that was.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -29,13 +30,19 @@ def contact_wrench(
     wrench = np.zeros(6)
     if not rows:
         return wrench
-    on_body, normal, first, second = (np.array([c[k] for c in rows]) for k in (5, 7, 11, 13))
-    press, along_first, along_second = np.array([(c[9], c[10], c[12]) for c in rows]).T[..., None]
-    order = np.sign(np.sum(np.cross(normal, first) * second, axis=1))[:, None]
-    force = press * normal + order * (along_first * first + along_second * second)
+    on_body, force = np.array([c[5] for c in rows]), contact_forces(rows)
     wrench[:3] = force.sum(axis=0)
     wrench[3:] = np.cross(on_body - point, force).sum(axis=0)
     return wrench
+
+
+def contact_forces(rows: Sequence[Any]) -> Array:
+    """Forces (n, 3) on the first body of each of Bullet's contact points, pressure and friction."""
+    normal, first, second = (np.array([c[k] for c in rows]) for k in (7, 11, 13))
+    press, along_first, along_second = np.array([(c[9], c[10], c[12]) for c in rows]).T[..., None]
+    order = np.sign(np.sum(np.cross(normal, first) * second, axis=1))[:, None]
+    forces: Array = press * normal + order * (along_first * first + along_second * second)
+    return forces
 
 
 def fixed_wrench(client: int, constraint: int, pose: Array, T_parent_frame: Array, point: Array) -> Array:

@@ -84,11 +84,13 @@ def joint_axes(scene: Scene, state: NDArray[np.void], size: float) -> list[Segme
     return found
 
 
-def contacts(state: NDArray[np.void], size: float) -> list[Segment]:
-    """The normal of every contact that a contact sensor feels."""
-    count = min(int(state["contact_count"][0]), state["contact_point"].shape[1])
-    points, normals = state["contact_point"][0, :count], state["contact_normal"][0, :count]
-    return [(p, p + size * n, MAGENTA) for p, n in zip(points, normals, strict=True)]
+def contacts(state: NDArray[np.void], size: float) -> tuple[list[Segment], float]:
+    """The force at every point where bodies touch, the largest ``size`` metres long; that force in N."""
+    count = int(state["touch_count"][0])
+    points, forces = state["touch_point"][0, :count], state["touch_force"][0, :count]
+    most = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    scale = size / max(most, 1e-9)
+    return [(p, p + scale * f, MAGENTA) for p, f in zip(points, forces, strict=True)], most
 
 
 def tension(scene: Scene, state: NDArray[np.void]) -> tuple[list[Segment], float]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ligature.bus.codec import Message
 from ligature.bus.pacing import Throttle
-from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release, Reset
+from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release, Reset, WatchContacts
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Colour, Scene, Visual
@@ -127,7 +127,7 @@ class Viewer:
         if "joints" in self.shown:
             found += overlay.joint_axes(self.scene, state, size)
         if "contacts" in self.shown:
-            found += overlay.contacts(state, size)
+            found += overlay.contacts(state, 2.0 * size)[0]
         if "tension" in self.shown:
             found += overlay.tension(self.scene, state)[0]
         if self._hold is not None:
@@ -141,6 +141,8 @@ class Viewer:
         words = [f"{view}   {figures.frame_rate:.0f} frames/s   {pace}   {float(state['sim_time'][0]):.2f} s"]
         if "tension" in self.shown:
             words.append(f"largest thread tension {overlay.tension(self.scene, state)[1]:.3g} N")
+        if "contacts" in self.shown:
+            words.append(f"largest contact force {overlay.contacts(state, 1.0)[1]:.3g} N")
         return words + (list(HELP) if "help" in self.shown else ["H: help"])
 
     def _collision_renderer(self) -> Renderer:
@@ -299,6 +301,8 @@ class Viewer:
             self.next_camera()
         elif key in TOGGLES:
             self.shown ^= {TOGGLES[key][0]}
+            if key == "N":
+                self._send(WatchContacts("contacts" in self.shown))
 
     def _reset_cameras(self) -> None:
         """Put the cameras, and the free view, back to where they were at the start."""
