@@ -124,7 +124,8 @@ class TreeControl:
         self._last_error = np.zeros(n)
         self._kick = np.zeros(n)
         self._kick_ticks = np.zeros(n, dtype=np.int64)
-        self._motor, self._effort = np.zeros(n), np.zeros(n)
+        self._motor, self._effort = np.zeros(n), motions.push[motions.slices[index]]
+        self._laden = False
         self._driven: list[int] = []
         self._stops: dict[int, float] = {}
         self._slowed: dict[int, tuple[float, float, float]] = {}
@@ -285,6 +286,11 @@ class TreeControl:
             pybullet.resetJointState(self.tree.uid, self.links[row], position, velocity, physicsClientId=self._client)
         self._motions.forget(self._index)
 
+    def carry(self) -> None:
+        """From now on the joints bear `Motions.force` of their tree's links, too."""
+        self._laden = True
+        self._sort()
+
     def apply(self) -> None:
         """Set motors and torques of this tick."""
         self._motions.joints(self._index)
@@ -294,6 +300,8 @@ class TreeControl:
             self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor,
             self._effort,
         )  # fmt: skip
+        if self._laden:
+            self._motions.weigh(self._index)
         for row, (low, high, _) in self._slowed.items():
             wanted = np.sign(self.target[row]) * FREE_SPEED if self.mode[row] == FORCE else self._motor[row]
             self._motor[row] = min(max(wanted, low), high)
@@ -339,7 +347,7 @@ class TreeControl:
     def _sort(self) -> None:
         """Sort the axes into those that a motor drives and those that an effort pushes; stop idle motors."""
         by_motor = (self.mode == VELOCITY) | (self.mode == SERVO) | ((self.mode == POSITION) & ~self._force_output)
-        by_effort = self._sprung | (self.mode == FORCE) | ((self.mode == POSITION) & self._force_output)
+        by_effort = self._laden | self._sprung | (self.mode == FORCE) | ((self.mode == POSITION) & self._force_output)
         # An effort whose speed is bounded is a motor of that strength.
         stopped = [*self._stops, *(row for row in self._slowed if self.mode[row] == FORCE)]
         by_motor[stopped], by_effort[stopped] = True, False

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree
 from ligature.physics.bodies import Placement
+from ligature.physics.control import TreeControl
+from ligature.physics.motions import Motions
 
 Array = NDArray[np.float64]
 
@@ -48,13 +50,24 @@ class Lift:
             )
 
 
-def gravity_lifts(client: int, trees: Sequence[Tree], place_of: Mapping[int, Placement], common: Array) -> list[Lift]:
-    """What has to be pushed every tick so that every body feels its own gravity."""
+def gravity_lifts(
+    client: int, scene: Scene, trees: Sequence[Tree], controls: Sequence[TreeControl],
+    place_of: Mapping[int, Placement], motions: Motions, common: Array,
+) -> list[Lift]:  # fmt: skip
+    """What has to be pushed every tick so that every body feels its own gravity.
+
+    Where nobody measures the joints' reactions, the joints carry it: efforts of a whole tree are set in one call.
+    """
     lifts = []
-    for tree in trees:
+    for k, tree in enumerate(trees):
         places = [place_of[body] for body in tree.link_of]
         forces = [place.body.mass * (place.body.gravity - common) for place in places]
         pushed = [i for i, force in enumerate(forces) if np.any(force)]
-        if pushed:
+        measured = any(scene.joints[joint].feedback for _, joint, _, _ in tree.axes)
+        if pushed and tree.static and not measured:
+            for i in pushed:
+                motions.force[places[i].row] = forces[i]
+            controls[k].carry()
+        elif pushed:
             lifts.append(Lift(client, [places[i] for i in pushed], [forces[i] for i in pushed]))
     return lifts

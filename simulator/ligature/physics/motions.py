@@ -80,6 +80,36 @@ def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     out[3], out[4], out[5] = wx, wy, wz
 
 
+@njit(cache=True)
+def _weigh(
+    begin: int, end: int, rows: Integers, fixed: Array, frame: Array, pose: Array, force: Array, load: Array,
+    effort: Array,
+) -> None:  # fmt: skip
+    """Add to ``effort`` what forces (r, 3) at the centres of mass of one tree's links do to its joints.
+
+    The rows are those of `_follow`; ``load`` (r, 6) is scratch: force, and moment about the world's origin.
+    """
+    for r in range(begin, end):
+        x, y, z = force[r, 0], force[r, 1], force[r, 2]
+        cx, cy, cz = pose[r, 0], pose[r, 1], pose[r, 2]
+        load[r, 0], load[r, 1], load[r, 2] = x, y, z
+        load[r, 3], load[r, 4], load[r, 5] = cy * z - cz * y, cz * x - cx * z, cx * y - cy * x
+    for r in range(end - 1, begin, -1):
+        p, kind, joint = rows[r, 0], rows[r, 1], rows[r, 2]
+        if joint >= 0:
+            f, at = frame[r], load[r]
+            ax, ay, az = _turned(f, fixed[r, 0], fixed[r, 1], fixed[r, 2])
+            if kind == _SLIDES:
+                effort[joint] += ax * at[0] + ay * at[1] + az * at[2]
+            else:
+                mx = at[3] - (f[1] * at[2] - f[2] * at[1])
+                my = at[4] - (f[2] * at[0] - f[0] * at[2])
+                mz = at[5] - (f[0] * at[1] - f[1] * at[0])
+                effort[joint] += ax * mx + ay * my + az * mz
+        for a in range(6):
+            load[p, a] += load[r, a]
+
+
 class Motions:
     """Motion of everything in one Bullet world.
 
@@ -94,6 +124,10 @@ class Motions:
         (a,) of all single axes of all trees.
     told
         Efforts of axes, by index, for which Bullet's motor is not the drive: what is reported instead.
+    push
+        (a,) efforts that the controllers apply in the coming tick.
+    force
+        (r, 3) forces at the centres of mass, for `weigh`.
     reaction
         (a, 6) force and moment that the joints of these axes carry, where Bullet measures them.
     """
@@ -111,11 +145,13 @@ class Motions:
         for k, tree in enumerate(trees):
             self._lay_out(k, tree)
         self.pose, self.twist = np.zeros((n, 7)), np.zeros((n, 6))
+        self.force, self._load = np.zeros((n, 3)), np.zeros((n, 6))
         self._frame, self._speed = np.zeros((n, 7)), np.zeros((n, 6))
         self._joints = np.zeros((3, axes[-1]))
         self.position, self.velocity, self.effort = self._joints
         self.told: dict[int, float] = {}
         self.reaction = np.zeros((axes[-1], 6))
+        self.push = np.zeros(axes[-1])
         self._uids = [tree.uid for tree in trees]
         self._still = {k for k, tree in enumerate(trees) if tree.static}
         self._rigid = {k for k, tree in enumerate(trees) if not tree.axes}
@@ -137,6 +173,12 @@ class Motions:
     def row(self, tree: int, link: int) -> int:
         """Row of a link; -1 is the base."""
         return int(self._begin[tree] + 1 + link)
+
+    def weigh(self, tree: int) -> None:
+        """Add what `force` does to the joints of a tree to `push`."""
+        self.links(tree)
+        _weigh(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._frame, self.pose, self.force,
+               self._load, self.push)  # fmt: skip
 
     def measure(self, tree: int) -> None:
         """Fill `reaction` for the axes of a tree from now on."""

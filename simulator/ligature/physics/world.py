@@ -84,7 +84,9 @@ class World(BulletQueries, BulletGrips):
             self._tree_of_joint.update(dict.fromkeys(control.row, control))
         self._jointed = [control for control in self._controls if control.links]
         self._body_controls: dict[int, BodyControl] = {}
-        self._lifts = gravity_lifts(self.client, self.trees, self.place_of, self._world_gravity)
+        self._lifts = gravity_lifts(
+            self.client, scene, self.trees, self._controls, self.place_of, self._motions, self._world_gravity
+        )
         self._damped = self._damping_factors()
         self._silence_pairs()
         self._closures = Closures(self.client, scene, self.place_of, self.report)

@@ -75,6 +75,13 @@ class Axes:
             self._setpoint[:2] = self.plant.read()[:2]
         return self._setpoint
 
+    def readings(self) -> tuple[Array, Array]:
+        """`measured` and `setpoint` with one look at what is driven."""
+        measured = self.plant.read()
+        if self.mode in (Mode.OFF, Mode.EFFORT):
+            self._setpoint[:2] = measured[:2]
+        return measured, self._setpoint
+
     @property
     def goal(self) -> Array:
         """Where the running move ends, or the set-point (n,)."""

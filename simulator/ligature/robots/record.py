@@ -29,7 +29,7 @@ class ArmRecord:
     def write(self, record: Any) -> None:
         """Fill ``record``, of `ligature.model.state.ARM_DTYPE`, the same each time, with the arm's state now."""
         arm, axes = self._arm, self._arm.joints
-        measured, setpoint, wrench = axes.measured(), axes.setpoint, arm.spatial_measured_cf()
+        (measured, setpoint), wrench = axes.readings(), arm.spatial_measured_cf()
         tool = arm.kinematics.instrument.id if isinstance(arm, PsmArm) else 0
         present = isinstance(arm, PsmArm) and arm.tool_present
         status = (arm.operating_state, axes.ratio_v, axes.ratio_a, arm.reference, tool, present)
@@ -38,7 +38,8 @@ class ArmRecord:
             self._tell(record)
         grip = arm.gripper if isinstance(arm, MtmArm) else arm.jaw.axes if isinstance(arm, PsmArm) and arm.jaw else None
         if grip is not None:
-            record["jaw_measured_js"], record["jaw_setpoint_js"] = grip.measured()[:, 0], grip.setpoint[:, 0]
+            opening, wanted = grip.readings()
+            record["jaw_measured_js"], record["jaw_setpoint_js"] = opening[:, 0], wanted[:, 0]
         placed = arm.base_frame.tobytes(), tool, arm.cf_orientation_absolute
         described = (measured.tobytes(), setpoint.tobytes(), wrench.tobytes(), *placed)
         if described != self._described:
