@@ -4,6 +4,7 @@ from pathlib import Path
 
 import bpy
 
+from .compat import HAS_FILE_HANDLER
 from .launch_file import export_scene, import_launch
 from .ligature.adf import AdfError
 from .preview_operators import is_previewing
@@ -192,7 +193,27 @@ def _export_entry(self, context):
     self.layout.operator(ADF_OT_export_scene.bl_idname, text="AMBF Launch File with All Models (.yaml)")
 
 
-CLASSES = (ADF_OT_import, ADF_OT_export, ADF_OT_import_launch, ADF_OT_export_scene)
+def _file_handlers():
+    """Drag and drop of scene files onto the 3D view, where Blender has it (from 4.1)."""
+    if not HAS_FILE_HANDLER:
+        return ()
+
+    class ADF_FH_import(bpy.types.FileHandler):
+        """Opens dropped scene files."""
+
+        bl_idname = "ADF_FH_import"
+        bl_label = "AMBF Description Format"
+        bl_import_operator = "adf.import_file"
+        bl_file_extensions = ".yaml;.yml;.ambf"
+
+        @classmethod
+        def poll_drop(cls, context):
+            return context.area is not None and context.area.type == "VIEW_3D"
+
+    return (ADF_FH_import,)
+
+
+CLASSES = (ADF_OT_import, ADF_OT_export, ADF_OT_import_launch, ADF_OT_export_scene, *_file_handlers())
 
 
 def attach() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from . import making
 from .ligature.authoring.generate import (
+    Holder,
     Needle,
     Thread,
     jaw_grasp_set,
@@ -18,7 +19,7 @@ from .ligature.authoring.generate import (
     suture_hole,
 )
 from .object_operators import active_body, target_file
-from .placing import hang, place, rest_pose
+from .placing import hang, inertial_frame, place, rest_pose
 from .read_file import add_parts, find_open
 
 THREADS = [
@@ -71,7 +72,7 @@ class ADF_OT_add_needle(ThreadSettings, bpy.types.Operator):
             add_parts(collection, suture(self.thread(), needle_end(spec), parent=body.adf.key))
             hang_by_text(collection)
         elif self.with_thread == "CHAIN":
-            add_parts(collection, suture_chain(self.thread(), T @ needle_end(spec), "Thread", body.adf.key, T))
+            add_parts(collection, suture_chain(self.thread(), T @ needle_end(spec), "Thread", holder_of(body)))
         return {"FINISHED"}
 
 
@@ -94,7 +95,7 @@ class ADF_OT_add_suture(ThreadSettings, bpy.types.Operator):
             add_parts(collection, suture(self.thread(), np.linalg.inv(T_parent) @ T, parent=key))
             hang_by_text(collection)
         else:
-            add_parts(collection, suture_chain(self.thread(), T, "Thread", key, T_parent))
+            add_parts(collection, suture_chain(self.thread(), T, "Thread", holder_of(body) if key else None))
         return {"FINISHED"}
 
 
@@ -122,7 +123,7 @@ class ADF_OT_add_hole(bpy.types.Operator):
         body = active_body(context, ("BODY",))
         collection = making.file_of(body)
         parts = suture_hole(
-            self.name, making.cursor_pose(context.scene), body.adf.key, rest_pose(body), self.radius, self.wire,
+            self.name, making.cursor_pose(context.scene), holder_of(body), self.radius, self.wire,
             self.stiffness, 1.0, self.travel,
         )  # fmt: skip
         add_parts(collection, parts)
@@ -169,6 +170,11 @@ class ADF_OT_add_endoscope(bpy.types.Operator):
                 place(camera, T @ rest_pose(camera))
         hang_by_text(collection)
         return {"FINISHED"}
+
+
+def holder_of(body):
+    """A body as what holds a generated part."""
+    return Holder(body.adf.key, rest_pose(body), inertial_frame(body))
 
 
 def hang_by_text(collection):

@@ -20,6 +20,7 @@ COLOURS = {
     "spring": (0.3, 0.9, 0.4, 1.0),
     "inertia": (0.95, 0.3, 0.9, 1.0),
     "ray": (1.0, 0.9, 0.2, 1.0),
+    "thread": (0.45, 0.35, 1.0, 1.0),
 }
 SIZE = 0.03
 """Length in metres of what has no size of its own."""
@@ -31,13 +32,13 @@ def lines_of(scene: bpy.types.Scene) -> dict[str, list[Array]]:
     """Polylines (n, 3) in the world by colour, of all objects that the view layer shows."""
     lines: dict[str, list[Array]] = {name: [] for name in COLOURS}
     for obj in scene.objects:
-        if obj.adf.role not in ("JOINT", "SENSOR", "INERTIAL") or obj.hide_get():
+        if obj.adf.role not in ("JOINT", "SENSOR", "INERTIAL", "SUTURE") or obj.hide_get():
             continue
         try:
             T = rest_pose(obj)
         except ValueError:
             continue  # Check Scene tells it
-        maker = {"JOINT": _joint, "SENSOR": _sensor, "INERTIAL": _inertia}[obj.adf.role]
+        maker = {"JOINT": _joint, "SENSOR": _sensor, "INERTIAL": _inertia, "SUTURE": _suture}[obj.adf.role]
         for colour, line in maker(obj):
             lines[colour].append(line @ T[:3, :3].T + T[:3, 3])
     return lines
@@ -92,6 +93,11 @@ def _sensor(obj: bpy.types.Object):
     for ray in group.array:
         start = np.array(ray.offset)
         yield "ray", np.array([start, start + group.range * np.array(ray.direction)])
+
+
+def _suture(obj: bpy.types.Object):
+    """The thread as it leaves its start, along +Z."""
+    yield "thread", np.array([[0.0, 0.0, 0.0], [0.0, 0.0, obj.adf.suture.length]])
 
 
 def _inertia(obj: bpy.types.Object):

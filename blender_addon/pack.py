@@ -23,7 +23,7 @@ LEFT_OUT = {"mesh/distance.py", "mesh/quality.py", "mesh/coacd_process.py"}
 """Compiled by numba or in need of SciPy, neither of which Blender has."""
 
 NAME = "adf_studio"
-WHEELS = {"PyYAML": "6.0.2", "coacd": "1.0.11"}
+WHEELS = {"PyYAML": "6.0.2", "coacd": "1.0.14"}
 PLATFORMS = {
     "linux-x64": ("manylinux2014_x86_64", "manylinux_2_17_x86_64", "manylinux_2_28_x86_64", "manylinux_2_31_x86_64"),
     "windows-x64": ("win_amd64",),

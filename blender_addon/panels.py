@@ -284,7 +284,7 @@ class ADF_PT_file(Sidebar, bpy.types.Panel):
         row.operator("adf.import_launch", text="Import Launch")
         row.operator("adf.export_scene", text="Export Scene")
         layout.operator_menu_enum("adf.new_file", "kind", text="New File", icon="ADD")
-        collection = chosen_collection(context)
+        collection = making.file_of(context.object) or chosen_collection(context)
         if collection is None:
             return
         box = layout.box()

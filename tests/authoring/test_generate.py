@@ -11,6 +11,7 @@ from ligature.adf.frames import pose_matrix
 from ligature.adf.update import Item, new_text
 from ligature.authoring.generate import (
     STEEL,
+    Holder,
     Needle,
     Parts,
     Thread,
@@ -23,6 +24,7 @@ from ligature.authoring.generate import (
     suture_hole,
 )
 from ligature.authoring.objfile import Paint, Surface, obj_texts
+from ligature.authoring.placement import JointKeys, child_pose
 from ligature.mesh.inertia import mass_properties
 from ligature.mesh.surface import convex_surface
 
@@ -79,10 +81,10 @@ def test_needle_thread_and_hole_simulate_and_stay_finite(tmp_path: Path, chain: 
     T_end = T @ needle_end(Needle())
     thread = Thread(length=0.05, elements=20)
     parts = needle(Needle(), T_world=T) + suture_hole(
-        "Entry1", pose_matrix((0.1, 0, 0.01), (0, 0, 0)), "BODY ground", GROUND_POSE
+        "Entry1", pose_matrix((0.1, 0, 0.01), (0, 0, 0)), Holder("BODY ground", GROUND_POSE)
     )
     parts += (
-        suture_chain(thread, T_end, parent="BODY Needle", T_parent=T)
+        suture_chain(thread, T_end, holder=Holder("BODY Needle", T, needle_frame(parts)))
         if chain
         else suture(thread, needle_end(Needle()), parent="BODY Needle")
     )
@@ -104,6 +106,20 @@ def test_a_grasp_set_refers_to_the_bodies_it_was_given() -> None:
     assert [(i.kind, i.values["parent"]) for i in items] == [
         ("ghost object", "psm1/left"), ("ghost object", "psm1/right"), ("actuator", "psm1/yaw"),
     ]  # fmt: skip
+
+
+def needle_frame(parts: Parts) -> np.ndarray:
+    return pose_matrix(*parts.items[0].values["inertial offset"])
+
+
+def test_a_chain_starts_where_the_needle_ends_also_when_its_principal_axes_are_turned() -> None:
+    inertial = needle_frame(needle(Needle()))
+    assert np.abs(inertial[:3, :3] - np.eye(3)).max() > 0.01
+    items = suture_chain(Thread(), needle_end(Needle()), holder=Holder("BODY Needle", np.eye(4), inertial)).items
+    joint, first = items[-1].values, items[0].values
+    names = ("parent pivot", "child pivot", "parent axis", "child axis", "offset", "joint offset")
+    keys = JointKeys(*(joint[name] for name in names))
+    np.testing.assert_allclose(child_pose(keys, inertial), pose_matrix(*first["location"]), atol=1e-9)
 
 
 def test_an_endoscope_has_two_parallel_eyes() -> None:

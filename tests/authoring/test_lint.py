@@ -184,6 +184,13 @@ def test_every_rule_has_a_seeded_fault() -> None:
     assert set(RULES) <= seeded
 
 
+def test_a_world_is_checked_for_what_worlds_have(tmp_path: Path) -> None:
+    camera = "name: c\n  look at: {x: 1, y: 0, z: 0}\n  clipping plane: {near: 1.0e-6, far: 10}\n"
+    (tmp_path / "w.yaml").write_text(f"environment: e.yaml\nnamespace: /x/\ncameras: [c]\nc:\n  {camera}")
+    resolver = Resolver([tmp_path])
+    assert [f.rule for f in lint(read_any(tmp_path / "w.yaml", resolver), resolver)] == ["clipping-ratio"]
+
+
 def test_real_models_are_checked_without_a_crash(corpus: Path) -> None:
     resolver, severe = Resolver([corpus]), 0
     for file in sorted((corpus / "suturing_scene").rglob("*.yaml")):

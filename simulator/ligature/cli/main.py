@@ -167,6 +167,50 @@ def decompose(
 
 
 @app.command()
+def fmt(
+    files: Annotated[list[Path], typer.Argument(help="Scene files of any kind.")],
+    check: Annotated[bool, typer.Option(help="Only tell files that are not in canonical form.")] = False,
+    lossy: Annotated[bool, typer.Option(help="Write files too whose comments or spare blocks are lost.")] = False,
+) -> None:
+    """Write scene files in canonical form: keys in the schema's order, numbers and vectors in one style."""
+    from ligature.cli.documents import fmt as run_fmt
+
+    raise typer.Exit(run_fmt(files, check, lossy, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def diff(before: Path, after: Path) -> None:
+    """Tell what two scene files say differently, object by object; exit status 1 when they differ."""
+    from ligature.cli.documents import diff as run_diff
+
+    raise typer.Exit(run_diff(before, after, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def inertia(
+    file: Annotated[Path, typer.Argument(help="A mesh, or a model file.")],
+    density: Annotated[float, typer.Option(help="In kg/m³.", min=1e-9)] = 1000.0,
+    mass: Annotated[Optional[float], typer.Option(help="In kg, instead of the density.", min=1e-12)] = None,  # noqa: UP045
+) -> None:
+    """Mass, centre of mass and principal moments of a mesh, or of the bodies of a model, as ADF keys."""
+    from ligature.cli.documents import inertia as run_inertia
+
+    raise typer.Exit(run_inertia(file, density, mass, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(help="A URDF file.")],
+    out: Annotated[Path, typer.Option("-o", help="The model file to write.")],
+    namespace: Annotated[str, typer.Option(help="Namespace of the model.")] = "/ambf/env/",
+) -> None:
+    """Turn a URDF robot into an ADF model with its meshes; tells what ADF cannot express."""
+    from ligature.cli.convert import convert as run_convert
+
+    raise typer.Exit(run_convert(source, out, namespace, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
 def poses(
     file: Launch,
     out: Annotated[Path, typer.Option(help="The npz file to write.")],

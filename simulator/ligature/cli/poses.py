@@ -33,7 +33,7 @@ def poses(
             console.print(str(diagnostic), style="red", markup=False)
         return 1
     simulation = ligature.Simulation(scene, dt=1e-3)
-    names = list(simulation.bodies)
+    names = [body.identity.identifier for body in scene.bodies]
     steps = max(round(1000.0 / rate), 1)
     frames = [np.array([simulation.bodies[name].pose for name in names])]
     while len(frames) * steps <= round(1000.0 * seconds):

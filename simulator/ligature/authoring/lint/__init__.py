@@ -6,6 +6,9 @@ from ligature.adf import Document, Resolver, Severity
 from ligature.authoring.lint import bodies, files, joints
 from ligature.authoring.lint.subject import RULES, Finding, Subject
 
+OF_ALL_FILES = ("duplicate-identifier", "clipping-ratio")
+"""Rules that hold for world files too; all others are about models."""
+
 
 def lint(
     document: Document,
@@ -13,15 +16,16 @@ def lint(
     unsaved: frozenset[str] = frozenset(),
     inflated: frozenset[str] = frozenset(),
 ) -> list[Finding]:
-    """All findings of a model file, the reader's first; ``unsaved`` and ``inflated`` are as in `Subject`."""
+    """All findings of a model or world file, the reader's first; ``unsaved`` and ``inflated`` are as in `Subject`."""
     found = [
         Finding(f"reader:{d.code}", d.severity, _key_of(document, d.message), d.message, d.hint)
         for d in document.diagnostics
         if d.severity >= Severity.WARNING
     ]
     subject = Subject(document, resolver, unsaved, inflated)
-    for check in RULES.values():
-        found += check(subject)
+    for name, check in RULES.items():
+        if document.kind == "model" or name in OF_ALL_FILES:
+            found += check(subject)
     return found
 
 
@@ -31,4 +35,4 @@ def _key_of(document: Document, message: str) -> str:
     return next((key for key in sorted(keys, key=len, reverse=True) if f"'{key}'" in message), "")
 
 
-__all__ = ["RULES", "Finding", "Subject", "bodies", "files", "joints", "lint"]
+__all__ = ["OF_ALL_FILES", "RULES", "Finding", "Subject", "bodies", "files", "joints", "lint"]

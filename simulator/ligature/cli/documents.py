@@ -1,0 +1,151 @@
+"""``ligature fmt``, ``diff`` and ``inertia``: canonical form, differences in meaning, and mass properties of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from ligature.adf import AdfError, Document, Resolver, Severity, read_any
+from ligature.adf.update import given_values, items_of, new_text, same
+from ligature.authoring.generate import mass_keys
+from ligature.authoring.lint.subject import Subject
+from ligature.authoring.save import SaveError, checked_text, save_all
+from ligature.authoring.shapes import shapes_properties
+from ligature.mesh.inertia import MassProperties, mass_properties
+from ligature.mesh.load import EXTENSIONS, load_mesh
+from ligature.mesh.surface import joined
+
+
+def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> int:
+    """Write files in canonical form, or tell those that are not; returns the exit status.
+
+    Comments, anchors and blocks that no list names have no place in the canonical form: a file that
+    has them is left alone unless ``lossy``.
+    """
+    status = 0
+    for file in files:
+        document = _read(file, console)
+        if document is None:
+            status = 1
+            continue
+        text = new_text(document.kind, given_values(document.top), items_of(document))
+        lost = _lost(document)
+        if text == document.text:
+            continue
+        if check:
+            console.print(f"{file}: is not in canonical form", markup=False)
+            status = 1
+        elif lost and not lossy:
+            console.print(f"{file}: left alone, since {lost} would be lost; --lossy takes that", markup=False)
+            status = 1
+        else:
+            status = max(status, _save(file, text, console))
+    return status
+
+
+def _lost(document: Document) -> str:
+    """What the canonical form cannot hold of a file."""
+    if any(line.lstrip().startswith("#") or " #" in line for line in document.text.splitlines()):
+        return "its comments"
+    if any(d.code == "unlisted" for d in document.diagnostics):
+        return "blocks that no list names"
+    return "what cannot be read" if any(d.severity >= Severity.ERROR for d in document.diagnostics) else ""
+
+
+def _save(file: Path, text: str, console: Console) -> int:
+    try:
+        save_all({file.resolve(): checked_text(text, file)})
+    except SaveError as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
+    console.print(f"{file}: written", markup=False)
+    return 0
+
+
+def diff(before: Path, after: Path, console: Console) -> int:
+    """Print what two files say differently, object by object; returns 1 when they differ."""
+    documents = [_read(file, console) for file in (before, after)]
+    if documents[0] is None or documents[1] is None:
+        return 2
+    old, new = ({i.key: (i.kind, dict(i.values)) for i in items_of(d)} for d in documents if d is not None)
+    old[""], new[""] = (("file", given_values(d.top)) for d in documents if d is not None)
+    lines: list[str] = []
+    for key in dict.fromkeys((*old, *new)):
+        if key not in new:
+            lines.append(f"- {old[key][0]} '{key}'")
+        elif key not in old:
+            lines.append(f"+ {new[key][0]} '{key}'")
+        else:
+            lines += _changes(key or "file", old[key][1], new[key][1])
+    for line in lines:
+        console.print(line, markup=False)
+    return int(bool(lines))
+
+
+def _changes(key: str, old: dict[str, object], new: dict[str, object]) -> list[str]:
+    lines = []
+    for path in dict.fromkeys((*old, *new)):
+        before, after = old.get(path), new.get(path)
+        if before is None or after is None or not same(before, after):
+            lines.append(f"  {key}: {path}: {_shown(before)} -> {_shown(after)}")
+    return lines
+
+
+def _shown(value: object) -> str:
+    return "default" if value is None else str(value)
+
+
+def inertia(file: Path, density: float, mass: float | None, console: Console) -> int:
+    """Print the mass properties of a mesh file, or of every body of a model; returns the exit status."""
+    resolver = Resolver.for_file(file)
+    if file.suffix.lower() in EXTENSIONS:
+        try:
+            solid = mass_properties(*joined(load_mesh(file.resolve(), resolver).parts), density)
+        except (AdfError, ValueError) as error:
+            console.print(f"{file}: {error}", style="red", markup=False)
+            return 1
+        _print_solid(file.name, solid if mass is None else solid.with_mass(mass), console)
+        return 0
+    document = _read(file, console)
+    if document is None:
+        return 1
+    subject = Subject(document, resolver)
+    for body in subject.bodies.values():
+        shapes = [(shape, T) for shape, T in subject.shapes(body) if shape.kind != "PLANE"]
+        mesh = subject.mesh(body, "mesh")
+        try:
+            if shapes:
+                solid = shapes_properties(shapes)
+            elif mesh is not None:
+                solid = mass_properties(*joined(mesh.parts))
+            else:
+                raise ValueError("no shape and no mesh")
+        except ValueError as error:
+            console.print(f"{body.key}: {error}", markup=False)
+            continue
+        weight = body.number("mass") if mass is None else mass
+        _print_solid(body.key, solid.with_mass(weight or density * solid.volume), console)
+    return 0
+
+
+def _print_solid(name: str, solid: MassProperties, console: Console) -> None:
+    keys = mass_keys(solid)
+    moments = ", ".join(f"i{a}: {keys[f'inertia.i{a}']:.6g}" for a in "xyz")
+    (x, y, z), (r, p, yaw) = keys["inertial offset"]
+    turned = f", orientation {{r: {r:.6g}, p: {p:.6g}, y: {yaw:.6g}}}" if np.any([r, p, yaw]) else ""
+    console.print(
+        f"{name}: mass {solid.mass:.6g} kg, volume {solid.volume:.6g} m³, inertia {{{moments}}}, "
+        f"position {{x: {x:.6g}, y: {y:.6g}, z: {z:.6g}}}{turned}",
+        markup=False,
+    )
+
+
+def _read(file: Path, console: Console) -> Document | None:
+    try:
+        return read_any(file, Resolver.for_file(file))
+    except AdfError as error:
+        console.print(str(error), style="red", markup=False)
+        return None

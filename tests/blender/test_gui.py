@@ -1,0 +1,106 @@
+"""Blender with a window under Xvfb: panels are drawn, operators are undone, pictures are taken; run by `make test-blender`."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sysconfig
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def display() -> Iterator[str]:
+    """A screen that nobody sees."""
+    binary = shutil.which("Xvfb")
+    if binary is None:
+        pytest.skip("Xvfb is not installed")
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        [binary, "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp"], pass_fds=(write,),
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    os.close(write)
+    with os.fdopen(read) as pipe:
+        number = pipe.readline().strip()
+    yield f":{number}"
+    server.terminate()
+    server.wait(timeout=10)
+
+
+@pytest.fixture
+def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Path]:
+    """What the session found, its output, and the folder of its pictures."""
+    binary = shutil.which("blender")
+    if binary is None:
+        pytest.skip("Blender is not installed")
+    environment = {
+        **os.environ, "DISPLAY": display, "LIBGL_ALWAYS_SOFTWARE": "1", "BLENDER_USER_SCRIPTS": str(scripts),
+        "BLENDER_USER_CONFIG": str(tmp_path / "config"), "PYTHONDONTWRITEBYTECODE": "1",
+        "LIGATURE_TEST_PACKAGES": sysconfig.get_paths()["purelib"],
+    }  # fmt: skip
+    environment.pop("WAYLAND_DISPLAY", None)
+    blank = tmp_path / "blank.blend"  # with a file to open, Blender shows no splash
+    save = f"import bpy; bpy.ops.wm.save_as_mainfile(filepath={str(blank)!r})"
+    subprocess.run(
+        [binary, "-b", "--factory-startup", "--python-expr", save], capture_output=True, timeout=100, check=True
+    )
+    startup = f"import sys; sys.path.append({sysconfig.get_paths()['purelib']!r})"
+    command = [
+        binary,
+        "--factory-startup",
+        "--enable-event-simulate",
+        "--window-geometry",
+        "0",
+        "0",
+        "1280",
+        "800",
+        str(blank),
+        "--python-expr",
+        startup,
+    ]
+    command += ["--python", str(HERE / "gui" / "session.py"), "--", str(tmp_path)]
+    start = time.monotonic()
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=280, check=False, cwd=tmp_path
+    )
+    output = f"{done.stdout}{done.stderr}\nafter {time.monotonic() - start:.0f} s, status {done.returncode}"
+    told = [line for line in done.stdout.splitlines() if line.startswith("RESULT ")]
+    assert told, output[-5000:]
+    return json.loads(told[-1].removeprefix("RESULT ")), output, tmp_path
+
+
+def test_panels_draw_operators_are_undone_and_nothing_is_left(session: tuple[dict, str, Path]) -> None:
+    found, output, folder = session
+    assert found["errors"] == [], "\n".join(found["errors"])
+    assert "Traceback" not in output and "Error: Python" not in output, output[-5000:]
+    assert set(found["drawn"]) >= {
+        "BODY",
+        "JOINT",
+        "SHAPE",
+        "HULL",
+        "INERTIAL",
+        "GHOST_OBJECT",
+        "CAMERA",
+        "LIGHT",
+        "SUTURE",
+    }
+    wrong = {name: how for name, how in found["undone"].items() if how not in ("undone", "same", "poll")}
+    assert wrong == {}
+    assert sum(how == "undone" for how in found["undone"].values()) >= 17, found["undone"]
+    assert found["left"] == []
+    for name in found["pictures"]:
+        assert (folder / f"{name}.png").stat().st_size > 20_000
+    target = os.environ.get("LIGATURE_PICTURES")
+    if target:
+        for name in found["pictures"]:
+            shutil.copy(folder / f"{name}.png", Path(target) / f"{name}.png")
