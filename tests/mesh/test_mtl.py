@@ -115,3 +115,11 @@ def test_a_library_named_a_thousand_times_is_read_once(read) -> None:
 def test_a_library_of_too_many_materials_is_refused(read) -> None:
     with pytest.raises(MeshError, match=r"m.mtl:4097:1: error: the library has more than 4096 materials"):
         read("newmtl a\n" * 5000)
+
+
+def test_physically_based_keys_are_read_and_absent_ones_stay_unknown(read) -> None:
+    found = material(read("newmtl a\nKe 0.1 0.2 0.3\nPr 0.4\nPm 1\nPc 0.5\nPcr 0.05\n"))
+    assert found.emission == (0.1, 0.2, 0.3)
+    assert (found.roughness, found.metallic, found.coat, found.coat_roughness) == (0.4, 1.0, 0.5, 0.05)
+    plain = material(read("newmtl a\nKd 1 1 1\n"))
+    assert (plain.roughness, plain.metallic, plain.coat) == (None, None, None)
