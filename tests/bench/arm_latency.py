@@ -121,9 +121,8 @@ def main() -> int:
     port = 11900 + os.getpid() % 90
     os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
     scene = ROOT / "scenes" / "suturing_small" / "launch.yaml"
-    run = subprocess.Popen(
-        [Path(sys.executable).parent / "ligature", "run", scene, "-p", "500"], stdout=subprocess.DEVNULL
-    )
+    command = (Path(sys.executable).parent / "ligature", "run", scene, "-p", "500", "--no-cameras")
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     try:
         while not master_answers(os.environ["ROS_MASTER_URI"]):
             time.sleep(0.1)

@@ -26,7 +26,7 @@ JOINTS = {
 
 @pytest.fixture(scope="module")
 def simulator(start: Callable[..., Any], arms_scene: Path) -> Any:
-    program = start(BIN / "ligature", "run", arms_scene, "-p", "500")
+    program = start(BIN / "ligature", "run", arms_scene, "-p", "500", "--no-cameras")
     program.wait_for("first state published")
     return program
 

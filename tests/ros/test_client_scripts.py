@@ -27,7 +27,7 @@ SETTLED = (2e-4, 2e-3)
 
 @pytest.fixture(scope="module")
 def simulator(start: Callable[..., Any], arms_scene: Path) -> Any:
-    program = start(BIN / "ligature", "run", arms_scene, "-p", "500")
+    program = start(BIN / "ligature", "run", arms_scene, "-p", "500", "--no-cameras")
     program.wait_for("first state published")
     return program
 
