@@ -107,7 +107,10 @@ def start_master(port: int, env: dict[str, str]) -> subprocess.Popen[bytes]:
     )  # fmt: skip
     deadline = time.monotonic() + 20
     while not master_answers(f"http://127.0.0.1:{port}"):
-        assert time.monotonic() < deadline
+        if time.monotonic() > deadline:
+            master.kill()
+            master.wait()
+            raise AssertionError("the ROS master did not answer within 20 s")
         time.sleep(0.05)
     return master
 

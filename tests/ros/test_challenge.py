@@ -247,21 +247,23 @@ def test_reports_and_joint_errors_travel_over_the_clients_node(stage: Stage) -> 
     from sensor_msgs.msg import ChannelFloat32
 
     node, evaluator = stage.client.get_ral(), ral("evaluation")
-    base = "/surgical_robotics_challenge/completion_report/team"
+    report, errors = (
+        "/surgical_robotics_challenge/completion_report/team/task1/",
+        "/ambf/env/psm1/errors_model/set_errors",
+    )
     received: list[Any] = []
-    report = node.publisher(f"{base}/task1/", PoseStamped, queue_size=1)
-    evaluator.subscriber(f"{base}/task1/", PoseStamped, received.append)
-    errors = node.publisher("/ambf/env/psm1/errors_model/set_errors", ChannelFloat32, queue_size=1)
-    evaluator.subscriber("ambf/env/psm1/errors_model/set_errors", ChannelFloat32, received.append)
-    evaluator.check_connections(5.0)
-    report.publish(PoseStamped())
-    errors.publish(ChannelFloat32(values=[0.1]))
-    deadline = time.monotonic() + 5.0
-    while len(received) < 2:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    node.forget(report)
-    node.forget(errors)
+    ends = [
+        (node, node.publisher(topic, type_, queue_size=1))
+        for topic, type_ in ((report, PoseStamped), (errors, ChannelFloat32))
+    ]
+    ends += [(evaluator, evaluator.subscriber(report, PoseStamped, received.append))]
+    ends += [(evaluator, evaluator.subscriber(errors.strip("/"), ChannelFloat32, received.append))]
+    stage.until(lambda: all(end.get_num_connections() for _, end in ends), 10.0)
+    ends[0][1].publish(PoseStamped())
+    ends[1][1].publish(ChannelFloat32(values=[0.1]))
+    stage.until(lambda: len(received) == 2, 10.0)
+    for owner, end in ends:
+        owner.forget(end)
 
 
 def test_fifty_clock_edges_a_second_are_fifty_updates(stage: Stage) -> None:
