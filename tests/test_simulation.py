@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -203,13 +204,14 @@ def test_ghosts_sense_what_enters_them(sim: Simulation) -> None:
 
 
 def test_ghosts_sense_the_thread_too(tmp_path: Path) -> None:
-    text = (SMALL.parent / "phantom.yaml").read_text()
+    scene = shutil.copytree(SMALL.parent, tmp_path / "scene")
+    text = (scene / "phantom.yaml").read_text()
     ghost = (
         "ghost objects: [GHOST g]\nGHOST g: {name: g, parent: BODY Block, location: {position: {x: -0.035, y: 0.0, z: 0.0152}}, "
         "collision shape: BOX, collision geometry: {x: 0.05, y: 0.01, z: 0.002}}\n"
     )
-    (tmp_path / "phantom.yaml").write_text(text + ghost)
-    simulation = Simulation(ligature.load(tmp_path / "phantom.yaml"))
+    (scene / "phantom.yaml").write_text(text + ghost)
+    simulation = Simulation(ligature.load(scene / "phantom.yaml"))
     simulation.step(5)
     sensed = simulation.state["ghost_sensed"][0, 0]
     inside = {simulation.scene.bodies[b].identity.name for b in np.flatnonzero(sensed)}
