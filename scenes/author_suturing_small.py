@@ -413,7 +413,7 @@ def world() -> dict[str, Any]:
         "light2": {
             "namespace": "lights/", "name": "light2", "parent": "BODY CameraFrame",
             "location": vector((0, 0, 0)), "direction": vector((0, 0, -1)),
-            "spot exponent": 0.9, "cutoff angle": 1.5, "shadow quality": 4,
+            "spot exponent": 0.9, "cutoff angle": 1.5, "shadow quality": 3,
         },
     }  # fmt: skip
     for side, x in (("L", -0.002), ("R", 0.002)):
