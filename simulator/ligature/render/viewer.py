@@ -94,7 +94,8 @@ class Viewer:
         self.shown: set[str] = set()
         self.paused = False
         self._clock = False
-        self.camera: int | None = 0 if scene.cameras else None
+        self._cameras = [camera.index for camera in scene.cameras if camera.visible]
+        self.camera: int | None = self._cameras[0] if self._cameras else None
         self._viewpoint, self._angle = Viewpoint(_middle(scene), 1.0), FREE_ANGLE
         self._hold: _Hold | None = None
         self._view: CameraView | None = None
@@ -195,9 +196,9 @@ class Viewer:
         return float(np.clip(np.linalg.norm(eye - _middle(self.scene, state)), 0.05, 5.0))
 
     def next_camera(self) -> None:
-        """Show the next camera of the scene, and after the last one the free view."""
-        following = 0 if self.camera is None else self.camera + 1
-        self.camera = following if following < len(self.scene.cameras) else None
+        """Show the next visible camera of the scene, and after the last one the free view."""
+        turn = [*self._cameras, None]
+        self.camera = turn[(turn.index(self.camera) + 1) % len(turn)]
 
     def _leave_camera(self) -> None:
         """Take the free viewpoint to where the shown camera stands, turning about what it looks at."""
@@ -309,7 +310,7 @@ class Viewer:
         for camera in self.scene.cameras:
             pose = matrix_pose7(camera.attachment.T_parent_object)
             self._send(PlaceCommand("camera", camera.index, tuple(pose.tolist())))
-        self.camera = 0 if self.scene.cameras else None
+        self.camera = self._cameras[0] if self._cameras else None
         self._viewpoint, self._angle = Viewpoint(_middle(self.scene), 1.0), FREE_ANGLE
 
 
