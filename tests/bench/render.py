@@ -59,16 +59,19 @@ def run_physics(launch: Path, models: tuple[int, ...] | None, ready: Any, stop: 
     result.value = ticks / ((time.perf_counter() - begin) * 1e3)
 
 
-def frames_per_second(draw: Any, seconds: float) -> float:
-    """Median rate of ``draw``, called for ``seconds``."""
+def frames_per_second(draw: Any, seconds: float) -> tuple[float, float]:
+    """Median rate of ``draw``, called for ``seconds``, and the milliseconds of processor time of a frame.
+
+    The second, over all threads, depends little on what else the machine does.
+    """
     draw()
     times: list[float] = []
-    end = time.perf_counter() + seconds
+    used, end = time.process_time(), time.perf_counter() + seconds
     while time.perf_counter() < end or len(times) < 3:
         begin = time.perf_counter()
         draw()
         times.append(time.perf_counter() - begin)
-    return 1.0 / statistics.median(times)
+    return 1.0 / statistics.median(times), (time.process_time() - used) / len(times) * 1e3
 
 
 def beside_physics(launch: Path, models: tuple[int, ...] | None, draw: Any) -> tuple[float, float]:
@@ -78,7 +81,7 @@ def beside_physics(launch: Path, models: tuple[int, ...] | None, draw: Any) -> t
     process = context.Process(target=run_physics, args=(launch, models, ready, stop, factor))
     process.start()
     ready.wait()
-    rate = frames_per_second(draw, SECONDS)
+    rate, _ = frames_per_second(draw, SECONDS)
     stop.set()
     process.join()
     return rate, float(factor.value)
@@ -129,18 +132,19 @@ def main() -> int:
         view = view_of(scene.cameras[0], simulation.state["camera_world"][0, 0], SIZE)
         say = sys.stdout.write
         tiny = Tiny(scene, simulation)
-        reference = frames_per_second(lambda tiny=tiny, view=view: tiny.draw(view), SECONDS)
+        reference, effort = frames_per_second(lambda tiny=tiny, view=view: tiny.draw(view), SECONDS)
         for samples in (4, 0):
             renderer = Renderer(scene, samples)
 
             def draw(renderer: Renderer = renderer, view: CameraView = view, state: Any = simulation.state) -> None:
                 renderer.render(state, view, PASSES)
 
-            alone = frames_per_second(draw, SECONDS)
+            alone, own = frames_per_second(draw, SECONDS)
             loaded, factor = beside_physics(launch, models, draw)
             say(
                 f"{name}, {SIZE[0]}x{SIZE[1]} {'+'.join(PASSES)}, {renderer.triangles} triangles, {samples} samples, "
                 f"{renderer.device}: {alone:.1f} frames/s alone ({alone / reference:.1f} times PyBullet's {reference:.1f}), "
+                f"{own:.0f} ms of processor time a frame (PyBullet's {effort:.0f}), "
                 f"{loaded:.1f} beside physics at real-time factor {factor:.2f}\n"
             )
     return 0
