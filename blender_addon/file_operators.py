@@ -9,7 +9,7 @@ from .launch_file import export_scene, import_launch
 from .ligature.adf import AdfError
 from .preview_operators import is_previewing
 from .read_file import import_file
-from .write_file import ExportError, after_export, export_file
+from .write_file import ExportError, after_export, export_file, export_variants
 
 
 class ADF_OT_import(bpy.types.Operator):
@@ -98,6 +98,63 @@ class ADF_OT_export(bpy.types.Operator):
         for problem in done.problems:
             self.report({"WARNING"}, problem)
         self.report({"INFO"}, f"{path.name}: {len(done.written)} files written")
+        return {"FINISHED"}
+
+
+class ADF_OT_add_variant(bpy.types.Operator):
+    """Add a variant: the same model in another file, under another namespace, moved as a whole"""
+
+    bl_idname = "adf.add_variant"
+    bl_label = "Add Variant"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(
+        name="File", description="Name of the file, beside the model's own", default="variant.yaml"
+    )
+    namespace: bpy.props.StringProperty(name="Namespace", default="/ambf/env/variant/")
+    location: bpy.props.FloatVectorProperty(name="Moved By", size=3, subtype="TRANSLATION")
+    rotation: bpy.props.FloatVectorProperty(name="Turned By", size=3, subtype="EULER")
+
+    @classmethod
+    def poll(cls, context):
+        collection = chosen_collection(context)
+        if collection is None or collection.adf.kind != "MODEL":
+            cls.poll_message_set("Make the collection of a model active")
+            return False
+        return True
+
+    def execute(self, context):
+        variant = chosen_collection(context).adf.variants.add()
+        variant.filepath, variant.namespace = self.filepath, self.namespace
+        variant.location, variant.rotation = self.location, self.rotation
+        return {"FINISHED"}
+
+
+class ADF_OT_export_variants(bpy.types.Operator):
+    """Write all variants of the active model beside it; they share its meshes"""
+
+    bl_idname = "adf.export_variants"
+    bl_label = "Export Variants"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        collection = chosen_collection(context)
+        if collection is None or not len(collection.adf.variants) or not collection.adf.filepath:
+            cls.poll_message_set("Export a model first, and add a variant to it")
+            return False
+        return True
+
+    def execute(self, context):
+        if is_previewing(context.scene):
+            self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
+            return {"CANCELLED"}
+        try:
+            written = export_variants(chosen_collection(context))
+        except ExportError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{len(written)} variants written")
         return {"FINISHED"}
 
 
@@ -213,7 +270,15 @@ def _file_handlers():
     return (ADF_FH_import,)
 
 
-CLASSES = (ADF_OT_import, ADF_OT_export, ADF_OT_import_launch, ADF_OT_export_scene, *_file_handlers())
+CLASSES = (
+    ADF_OT_import,
+    ADF_OT_export,
+    ADF_OT_import_launch,
+    ADF_OT_export_scene,
+    ADF_OT_add_variant,
+    ADF_OT_export_variants,
+    *_file_handlers(),
+)
 
 
 def attach() -> None:

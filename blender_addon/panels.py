@@ -302,6 +302,14 @@ class ADF_PT_file(Sidebar, bpy.types.Panel):
         ):
             if group is not None and hasattr(group, name):
                 box.prop(group, name)
+        for index, variant in enumerate(collection.adf.variants):
+            row = layout.row(align=True)
+            row.prop(variant, "filepath", text=str(index))
+            row.prop(variant, "namespace", text="")
+        if collection.adf.kind == "MODEL":
+            row = layout.row(align=True)
+            row.operator("adf.add_variant", icon="ADD")
+            row.operator("adf.export_variants")
         layout.template_list(
             "ADF_UL_objects", "", collection, "all_objects", context.scene.adf, "active_object", rows=4
         )

@@ -14,14 +14,16 @@ from pathlib import Path
 import bpy
 
 from .ligature.adf import AdfError, Element
+from .ligature.adf.frames import pose_matrix
 from .ligature.adf.nodes import Mapping, parse
 from .ligature.adf.patch import PatchError
 from .ligature.adf.schema import BY_PATH, SCHEMA
 from .ligature.adf.update import Item, given_values, new_text, updated
 from .ligature.authoring.objfile import MeshWriteError, obj_texts
+from .ligature.authoring.placement import matrix_of, pose_of
 from .ligature.authoring.save import SaveError, checked_text, save_all
 from .mesh_data import Textures, mesh_print, surfaces_of
-from .placing import SHAPED, children_with, placed_keys, state_of
+from .placing import SHAPED, children_with, clean, placed_keys, state_of
 from .properties import KIND_OF_ROLE
 from .schema_properties import PLACED, fetch, identifier, keys_of, state_text, store
 
@@ -73,6 +75,32 @@ def text_of(collection: bpy.types.Collection, meshes: dict[str, dict] | None = N
     kept = {obj.adf.was for obj in objects}
     removed = [key for key in json.loads(stored.imported_keys or "[]") if key not in kept]
     return updated(stored.source, kind, top, items, removed)
+
+
+def variant_text(collection: bpy.types.Collection, variant: bpy.types.PropertyGroup) -> str:
+    """The text of the same model under another namespace, moved as a whole; raises ValueError."""
+    motion = pose_matrix(variant.location, variant.rotation)
+    text = text_of(collection)
+    root = parse(text, Path("variant.yaml"))
+    top = {**_top_values("model", root), "namespace": variant.namespace}
+    items = []
+    for obj in members(collection):
+        kind = KIND_OF_ROLE[obj.adf.role]
+        values = given_values(Element(kind, obj.adf.key, root.get(obj.adf.key)))
+        if kind == "body":
+            values["location"] = clean(pose_of(motion @ matrix_of(values.get("location"))))
+        items.append(Item(kind, obj.adf.key, values))
+    return updated(text, "model", top, items)
+
+
+def export_variants(collection: bpy.types.Collection) -> list[Path]:
+    """Write the variants beside the model, whose meshes they share; raises `ExportError`."""
+    folder = Path(bpy.path.abspath(collection.adf.filepath)).parent
+    try:
+        texts = {folder / Path(v.filepath).name: variant_text(collection, v) for v in collection.adf.variants}
+        return save_all({path: checked_text(text, path) for path, text in texts.items()})
+    except (ValueError, AdfError, SaveError, PatchError) as error:
+        raise ExportError(str(error)) from error
 
 
 def after_export(collection: bpy.types.Collection, path: Path, text: str) -> None:

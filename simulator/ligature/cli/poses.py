@@ -34,12 +34,12 @@ def poses(
         return 1
     simulation = ligature.Simulation(scene, dt=1e-3)
     names = [body.identity.identifier for body in scene.bodies]
-    steps = max(round(1000.0 / rate), 1)
-    frames = [np.array([simulation.bodies[name].pose for name in names])]
-    while len(frames) * steps <= round(1000.0 * seconds):
-        simulation.step(steps)
+    ticks = np.rint(np.arange(int(seconds * rate + 1e-9) + 1) * 1000.0 / rate).astype(int)
+    frames = []
+    for wait in np.diff(ticks, prepend=0):
+        simulation.step(int(wait))
         frames.append(np.array([simulation.bodies[name].pose for name in names]))
-    times = np.arange(len(frames)) * steps * 1e-3
+    times = ticks * 1e-3
     np.savez(out, identifiers=np.array(names), times=times, poses=np.array(frames))
     console.print(f"{out}: {len(names)} bodies, {len(frames)} frames", markup=False)
     return 0

@@ -50,11 +50,20 @@ def picture(name):
     RESULT["pictures"].append(name)
 
 
+def plain(value):
+    """A stored value without the address that its own text would show."""
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return str(value)
+
+
 def scene_print():
     told = []
     for obj in sorted(bpy.data.objects, key=lambda o: o.name):
         group = getattr(obj.adf, obj.adf.role.lower(), None)
-        keys = sorted((k, str(v)) for k, v in group.items()) if group is not None and hasattr(group, "items") else []
+        keys = sorted((k, plain(v)) for k, v in group.items()) if group is not None and hasattr(group, "items") else []
         told.append(
             [
                 obj.name,

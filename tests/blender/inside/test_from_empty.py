@@ -121,7 +121,7 @@ def check_simulation(target):
         pytest.skip("set LIGATURE_PYTHON to a Python that has ligature")
     environment = {**os.environ, "PYTHONPATH": os.path.join(os.environ["LIGATURE_ROOT"], "simulator")}
     done = subprocess.run(
-        [python, "-c", SIMULATE, str(target)], capture_output=True, text=True, env=environment, timeout=200
+        [python, "-c", SIMULATE, str(target)], capture_output=True, text=True, env=environment, timeout=270
     )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
@@ -147,3 +147,25 @@ def test_writing_again_changes_nothing(tmp_path):
     bpy.ops.adf.import_launch(filepath=str(target))
     bpy.ops.adf.export_scene(filepath=str(target))
     assert {p: p.read_bytes() for p in target.parent.rglob("*") if p.is_file()} == before
+
+
+def test_simulate_here_plays_the_motion_on_copies(tmp_path, monkeypatch):
+    python = os.environ.get("LIGATURE_PYTHON")
+    if python is None:
+        pytest.skip("set LIGATURE_PYTHON to a Python that has ligature")
+    monkeypatch.setenv("PYTHONPATH", os.path.join(os.environ["LIGATURE_ROOT"], "simulator"))
+    bpy.context.preferences.addons["adf_studio"].preferences.simulator = os.path.join(
+        os.path.dirname(python), "ligature"
+    )
+    bpy.ops.adf.new_file(kind="MODEL", name="scene", namespace="/ambf/env/")
+    ball = mesh_body("ball", (0, 0, 1.0), (0.1, 0.1, 0.1), mass=1.0)
+    bpy.ops.adf.fit_shape(kind="SPHERE")
+    bpy.ops.adf.new_file(kind="WORLD", name="world", namespace="/ambf/env/")
+    before = [list(row) for row in ball.matrix_basis]
+    assert bpy.ops.adf.simulate(seconds=0.25) == {"FINISHED"}
+    assert [list(row) for row in ball.matrix_basis] == before
+    copy = bpy.data.collections["ADF Motion"].objects[0]
+    bpy.context.scene.frame_set(bpy.context.scene.frame_start + 6)
+    assert copy.matrix_world.translation.z == pytest.approx(1.0 - 0.5 * 9.8 * 0.25**2, abs=0.02)
+    bpy.ops.adf.clear_motion()
+    assert "ADF Motion" not in bpy.data.collections and ball.name in bpy.data.objects

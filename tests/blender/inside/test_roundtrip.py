@@ -93,6 +93,24 @@ def test_references_to_other_files_are_kept_and_resolved_when_those_are_open(cor
     assert folder.is_dir()
 
 
+def test_one_instrument_is_written_as_two_files(corpus, tmp_path):
+    file = next(corpus.rglob("LND_400006_SIMPLE/psm1.yaml"))
+    done = import_file(file, bpy.context.scene)
+    export_file(done.collection, tmp_path / "psm1.yaml")
+    done.collection.adf.filepath = str(tmp_path / "psm1.yaml")
+    layers = bpy.context.view_layer
+    layers.active_layer_collection = layers.layer_collection.children[done.collection.name]
+    bpy.ops.adf.add_variant(filepath="psm2.yaml", namespace="/ambf/env/psm2/", location=(0.5, 0.0, 0.0))
+    assert bpy.ops.adf.export_variants() == {"FINISHED"}
+    first, second = (read_any(tmp_path / f"psm{i}.yaml", Resolver([tmp_path])) for i in (1, 2))
+    assert second.top.text("namespace") == "/ambf/env/psm2/"
+    for a, b in zip(first.elements("bodies"), second.elements("bodies"), strict=True):
+        shift = np.subtract(b.pose("location")[0], a.pose("location")[0])
+        np.testing.assert_allclose(shift, [0.5, 0.0, 0.0], atol=1e-6)
+        assert a.key == b.key
+    assert (tmp_path / "psm1.yaml").read_bytes() == file.read_bytes()
+
+
 def test_a_moved_body_writes_its_own_pose_only(corpus, tmp_path):
     file = next(corpus.rglob("Simple/phantom.yaml"))
     done = import_file(file, bpy.context.scene)
