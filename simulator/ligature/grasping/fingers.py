@@ -34,6 +34,9 @@ EFFORT = 0.2
 PUSH, PUSH_SPEED = 2.0, 0.03
 """Force in N with which one finger alone pushes what stands before it, and its speed then, m/s."""
 
+LEAST_LEVER = 1e-3
+"""Distance in metres from the axis of the fingers that counts for everything nearer."""
+
 APPROACH = 4
 """Ticks in which a finger may close its gap."""
 
@@ -98,7 +101,7 @@ class Fingers:
         """Let the fingers close gently on what is this far from them."""
         self._slowed = True
         for joint, opening, face in zip(self.jaw.joints, self.jaw.opening, faces, strict=True):
-            lever = max(face.lever, 1e-3)
+            lever = max(face.lever, LEAST_LEVER)
             speed = (PUSH_SPEED + max(face.gap, 0.0) / (APPROACH * self._world.dt)) / lever
             strength = PUSH * lever if face.gap < 10 * TOUCH else np.inf
             low, high = (-speed, np.inf) if opening > 0.0 else (-np.inf, speed)
@@ -109,6 +112,14 @@ class Fingers:
         self._slowed = True
         for joint, opening, at, tau in zip(self.jaw.joints, self.jaw.opening, positions, effort, strict=True):
             self._world.stop_joint(joint, at, -opening * tau)
+
+    def closer(self, positions: tuple[float, float], way: float, levers: tuple[float, float]) -> tuple[float, float]:
+        """The joint positions at which each pad is ``way`` metres nearer to the other."""
+        one, two = (
+            at - opening * way / max(lever, LEAST_LEVER)
+            for at, opening, lever in zip(positions, self.jaw.opening, levers, strict=True)
+        )
+        return one, two
 
     def let(self) -> None:
         """Let both fingers follow their commands again."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.grasping.fingers import TOUCH, Facing, Fingers
+from ligature.grasping.fingers import LEAST_LEVER, TOUCH, Facing, Fingers
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.scene import Jaw, Scene
 from ligature.model.state import StateRecord
@@ -31,7 +31,10 @@ LOOK = 4
 CREEP = 0.2e-3
 """Slip in metres after which a jaw looks whether the body is still between its pads."""
 
-PRESENT = 0.2e-3
+JUMP = 0.01
+"""Way in metres that no holder goes within a tick unless it is put elsewhere."""
+
+PRESENT = 0.3e-3
 """Gap in metres, that of both pads together, beyond which they have lost the body."""
 
 
@@ -54,13 +57,29 @@ class Held:
 
 @dataclass
 class _Grip:
-    """A grasp and what it needs of its jaw: levers of the pads, joint positions at which the fingers stop."""
+    """A grasp and what it needs of its jaw: levers of the pads, joint positions at which the fingers stop.
+
+    ``pace`` (6,) is the holder's velocity at the body's centre in the last tick, ``holder_at`` (3,) where it was.
+    """
 
     body: int
     grasp: Grasp
     levers: tuple[float, float]
     positions: tuple[float, float]
+    pace: Array
+    holder_at: Array
     checked: float = 0.0
+
+    def jumped(self, holder_at: Array) -> bool:
+        """Whether the holder, now at ``holder_at`` (3,), was put elsewhere since the last call."""
+        before, self.holder_at = self.holder_at, holder_at
+        return bool(np.abs(holder_at - before).max() > JUMP)
+
+    def carry(self, holder: Motion, body: Motion) -> Array:
+        """By how much (6,) the holder's velocity at the body's centre has changed since the last call."""
+        pace = holder.velocity_at(body.pose[:3])
+        change, self.pace = pace - self.pace, pace
+        return change
 
 
 class Grasps(Mapping[str, Held | None]):
@@ -106,6 +125,17 @@ class Grasps(Mapping[str, Held | None]):
         name = self._scene.jaws[index].name
         return Held(name, grip.body, grasp.normal_force, wrench, grasp.slipped.copy(), grasp.share())
 
+    def patch(self, name: str) -> Array:
+        """Pose (4, 4) in world axes of the patch in which a jaw holds, z normal to the pads, x along the fingers.
+
+        Raises ValueError when it holds nothing.
+        """
+        index = [jaw.name for jaw in self._scene.jaws].index(name)
+        grip = self._grips[index]
+        if grip is None:
+            raise ValueError(f"the jaw of {name} holds nothing")
+        return grip.grasp.world_patch(self._world.motion(self._scene.jaws[index].holder)[0])
+
     # --- the tick ---------------------------------------------------------------------------
 
     def step(self, tick: int) -> None:
@@ -142,14 +172,16 @@ class Grasps(Mapping[str, Held | None]):
 
     def _grasp(self, index: int, body: int, faces: tuple[Facing, Facing]) -> None:
         fingers, jaw = self._fingers[index], self._scene.jaws[index]
-        T_world_holder = pose7_matrix(self._world.motion(jaw.holder)[0])
-        T_world_body = pose7_matrix(self._world.motion(body)[0])
+        holder = Motion(*self._world.motion(jaw.holder), 0.0, np.zeros(3))
+        T_world_holder, T_world_body = pose7_matrix(holder.pose), pose7_matrix(self._world.motion(body)[0])
         T_holder_patch = inverse(T_world_holder) @ _patch_pose(fingers, faces)
         friction = self._friction(jaw, self._scene.bodies[body].friction)
         grasp = Grasp(Patch(T_holder_patch, jaw.half_width, friction), inverse(T_world_holder) @ T_world_body)
-        self._grips[index] = grip = _Grip(body, grasp, (faces[0].lever, faces[1].lever), fingers.positions())
+        grasp.begin(holder)
+        levers, pace = (faces[0].lever, faces[1].lever), holder.velocity_at(T_world_body[:3, 3])
+        self._grips[index] = grip = _Grip(body, grasp, levers, fingers.positions(), pace, holder.pose[:3])
         self._take(index, grip)
-        self._world.hold_up(body, True)
+        self._world.hold_up(body, True, gripped=True)
         self._rods.weigh(self._world)
         self._keep(index, grip)
 
@@ -171,17 +203,28 @@ class Grasps(Mapping[str, Held | None]):
         """Press as hard as the commands ask; let go when they open, or when the body has slipped out."""
         fingers = self._fingers[index]
         efforts = fingers.efforts()
-        force = min(effort / max(lever, 1e-3) for effort, lever in zip(efforts, grip.levers, strict=True))
-        if force <= 0.0:
+        force = min(effort / max(lever, LEAST_LEVER) for effort, lever in zip(efforts, grip.levers, strict=True))
+        if force <= 0.0 or grip.jumped(self._world.motion(fingers.jaw.holder)[0][:3]):
             self._let_go(index)
             return
         grip.grasp.normal_force = force
         fingers.stop(grip.positions, (force * grip.levers[0], force * grip.levers[1]))
         if grip.grasp.slipped[0] > grip.checked + CREEP:
-            grip.checked = float(grip.grasp.slipped[0])
-            faces = fingers.facing(grip.body, fingers.jaw.reach)
-            if faces is None or faces[0].gap + faces[1].gap > PRESENT:
-                self._let_go(index)
+            self._look_again(index, grip)
+
+    def _look_again(self, index: int, grip: _Grip) -> None:
+        """Let patch and fingers follow a body that slips; let go when it has slipped out."""
+        fingers = self._fingers[index]
+        grip.checked = float(grip.grasp.slipped[0])
+        faces = fingers.facing(grip.body, fingers.jaw.reach)
+        room = np.inf if faces is None else faces[0].gap + faces[1].gap
+        if faces is None or room > PRESENT:
+            self._let_go(index)
+            return
+        T_holder_world = inverse(pose7_matrix(self._world.motion(fingers.jaw.holder)[0]))
+        grip.grasp.move_patch(T_holder_world @ _patch_pose(fingers, faces))
+        grip.levers = faces[0].lever, faces[1].lever
+        grip.positions = fingers.closer(grip.positions, 0.5 * room, grip.levers)
 
     def _let_go(self, index: int) -> None:
         """End a grasp; contacts stay off until the fingers are clear of the body."""
@@ -190,7 +233,7 @@ class Grasps(Mapping[str, Held | None]):
             return
         self._grips[index] = None
         self._fingers[index].let()
-        self._world.hold_up(grip.body, False)
+        self._world.hold_up(grip.body, False, gripped=True)
         self._rods.weigh(self._world)
         self._near[index] = True
 
@@ -203,18 +246,25 @@ class Grasps(Mapping[str, Held | None]):
         for body, all_holding in by_body.items():
             actuated = self._actuated()
             holding = [i for i in all_holding if body not in [actuated[a] for a in self._actuators[i]]]
-            if not holding:
-                continue
-            grasps = [grip.grasp for grip in (self._grips[i] for i in holding) if grip is not None]
-            holders = [self._scene.jaws[i].holder for i in holding]
-            motions = [Motion(*self._world.motion(holder), 0.0, np.zeros(3)) for holder in holders]
-            impulses = hold_together(grasps, motions, self._free_motion(body), self._world.dt)
-            self._world.apply_impulse(body, impulses[0, :3], impulses[0, 3:])
-            for holder, impulse in zip(holders, impulses[1:], strict=True):
-                self._world.apply_impulse(holder, impulse[:3], impulse[3:])
+            if holding:
+                self._exchange(body, holding)
+
+    def _exchange(self, body: int, holding: list[int]) -> None:
+        """Let the jaws ``holding`` act on one body for the coming tick."""
+        world = self._world
+        grips = [grip for grip in (self._grips[i] for i in holding) if grip is not None]
+        holders = [Motion(*world.motion(self._scene.jaws[i].holder), 0.0, np.zeros(3)) for i in holding]
+        motion = self._free_motion(body)
+        carried = np.mean([grip.carry(holder, motion) for grip, holder in zip(grips, holders, strict=True)], axis=0)
+        world.carry(body, carried)
+        motion.twist[:] += (1.0 - self._scene.bodies[body].mass * motion.inverse_mass) * carried
+        impulses = hold_together([grip.grasp for grip in grips], holders, motion, world.dt)
+        world.apply_impulse(body, impulses[0, :3], impulses[0, 3:])
+        for index, impulse in zip(holding, impulses[1:], strict=True):
+            world.apply_impulse(self._scene.jaws[index].holder, impulse[:3], impulse[3:])
 
     def _free_motion(self, body: int) -> Motion:
-        """How a body would move after the tick were it let go now."""
+        """How a body would move after the tick were it let go now, but for what is added to its mass."""
         pose, twist = self._world.motion(body)
         mass, inertia = self._world.mass_of(body)
         pending, dt = self._world.pending(body), self._world.dt

@@ -12,6 +12,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, inertia_of, is_alone
 from ligature.physics.bodies import Placement
@@ -20,7 +21,7 @@ from ligature.physics.control import TreeControl
 Array = NDArray[np.float64]
 
 LEAST_HELD_MASS = 0.05
-"""Mass in kg that a held body has at least towards forces; its weight stays its own.
+"""Mass in kg that a held body has at least towards forces; its weight stays its own, the rest moves as the holder.
 
 What holds it is an arm of kilograms. A needle of 0.1 g between stiff pads and a taut thread would be thrown
 from one to the other within a tick: a force F meets the next reaction only after F dt²/m, 11 mm for 1 N.
@@ -43,6 +44,7 @@ class BulletGrips:
 
     scene: Scene
     client: int
+    dt: float
     place_of: dict[int, Placement]
     trees: list[Tree]
     _tree_of_joint: dict[int, TreeControl]
@@ -54,6 +56,7 @@ class BulletGrips:
         self._free_bodies = {tree.root for tree in self.trees if is_alone(tree, self.scene.bodies)}
         self._burdens: dict[int, tuple[Placement, Array]] = {}
         self._held_up: dict[int, int] = {}
+        self._gripped: dict[int, int] = {}
 
     def surroundings(self, bodies: Collection[int]) -> tuple[list[int], Array]:
         """Bodies whose boxes meet the common box of ``bodies``, in order, and the corners (2, 3) of that."""
@@ -111,18 +114,23 @@ class BulletGrips:
 
     # --- mass -------------------------------------------------------------------------------
 
-    def hold_up(self, body: int, held: bool) -> None:
-        """Note that one more, or one less, holds ``body``; a held body has at least `LEAST_HELD_MASS`."""
-        count = self._held_up.get(body, 0) + (1 if held else -1)
-        self._held_up[body] = count
-        if body in self._free_bodies and (count == 1 if held else count == 0):
+    def hold_up(self, body: int, held: bool, gripped: bool = False) -> None:
+        """Note that one more, or one less, holds ``body``; one that is ``gripped`` by pads gets heavier itself.
+
+        What a constraint holds is as heavy as its holder anyway.
+        """
+        change = 1 if held else -1
+        for counts in (self._held_up, self._gripped) if gripped else (self._held_up,):
+            counts[body] = counts.get(body, 0) + change
+            if counts[body] == 0:
+                del counts[body]
+        if gripped and body in self._free_bodies:
             self._weigh(body)
-        if count == 0:
-            del self._held_up[body]
 
     def _weigh(self, body: int) -> None:
-        mass, inertia = self.mass_of(body)
+        """Give Bullet the mass that a body has, and note what its weight must be relieved of."""
         place = self.place_of[body]
+        mass, inertia = self.mass_of(body) if body in self._gripped else (place.body.mass, inertia_of(place.body))
         pybullet.changeDynamics(
             place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self.client
         )
@@ -136,23 +144,35 @@ class BulletGrips:
         """Mass and principal moments (3,) by which a body resists forces now."""
         described = self.scene.bodies[body]
         inertia = inertia_of(described)
-        if body in self._free_bodies and self._held_up.get(body, 0) > 0:
+        if body in self._free_bodies and self.is_held(body):
             scale = max(1.0, LEAST_HELD_MASS / described.mass)
             return scale * described.mass, scale * inertia
         return described.mass, inertia
 
     def is_held(self, body: int) -> bool:
         """Whether something holds a body."""
-        return self._held_up.get(body, 0) > 0
+        return body in self._held_up
+
+    def carry(self, body: int, change: Array) -> None:
+        """Move the added mass of a body along with its holders, whose velocity there changed by ``change`` (6,)."""
+        if body in self._burdens:
+            place, _ = self._burdens[body]
+            pose, twist = np.empty(7), np.empty(6)
+            place.read_inertial(pose, twist)
+            mass, inertia = self.mass_of(body)
+            share = 1.0 - place.body.mass / mass
+            R = pose7_matrix(pose)[:3, :3]
+            moment = R @ (inertia * (R.T @ change[3:]))
+            place.load((share / self.dt * np.concatenate([mass * change[:3], moment])).tolist())
 
     def _carry_burdens(self) -> None:
         """Take the weight of added mass off again, for the coming tick."""
         for place, lift in self._burdens.values():
             place.push(lift)
 
-    def _hold_up_again(self, counts: Mapping[int, int]) -> None:
+    def _hold_up_again(self, held_up: Mapping[int, int], gripped: Mapping[int, int]) -> None:
         """Take up the counts of `hold_up` after a rebuild."""
-        self._held_up = dict(counts)
-        for body in self._held_up:
+        self._held_up, self._gripped = dict(held_up), dict(gripped)
+        for body in self._gripped:
             if body in self._free_bodies:
                 self._weigh(body)

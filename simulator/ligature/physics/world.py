@@ -275,6 +275,8 @@ class World(BulletQueries, BulletGrips):
         memory = {
             "trees": trees,
             "controls": [control.memory() for control in self._controls],
+            "held": self.held_constraints(),
+            "held_up": (dict(self._held_up), dict(self._gripped)),
             "bodies": {body: control.memory() for body, control in self._body_controls.items()},
         }
         self.restore(memory)
@@ -282,7 +284,6 @@ class World(BulletQueries, BulletGrips):
 
     def restore(self, memory: dict[str, Any]) -> None:
         """Rebuild the world and continue from `snapshot` (DESIGN §4.6: rebuilding is what is exact)."""
-        held = self.held_constraints()
         self.close()
         self._create()
         for tree, (pose, velocity, joints) in zip(self.trees, memory["trees"], strict=True):
@@ -295,7 +296,8 @@ class World(BulletQueries, BulletGrips):
         for body, kept in memory["bodies"].items():
             control_ = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
             control_.recall(kept)
-        self.hold_again(held)
+        self.hold_again(memory["held"])
+        self._hold_up_again(*memory["held_up"])
         self._motions.forget_all()
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ the fingers opens them. The other two moments have no limit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,10 +77,24 @@ class Grasp:
         self.load = np.zeros(6)
         self.slipped = np.zeros(2)
         self.slides = np.zeros(2, dtype=np.bool_)
+        self.pace, self.lag = np.zeros(6), np.zeros(6)
+
+    def begin(self, holder: Motion) -> None:
+        """Take note of how the holder moves when the grasp begins."""
+        T = self.world_patch(holder.pose)
+        velocity = holder.velocity_at(T[:3, 3])
+        self.pace = np.concatenate([T[:3, :3].T @ velocity[:3], T[:3, :3].T @ velocity[3:]])
 
     def world_patch(self, holder_pose: Array) -> Array:
         """Pose (4, 4) of the patch with the holder's inertial frame at ``holder_pose`` (7,)."""
         return np.asarray(pose7_matrix(holder_pose) @ self.patch.T_holder_patch)
+
+    def move_patch(self, T_holder_patch: Array) -> None:
+        """Let the pads touch elsewhere, with nothing else changed."""
+        T_holder_body = self.patch.T_holder_patch @ pose7_matrix(self.held)
+        self.patch = replace(self.patch, T_holder_patch=T_holder_patch)
+        self._patch = matrix_pose7(T_holder_patch)
+        self.held = matrix_pose7(inverse(T_holder_patch) @ T_holder_body)
 
     def share(self) -> float:
         """How much of what friction can carry was used in the last tick, 0 to 1."""
@@ -99,6 +113,8 @@ def hold_together(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Moti
         np.array([(*g.patch.limits(g.normal_force), max(g.normal_force, LEAST_FORCE)) for g in grasps]),
         np.zeros((len(grasps), 6)),
         np.array([g.slipped for g in grasps]),
+        np.array([g.pace for g in grasps]),
+        np.array([g.lag for g in grasps]),
         np.zeros((len(grasps), 2), dtype=np.bool_),
     )
     impulses = np.zeros((1 + len(grasps), 6))
@@ -108,4 +124,5 @@ def hold_together(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Moti
     )  # fmt: skip
     for g, grasp in enumerate(grasps):
         grasp.held, grasp.load, grasp.slipped, grasp.slides = pads.held[g], pads.load[g], pads.slid[g], pads.slides[g]
+        grasp.pace, grasp.lag = pads.pace[g], pads.lag[g]
     return impulses

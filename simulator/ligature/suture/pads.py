@@ -27,6 +27,9 @@ MAX_NEWTON = 50
 STIFFNESS, DAMPING = 2e4, 60.0
 """Of pads against translation, N/m and N s/m: two tools that disagree by 0.1 mm pull 1 N."""
 
+CATCH_UP = 0.02
+"""Seconds in which a body catches up with what its holder moved on while the tick was under way."""
+
 TURN_STIFFNESS, TURN_DAMPING = 2.0, 5e-3
 """Of pads against rotation, N m/rad and N m s/rad: 1 N at the tip of a needle turns it by half a degree."""
 
@@ -46,6 +49,8 @@ class Pads(NamedTuple):
     limits: Array  # (g, 3) largest tangential force, moment about the normal, and normal force
     load: Array  # (g, 6) on the body, in patch axes: N, N m
     slid: Array  # (g, 2) way and angle that the body has slipped: m, rad
+    pace: Array  # (g, 6) velocity of the holder at the patch in the last tick, in patch axes
+    lag: Array  # (g, 6) how far the body has yet to catch up with the holder, in patch axes
     slides: NDArray[np.bool_]  # (g, 2) whether it slides along the pads, and pries them apart
 
 
@@ -247,7 +252,8 @@ def hold(body_pose, body_twist, inverse_mass, inverse_inertia, holder_pose, hold
     """Impulses of one tick: ``impulse[0]`` (6,) on the body, ``impulse[1 + g]`` on the holder of jaw g.
 
     All are about the centres of mass, in world axes. ``body_twist`` (6,) is as it would be after the tick were
-    the body let go. Holders move as they do. Loads, held poses and slips of ``pads`` are brought up to date.
+    the body let go. Holders move as they do; that they gain or lose speed within the tick shows in the next
+    one as a lag of the body, which is made up in time without force. ``pads`` are brought up to date.
     """
     n = pads.patch.shape[0]
     _inverse_inertia(body_pose, inverse_inertia, room.S, room.W)
@@ -259,6 +265,10 @@ def hold(body_pose, body_twist, inverse_mass, inverse_inertia, holder_pose, hold
         _velocity(room.R[g], holder_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
         _soften(g, inverse_mass, at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
         for row in range(6):
+            change = room.drift[g, row] - pads.pace[g, row]
+            pads.pace[g, row] = room.drift[g, row]
+            pads.lag[g, row] = (1.0 - dt / CATCH_UP) * pads.lag[g, row] - dt * change
+            room.error[g, row] -= pads.lag[g, row]
             pads.load[g, row] = 0.0
     for _ in range(SWEEPS):
         bounded = False
