@@ -338,7 +338,7 @@ class Simulation:
             "grasps": self.grasps.memory(),
         }
         self._holes.restart()
-        self._ghosts.restart()
+        self._ghosts.forget()
         self.grasps.recall(parts["grasps"])
         self._write_state()
         return Snapshot(copy.deepcopy(parts))
@@ -352,7 +352,7 @@ class Simulation:
         self._holes.recall(parts["holes"])
         self._attachments.recall(parts["attachments"])
         self.arms.recall(parts["arms"])
-        self._ghosts.restart()
+        self._ghosts.forget()
         self._actuators.recall(parts["actuators"])
         self.grasps.recall(parts["grasps"])
         self._write_state()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import NEEDLE_AT, Theatre
+
+from tests.grasping.theatre import NEEDLE_AT, Theatre
 
 FRICTION = 0.25
 """Of pads on the needle: 0.5 each, and contacts multiply."""

@@ -193,10 +193,6 @@ class Ghosts:
                 ghost_world, body_pose, self._elements, self._half_lengths, self._radii, self.sensed,
             )  # fmt: skip
 
-    def restart(self) -> None:
-        """Forget what was seen, so that the next update asks about everything again."""
-        self._seen_ghost[:], self._seen_body[:] = np.nan, np.nan
-
     def _ask_about_bodies(self, ghost_world: Array, bodies: Array) -> None:
         for ghost in np.flatnonzero(self._ask.any(axis=1)):
             asked = np.flatnonzero(self._ask[ghost])
