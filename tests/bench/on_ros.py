@@ -20,7 +20,7 @@ CORPUS = Path(os.environ.get("LIGATURE_CORPUS", ROOT.parent / "shared" / "corpus
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
 UPDATES = 200.0
 UNTHROTTLED = "100"
-SECONDS = 12
+SECONDS = 8
 SETTLING = 4
 
 

@@ -89,6 +89,10 @@ class Fingers:
         """Whether a body touches a finger."""
         return any(self._world.gaps(own, body, 0.0) is not None for own in self.jaw.fingers)
 
+    def driven(self) -> bool:
+        """Whether a command moves a finger: limp ones grasp nothing."""
+        return any(self._world.joint_driven(joint) for joint in self.jaw.joints)
+
     def efforts(self) -> tuple[float, float]:
         """Efforts (N m) with which the commands of both fingers would close them; negative ones open."""
         one, two = (

@@ -143,7 +143,7 @@ class Grasps(Mapping[str, Held | None]):
         for index, grip in enumerate(self._grips):
             if grip is not None:
                 self._keep(index, grip)
-            elif self._near[index] or (tick + index) % LOOK == 0:
+            elif self._near[index] or ((tick + index) % LOOK == 0 and self._fingers[index].driven()):
                 self._look(index)
         self._hold()
 

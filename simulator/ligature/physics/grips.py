@@ -16,7 +16,7 @@ from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, inertia_of, is_alone
 from ligature.physics.bodies import Placement
-from ligature.physics.control import TreeControl
+from ligature.physics.control import FREE, TreeControl
 
 Array = NDArray[np.float64]
 
@@ -98,6 +98,11 @@ class BulletGrips:
     def let_joint(self, joint: int) -> None:
         """End `stop_joint` and `slow_joint`."""
         self._tree_of_joint[joint].let(joint)
+
+    def joint_driven(self, joint: int) -> bool:
+        """Whether anything commands a joint; else it is limp."""
+        control = self._tree_of_joint[joint]
+        return bool(control.mode[control.row[joint]] != FREE)
 
     def joint_position(self, joint: int) -> float:
         """Where a joint is now."""
