@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-BENCHMARKS = ("scenes", "latency", "arm_latency", "kinematics", "cameras", "render")
+BENCHMARKS = ("scenes", "on_ros", "latency", "arm_latency", "kinematics", "cameras", "render")
 
 
 def main() -> int:
