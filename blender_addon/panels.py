@@ -301,7 +301,9 @@ class ADF_PT_file(Sidebar, bpy.types.Panel):
             "environment",
         ):
             if group is not None and hasattr(group, name):
-                box.prop(group, name)
+                row = box.column()
+                row.active = group.is_property_set(name)  # what the file does not give is dim
+                row.prop(group, name)
         for index, variant in enumerate(collection.adf.variants):
             row = layout.row(align=True)
             row.prop(variant, "filepath", text=str(index))
