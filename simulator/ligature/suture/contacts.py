@@ -17,6 +17,9 @@ from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 SLACK = 0.5
 """Distance, in radii, at which a contact is found although nothing moves."""
 
+THROWN = 4.0
+"""Most radii by which tension widens the search for contacts with bodies."""
+
 RECOVERY = 0.1
 """Speed in m/s at which a rod that starts inside a body is pushed out."""
 
@@ -28,16 +31,16 @@ GROUP = 8
 
 
 @kernel
-def detect(first, n, nodes, shapes, old, new, work, counts, self_skip, dt):
+def detect(first, n, nodes, shapes, old, new, work, tension, counts, self_skip, dt):
     """Fill ``new`` with the contacts of elements ``first`` … ``first + n - 1``; ``old`` are the last tick's.
 
-    ``counts`` returns the contacts found, and those for which there was no room. Bonds that already
-    stand at the head of ``new`` stay.
+    ``tension`` (elements,) is that of the last tick. ``counts`` returns the contacts found, and those for
+    which there was no room. Bonds that already stand at the head of ``new`` stay.
     """
     bonds = new.count[0]
     capacity = new.node.shape[0]
     _world_segments(first, n, nodes, work, dt)
-    missed = _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt)
+    missed = _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt)
     settled = new.count[0]
     missed += _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip)
     _sort(new, settled)
@@ -81,7 +84,7 @@ def _distance(a, b):
 
 
 @inlined
-def _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt):
+def _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt):
     missed = 0
     p, normal, R = work.three[0], work.three[1], work.R[nodes.x.shape[0]]
     for c in range(shapes.node.shape[0]):
@@ -94,18 +97,21 @@ def _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt):
         sweep = shapes.sweep[c]
         for e in range(n):
             box = work.box[e]
+            # A light taut element is thrown farther in a tick than its motion tells.
+            thrown = min(abs(tension[e]) * dt * dt / nodes.mass[first + e], THROWN * nodes.radius[first + e])
+            margin = sweep + thrown
             outside = False
             for a in range(3):
-                if box[0, a] > shapes.box[c, 1, a] + sweep or box[1, a] < shapes.box[c, 0, a] - sweep:
+                if box[0, a] > shapes.box[c, 1, a] + margin or box[1, a] < shapes.box[c, 0, a] - margin:
                     outside = True
             if outside or shapes.skip[c, e]:
                 continue
             segment = work.segment[e]
-            reach = nodes.radius[first + e] + work.reach[e] + sweep
+            reach = nodes.radius[first + e] + work.reach[e] + margin
             s, d = _deepest(shapes.kind[c], shapes.size[c], planes, pose, R, segment, reach,
                             nodes.radius[first + e], p, normal)  # fmt: skip
             nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
-            if d > reach or _recede(nodes, work, e, k, s, d - nodes.radius[first + e], nx, ny, nz, dt):
+            if d > reach or _recede(nodes, work, e, k, s, d - nodes.radius[first + e] - thrown, nx, ny, nz, dt):
                 continue
             if new.count[0] == capacity:
                 missed += 1
@@ -158,14 +164,18 @@ def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
     slope = normal[0] * tx + normal[1] * ty + normal[2] * tz
     low, high, s = 0.0, 1.0, 0.5
     near = 1.0 if slope < 0.0 else 0.0
-    _depth_at(kind, size, planes, pose, R, segment, near, p, normal)
+    end = _depth_at(kind, size, planes, pose, R, segment, near, p, normal)
     end_slope = normal[0] * tx + normal[1] * ty + normal[2] * tz
     if slope * end_slope >= 0.0:
         # Downhill all the way: the lower end, or between it and the middle where the slope is slight.
         tilt = abs(end_slope)
         share = 1.0 if tilt <= BLEND * radius else BLEND * radius / tilt
         s = near + (0.5 - near) * share
-        return s, _depth_at(kind, size, planes, pose, R, segment, s, p, normal)
+        depth = _depth_at(kind, size, planes, pose, R, segment, s, p, normal)
+        if depth <= end + BLEND * radius:
+            return s, depth
+        # Not over one face: the part curves away below, as a needle under a joint of the thread.
+        return near, _depth_at(kind, size, planes, pose, R, segment, near, p, normal)
     if near == 1.0:
         low = 0.5
     else:

@@ -89,12 +89,12 @@ def _scale_loads(joints, factor):
 
 @inlined
 def _one_step(
-    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, counts, self_skip,
+    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, tension, counts, self_skip,
     stiffness, h, part,
 ):  # fmt: skip
     new.count[0] = 0
     place_bonds(nodes, work, new, grips, points)
-    detect(first, work.segment.shape[0], nodes, shapes, old, new, work, counts, self_skip, h)
+    detect(first, work.segment.shape[0], nodes, shapes, old, new, work, tension, counts, self_skip, h)
     return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, part == 0, (part + 1) * h)
 
 
@@ -126,8 +126,8 @@ def run_tick(
         old, new = a, b
         for part in range(parts):
             more, fine = _one_step(
-                first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, counts,
-                self_skip, stiffness, h, part,
+                first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, tension,
+                counts, self_skip, stiffness, h, part,
             )  # fmt: skip
             steps += more
             settled = settled and fine
