@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError
 from ligature.adf.nodes import parse
+
+WRITERS = 16
+"""Files that are written at a time."""
 
 
 class SaveError(OSError):
@@ -22,10 +26,13 @@ def save_all(files: Mapping[Path, bytes]) -> list[Path]:
     be written leaves everything as it was. Returns the paths that were written. Raises `SaveError`.
     """
     changed = {path: data for path, data in files.items() if _content(path) != data}
-    staged: list[tuple[str, Path]] = []
+    with ThreadPoolExecutor(WRITERS) as pool:  # most of the time goes to waiting for the disk
+        writing = [(pool.submit(_staged, path, data), path) for path, data in changed.items()]
+    staged = [(job.result(), path) for job, path in writing if job.exception() is None]
+    failed = [job.exception() for job, _ in writing if job.exception() is not None]
     try:
-        for path, data in changed.items():
-            staged.append((_staged(path, data), path))
+        if failed:
+            raise failed[0] or OSError()
         for name, path in staged:
             os.replace(name, path)
     except OSError as error:
