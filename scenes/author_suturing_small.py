@@ -457,9 +457,9 @@ class Dumper(yaml.SafeDumper):
         return True
 
 
-def text(document: dict[str, Any]) -> str:
-    """The YAML text of one file."""
-    header = "# Written by scenes/author_suturing_small.py\n"
+def text(document: dict[str, Any], script: str = "author_suturing_small.py") -> str:
+    """The YAML text of one file, which names the script that wrote it."""
+    header = f"# Written by scenes/{script}\n"
     return header + yaml.dump(document, Dumper=Dumper, sort_keys=False, default_flow_style=None, width=110)
 
 

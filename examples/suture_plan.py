@@ -1,0 +1,142 @@
+"""Geometry of a throw: how a needle turns through two holes, and how a tool must hold it to reach all of that.
+
+World axes, metres, radians. Frames: *arc*, at the centre of the needle's circle with the plane's normal as z, so that
+the needle runs from base to tip with growing angle about z; *tool*, the tip frame of a PSM: z along the instrument, x
+along the axis of its jaw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from ligature.model.frames import axis_rotation, frame, inverse, pose7_matrix
+from ligature.model.piercing import Needle
+from ligature.model.scene import Body
+from ligature.robots.psm import Psm
+
+Array = np.ndarray
+
+PAD = 0.0078
+"""Metres from the control point of a tool to the middle of its pads."""
+
+TILTS = np.radians(np.arange(-50, 51, 10))
+"""Angles by which a tool may lean about the needle's tangent."""
+
+PIVOTS = np.radians(np.arange(-40, 41, 10))
+"""Angles by which it may turn about the needle's radius."""
+
+
+@dataclass(frozen=True)
+class NeedleArc:
+    """A needle as a part of a circle: ``T_body_arc`` (4, 4), ``radius``, and ``begin`` < ``end`` from base to tip."""
+
+    T_body_arc: Array
+    radius: float
+    begin: float
+    end: float
+
+    @classmethod
+    def of(cls, needle: Needle, body: Body) -> NeedleArc:
+        """The arc of a scene's needle."""
+        arc = needle.arc
+        R = np.column_stack([arc.x, arc.y, np.cross(arc.x, arc.y)])
+        return cls(body.T_body_inertial @ frame(R, arc.centre), arc.radius, arc.begin, arc.end)
+
+    @property
+    def length(self) -> float:
+        """Length from base to tip."""
+        return self.radius * (self.end - self.begin)
+
+    def angle(self, depth: float) -> float:
+        """The angle at which ``depth`` metres are left to the tip."""
+        return self.end - depth / self.radius
+
+
+@dataclass(frozen=True)
+class Grip:
+    """How a tool holds a needle: ``depth`` metres from its tip; ``tilt``, ``pivot`` and ``flipped`` say which way."""
+
+    depth: float
+    tilt: float
+    pivot: float
+    flipped: bool
+
+    def T_arc_tool(self, arc: NeedleArc) -> Array:
+        """Pose (4, 4) of the tool in the arc frame."""
+        a = arc.angle(self.depth)
+        out, along, normal = np.array([np.cos(a), np.sin(a), 0.0]), np.array([-np.sin(a), np.cos(a), 0.0]), [0.0, 0, 1]
+        R = np.column_stack([along, np.cross(normal, along), normal])
+        R = axis_rotation(out, self.pivot) @ axis_rotation(along, self.tilt) @ R
+        if self.flipped:
+            R = R @ axis_rotation((0.0, 0.0, 1.0), np.pi)
+        return frame(R, arc.radius * out - PAD * R[:, 2])
+
+
+@dataclass(frozen=True)
+class Throw:
+    """The circle on which a needle goes in at ``entry`` and out at ``exit``, both (3,), under the surface ``up``."""
+
+    centre: Array
+    normal: Array
+    towards_entry: float
+    towards_exit: float
+    axes: Array
+
+    @classmethod
+    def through(cls, entry: Array, exit: Array, radius: float, up: Array) -> Throw:
+        """The circle of ``radius`` through both holes, its centre above them."""
+        chord = exit - entry
+        length = float(np.linalg.norm(chord))
+        if length >= 2.0 * radius:
+            raise ValueError(f"holes {1e3 * length:.1f} mm apart are too far for a needle of radius {1e3 * radius:.1f} mm")
+        forward = chord / length
+        up = up - (up @ forward) * forward
+        up = up / np.linalg.norm(up)
+        normal = np.cross(up, forward)
+        normal = -normal if np.cross(normal, -up) @ forward < 0 else normal
+        centre = (entry + exit) / 2 + np.sqrt(radius**2 - (length / 2) ** 2) * up
+        x = (entry - centre) / radius
+        axes = np.column_stack([x, np.cross(normal, x), normal])
+        way = axes.T @ (exit - centre)
+        return cls(centre, normal, 0.0, float(np.arctan2(way[1], way[0]) % (2 * np.pi)), axes)
+
+    def T_world_arc(self, tip: float, arc: NeedleArc) -> Array:
+        """Pose (4, 4) of the arc frame with the tip at the angle ``tip`` past the entry."""
+        return frame(self.axes @ axis_rotation((0.0, 0.0, 1.0), tip - arc.end), self.centre)
+
+
+def grips(depths: Sequence[float]) -> Iterator[Grip]:
+    """All ways to hold a needle that are worth a try."""
+    for depth in depths:
+        for tilt in TILTS:
+            for pivot in PIVOTS:
+                for flipped in (False, True):
+                    yield Grip(depth, float(tilt), float(pivot), flipped)
+
+
+def best_grip(
+    arc: NeedleArc, depths: Sequence[float], kinematics: Psm, T_world_base: Array, poses: Sequence[Array]
+) -> Grip | None:
+    """The grip with which a tool reaches all ``poses`` (k, 4, 4) of the arc, farthest from the limits of its joints."""
+    T_base = inverse(T_world_base)
+    best, best_margin = None, 0.0
+    span = kinematics.upper - kinematics.lower
+    for grip in grips(depths):
+        T_arc_tool = grip.T_arc_tool(arc)
+        wanted = np.array([T_base @ T @ T_arc_tool for T in poses])
+        found = kinematics.inverse(wanted)
+        if not found.ok.all():
+            continue
+        inside = np.minimum(found.q - kinematics.lower, kinematics.upper - found.q) / span
+        inside[:, 3] = 0.5
+        margin = float(inside.min()) - 0.05 * abs(grip.tilt) - 0.05 * abs(grip.pivot)
+        if best is None or margin > best_margin:
+            best, best_margin = grip, margin
+    return best
+
+
+def pose_of(pose7: Array) -> Array:
+    """A pose (7,) as a matrix."""
+    return pose7_matrix(np.asarray(pose7))
