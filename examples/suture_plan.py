@@ -18,8 +18,11 @@ from ligature.robots.psm import Psm
 
 Array = np.ndarray
 
-PAD = 0.0078
-"""Metres from the control point of a tool to the middle of its pads."""
+PAD = 0.0094
+"""Metres from the control point of a tool to where it holds: near the end of its fingers, as the needle lies flat."""
+
+JUMP = 1.0
+"""Radians between two poses of a way beyond which a joint would swing round."""
 
 TILTS = np.radians(np.arange(-50, 51, 10))
 """Angles by which a tool may lean about the needle's tangent."""
@@ -117,20 +120,32 @@ def grips(depths: Sequence[float]) -> Iterator[Grip]:
 
 
 def best_grip(
-    arc: NeedleArc, depths: Sequence[float], kinematics: Psm, T_world_base: Array, poses: Sequence[Array]
+    arc: NeedleArc,
+    depths: Sequence[float],
+    kinematics: Psm,
+    T_world_base: Array,
+    way: Sequence[Array],
+    now: Array,
 ) -> Grip | None:
-    """The grip with which a tool reaches all ``poses`` (k, 4, 4) of the arc, farthest from the limits of its joints."""
+    """The grip farthest from the limits of a tool's joints of those that reach ``way`` (k, 4, 4) without a swing.
+
+    It must also reach the needle where it is ``now`` (4, 4), from 15 mm behind.
+    """
     T_base = inverse(T_world_base)
     best, best_margin = None, 0.0
     span = kinematics.upper - kinematics.lower
     for grip in grips(depths):
         T_arc_tool = grip.T_arc_tool(arc)
-        wanted = np.array([T_base @ T @ T_arc_tool for T in poses])
-        found = kinematics.inverse(wanted)
-        if not found.ok.all():
+        path = kinematics.inverse(np.array([T_base @ T @ T_arc_tool for T in way]))
+        if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max() > JUMP:
             continue
-        inside = np.minimum(found.q - kinematics.lower, kinematics.upper - found.q) / span
-        inside[:, 3] = 0.5
+        here = now @ T_arc_tool
+        behind = frame(np.eye(3), -0.015 * here[:3, 2]) @ here
+        start = kinematics.inverse(np.array([T_base @ here, T_base @ behind]))
+        if not start.ok.all():
+            continue
+        q = np.vstack([path.q, start.q])
+        inside = np.minimum(q - kinematics.lower, kinematics.upper - q) / span
         margin = float(inside.min()) - 0.05 * abs(grip.tilt) - 0.05 * abs(grip.pivot)
         if best is None or margin > best_margin:
             best, best_margin = grip, margin

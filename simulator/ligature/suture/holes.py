@@ -322,11 +322,15 @@ def settled_tissue(tissue: Tissue, weight: float) -> Tissue:
 
 
 def _set_law(lines: arrays.Lines, line: int, hole: Hole, weight: float, arm: float) -> None:
-    """Springs, dampers and limits of a line in a hole; what they do at ``arm`` metres they do against turning.
+    """Springs, dampers and limits of a line in a hole; what they do at an arm they do against turning.
 
-    A thread has no arm: it turns freely.
+    That arm is half the opening, at whose rim tissue touches a needle; more, up to ``arm`` metres, for needles so heavy
+    that the tissue bears their weight. A thread has no arm: it turns freely.
     """
     tissue = settled_tissue(hole.tissue, weight)
+    if arm > 0.0:
+        bears = min(1.0, FRICTION_PER_WEIGHT * weight / max(tissue.friction or 0.0, 1e-9))
+        arm = max(arm * bears, float(hole.half.min()))
     scale = np.array([1.0, 1.0, 1.0, arm**2, arm**2, arm**2])
     stiffness = (tissue.stiffness or 0.0) * scale
     damping = SETTLING * stiffness

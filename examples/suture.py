@@ -1,0 +1,251 @@
+"""A suture without hands: two arms pick up a needle and make throws through a pad, by the calls a real robot takes.
+
+The program localises from ground truth, plans with closed-form kinematics (`suture_plan`), and moves the arms by CRTK
+alone: ``move_cp``, ``servo_cp``, ``jaw/servo_jp``, ``measured_cp``. Run ``python examples/suture.py --help``.
+World axes, metres, radians, seconds of simulated time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import ligature
+import numpy as np
+from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7
+from ligature.robots.operating_state import Refused
+from ligature.robots.poses import rotation_vector
+from ligature.tasks import Monitor, judge_suture
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from suture_plan import NeedleArc, Throw, best_grip, pose_of  # noqa: E402
+
+SCENE = Path(__file__).resolve().parents[1] / "scenes" / "suturing" / "launch.yaml"
+UP = np.array([0.0, 0.0, 1.0])
+STREAM = 0.005
+"""Seconds between two set-points of a stream: 200 Hz."""
+
+HOLD_DEPTHS = (0.013, 0.015, 0.017)
+"""Metres from the needle's tip at which it may be held to drive it."""
+
+PULL_DEPTHS = (0.003, 0.004, 0.0025)
+"""The same for the hand that pulls it out."""
+
+OPEN, SHUT = 0.8, -0.35
+ABOVE, BEFORE, BEYOND = 0.02, 0.4, 0.75
+"""Metres above the work when moving; angles of the tip before the entry and beyond the exit."""
+
+Array = np.ndarray
+
+
+class Failure(RuntimeError):
+    """The suture cannot go on; the text says what went wrong."""
+
+
+class Surgeon:
+    """Two arms, a needle, and how they work together."""
+
+    def __init__(self, simulation: ligature.Simulation, watch: Callable[[], None] = lambda: None) -> None:
+        self.simulation, self._watch = simulation, watch
+        scene = simulation.scene
+        self.monitor = Monitor(scene)
+        self._needle = simulation.bodies[scene.bodies[self.monitor.scenery.needle].identity.topic]
+        self.arc = NeedleArc.of(scene.needles[0], scene.bodies[self.monitor.scenery.needle])
+        self._base = {arm.name: scene.bodies[arm.base].T_world_body for arm in scene.arms if arm.base >= 0}
+        self.arms = {name: simulation.arms[name] for name in ("PSM1", "PSM2")}
+
+    # --- time and seeing --------------------------------------------------------------------
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass, and look at it all the while."""
+        for _ in range(max(1, round(seconds / STREAM))):
+            self.simulation.step(round(STREAM / self.simulation.dt))
+            self.monitor.observe(self.simulation.state[0])
+            self._watch()
+
+    def needle(self) -> Array:
+        """Pose (4, 4) of the needle's arc frame."""
+        return pose_of(self._needle.pose) @ self.arc.T_body_arc
+
+    def tool(self, name: str) -> Array:
+        """Pose (4, 4) of an arm's tool by its own sensors."""
+        return self._base[name] @ pose_of(self.arms[name].local_measured_cp())
+
+    def hole(self, side: str, pair: int) -> Array:
+        """Position (3,) of a hole."""
+        return self.simulation.bodies[f"BODY {side}{pair}"].pose[:3]
+
+    # --- moving -----------------------------------------------------------------------------
+
+    def move(self, name: str, T_world_tool: Array) -> None:
+        """Go there on a joint trajectory, and wait for it."""
+        arm = self.arms[name]
+        try:
+            arm.move_cp(inverse(self._base[name]) @ T_world_tool)
+        except Refused as refused:
+            raise Failure(str(refused)) from refused
+        while arm.is_busy:
+            self.wait(0.02)
+
+    def glide(self, name: str, poses: Iterator[Array]) -> None:
+        """Stream poses of the tool, one each `STREAM`."""
+        arm = self.arms[name]
+        for T in poses:
+            try:
+                arm.servo_cp(inverse(self._base[name]) @ T)
+            except Refused as refused:
+                raise Failure(str(refused)) from refused
+            self.wait(STREAM)
+
+    def line(self, name: str, goal: Array, speed: float = 0.03) -> None:
+        """Stream the straight way to a pose of the tool."""
+        start = self.tool(name)
+        way = goal[:3, 3] - start[:3, 3]
+        turn = rotation_vector(start[:3, :3].T @ goal[:3, :3])
+        angle = float(np.linalg.norm(turn))
+        steps = max(2, int(max(np.linalg.norm(way) / speed, angle / 1.5) / STREAM))
+        axis = turn / angle if angle > 1e-9 else UP
+        self.glide(
+            name,
+            (
+                frame(start[:3, :3] @ axis_rotation(axis, angle * s), start[:3, 3] + s * way)
+                for s in np.linspace(0.0, 1.0, steps + 1)[1:]
+            ),
+        )
+
+    def turn(self, name: str, throw: Throw, begin: float, end: float, speed: float = 0.8) -> None:
+        """Turn the needle that ``name`` holds along the throw's circle, its tip from one angle to another."""
+        T_arc_tool = inverse(self.needle()) @ self.tool(name)
+        steps = max(2, int(abs(end - begin) / speed / STREAM))
+        self.glide(name, (throw.T_world_arc(a, self.arc) @ T_arc_tool for a in np.linspace(begin, end, steps)))
+
+    def jaw(self, name: str, angle: float, seconds: float = 0.3) -> None:
+        """Open or close the jaw."""
+        jaw = self.arms[name].jaw
+        start = float(jaw.setpoint_js().position[0])
+        for s in np.linspace(0.0, 1.0, max(2, int(seconds / STREAM))):
+            jaw.servo_jp([start + s * (angle - start)])
+            self.wait(STREAM)
+
+    def take(self, name: str, T_world_tool: Array) -> None:
+        """Come from behind, close on the needle, and make sure that something is between the fingers."""
+        back = frame(np.eye(3), -0.015 * T_world_tool[:3, 2]) @ T_world_tool
+        self.jaw(name, OPEN)
+        self.move(name, back)
+        self.line(name, T_world_tool)
+        self.jaw(name, SHUT, 0.5)
+        self.wait(0.2)
+        if self.simulation.grasps[name] is None:
+            raise Failure(f"{name} closed on nothing")
+
+    def leave(self, name: str) -> None:
+        """Open, and draw back along the tool."""
+        self.jaw(name, OPEN)
+        T = self.tool(name)
+        self.line(name, frame(np.eye(3), -0.02 * T[:3, 2]) @ T)
+
+    # --- the suture -------------------------------------------------------------------------
+
+    def prepare(self) -> None:
+        """Enable and home both arms."""
+        for arm in self.arms.values():
+            arm.home()
+        while any(arm.is_busy or not arm.is_homed for arm in self.arms.values()):
+            self.wait(0.05)
+
+    def throw(self, pair: int) -> Throw:
+        """The circle through a pair of holes."""
+        return Throw.through(self.hole("Entry", pair), self.hole("Exit", pair), self.arc.radius, UP)
+
+    def pick_up(self, name: str, throw: Throw) -> None:
+        """Take the needle from the pad, in the way in which it can be driven."""
+        way = [throw.T_world_arc(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
+        grip = self._grip(name, HOLD_DEPTHS, way, self.needle())
+        self.take(name, self.needle() @ grip)
+        T = self.tool(name)
+        self.line(name, frame(np.eye(3), ABOVE * UP) @ T)
+
+    def _grip(self, name: str, depths: tuple[float, ...], way: list[Array], now: Array) -> Array:
+        """Pose (4, 4) of the tool in the arc frame that reaches the whole way, and where the needle is now."""
+        kinematics, base = self.arms[name].kinematics, self._base[name]
+        grip = best_grip(self.arc, depths, kinematics, base, way, now)
+        if grip is None:
+            raise Failure(f"{name} cannot hold the needle so that it reaches the whole throw")
+        return grip.T_arc_tool(self.arc)
+
+    def drive(self, name: str, throw: Throw) -> None:
+        """Turn the needle, which ``name`` holds, in at the entry and out at the exit."""
+        start = throw.T_world_arc(-BEFORE, self.arc) @ inverse(self.needle()) @ self.tool(name)
+        self.move(name, frame(np.eye(3), ABOVE * UP) @ start)
+        start = throw.T_world_arc(-BEFORE, self.arc) @ inverse(self.needle()) @ self.tool(name)
+        self.line(name, start)
+        self.turn(name, throw, -BEFORE, throw.towards_exit + BEYOND)
+
+    def pull_out(self, name: str, other: str, throw: Throw, out: float = 0.035) -> None:
+        """``name`` takes the tip beyond the exit, ``other`` lets go, and the needle and its thread come out."""
+        tip = throw.towards_exit + BEYOND
+        rest = self.arc.end - self.arc.begin
+        way = [throw.T_world_arc(a, self.arc) for a in np.linspace(tip, throw.towards_exit + rest + 0.3, 10)]
+        self.take(name, self.needle() @ self._grip(name, PULL_DEPTHS, way, self.needle()))
+        self.leave(other)
+        self.turn(name, throw, tip, throw.towards_exit + rest + 0.3)
+        T = self.tool(name)
+        self.line(name, frame(np.eye(3), out * (0.8 * UP + 0.6 * throw.axes[:, 1] * 0.0)) @ T, 0.04)
+
+    def hand_over(self, giver: str, taker: str, throw: Throw) -> None:
+        """The needle goes to the arm that drives the next throw."""
+        way = [throw.T_world_arc(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
+        self.take(taker, self.needle() @ self._grip(taker, HOLD_DEPTHS, way, self.needle()))
+        self.leave(giver)
+
+    def suture(self, pairs: tuple[int, ...], driver: str = "PSM1", puller: str = "PSM2") -> None:
+        """Throws through ``pairs``, from picking the needle up to pulling it out of the last hole."""
+        self.prepare()
+        throw = self.throw(pairs[0])
+        self.pick_up(driver, throw)
+        for number, pair in enumerate(pairs):
+            throw = self.throw(pair)
+            if number:
+                self.hand_over(puller, driver, throw)
+            self.drive(driver, throw)
+            self.pull_out(puller, driver, throw)
+
+
+def scatter(simulation: ligature.Simulation, seed: int) -> None:
+    """Lay the needle somewhere else on the pad, turned otherwise; seed 0 leaves it."""
+    if seed == 0:
+        return
+    rng = np.random.default_rng(seed)
+    body = simulation.scene.needles[0].body
+    handle = simulation.bodies[simulation.scene.bodies[body].identity.topic]
+    T = pose_of(handle.pose)
+    turned = axis_rotation(UP, float(rng.uniform(-0.6, 0.6)))
+    shift = np.append(rng.uniform(-0.008, 0.008, 2), 0.0)
+    handle.set_pose(matrix_pose7(frame(turned @ T[:3, :3], T[:3, 3] + shift)))
+
+
+def main() -> int:
+    """Make a suture and print how well it went."""
+    arguments = argparse.ArgumentParser(description="Two arms suture a pad by themselves.")
+    arguments.add_argument("--throws", type=int, default=2, help="throws, from the first pair of holes on")
+    arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
+    given = arguments.parse_args()
+    simulation = ligature.Simulation(ligature.load(SCENE))
+    scatter(simulation, given.seed)
+    surgeon = Surgeon(simulation)
+    surgeon.wait(0.3)
+    pairs = tuple(range(1, given.throws + 1))
+    try:
+        surgeon.suture(pairs)
+    except Failure as failure:
+        print(f"stopped: {failure}")
+    monitor = surgeon.monitor
+    score = judge_suture(monitor.scenery, simulation.state["body_pose"][0], monitor.passages, simulation.time, len(pairs))
+    print("\n".join([*score.lines(), *monitor.measures().lines()]))
+    return 0 if score.success else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
