@@ -20,22 +20,24 @@ from ligature.robots.poses import rotation_vector
 from ligature.tasks import Monitor, judge_suture
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from suture_plan import NeedleArc, Throw, best_grip, pose_of  # noqa: E402
+from suture_plan import UP, NeedleArc, Throw, best_grip, pose_of  # noqa: E402
 
 SCENE = Path(__file__).resolve().parents[1] / "scenes" / "suturing" / "launch.yaml"
-UP = np.array([0.0, 0.0, 1.0])
 STREAM = 0.005
 """Seconds between two set-points of a stream: 200 Hz."""
 
-HOLD_DEPTHS = (0.013, 0.015, 0.017)
+HOLD_DEPTHS = (0.020, 0.0205, 0.021)
 """Metres from the needle's tip at which it may be held to drive it."""
 
-PULL_DEPTHS = (0.003, 0.004, 0.0025)
+PULL_DEPTHS = (0.0018, 0.0022, 0.0026)
 """The same for the hand that pulls it out."""
 
+PICK_DEPTHS = (0.003, 0.004, 0.005)
+"""The same for the hand that picks it up."""
+
 OPEN, SHUT = 0.8, -0.35
-ABOVE, BEFORE, BEYOND = 0.02, 0.4, 0.75
-"""Metres above the work when moving; angles of the tip before the entry and beyond the exit."""
+ABOVE, MEETING, BEFORE, BEYOND = 0.02, 0.03, 0.4, 0.5
+"""Metres above the work when moving and when handing over; angles of the tip before the entry and beyond the exit."""
 
 Array = np.ndarray
 
@@ -133,7 +135,9 @@ class Surgeon:
         """Come from behind, close on the needle, and make sure that something is between the fingers."""
         back = frame(np.eye(3), -0.015 * T_world_tool[:3, 2]) @ T_world_tool
         self.jaw(name, OPEN)
-        self.move(name, back)
+        self.line(name, frame(np.eye(3), ABOVE * UP) @ self.tool(name))
+        self.move(name, frame(np.eye(3), ABOVE * UP) @ back)
+        self.line(name, back)
         self.line(name, T_world_tool)
         self.jaw(name, SHUT, 0.5)
         self.wait(0.2)
@@ -160,17 +164,18 @@ class Surgeon:
         return Throw.through(self.hole("Entry", pair), self.hole("Exit", pair), self.arc.radius, UP)
 
     def pick_up(self, name: str, throw: Throw) -> None:
-        """Take the needle from the pad, in the way in which it can be driven."""
-        way = [throw.T_world_arc(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
-        grip = self._grip(name, HOLD_DEPTHS, way, self.needle())
+        """Take the needle from the pad near its tip, and hold it up before the entry."""
+        waiting = frame(np.eye(3), MEETING * UP) @ throw.T_world_arc(-BEFORE, self.arc)
+        grip = self._grip(name, PICK_DEPTHS, [waiting], self.needle(), upright=True)
         self.take(name, self.needle() @ grip)
         T = self.tool(name)
-        self.line(name, frame(np.eye(3), ABOVE * UP) @ T)
+        self.line(name, frame(np.eye(3), MEETING * UP) @ T)
+        self.move(name, waiting @ inverse(self.needle()) @ self.tool(name))
 
-    def _grip(self, name: str, depths: tuple[float, ...], way: list[Array], now: Array) -> Array:
+    def _grip(self, name: str, depths: tuple[float, ...], way: list[Array], now: Array, upright: bool = False) -> Array:
         """Pose (4, 4) of the tool in the arc frame that reaches the whole way, and where the needle is now."""
         kinematics, base = self.arms[name].kinematics, self._base[name]
-        grip = best_grip(self.arc, depths, kinematics, base, way, now)
+        grip = best_grip(self.arc, depths, kinematics, base, way, now, self.hole("Entry", 1), upright)
         if grip is None:
             raise Failure(f"{name} cannot hold the needle so that it reaches the whole throw")
         return grip.T_arc_tool(self.arc)
@@ -200,15 +205,14 @@ class Surgeon:
         self.take(taker, self.needle() @ self._grip(taker, HOLD_DEPTHS, way, self.needle()))
         self.leave(giver)
 
-    def suture(self, pairs: tuple[int, ...], driver: str = "PSM1", puller: str = "PSM2") -> None:
+    def suture(self, pairs: tuple[int, ...], driver: str = "PSM2", puller: str = "PSM1") -> None:
         """Throws through ``pairs``, from picking the needle up to pulling it out of the last hole."""
         self.prepare()
         throw = self.throw(pairs[0])
-        self.pick_up(driver, throw)
-        for number, pair in enumerate(pairs):
+        self.pick_up(puller, throw)
+        for pair in pairs:
             throw = self.throw(pair)
-            if number:
-                self.hand_over(puller, driver, throw)
+            self.hand_over(puller, driver, throw)
             self.drive(driver, throw)
             self.pull_out(puller, driver, throw)
 
@@ -242,7 +246,9 @@ def main() -> int:
     except Failure as failure:
         print(f"stopped: {failure}")
     monitor = surgeon.monitor
-    score = judge_suture(monitor.scenery, simulation.state["body_pose"][0], monitor.passages, simulation.time, len(pairs))
+    score = judge_suture(
+        monitor.scenery, simulation.state["body_pose"][0], monitor.passages, simulation.time, len(pairs)
+    )
     print("\n".join([*score.lines(), *monitor.measures().lines()]))
     return 0 if score.success else 1
 

@@ -21,10 +21,19 @@ Array = np.ndarray
 PAD = 0.0094
 """Metres from the control point of a tool to where it holds: near the end of its fingers, as the needle lies flat."""
 
+SHAFT_RADIUS, WRIST_RADIUS = 0.00425, 0.0026
+SHAFT_END, PALM, PINCH = 3, 4, 5
+"""Radii of the instrument in metres, and which link frames of a PSM are at the end of its shaft."""
+
+LEAST_CLEARANCE = 0.0006
+"""Metres that an instrument keeps from the tissue while it drives."""
+
 JUMP = 1.0
 """Radians between two poses of a way beyond which a joint would swing round."""
 
-TILTS = np.radians(np.arange(-50, 51, 10))
+UP = np.array([0.0, 0.0, 1.0])
+
+TILTS = np.radians(np.arange(-60, 61, 10))
 """Angles by which a tool may lean about the needle's tangent."""
 
 PIVOTS = np.radians(np.arange(-40, 41, 10))
@@ -93,7 +102,9 @@ class Throw:
         chord = exit - entry
         length = float(np.linalg.norm(chord))
         if length >= 2.0 * radius:
-            raise ValueError(f"holes {1e3 * length:.1f} mm apart are too far for a needle of radius {1e3 * radius:.1f} mm")
+            raise ValueError(
+                f"holes {1e3 * length:.1f} mm apart are too far for a needle of radius {1e3 * radius:.1f} mm"
+            )
         forward = chord / length
         up = up - (up @ forward) * forward
         up = up / np.linalg.norm(up)
@@ -110,11 +121,11 @@ class Throw:
         return frame(self.axes @ axis_rotation((0.0, 0.0, 1.0), tip - arc.end), self.centre)
 
 
-def grips(depths: Sequence[float]) -> Iterator[Grip]:
-    """All ways to hold a needle that are worth a try."""
+def grips(depths: Sequence[float], upright: bool) -> Iterator[Grip]:
+    """All ways to hold a needle that are worth a try; ``upright`` ones stand on its plane, as it takes to pick it up."""
     for depth in depths:
-        for tilt in TILTS:
-            for pivot in PIVOTS:
+        for tilt in (0.0,) if upright else TILTS:
+            for pivot in (0.0,) if upright else PIVOTS:
                 for flipped in (False, True):
                     yield Grip(depth, float(tilt), float(pivot), flipped)
 
@@ -126,18 +137,24 @@ def best_grip(
     T_world_base: Array,
     way: Sequence[Array],
     now: Array,
+    surface: Array,
+    upright: bool = False,
 ) -> Grip | None:
     """The grip farthest from the limits of a tool's joints of those that reach ``way`` (k, 4, 4) without a swing.
 
-    It must also reach the needle where it is ``now`` (4, 4), from 15 mm behind.
+    It must also reach the needle where it is ``now`` (4, 4), from 15 mm behind, and on the way keep clear of the
+    tissue, whose upper side is level through the point ``surface`` (3,).
     """
     T_base = inverse(T_world_base)
     best, best_margin = None, 0.0
     span = kinematics.upper - kinematics.lower
-    for grip in grips(depths):
+    for grip in grips(depths, upright):
         T_arc_tool = grip.T_arc_tool(arc)
         path = kinematics.inverse(np.array([T_base @ T @ T_arc_tool for T in way]))
-        if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max() > JUMP:
+        if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max(initial=0.0) > JUMP:
+            continue
+        height = clearance(kinematics, path.q, T_world_base, UP) - float(surface[2])
+        if height < LEAST_CLEARANCE:
             continue
         here = now @ T_arc_tool
         behind = frame(np.eye(3), -0.015 * here[:3, 2]) @ here
@@ -150,6 +167,18 @@ def best_grip(
         if best is None or margin > best_margin:
             best, best_margin = grip, margin
     return best
+
+
+def clearance(kinematics: Psm, q: Array, T_world_base: Array, up: Array) -> float:
+    """How high over the plane through the world's origin the lowest part of an instrument's end stays (k, 6).
+
+    The end of the shaft is a disc, the wrist a ball about its yaw axis.
+    """
+    frames = T_world_base @ kinematics.frames(q)
+    palm, pinch = frames[:, PALM, :3, 3] @ up, frames[:, PINCH, :3, 3] @ up
+    along = frames[:, SHAFT_END, :3, 2] @ up
+    disc = palm - SHAFT_RADIUS * np.sqrt(np.maximum(1.0 - along**2, 0.0))
+    return float(min(disc.min(), (pinch - WRIST_RADIUS).min()))
 
 
 def pose_of(pose7: Array) -> Array:

@@ -74,7 +74,12 @@ def hole(T_world: np.ndarray, name: str) -> dict[str, Any]:
     """The ring of a hole: nothing to see, it lies in the skin."""
     block = small.body(name, T_world, HOLE_MASS, ring(), passive=False)
     del block["compound shape"]
-    return {**block, "mesh": "", "inertia": {"ix": 2e-8, "iy": 2e-8, "iz": 3e-8}, "damping": {"linear": 0.5, "angular": 0.5}}
+    return {
+        **block,
+        "mesh": "",
+        "inertia": {"ix": 2e-8, "iy": 2e-8, "iz": 3e-8},
+        "damping": {"linear": 0.5, "angular": 0.5},
+    }
 
 
 def spring(name: str, T_pad_hole: np.ndarray) -> dict[str, Any]:
@@ -161,11 +166,16 @@ def documents() -> dict[str, dict[str, Any]]:
     return {"phantom.yaml": phantom(), "ghosts.yaml": ghosts(), "launch.yaml": launch()}
 
 
+def texts() -> dict[str, str]:
+    """Text of every file of the scene by name."""
+    return {name: small.text(document, Path(__file__).name) for name, document in documents().items()}
+
+
 def main() -> None:
     """Write every file of the scene."""
     HERE.mkdir(exist_ok=True)
-    for name, document in documents().items():
-        (HERE / name).write_text(small.text(document, Path(__file__).name), encoding="utf-8")
+    for name, written in texts().items():
+        (HERE / name).write_text(written, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -463,11 +463,16 @@ def text(document: dict[str, Any], script: str = "author_suturing_small.py") -> 
     return header + yaml.dump(document, Dumper=Dumper, sort_keys=False, default_flow_style=None, width=110)
 
 
+def texts() -> dict[str, str]:
+    """Text of every file of the scene by name."""
+    return {name: text(document) for name, document in documents().items()}
+
+
 def main() -> None:
     """Write every file of the scene."""
     HERE.mkdir(exist_ok=True)
-    for name, document in documents().items():
-        (HERE / name).write_text(text(document), encoding="utf-8")
+    for name, written in texts().items():
+        (HERE / name).write_text(written, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -39,8 +39,8 @@ from ligature.robots.record import ArmRecord
 
 Array = NDArray[np.float64]
 
-JAW_STIFFNESS = 0.5
-"""N·m per radian of following error with which each finger presses: 9 N at the tips of a needle driver at −20°."""
+JAW_STIFFNESS = 1.0
+"""N·m per radian of following error with which each finger presses: 18 N at the tips of a needle driver at −20°."""
 
 WATCH_PERIOD = 5
 """Ticks between two looks at following errors."""

@@ -52,10 +52,11 @@ def authored_by(name: str) -> ModuleType:
     return module
 
 
-def test_files_are_what_their_script_writes() -> None:
-    module = authored_by("author_suturing_small")
-    for name, document in module.documents().items():
-        assert (SCENES / "suturing_small" / name).read_text(encoding="utf-8") == module.text(document), name
+@pytest.mark.parametrize("scene", ["suturing_small", "suturing"])
+def test_files_are_what_their_script_writes(scene: str) -> None:
+    module = authored_by(f"author_{scene}")
+    for name, text in module.texts().items():
+        assert (SCENES / scene / name).read_text(encoding="utf-8") == text, name
 
 
 def test_looks_are_what_their_script_writes() -> None:
