@@ -121,7 +121,7 @@ class Surgeon:
         """Turn the needle that ``name`` holds along the throw's circle, its tip from one angle to another."""
         T_arc_tool = inverse(self.needle()) @ self.tool(name)
         steps = max(2, int(abs(end - begin) / speed / STREAM))
-        self.glide(name, (throw.T_world_arc(a, self.arc) @ T_arc_tool for a in np.linspace(begin, end, steps)))
+        self.glide(name, (throw.arc_at(a, self.arc) @ T_arc_tool for a in np.linspace(begin, end, steps)))
 
     def jaw(self, name: str, angle: float, seconds: float = 0.3) -> None:
         """Open or close the jaw."""
@@ -165,7 +165,7 @@ class Surgeon:
 
     def pick_up(self, name: str, throw: Throw) -> None:
         """Take the needle from the pad near its tip, and hold it up before the entry."""
-        waiting = frame(np.eye(3), MEETING * UP) @ throw.T_world_arc(-BEFORE, self.arc)
+        waiting = frame(np.eye(3), MEETING * UP) @ throw.arc_at(-BEFORE, self.arc)
         grip = self._grip(name, PICK_DEPTHS, [waiting], self.needle(), upright=True)
         self.take(name, self.needle() @ grip)
         T = self.tool(name)
@@ -178,13 +178,13 @@ class Surgeon:
         grip = best_grip(self.arc, depths, kinematics, base, way, now, self.hole("Entry", 1), upright)
         if grip is None:
             raise Failure(f"{name} cannot hold the needle so that it reaches the whole throw")
-        return grip.T_arc_tool(self.arc)
+        return grip.tool_in_arc(self.arc)
 
     def drive(self, name: str, throw: Throw) -> None:
         """Turn the needle, which ``name`` holds, in at the entry and out at the exit."""
-        start = throw.T_world_arc(-BEFORE, self.arc) @ inverse(self.needle()) @ self.tool(name)
+        start = throw.arc_at(-BEFORE, self.arc) @ inverse(self.needle()) @ self.tool(name)
         self.move(name, frame(np.eye(3), ABOVE * UP) @ start)
-        start = throw.T_world_arc(-BEFORE, self.arc) @ inverse(self.needle()) @ self.tool(name)
+        start = throw.arc_at(-BEFORE, self.arc) @ inverse(self.needle()) @ self.tool(name)
         self.line(name, start)
         self.turn(name, throw, -BEFORE, throw.towards_exit + BEYOND)
 
@@ -192,7 +192,7 @@ class Surgeon:
         """``name`` takes the tip beyond the exit, ``other`` lets go, and the needle and its thread come out."""
         tip = throw.towards_exit + BEYOND
         rest = self.arc.end - self.arc.begin
-        way = [throw.T_world_arc(a, self.arc) for a in np.linspace(tip, throw.towards_exit + rest + 0.3, 10)]
+        way = [throw.arc_at(a, self.arc) for a in np.linspace(tip, throw.towards_exit + rest + 0.3, 10)]
         self.take(name, self.needle() @ self._grip(name, PULL_DEPTHS, way, self.needle()))
         self.leave(other)
         self.turn(name, throw, tip, throw.towards_exit + rest + 0.3)
@@ -201,7 +201,7 @@ class Surgeon:
 
     def hand_over(self, giver: str, taker: str, throw: Throw) -> None:
         """The needle goes to the arm that drives the next throw."""
-        way = [throw.T_world_arc(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
+        way = [throw.arc_at(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
         self.take(taker, self.needle() @ self._grip(taker, HOLD_DEPTHS, way, self.needle()))
         self.leave(giver)
 

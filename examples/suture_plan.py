@@ -75,7 +75,7 @@ class Grip:
     pivot: float
     flipped: bool
 
-    def T_arc_tool(self, arc: NeedleArc) -> Array:
+    def tool_in_arc(self, arc: NeedleArc) -> Array:
         """Pose (4, 4) of the tool in the arc frame."""
         a = arc.angle(self.depth)
         out, along, normal = np.array([np.cos(a), np.sin(a), 0.0]), np.array([-np.sin(a), np.cos(a), 0.0]), [0.0, 0, 1]
@@ -116,13 +116,13 @@ class Throw:
         way = axes.T @ (exit - centre)
         return cls(centre, normal, 0.0, float(np.arctan2(way[1], way[0]) % (2 * np.pi)), axes)
 
-    def T_world_arc(self, tip: float, arc: NeedleArc) -> Array:
+    def arc_at(self, tip: float, arc: NeedleArc) -> Array:
         """Pose (4, 4) of the arc frame with the tip at the angle ``tip`` past the entry."""
         return frame(self.axes @ axis_rotation((0.0, 0.0, 1.0), tip - arc.end), self.centre)
 
 
 def grips(depths: Sequence[float], upright: bool) -> Iterator[Grip]:
-    """All ways to hold a needle that are worth a try; ``upright`` ones stand on its plane, as it takes to pick it up."""
+    """All ways to hold a needle that are worth a try; ``upright`` ones stand on its plane, to pick it up."""
     for depth in depths:
         for tilt in (0.0,) if upright else TILTS:
             for pivot in (0.0,) if upright else PIVOTS:
@@ -149,7 +149,7 @@ def best_grip(
     best, best_margin = None, 0.0
     span = kinematics.upper - kinematics.lower
     for grip in grips(depths, upright):
-        T_arc_tool = grip.T_arc_tool(arc)
+        T_arc_tool = grip.tool_in_arc(arc)
         path = kinematics.inverse(np.array([T_base @ T @ T_arc_tool for T in way]))
         if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max(initial=0.0) > JUMP:
             continue
