@@ -77,50 +77,64 @@ def test_released_needle_half_through_one_hole_stays_where_it_was_left(kit):
     tissue = Tissued(kit)
     weight = [0.0, 0.0, -9.81 * MASS, 0.0, 0.0, 0.0]
     tissue.run(10_000, weight)
-    assert np.linalg.norm(tissue.pose[:3]) < 0.01e-3
-    assert 2.0 * np.linalg.norm(tissue.pose[3:6]) * RADIUS < 0.01e-3
+    assert np.linalg.norm(tissue.pose[:3]) < 0.02e-3
+    assert 2.0 * np.linalg.norm(tissue.pose[3:6]) * RADIUS < 0.02e-3
     (insertion,) = tissue.holes.insertions
     assert insertion.body == NEEDLE
     assert insertion.depth == pytest.approx(ARC.length / 2, abs=1e-5)
     assert insertion.force == pytest.approx([0.0, 0.0, 9.81 * MASS], rel=1e-3, abs=1e-9)
 
 
-@pytest.mark.parametrize("holes", [(HALF_WAY,), tuple(RADIUS * np.array([[0.6, 0.8, 0.0], [-0.6, 0.8, 0.0]]))])
-def test_needle_turned_along_its_arc_follows_it(kit, holes):
-    tissue = Tissued(kit, holes)
+TWO_HOLES = tuple(RADIUS * np.array([[0.6, 0.8, 0.0], [-0.6, 0.8, 0.0]]))
+
+
+def _along(force):
+    """A force that draws the needle through the hole half way, along its arc there."""
+    return lambda pose: np.r_[-force, 0.0, 0.0, np.cross(HALF_WAY - pose[:3], [-force, 0.0, 0.0])]
+
+
+def test_needle_drawn_through_one_hole_follows_its_arc(kit):
+    tissue = Tissued(kit)
     start = tissue.pose.copy()
-    moment = 1.5 * len(holes) * settled_tissue(Tissue(), 0.0).friction * RADIUS
-    tissue.run(600, [0.0, 0.0, 0.0, 0.0, 0.0, moment])
-    assert 2.0 * np.arcsin(abs(tissue.pose[5])) * RADIUS > 2e-3
+    tissue.run(150, _along(0.6))
+    assert tissue.holes.insertions[0].depth > ARC.length / 2 + 3e-3
     assert tissue.off_arc(start) < 0.1e-3
 
 
-def test_needle_pulled_at_its_tip_follows_its_arc(kit):
-    tissue = Tissued(kit)
+def test_needle_turned_about_its_centre_in_two_holes_follows_its_arc(kit):
+    tissue = Tissued(kit, TWO_HOLES)
+    start = tissue.pose.copy()
+    tissue.run(600, [0.0, 0.0, 0.0, 0.0, 0.0, 3.0 * settled_tissue(Tissue(), 0.0).friction * RADIUS])
+    assert 2.0 * np.arcsin(abs(tissue.pose[5])) * RADIUS > 2e-3
+    assert tissue.off_arc(start) < 0.3e-3
+
+
+def test_needle_pulled_at_its_tip_through_two_holes_follows_its_arc(kit):
+    tissue = Tissued(kit, TWO_HOLES)
     start = tissue.pose.copy()
 
     def pull(pose):
         T = pose7_matrix(pose)
         tip, along = T[:3, :3] @ ARC.point(0.0), T[:3, :3] @ np.array([0.0, -1.0, 0.0])
-        return np.r_[0.6 * along, np.cross(tip, 0.6 * along)]
+        return np.r_[0.8 * along, np.cross(tip, 0.8 * along)]
 
-    tissue.run(500, pull)
-    assert tissue.holes.insertions[0].depth > ARC.length / 2 + 3e-3
+    depth = tissue.run(1).holes.insertions[0].depth
+    tissue.run(400, pull)
+    assert tissue.holes.insertions[0].depth > depth + 1e-3
     assert tissue.off_arc(start) < 0.3e-3
 
 
 def test_sliding_needle_feels_friction_and_drag_of_its_speed(kit):
     tissue = Tissued(kit, tissue=Tissue(friction=0.2, drag=10.0))
-    tissue.bench.twist[NEEDLE][5] = 0.0
-    tissue.run(800, [0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * RADIUS])
+    tissue.run(300, _along(0.5))
     speed = tissue.bench.twist[NEEDLE][5] * RADIUS
     assert speed == pytest.approx((0.5 - 0.2) / 10.0, rel=0.05)
 
 
-def test_needle_turned_by_less_than_friction_does_not_move(kit):
+def test_needle_drawn_by_less_than_friction_does_not_move(kit):
     tissue = Tissued(kit)
-    moment = [0.0, 0.0, 0.0, 0.0, 0.0, 0.9 * 0.3 * RADIUS]
-    tissue.run(100, moment)
+    moment = _along(0.9 * 0.3)
+    tissue.run(400, moment)
     before = tissue.pose.copy()
     tissue.run(5000, moment)
     assert np.abs(tissue.pose - before).max() < 1e-9
@@ -149,10 +163,10 @@ def test_needle_that_slides_out_of_its_hole_is_free(kit):
     tissue = Tissued(kit)
     ticks = 0
     while (tissue.holes.insertions or not ticks) and ticks < 300:
-        tissue.run(1, [0.0, 0.0, 0.0, 0.0, 0.0, 0.015])
+        tissue.run(1, _along(1.5))
         ticks += 1
-    # Half of the needle at the speed at which drag and friction balance the moment.
-    assert ticks * DT == pytest.approx(ARC.length / 2 / ((0.015 / RADIUS - 0.3) / 10.0), rel=0.1)
+    # Half of the needle at the speed at which drag and friction balance the force.
+    assert ticks * DT == pytest.approx(ARC.length / 2 / ((1.5 - 0.3) / 10.0), rel=0.1)
 
 
 @pytest.mark.parametrize("block_mass", [1e-4, 0.01])
