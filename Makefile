@@ -2,10 +2,10 @@
 
 PYTHON := .venv/bin/python
 STAMPS := build/stamps
-SCENE  ?= scenes/suturing_small/launch.yaml
+SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
 
-.PHONY: run test setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
+.PHONY: run demo test setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -59,6 +59,9 @@ bench: setup
 # two simulated hours of servo on both arms, as fast as the machine allows
 soak: setup
 	$(PYTHON) -m tests.bench.soak
+
+demo: setup
+	$(PYTHON) examples/suture.py --out out
 
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md

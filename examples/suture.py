@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -17,7 +18,8 @@ import numpy as np
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7
 from ligature.robots.operating_state import Refused
 from ligature.robots.poses import rotation_vector
-from ligature.tasks import Monitor, judge_suture
+from ligature.tasks import Measures, Monitor, SutureScore, judge_suture
+from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from suture_plan import UP, NeedleArc, Throw, best_grip, pose_of  # noqa: E402
@@ -38,6 +40,9 @@ PICK_DEPTHS = (0.003, 0.004, 0.005)
 OPEN, SHUT = 0.8, -0.35
 ABOVE, MEETING, BEFORE, BEYOND = 0.02, 0.03, 0.4, 0.5
 """Metres above the work when moving and when handing over; angles of the tip before the entry and beyond the exit."""
+
+FILM_PERIOD, FILM_SIZE = 0.25, (640, 400)
+"""Seconds between two pictures of the film, and their width and height."""
 
 Array = np.ndarray
 
@@ -197,7 +202,7 @@ class Surgeon:
         self.leave(other)
         self.turn(name, throw, tip, throw.towards_exit + rest + 0.3)
         T = self.tool(name)
-        self.line(name, frame(np.eye(3), out * (0.8 * UP + 0.6 * throw.axes[:, 1] * 0.0)) @ T, 0.04)
+        self.line(name, frame(np.eye(3), out * UP) @ T, 0.04)
 
     def hand_over(self, giver: str, taker: str, throw: Throw) -> None:
         """The needle goes to the arm that drives the next throw."""
@@ -230,27 +235,71 @@ def scatter(simulation: ligature.Simulation, seed: int) -> None:
     handle.set_pose(matrix_pose7(frame(turned @ T[:3, :3], T[:3, 3] + shift)))
 
 
-def main() -> int:
-    """Make a suture and print how well it went."""
-    arguments = argparse.ArgumentParser(description="Two arms suture a pad by themselves.")
-    arguments.add_argument("--throws", type=int, default=2, help="throws, from the first pair of holes on")
-    arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
-    given = arguments.parse_args()
-    simulation = ligature.Simulation(ligature.load(SCENE))
-    scatter(simulation, given.seed)
-    surgeon = Surgeon(simulation)
+class Film:
+    """Pictures of a camera while time passes: one now and then as a file, all of them as a short animation."""
+
+    def __init__(self, simulation: ligature.Simulation, folder: Path, camera: str = "cameraL") -> None:
+        self._simulation, self._folder = simulation, folder
+        self._camera = simulation.cameras[camera]
+        self._frames: list[Image.Image] = []
+        self._next = 0.0
+
+    def watch(self) -> None:
+        """Take a picture when it is time for one."""
+        if self._simulation.time >= self._next:
+            self._next += FILM_PERIOD
+            self._frames.append(Image.fromarray(self._camera.capture(FILM_SIZE, passes=("rgb",)).rgb))
+
+    def save(self) -> None:
+        """Write ``suture.gif`` and eight pictures along the way; nothing half-written stays under these names."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        for number, index in enumerate(np.linspace(0, len(self._frames) - 1, 8).round().astype(int), 1):
+            self._frames[index].save(self._folder / f"suture_{number}.png")
+        part = self._folder / "suture.gif.part"
+        first, *rest = [frame.quantize(128) for frame in self._frames]
+        first.save(part, format="GIF", save_all=True, append_images=rest, duration=100, loop=0)
+        part.replace(self._folder / "suture.gif")
+
+
+def operate(
+    simulation: ligature.Simulation, throws: int, film: Film | None = None
+) -> tuple[SutureScore, Measures, str]:
+    """Suture; returns how well it went, what was measured, and why it stopped, if it did."""
+    surgeon = Surgeon(simulation, film.watch if film else lambda: None)
     surgeon.wait(0.3)
-    pairs = tuple(range(1, given.throws + 1))
+    pairs, stopped = tuple(range(1, throws + 1)), ""
     try:
         surgeon.suture(pairs)
     except Failure as failure:
-        print(f"stopped: {failure}")
-    monitor = surgeon.monitor
-    score = judge_suture(
-        monitor.scenery, simulation.state["body_pose"][0], monitor.passages, simulation.time, len(pairs)
-    )
-    print("\n".join([*score.lines(), *monitor.measures().lines()]))
-    return 0 if score.success else 1
+        stopped = str(failure)
+    monitor, poses = surgeon.monitor, simulation.state["body_pose"][0]
+    score = judge_suture(monitor.scenery, poses, monitor.passages, simulation.time, throws)
+    return score, monitor.measures(), stopped
+
+
+def main() -> int:
+    """Make a suture and print how well it went."""
+    arguments = argparse.ArgumentParser(description="Two arms suture a pad by themselves.")
+    arguments.add_argument("--throws", type=int, choices=(1, 2, 3), default=2, help="from the first pair of holes on")
+    arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
+    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
+    given = arguments.parse_args()
+    simulation = ligature.Simulation(ligature.load(SCENE))
+    scatter(simulation, given.seed)
+    film = Film(simulation, given.out) if given.out else None
+    started = time.perf_counter()
+    score, measures, stopped = operate(simulation, given.throws, film)
+    took = time.perf_counter() - started
+    lines = [
+        *score.lines(),
+        *measures.lines(),
+        f"computed in {took:.1f} s, {simulation.time / took:.1f} times real time",
+    ]
+    print("\n".join([f"stopped: {stopped}", *lines] if stopped else lines))
+    if film is not None:
+        film.save()
+        print(f"pictures in {given.out}")
+    return 0 if score.success and not stopped else 1
 
 
 if __name__ == "__main__":

@@ -35,6 +35,9 @@ BRIDGE, BRIDGE_THICKNESS = 0.003, 0.0008
 OPENING, RING = 0.0015, 0.0004
 """Half width of a hole, and the radius of the four rods around it."""
 
+CAMERA = ((0.0307, 0.292, 0.835), (0.69813, 0.0, -3.14158))
+"""Where the cameras look from: all four pairs of holes are in the picture."""
+
 HOLE_MASS = 0.005
 HOLE_STIFFNESS, HOLE_TURN = 400.0, 0.02
 """How the tissue around a hole gives: N/m and N·m/rad."""
@@ -118,6 +121,7 @@ def phantom() -> dict[str, Any]:
     pad = document.pop("BODY Block")
     T_world_pad = pose_matrix([pad["location"]["position"][axis] for axis in "xyz"], (0, 0, 0))
     pad.update({"name": "Phantom", "mesh": "block.obj", "compound collision shape": flesh()})
+    document["BODY CameraFrame"]["location"] = small.pose(pose_matrix(*CAMERA))
     blocks = {"BODY Phantom": pad}
     joints = {}
     for name, T_pad_hole in holes().items():

@@ -1,0 +1,58 @@
+"""The example that sutures by itself: it must go on working as the simulator changes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import ligature
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+sys.path.insert(0, str(EXAMPLES))
+
+import suture  # noqa: E402
+import suture_plan  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def operated() -> tuple[ligature.Simulation, object, object, str]:
+    """One throw from the scene's own place of the needle."""
+    simulation = ligature.Simulation(ligature.load(suture.SCENE))
+    return (simulation, *suture.operate(simulation, throws=1))
+
+
+def test_one_throw_goes_through_entry_and_exit(operated: tuple) -> None:
+    _, score, _, stopped = operated
+    assert stopped == ""
+    assert score.success, score.lines()
+    assert max(score.misses) < 1e-3
+
+
+def test_nothing_was_dropped_and_the_tissue_was_treated_gently(operated: tuple) -> None:
+    _, _, measures, _ = operated
+    assert measures.drops == 0
+    assert measures.tissue_force < 2.0
+    assert set(measures.path_lengths) == {"PSM1", "PSM2"}
+
+
+def test_the_thread_followed_the_needle_out_of_the_exit(operated: tuple) -> None:
+    simulation, *_ = operated
+    holes = {simulation.scene.holes[i.hole].name.rpartition("ghost")[2] for i in simulation.insertions}
+    assert {"Entry1", "Exit1"} <= holes
+
+
+def test_holes_too_far_apart_for_the_needle_are_told() -> None:
+    with pytest.raises(ValueError, match=r"holes 25\.0 mm apart are too far for a needle of radius 10\.0 mm"):
+        suture_plan.Throw.through(np.zeros(3), np.array([0.025, 0, 0]), 0.01, suture_plan.UP)
+
+
+def test_the_circle_of_a_throw_goes_through_both_holes() -> None:
+    entry, exit = np.array([0.01, 0.02, 0.03]), np.array([0.022, 0.02, 0.03])
+    throw = suture_plan.Throw.through(entry, exit, 0.0097, suture_plan.UP)
+    at = [throw.centre + 0.0097 * throw.axes @ [np.cos(a), np.sin(a), 0.0] for a in (0.0, throw.towards_exit)]
+    assert at[0] == pytest.approx(entry)
+    assert at[1] == pytest.approx(exit)
+    middle = throw.centre + 0.0097 * throw.axes @ [np.cos(throw.towards_exit / 2), np.sin(throw.towards_exit / 2), 0]
+    assert middle[2] < entry[2]
