@@ -267,7 +267,7 @@ def test_a_closing_jaw_presses_by_how_far_it_was_told_to_close(whole: Simulation
     whole.step(600)
     pressed = psm.jaw.measured_js()
     assert pressed.position == pytest.approx([0.0], abs=0.02)
-    assert pressed.effort[0] == pytest.approx(-0.5 * np.deg2rad(20) / 2, abs=0.01)
+    assert pressed.effort[0] == pytest.approx(-1.0 * np.deg2rad(20) / 2, abs=0.01)
 
 
 def test_the_ecm_moves_the_cameras_about_its_remote_centre(whole: Simulation) -> None:
