@@ -111,17 +111,24 @@ class Fingers:
             low, high = (-speed, np.inf) if opening > 0.0 else (-np.inf, speed)
             self._world.slow_joint(joint, low, high, strength)
 
+    def approach_thread(self, box: Array) -> None:
+        """Let the fingers close gently on a thread that is within their box (2, 3)."""
+        lever = 0.5 * self.jaw.reach
+        self.approach((Facing(0.0, box[0], lever), Facing(0.0, box[1], lever)))
+
     def stop(self, positions: tuple[float, float], effort: tuple[float, float]) -> None:
         """Keep both fingers at ``positions``, pressing with ``effort``."""
         self._slowed = True
         for joint, opening, at, tau in zip(self.jaw.joints, self.jaw.opening, positions, effort, strict=True):
             self._world.stop_joint(joint, at, -opening * tau)
 
-    def closer(self, positions: tuple[float, float], way: float, levers: tuple[float, float]) -> tuple[float, float]:
-        """The joint positions at which each pad is ``way`` metres nearer to the other."""
+    def moved(
+        self, positions: tuple[float, float], ways: tuple[float, float], levers: tuple[float, float]
+    ) -> tuple[float, float]:
+        """The joint positions at which the pads are ``ways`` metres further closed."""
         one, two = (
             at - opening * way / max(lever, LEAST_LEVER)
-            for at, opening, lever in zip(positions, self.jaw.opening, levers, strict=True)
+            for at, opening, way, lever in zip(positions, self.jaw.opening, ways, levers, strict=True)
         )
         return one, two
 

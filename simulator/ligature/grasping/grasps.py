@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.grasping import pinches
 from ligature.grasping.fingers import LEAST_LEVER, TOUCH, Facing, Fingers
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.scene import Jaw, Scene
@@ -22,6 +23,7 @@ from ligature.physics import World
 from ligature.suture import Rods
 from ligature.suture.grasp import Grasp, Patch, hold_together
 from ligature.suture.motion import Motion
+from ligature.suture.rod import Pads
 
 Array = NDArray[np.float64]
 
@@ -99,6 +101,8 @@ class Grasps(Mapping[str, Held | None]):
         self._own = [{link.body for link in tree_of[jaw.holder].links} for jaw in scene.jaws]
         self._actuators = [[a.index for a in scene.actuators if a.parent in own] for own in self._own]
         self._grips: list[_Grip | None] = [None for _ in scene.jaws]
+        self._pinches: list[pinches.Pinch | None] = [None for _ in scene.jaws]
+        self._pads: list[Pads | None] = [None for _ in scene.jaws]
         self._passing: list[list[int]] = [[] for _ in scene.jaws]
         self._near = [False for _ in scene.jaws]
 
@@ -116,7 +120,9 @@ class Grasps(Mapping[str, Held | None]):
         return len(self._scene.jaws)
 
     def _held(self, index: int) -> Held | None:
-        grip = self._grips[index]
+        grip, pinch = self._grips[index], self._pinches[index]
+        if pinch is not None:
+            return _held_thread(self._scene.jaws[index].name, pinch)
         if grip is None:
             return None
         grasp = grip.grasp
@@ -141,8 +147,11 @@ class Grasps(Mapping[str, Held | None]):
     def step(self, tick: int) -> None:
         """Look, close, hold, let go; the coming tick of the bodies moves by the impulses."""
         for index, grip in enumerate(self._grips):
+            pinch = self._pinches[index]
             if grip is not None:
                 self._keep(index, grip)
+            elif pinch is not None:
+                self._keep_thread(index, pinch)
             elif self._near[index] or ((tick + index) % LOOK == 0 and self._fingers[index].driven()):
                 self._look(index)
         self._hold()
@@ -150,7 +159,7 @@ class Grasps(Mapping[str, Held | None]):
     def _look(self, index: int) -> None:
         """Close gently on what is between the fingers; grasp it when both touch it."""
         fingers, passing = self._fingers[index], self._passing[index]
-        around, _ = self._world.surroundings(fingers.jaw.fingers)
+        around, box = self._world.surroundings(fingers.jaw.fingers)
         between: list[tuple[int, tuple[Facing, Facing]]] = []
         for body in around:
             if self._scene.bodies[body].static or body in self._own[index]:
@@ -160,9 +169,13 @@ class Grasps(Mapping[str, Held | None]):
                 between.append((body, faces))
         for body in [body for body in passing if not fingers.near(body)]:
             self._let_pass(index, body, False)
-        self._near[index] = bool(between or passing)
+        thread = pinches.within(self._rods, box)
+        self._near[index] = bool(between or passing or thread)
         if not between:
-            fingers.let()
+            if not thread:
+                fingers.let()
+            elif not self._pinch(index):
+                fingers.approach_thread(box)
             return
         body, faces = min(between, key=lambda item: item[1][0].gap + item[1][1].gap)
         if max(faces[0].gap, faces[1].gap) <= TOUCH and min(fingers.efforts()) > 0.0:
@@ -184,6 +197,45 @@ class Grasps(Mapping[str, Held | None]):
         self._world.hold_up(body, True, gripped=True)
         self._rods.weigh(self._world)
         self._keep(index, grip)
+
+    def _pinch(self, index: int) -> bool:
+        """Hold a thread that both pads touch."""
+        fingers, jaw = self._fingers[index], self._scene.jaws[index]
+        for number, rod in enumerate(self._rods.rods):
+            friction = self._friction(jaw, float(rod.description.friction.mean()))
+            pinch = pinches.begin(number, self._rods, self._world, fingers, friction)
+            if pinch is not None:
+                self._pinches[index] = pinch
+                self._world.clamped.update(jaw.fingers)
+                self._keep_thread(index, pinch)
+                return True
+        return False
+
+    def _keep_thread(self, index: int, pinch: pinches.Pinch) -> None:
+        """Let the pads of a jaw act on a thread in the coming tick, or let it go."""
+        pads = pinches.keep(pinch, self._rods, self._world, self._fingers[index])
+        if pads is None:
+            self._end_thread(index, pinch)
+        else:
+            self._pads[index] = pads
+            self._tell_rod(pinch.rod)
+
+    def _end_thread(self, index: int, pinch: pinches.Pinch) -> None:
+        """Let a thread go."""
+        self._pinches[index] = self._pads[index] = None
+        self._world.clamped -= set(self._scene.jaws[index].fingers)
+        self._rods.spare(pinch.rod, self._scene.jaws[index].fingers, None)
+        self._fingers[index].let()
+        self._tell_rod(pinch.rod)
+
+    def _tell_rod(self, number: int) -> None:
+        """Let a rod know all pads that hold it."""
+        held = [
+            other
+            for p, other in zip(self._pinches, self._pads, strict=True)
+            if p is not None and other is not None and p.rod == number
+        ]
+        self._rods.rods[number].pinch(held)
 
     def _friction(self, jaw: Jaw, other: float) -> float:
         """Coefficient between the pads and something with the friction ``other``: the product, as for all contacts."""
@@ -224,7 +276,7 @@ class Grasps(Mapping[str, Held | None]):
         T_holder_world = inverse(pose7_matrix(self._world.motion(fingers.jaw.holder)[0]))
         grip.grasp.move_patch(T_holder_world @ _patch_pose(fingers, faces))
         grip.levers = faces[0].lever, faces[1].lever
-        grip.positions = fingers.closer(grip.positions, 0.5 * room, grip.levers)
+        grip.positions = fingers.moved(grip.positions, (0.5 * room, 0.5 * room), grip.levers)
 
     def _let_go(self, index: int) -> None:
         """End a grasp; contacts stay off until the fingers are clear of the body."""
@@ -281,6 +333,9 @@ class Grasps(Mapping[str, Held | None]):
         for index, grip in enumerate(self._grips):
             if grip is not None and body in (None, grip.body):
                 self._let_go(index)
+            pinch = self._pinches[index]
+            if pinch is not None and body is None:
+                self._end_thread(index, pinch)
 
     def write_state(self, state: StateRecord) -> None:
         """Write what every jaw holds into a state record."""
@@ -293,11 +348,29 @@ class Grasps(Mapping[str, Held | None]):
 
     def memory(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
-        return {"grips": list(self._grips), "passing": [list(p) for p in self._passing], "near": list(self._near)}
+        return {
+            "grips": list(self._grips),
+            "pinches": list(self._pinches),
+            "pads": list(self._pads),
+            "passing": [list(p) for p in self._passing],
+            "near": list(self._near),
+        }
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Continue from `memory`, with a world that was built anew."""
         self._grips, self._near = list(memory["grips"]), list(memory["near"])
+        self._pinches, self._pads = list(memory["pinches"]), list(memory["pads"])
+        self._world.clamped.clear()
+        for number in range(len(self._rods.rods)):
+            for jaw in self._scene.jaws:
+                self._rods.spare(number, jaw.fingers, None)
+            self._tell_rod(number)
+        for index, pinch in enumerate(self._pinches):
+            if pinch is not None:
+                fingers = self._scene.jaws[index].fingers
+                self._world.clamped.update(fingers)
+                self._rods.spare(pinch.rod, fingers, self._rods.element_of(pinch.body))
+                self._fingers[index].stop(pinch.positions, (0.0, 0.0))
         for index, passing in enumerate(memory["passing"]):
             self._passing[index] = []
             for body in passing:
@@ -306,6 +379,13 @@ class Grasps(Mapping[str, Held | None]):
             if grip is not None:
                 self._take(index, grip)
         self._rods.weigh(self._world)
+
+
+def _held_thread(name: str, pinch: pinches.Pinch) -> Held:
+    limit = 2.0 * pinch.friction * pinch.normal_force
+    share = float(np.linalg.norm(pinch.force)) / limit if limit > 0.0 else 0.0
+    wrench = np.concatenate([pinch.force, np.zeros(3)])
+    return Held(name, pinch.body, pinch.normal_force, wrench, np.array([abs(pinch.slip), 0.0]), share)
 
 
 def _patch_pose(fingers: Fingers, faces: tuple[Facing, Facing]) -> Array:

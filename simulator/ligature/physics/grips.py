@@ -40,7 +40,10 @@ class Gaps:
 
 
 class BulletGrips:
-    """The part of a `World` that grasping needs."""
+    """The part of a `World` that grasping needs.
+
+    ``clamped`` are fingers whose joints are stopped while they hold a thread: it cannot move them.
+    """
 
     scene: Scene
     client: int
@@ -55,6 +58,7 @@ class BulletGrips:
     def _setup_grips(self) -> None:
         self._free_bodies = {tree.root for tree in self.trees if is_alone(tree, self.scene.bodies)}
         self._burdens: dict[int, tuple[Placement, Array]] = {}
+        self.clamped: set[int] = set()
         self._held_up: dict[int, int] = {}
         self._gripped: dict[int, int] = {}
 

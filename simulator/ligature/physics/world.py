@@ -204,7 +204,7 @@ class World(BulletQueries, BulletGrips):
     def driven(self, body: int) -> bool:
         """Whether a command sets the velocity of a body, so that a thread, however light the body, does not."""
         control = self._body_controls.get(body)
-        return control is not None and control.sets_velocity
+        return body in self.clamped or (control is not None and control.sets_velocity)
 
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,).
@@ -213,7 +213,7 @@ class World(BulletQueries, BulletGrips):
         """
         total, given = self._impulses.get(body), np.concatenate([impulse, moment])
         self._impulses[body] = given if total is None else total + given
-        if not self.driven(body):
+        if body in self.clamped or not self.driven(body):
             self.place_of[body].load((given / self.dt).tolist())
 
     def mobility(self, body: int) -> Array:

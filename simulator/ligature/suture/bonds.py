@@ -1,12 +1,17 @@
-"""Bonds: points of two nodes that stay together, for ties in the middle of a rod and for grips.
+"""Bonds: points of two nodes that stay together, for ties in the middle of a rod, for grips, and for pinches.
 
-World axes, SI units.
+A pinch holds whatever element passes between two pads: across them rigidly, along them by friction up to a
+limit that is given. World axes, SI units.
 """
 
 from __future__ import annotations
 
 from ligature.suture.compiled import inlined
-from ligature.suture.rotations import matrix_of, rotate
+from ligature.suture.coupling import SLIPS
+from ligature.suture.rotations import matrix_of, rotate, rotate_back
+
+PINCH = -2
+"""Key of the first pinch; the next ones have lower keys."""
 
 
 @inlined
@@ -40,7 +45,61 @@ def _bond(nodes, work, touches, i, k, points):
 
 
 @inlined
-def place_bonds(nodes, work, touches, grips, points):
-    """Add the bonds of all ``grips`` (g, 2), pairs of nodes, with their ``points`` (g, m, 2, 3)."""
+def _pinch(nodes, work, old, touches, g, i, k, points):
+    """Add pinch number ``g`` of the element at node i by node k.
+
+    ``points[0, 1]`` is the middle of the pads and ``points[1, 1]`` their normal, in the frame of node k;
+    ``points[2, 0, 0]`` is the largest force along the pads.
+    """
+    c = touches.count[0]
+    if c == touches.node.shape[0]:
+        return
+    touches.count[0] = c + 1
+    for node in (i, k):
+        matrix_of(nodes.q[node, 0], nodes.q[node, 1], nodes.q[node, 2], nodes.q[node, 3], work.R[node])
+    start, local, normal, slip = touches.start[c], touches.local[c], touches.normal[c], touches.slip[c]
+    rx, ry, rz = rotate(work.R[k], points[0, 1, 0], points[0, 1, 1], points[0, 1, 2])
+    start[1, 0], start[1, 1], start[1, 2] = nodes.x[k, 0] + rx, nodes.x[k, 1] + ry, nodes.x[k, 2] + rz
+    normal[0], normal[1], normal[2] = rotate(work.R[k], points[1, 1, 0], points[1, 1, 1], points[1, 1, 2])
+    a, b = nodes.axis[i, 0], nodes.axis[i, 1]
+    px, py, pz = rotate_back(
+        work.R[i], start[1, 0] - nodes.x[i, 0], start[1, 1] - nodes.x[i, 1], start[1, 2] - nodes.x[i, 2]
+    )
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    s = ((px - a[0]) * ux + (py - a[1]) * uy + (pz - a[2]) * uz) / (ux * ux + uy * uy + uz * uz)
+    s = min(max(s, 0.0), 1.0)
+    local[0, 0], local[0, 1], local[0, 2] = a[0] + s * ux, a[1] + s * uy, a[2] + s * uz
+    rx, ry, rz = rotate(work.R[i], local[0, 0], local[0, 1], local[0, 2])
+    start[0, 0], start[0, 1], start[0, 2] = nodes.x[i, 0] + rx, nodes.x[i, 1] + ry, nodes.x[i, 2] + rz
+    gap = 0.0
+    for m in range(3):
+        local[1, m] = points[0, 1, m]
+        gap += (start[0, m] - start[1, m]) * normal[m]
+        slip[m] = 0.0
+    touches.gap[c], touches.target[c] = gap, 0.0
+    touches.node[c, 0], touches.node[c, 1], touches.key[c] = i, k, PINCH - g
+    touches.arm[c, 0], touches.arm[c, 1] = 0.0, 0.0
+    touches.bond[c], touches.closed[c] = True, True
+    touches.friction[c], touches.press[c] = 1.0, points[2, 0, 0]
+    touches.mode[c], touches.switches[c] = SLIPS, 0
+    for o in range(old.count[0]):
+        if not old.bond[o]:
+            break
+        if old.key[o] == PINCH - g:
+            along = old.slip[o, 0] * normal[0] + old.slip[o, 1] * normal[1] + old.slip[o, 2] * normal[2]
+            for m in range(3):
+                slip[m] = old.slip[o, m] - along * normal[m]
+            touches.mode[c] = old.mode[o]
+
+
+@inlined
+def place_bonds(nodes, work, old, touches, grips, points):
+    """Add the bonds of all ``grips`` (g, 3): two nodes and whether it is a pinch, with ``points`` (g, m, 2, 3).
+
+    ``old`` are the contacts of the last tick.
+    """
     for g in range(grips.shape[0]):
-        _bond(nodes, work, touches, grips[g, 0], grips[g, 1], points[g])
+        if grips[g, 2]:
+            _pinch(nodes, work, old, touches, g, grips[g, 0], grips[g, 1], points[g])
+        else:
+            _bond(nodes, work, touches, grips[g, 0], grips[g, 1], points[g])

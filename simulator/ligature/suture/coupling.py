@@ -130,6 +130,12 @@ def _friction(touches, c, wx, wy, wz, scale, dt):
     return s, (s if touches.mode[c] == YIELDS else 0.0), s
 
 
+@inlined
+def rigid(touches, c):
+    """Whether bond ``c`` has no limit; one with friction is a pinch, of which `Touches.press` is given."""
+    return touches.bond[c] and touches.friction[c] == 0.0
+
+
 @kernel
 def add_contacts(nodes, touches, work, stiffness, dt):
     """Add all closed contacts to ``work.H`` and ``work.g``."""
@@ -142,7 +148,9 @@ def add_contacts(nodes, touches, work, stiffness, dt):
         touches.room[c] = room
         across, along, s, normal = 0.0, 0.0, 0.0, 0.0
         if touches.bond[c]:
-            across, along, s, normal, room = scale, scale, scale, scale, gap
+            room = gap
+        if rigid(touches, c):
+            across, along, s, normal = scale, scale, scale, scale
         elif touches.closed[c]:
             across, along, s = _friction(touches, c, wx, wy, wz, scale, dt)
             normal = scale
@@ -191,12 +199,14 @@ def settle_contacts(nodes, touches, work, stiffness, dt):
         ux, uy, uz = ax - bx, ay - by, az - bz
         kx, ky, kz = rotate(work.K[c], ux, uy, uz)
         force[0], force[1], force[2] = per_dt2 * (f[0] - kx), per_dt2 * (f[1] - ky), per_dt2 * (f[2] - kz)
-        if touches.bond[c]:
+        if rigid(touches, c):
             continue
         un = ux * n[0] + uy * n[1] + uz * n[2]
         begun = touches.begun[c]
         w[0], w[1], w[2] = begun[0] + ux - un * n[0], begun[1] + uy - un * n[1], begun[2] + uz - un * n[2]
         press = force[0] * n[0] + force[1] * n[1] + force[2] * n[2]
+        if touches.bond[c]:
+            press = touches.press[c]
         if touches.closed[c] and press >= 0.0:
             changed = _settle_friction(touches, c, w, press, stiffness) or changed
         elif touches.closed[c]:
@@ -241,7 +251,7 @@ def conclude_contacts(touches, stiffness):
     """The slip that the next tick's friction starts from."""
     for c in range(touches.count[0]):
         slip, w = touches.slip[c], touches.ended[c]
-        if not touches.closed[c] or touches.bond[c]:
+        if not touches.closed[c] or rigid(touches, c):
             touches.press[c] = 0.0
             touches.mode[c] = SLIPS
             for a in range(3):

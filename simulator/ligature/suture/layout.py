@@ -70,7 +70,7 @@ class Touches(NamedTuple):
     begun: Array  # (C, 3) slip there
     ended: Array  # (C, 3) slip at its end
     push: Array  # (C, 3) force on the element where it began, times dt²
-    bond: NDArray[np.bool_]  # (C,) holds the points together in every direction, whatever the gap
+    bond: NDArray[np.bool_]  # (C,) holds the points together whatever the gap: in every direction, or across pads
     force: Array  # (C, 3) on the element, N
 
 

@@ -16,6 +16,7 @@ from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, quat
 from ligature.model.poses import compose_rows
 from ligature.suture import layout
 from ligature.suture.bodies import Bodies
+from ligature.suture.bonds import PINCH
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, Tie, frame_quaternions
 from ligature.suture.passages import Passages, passages
@@ -49,6 +50,20 @@ class Partner:
     T_body_inertial: Array
     gravity: Array
     fixed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Pads:
+    """A pair of pads that hold whatever element of a rod passes between them.
+
+    ``points`` (p, 3) are where they touch and ``normal`` (3,) points across them, in the inertial frame of the
+    partner ``body``; ``limit`` is the largest friction force in newtons, shared by the points.
+    """
+
+    body: int
+    points: Array
+    normal: Array
+    limit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +108,7 @@ class Rod:
         self.partners = tuple(partners)
         self.dt = dt
         self.grips: list[Grip] = []
+        self._pads: tuple[Pads, ...] = ()
         n = len(description.mass)
         known = {partner.body: partner for partner in partners}
         for tie in description.ties:
@@ -175,7 +191,7 @@ class Rod:
         self._nodes.x[self._own], self._nodes.q[self._own] = poses[:, :3], poses[:, 3:]
         self._nodes.v[:], self._nodes.w[:] = 0.0, 0.0
         self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
-        self.grips = []
+        self.grips, self._pads, self._near = [], (), None
         self._bonds = self._gather_bonds()
         self.tension[:], self.impulse[:] = 0.0, 0.0
         for touches in self._touches:
@@ -203,6 +219,7 @@ class Rod:
         for name in TOUCH_MEMORY:
             getattr(touches, name)[:n] = memory[f"touch_{name}"]
         self.grips = [Grip(int(g[0]), int(g[1]), g[2:].reshape(3, 2, 3)) for g in memory["grips"]]
+        self._pads, self._near = (), None
         self._bonds = self._gather_bonds()
 
     def finite(self) -> bool:
@@ -290,6 +307,11 @@ class Rod:
         return poses
 
     @property
+    def skip(self) -> NDArray[np.bool_]:
+        """Which elements pass through which parts of bodies, (parts, n)."""
+        return self._shapes.skip
+
+    @property
     def contacts(self) -> layout.Touches:
         """Contact points of the last tick; only the first ``count[0]`` rows count."""
         return self._touches[0]
@@ -330,7 +352,7 @@ class Rod:
             self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
         rows = [(colliders.row_of[body], self.node_of[body]) for body in near]
         self._met = np.array(rows, dtype=np.int64).reshape(-1, 2)
-        holding = sorted({*self._tied, *(g.body for g in self.grips)})
+        holding = sorted({*self._tied, *(g.body for g in self.grips), *(p.body for p in self._pads)})
         self._apart = [body for body in holding if body not in near]
         partners = [(body, self.node_of[body]) for body in (*near, *self._apart)]
         self._movable = [(body, node) for body, node in partners if not self._fixed[body]]
@@ -346,19 +368,47 @@ class Rod:
         T_b = inverse(partner.T_body_inertial) @ T_body_b
         none = np.zeros(3)
         self.grips.append(self._grip_of(Tie(element, body, T_a, T_b, none, none, none, none, none)))
+        self._near = None
         self._bonds = self._gather_bonds()
 
     def release(self, element: int, body: int) -> None:
         """Let go of a grip."""
         self.grips = [g for g in self.grips if (g.element, g.body) != (element, body)]
+        self._near = None
+        self._bonds = self._gather_bonds()
+
+    def pinch(self, pads: Sequence[Pads]) -> None:
+        """Hold what passes between ``pads`` from now on, and nothing else by pads."""
+        if [p.body for p in pads] != [p.body for p in self._pads]:
+            self._near = None
+        self._pads = tuple(pads)
         self._bonds = self._gather_bonds()
 
     def _gather_bonds(self) -> tuple[NDArray[np.int64], Array]:
-        """Nodes (g, 2) and points (g, 3, 2, 3) of all bonds."""
-        self._near = None
+        """Nodes and kinds (g, 3) and points (g, 3, 2, 3) of all bonds; pinches last."""
         held = (*self._permanent, *self.grips)
-        nodes = np.array([(self._first + g.element, self.node_of[g.body]) for g in held], dtype=np.int64)
-        return nodes.reshape(-1, 2), np.array([g.points for g in held]).reshape(-1, 3, 2, 3)
+        nodes = [(self._first + g.element, self.node_of[g.body], 0) for g in held]
+        nodes += [(self._first, self.node_of[p.body], 1) for p in self._pads for _ in p.points]
+        points = np.array([*(g.points for g in held), *(p for pads in self._pads for p in _pinch_rows(pads))])
+        return np.array(nodes, dtype=np.int64).reshape(-1, 3), points.reshape(-1, 3, 2, 3)
+
+    def _find_pinched(self) -> None:
+        """Give every pinch the element nearest to its point."""
+        grips, points = self._bonds
+        rows = np.flatnonzero(grips[:, 2])
+        for row in rows:
+            k = grips[row, 1]
+            at = self._nodes.x[k] + quaternion_matrix(self._nodes.q[k]) @ points[row, 0, 1]
+            grips[row, 0] = self._first + int(np.argmin(np.linalg.norm(self.positions - at, axis=1)))
+
+    def pinched(self, body: int) -> tuple[int, Array]:
+        """Element in the pads of a body, and force (3,) of the pads on the rod in the last tick; -1 without any."""
+        touches = self._touches[0]
+        rows = np.flatnonzero(touches.bond[: touches.count[0]] & (touches.key[: touches.count[0]] <= PINCH))
+        rows = rows[touches.node[rows, 1] == self.node_of[body]]
+        if not len(rows):
+            return -1, np.zeros(3)
+        return int(touches.node[rows[0], 0]) - self._first, touches.force[rows].sum(axis=0)
 
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
@@ -370,6 +420,8 @@ class Rod:
         a, b, c = self._touches
         last, next_, spare = (self._touch_tables[id(touches)] for touches in self._touches)
         nodes, joints, shapes, work = self._tables
+        if self._pads:
+            self._find_pinched()
         grips, points = self._bonds
         run_tick(
             self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
@@ -385,6 +437,16 @@ class Rod:
 
 
 TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "mode", "bond", "normal", "force", "start")
+
+
+def _pinch_rows(pads: Pads) -> list[Array]:
+    """What `ligature.suture.bonds` wants of each point of a pair of pads, (3, 2, 3)."""
+    rows = []
+    for point in pads.points:
+        row = np.zeros((3, 2, 3))
+        row[0, 1], row[1, 1], row[2, 0, 0] = point, pads.normal, pads.limit / len(pads.points)
+        rows.append(row)
+    return rows
 
 
 def _ends(description: RodDescription) -> tuple[Tie | None, Tie | None, list[Tie]]:

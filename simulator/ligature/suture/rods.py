@@ -5,6 +5,8 @@ World axes, SI units; poses and twists as in `ligature.model.state`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,9 @@ from ligature.suture.description import RodDescription, from_chain
 from ligature.suture.rod import Partner, Rod
 
 Array = NDArray[np.float64]
+
+NEXT_TO_PADS = 3
+"""Elements next to the one between pads that do not touch the fingers."""
 
 NEXT_TO_TIE = 3
 """Elements next to a tie that do not touch the tied body, in which they begin."""
@@ -36,6 +41,7 @@ class Rods:
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
         self._colliders = Colliders(scene, dt)
         self.rods = [self._rod(scene, from_chain(scene, chain), dt) for chain in scene.rods]
+        self._skip = [rod.skip.copy() for rod in self.rods]
         self._of_body = {body: (rod, e) for rod in self.rods for e, body in enumerate(rod.description.bodies)}
 
     def _rod(self, scene: Scene, description: RodDescription, dt: float) -> Rod:
@@ -92,6 +98,18 @@ class Rods:
         for rod in self.rods:
             if rod.hangs_on(body):
                 rod.carry(T)
+
+    def element_of(self, body: int) -> int:
+        """Number of the element that a body is in its rod."""
+        return self._of_body[body][1]
+
+    def spare(self, number: int, bodies: Sequence[int], element: int | None) -> None:
+        """Let the elements around ``element`` of a rod pass through ``bodies``; None ends that."""
+        rod = self.rods[number]
+        beside = np.abs(np.arange(len(rod.positions)) - element) < NEXT_TO_PADS if element is not None else False
+        for body in bodies:
+            parts = self._colliders.parts_of(body)
+            rod.skip[parts] = self._skip[number][parts] | beside
 
     def weigh(self, masses: Masses) -> None:
         """Take over how the bodies that may meet a rod resist forces now, and whether they are held or fall."""

@@ -93,7 +93,7 @@ def _one_step(
     stiffness, h, part,
 ):  # fmt: skip
     new.count[0] = 0
-    place_bonds(nodes, work, new, grips, points)
+    place_bonds(nodes, work, old, new, grips, points)
     detect(first, work.segment.shape[0], nodes, shapes, old, new, work, tension, counts, self_skip, h)
     return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, part == 0, (part + 1) * h)
 

@@ -1,0 +1,122 @@
+"""Threads between the fingers of a jaw: held across the pads, sliding along them against friction.
+
+The rod's own contacts with the fingers hold until both pads touch; then the pads of `ligature.suture.rod` take
+over, inside the rod's implicit solve, with the friction that the force between the fingers allows. World axes, SI
+units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.grasping.fingers import FACING, LEAST_LEVER, TOUCH, Fingers
+from ligature.model.frames import pose7_matrix
+from ligature.physics import World
+from ligature.suture import Rods
+from ligature.suture.rod import Pads, Rod
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Pinch:
+    """One jaw that holds a thread.
+
+    ``rod`` is its number, ``body`` the element between the pads, ``along`` (m) where that was from the rod's
+    beginning when the grasp began. ``positions`` are where the fingers stop, ``lever`` how far the thread is from
+    their axis. ``points`` (2, 3) and ``normal`` (3,) of the pads are in the first finger's inertial frame.
+    """
+
+    rod: int
+    body: int
+    along: float
+    positions: tuple[float, float]
+    lever: float
+    points: Array
+    normal: Array
+    friction: float
+    reach: float
+    normal_force: float = 0.0
+    force: Array = field(default_factory=lambda: np.zeros(3))
+    slip: float = 0.0
+
+
+def begin(number: int, rods: Rods, world: World, fingers: Fingers, friction: float) -> Pinch | None:
+    """A grasp of a rod, when both pads touch it and the fingers are told to close."""
+    rod, jaw = rods.rods[number], fingers.jaw
+    axis, pivot = fingers.axis()
+    touched = [_touched(rod, fingers, finger, axis, pivot) for finger in (0, 1)]
+    if touched[0] is None or touched[1] is None or min(fingers.efforts()) <= 0.0:
+        return None
+    centre = 0.5 * (touched[0] + touched[1])
+    lever = centre - pivot
+    lever = lever - (lever @ axis) * axis
+    normal = fingers.closing(0, axis, lever)
+    element, on_rod, tangent = _nearest(rod, centre)
+    along = tangent - (tangent @ normal) * normal
+    along *= 0.5 * jaw.half_width / max(float(np.linalg.norm(along)), 1e-12)
+    T = pose7_matrix(world.motion(jaw.fingers[0])[0])
+    points = (np.array([on_rod - along, on_rod + along]) - T[:3, 3]) @ T[:3, :3]
+    return Pinch(
+        number, rod.description.bodies[element], _along(rod, element, on_rod), fingers.positions(),
+        float(np.linalg.norm(lever)), points, T[:3, :3].T @ normal, friction, jaw.half_width,
+    )  # fmt: skip
+
+
+def keep(pinch: Pinch, rods: Rods, world: World, fingers: Fingers) -> Pads | None:
+    """What the pads do in the coming tick; None when the fingers open, or the thread has slipped out."""
+    rod, finger = rods.rods[pinch.rod], fingers.jaw.fingers[0]
+    force = min(fingers.efforts()) / max(pinch.lever, LEAST_LEVER)
+    T = pose7_matrix(world.motion(finger)[0])
+    centre = T[:3, :3] @ pinch.points.mean(axis=0) + T[:3, 3]
+    element, on_rod, _ = _nearest(rod, centre)
+    if force <= 0.0 or np.linalg.norm(on_rod - centre) > pinch.reach:
+        return None
+    pinch.normal_force, pinch.body = force, rod.description.bodies[element]
+    pinch.slip = _along(rod, element, on_rod) - pinch.along
+    pinch.force = rod.pinched(finger)[1]
+    fingers.stop(pinch.positions, (force * pinch.lever, force * pinch.lever))
+    rods.spare(pinch.rod, fingers.jaw.fingers, element)
+    return Pads(finger, pinch.points, pinch.normal, 2.0 * pinch.friction * force)
+
+
+def within(rods: Rods, box: Array) -> bool:
+    """Whether an element of a rod has its centre within the box (2, 3)."""
+    return any(bool(((rod.positions > box[0]) & (rod.positions < box[1])).all(axis=1).any()) for rod in rods.rods)
+
+
+def _touched(rod: Rod, fingers: Fingers, finger: int, axis: Array, pivot: Array) -> Array | None:
+    """Mean point (3,) of the contacts that face a pad, None unless one of them touches."""
+    contacts = rod.contacts
+    node = rod.node_of.get(fingers.jaw.fingers[finger], -1)
+    rows = np.flatnonzero(contacts.node[: contacts.count[0], 1] == node)
+    points = contacts.start[rows, 0]
+    levers = points - pivot
+    levers -= np.outer(levers @ axis, axis)
+    ways = np.array([fingers.closing(finger, axis, lever) for lever in levers]).reshape(-1, 3)
+    facing = np.sum(ways * contacts.normal[rows], axis=1) > FACING
+    rows, points = rows[facing], points[facing]
+    if not len(rows) or not (contacts.closed[rows].any() or contacts.gap[rows].min() < TOUCH):
+        return None
+    return np.asarray(points.mean(axis=0))
+
+
+def _nearest(rod: Rod, point: Array) -> tuple[int, Array, Array]:
+    """The element nearest to ``point`` (3,), its point nearest to it, and its direction, world axes."""
+    e = int(np.argmin(np.linalg.norm(rod.positions - point, axis=1)))
+    R = pose7_matrix(np.concatenate([rod.positions[e], rod.orientations[e]]))[:3, :3]
+    a, b = rod.description.ends[e] @ R.T + rod.positions[e]
+    s = float(np.clip((point - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0))
+    return e, a + s * (b - a), (b - a) / np.linalg.norm(b - a)
+
+
+def _along(rod: Rod, element: int, point: Array) -> float:
+    """How far from the beginning of a rod, along it, a point on an element is."""
+    ends = rod.description.ends
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    R = pose7_matrix(np.concatenate([rod.positions[element], rod.orientations[element]]))[:3, :3]
+    first = R @ ends[element, 0] + rod.positions[element]
+    return float(lengths[:element].sum() + np.linalg.norm(point - first))
