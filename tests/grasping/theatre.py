@@ -81,7 +81,7 @@ class Theatre:
         self.sim.arms[name].move_jaw([0.5])
         self.wait()
 
-    def close(self, name: str, angle: float = -0.3, ticks: int = 600) -> None:
+    def close(self, name: str, angle: float = -0.14, ticks: int = 600) -> None:
         """Close an arm's jaw until it holds the needle."""
         self.sim.arms[name].servo_jaw([angle])
         for _ in range(ticks):
@@ -91,7 +91,7 @@ class Theatre:
                 return
         raise AssertionError(f"{name} closed on nothing")
 
-    def hand_needle_to(self, name: str, angle: float = -0.3) -> None:
+    def hand_needle_to(self, name: str, angle: float = -0.14) -> None:
         """Put the needle between an arm's pads and let them close on it."""
         self.reach(name)
         self.open(name)
