@@ -61,7 +61,7 @@ soak: setup
 	$(PYTHON) -m tests.bench.soak
 
 demo: setup
-	$(PYTHON) examples/suture.py --out out
+	.venv/bin/ligature demo
 
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md

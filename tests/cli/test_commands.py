@@ -112,3 +112,18 @@ def test_render_names_the_cameras_there_are(tmp_path: Path) -> None:
 def test_render_refuses_what_it_cannot_write(tmp_path: Path) -> None:
     assert "npy, png, exr" in ligature("render", SMALL, "--camera", "cameraL", "--format", "gif").stderr
     assert "five numbers" in ligature("render", SMALL, "--camera", "cameraL", "--distortion", "1,2").stderr
+
+
+def test_demo_needs_the_repository(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from ligature.cli import demo
+    from rich.console import Console
+
+    monkeypatch.setattr(demo, "EXAMPLE", tmp_path / "suture.py")
+    assert demo.demo(2, 0, tmp_path, Console(soft_wrap=True)) == 2
+    assert "comes with the repository" in capsys.readouterr().out
+    (tmp_path / "suture.py").write_text(
+        "import sys; sys.exit(0 if sys.argv[1:4] == ['--throws', '2', '--seed'] else 3)"
+    )
+    assert demo.demo(2, 0, tmp_path, Console(soft_wrap=True)) == 0

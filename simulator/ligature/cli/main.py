@@ -223,6 +223,18 @@ def poses(
     raise typer.Exit(run_poses(file, indices(models), root or [], seconds, rate, out, Console(highlight=False)))
 
 
+@app.command()
+def demo(
+    throws: Annotated[int, typer.Option(help="Throws, from the first pair of holes on.", min=1, max=3)] = 2,
+    seed: Annotated[int, typer.Option(help="Where the needle lies; 0 is the scene's own place.", min=0)] = 0,
+    out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
+) -> None:
+    """Have two arms suture by themselves; prints the score, writes pictures."""
+    from ligature.cli.demo import demo as run_demo
+
+    raise typer.Exit(run_demo(throws, seed, out, Console(highlight=False, soft_wrap=True)))
+
+
 def main() -> None:
     """Entry point of the command."""
     app()

@@ -1,0 +1,20 @@
+"""``ligature demo``: runs the example that sutures by itself, which lies beside the package in the repository."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "suture.py"
+
+
+def demo(throws: int, seed: int, out: Path, console: Console) -> int:
+    """Run the example; returns its exit status."""
+    if not EXAMPLE.is_file():
+        console.print(f"there is no '{EXAMPLE}': the demonstration comes with the repository, not with the package")
+        return 2
+    command = [sys.executable, str(EXAMPLE), "--throws", str(throws), "--seed", str(seed), "--out", str(out)]
+    return subprocess.run(command, check=False).returncode
