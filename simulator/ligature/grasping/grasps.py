@@ -27,7 +27,7 @@ from ligature.suture.rod import Pads
 
 Array = NDArray[np.float64]
 
-LOOK = 4
+LOOK = 5
 """Ticks between two looks at what stands between open fingers."""
 
 CREEP = 0.2e-3

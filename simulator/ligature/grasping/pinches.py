@@ -85,7 +85,12 @@ def keep(pinch: Pinch, rods: Rods, world: World, fingers: Fingers) -> Pads | Non
 
 def within(rods: Rods, box: Array) -> bool:
     """Whether an element of a rod has its centre within the box (2, 3)."""
-    return any(bool(((rod.positions > box[0]) & (rod.positions < box[1])).all(axis=1).any()) for rod in rods.rods)
+    for rod in rods.rods:
+        low, high = rod.box().tolist()
+        apart = any(a > y or b < x for a, b, x, y in zip(low, high, *box.tolist(), strict=True))
+        if not apart and ((rod.positions > box[0]) & (rod.positions < box[1])).all(axis=1).any():
+            return True
+    return False
 
 
 def _touched(rod: Rod, fingers: Fingers, finger: int, axis: Array, pivot: Array) -> Array | None:
