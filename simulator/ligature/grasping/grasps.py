@@ -21,7 +21,7 @@ from ligature.model.scene import Jaw, Scene
 from ligature.model.state import StateRecord
 from ligature.physics import World
 from ligature.suture import Rods
-from ligature.suture.grasp import Grasp, Patch, hold_together
+from ligature.suture.grasp import Grasp, Patch, hold_together, warm_up
 from ligature.suture.motion import Motion
 from ligature.suture.rod import Pads
 
@@ -105,6 +105,8 @@ class Grasps(Mapping[str, Held | None]):
         self._pads: list[Pads | None] = [None for _ in scene.jaws]
         self._passing: list[list[int]] = [[] for _ in scene.jaws]
         self._near = [False for _ in scene.jaws]
+        if scene.jaws:
+            warm_up()
 
     def __getitem__(self, name: str) -> Held | None:
         for index, jaw in enumerate(self._scene.jaws):

@@ -126,3 +126,10 @@ def hold_together(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Moti
         grasp.held, grasp.load, grasp.slipped, grasp.slides = pads.held[g], pads.load[g], pads.slid[g], pads.slides[g]
         grasp.pace, grasp.lag = pads.pace[g], pads.lag[g]
     return impulses
+
+
+def warm_up() -> None:
+    """Compile the kernels, or load them, so that the first grasp of a run need not wait."""
+    origin = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    still = Motion(origin, np.zeros(6), 1.0, np.ones(3))
+    hold_together([Grasp(Patch(np.eye(4), 1e-3, 0.5), np.eye(4))], [still], still, 1e-3)

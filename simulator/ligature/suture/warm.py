@@ -10,6 +10,7 @@ import numpy as np
 from ligature.model.scene import Body, Box, Collider, Identity, Scene, WorldSettings
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import from_material
+from ligature.suture.grasp import warm_up
 from ligature.suture.rod import Partner, Rod
 
 DT = 1e-3
@@ -39,6 +40,7 @@ def compile_kernels() -> None:
     rod = Rod(from_material(points, 1e-3, 1e8, 1100.0), [partner], colliders.shapes(2), DT)
     rod.meet(colliders, colliders.update(_Still(), rod.box()), _Still())
     rod.step()
+    warm_up()
 
 
 if __name__ == "__main__":
