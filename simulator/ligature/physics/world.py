@@ -6,6 +6,7 @@ world axes, twists are linear at the centre of mass, then angular, in world axes
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from typing import Any
 
@@ -63,6 +64,7 @@ class World(BulletQueries, BulletGrips):
     def _create(self) -> None:
         scene = self.scene
         self.client = pybullet.connect(pybullet.DIRECT)
+        self._end = weakref.finalize(self, pybullet.disconnect, self.client)
         self._world_gravity = common_gravity(scene)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS, erp=CLOSING,
@@ -301,8 +303,8 @@ class World(BulletQueries, BulletGrips):
         self._motions.forget_all()
 
     def close(self) -> None:
-        """Give the Bullet client back."""
-        pybullet.disconnect(physicsClientId=self.client)
+        """Give the Bullet client back; a world that is forgotten does so by itself."""
+        self._end()
 
     # --- set-up -----------------------------------------------------------------------------
 
