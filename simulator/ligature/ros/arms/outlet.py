@@ -16,10 +16,12 @@ from ligature.ros.arms.readings import Reading, readings
 from ligature.ros.arms.services import Services
 from ligature.ros.publisher import Publisher
 
+EVERY = {"measured_js": 1, "measured_cp": 1, "setpoint_js": 2, "setpoint_cp": 2, "jaw/measured_js": 2,
+         "gripper/measured_js": 2, "measured_cv": 2, "body/measured_cf": 2}  # fmt: skip
 SELDOM = 4
-"""Jacobians and the like are published every so many periods."""
-
-_SELDOM_TOPICS = ("body/jacobian", "spatial/jacobian", "gravity_compensation/setpoint_js")
+"""Readings are published every so many periods: where the arm is at 200 Hz, what else programs close loops on at
+100 Hz, the rest at 50 Hz. A client of the dVRK listens to a dozen of them for each arm, in one Python process.
+"""
 
 
 class ArmOutlet:
@@ -34,7 +36,7 @@ class ArmOutlet:
         self.events = EventTopics(root, description.kind)
         self._readings = readings(description.kind, kinematics.joint_names, self.base_frame)
         self._outlets: list[tuple[Reading, Publisher, int]] = [
-            (reading, Publisher(f"{root}/{reading.topic}", type(reading.message)), _periods(reading))
+            (reading, Publisher(f"{root}/{reading.topic}", type(reading.message)), EVERY.get(reading.topic, SELDOM))
             for reading in self._readings
         ]
         Services(root, self.events, lambda: self._kinematics, lambda: self._T_reference_base)
@@ -60,7 +62,3 @@ class ArmOutlet:
     def dropped(self) -> int:
         """Messages that slow clients missed."""
         return sum(publisher.dropped for _, publisher, _ in self._outlets)
-
-
-def _periods(reading: Reading) -> int:
-    return SELDOM if reading.topic in _SELDOM_TOPICS else 1
