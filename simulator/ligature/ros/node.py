@@ -129,7 +129,7 @@ class Node:
         state = self._state[0]
         sent, missed = self._schedule.publish(now, state, rospy.Time.from_sec(float(state["stamp"])))
         if self._arms.next_due() <= now:
-            sent += self._arms.publish(now, state)
+            sent += self._arms.publish(now, state, lambda: self._block.read(self._state))
         figures = self._block.figures
         figures["published"] += np.uint64(sent)
         figures["publish_late"] += np.uint64(missed)

@@ -90,21 +90,32 @@ class ArmsNode:
         """When `publish` has something to do, on the monotonic clock."""
         return self._due if self._outlets else math.inf
 
-    def publish(self, now: float, state: Any) -> int:
-        """Events first, then readings; returns how many readings were sent."""
+    def publish(self, now: float, state: Any, refresh: Callable[[], Any]) -> int:
+        """Readings, then events; returns how many readings were sent.
+
+        ``state`` is an element of the node's state record, which ``refresh`` reads anew. Whoever hears that a move has
+        ended finds readings that are no older than its end: the bus holds a state before it tells the state's events.
+        """
         self._due = max(self._due + PERIOD, now + PERIOD / 5)
         self._count += 1
-        self._tell_events()
-        if now > self._beat:
-            self._beat = now + HEARTBEAT
-            for outlet in self._outlets:
-                outlet.events.beat()
+        events = self._block.events.read()
+        if events:
+            refresh()
+        settled = {event.arm for event in events if event.name == "operating_state"}
         stamp = self._stamp(state)
         if self._count % FOLLOW_PERIODS == 0:
             for outlet in self._outlets:
                 outlet.follow(state["arm"][outlet.index])
             self._setup_joints.publish(state, stamp)
-        sent = sum(outlet.publish(state["arm"][outlet.index], stamp, self._count) for outlet in self._outlets)
+        sent = 0
+        for outlet in self._outlets:
+            sent += outlet.publish(state["arm"][outlet.index], stamp, 0 if outlet.index in settled else self._count)
+        for event in events:
+            self._outlets[event.arm].events.tell(event.name, event.value)
+        if now > self._beat:
+            self._beat = now + HEARTBEAT
+            for outlet in self._outlets:
+                outlet.events.beat()
         if self._challenge is not None:
             self._challenge.publish(now, state, stamp)
         if self._count % TF_PERIODS == 0:
@@ -114,10 +125,6 @@ class ArmsNode:
     def _stamp(self, state: Any) -> Any:
         now, told = rospy.Time.now(), rospy.Time.from_sec(float(state["stamp"]))
         return now if (now - told).to_sec() > STALE else told
-
-    def _tell_events(self) -> None:
-        for event in self._block.events.read():
-            self._outlets[event.arm].events.tell(event.name, event.value)
 
     def _publish_tf(self, state: Any, stamp: Any) -> None:
         if self._tf is None or not self._tf.heard:

@@ -16,8 +16,10 @@ from ligature.ros.arms.readings import Reading, readings
 from ligature.ros.arms.services import Services
 from ligature.ros.publisher import Publisher
 
-EVERY = {"measured_js": 1, "measured_cp": 1, "setpoint_js": 2, "setpoint_cp": 2, "jaw/measured_js": 2,
-         "gripper/measured_js": 2, "measured_cv": 2, "body/measured_cf": 2}  # fmt: skip
+EVERY = {
+    "measured_js": 1, "measured_cp": 1, "setpoint_js": 2, "setpoint_cp": 2, "jaw/measured_js": 2,
+    "jaw/setpoint_js": 2, "gripper/measured_js": 2, "measured_cv": 2, "body/measured_cf": 2,
+}  # fmt: skip
 SELDOM = 4
 """Readings are published every so many periods: where the arm is at 200 Hz, what else programs close loops on at
 100 Hz, the rest at 50 Hz. A client of the dVRK listens to a dozen of them for each arm, in one Python process.
