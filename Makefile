@@ -5,7 +5,7 @@ STAMPS := build/stamps
 SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
 
-.PHONY: run demo test setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
+.PHONY: run demo test test-slow setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -50,6 +50,10 @@ lint: setup
 
 unit: setup
 	$(PYTHON) -m pytest -m "not slow" tests
+
+# what takes long, or watches real time so closely that other work on the machine disturbs it
+test-slow: setup
+	$(PYTHON) -m pytest -m slow tests
 
 fuzz: setup
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)

@@ -220,6 +220,7 @@ def test_the_evaluation_reads_needle_and_camera_from_their_literal_topics(
     assert abs(stage.client.get_time() - time.time()) < 1.0
 
 
+@pytest.mark.slow  # it samples a moving needle in real time: other work on the machine makes it miss a crossing
 def test_a_needle_led_through_entry_and_exit_is_two_insertions_in_order(
     stage: Stage, needle: Any, holes: dict[str, Any]
 ) -> None:
