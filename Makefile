@@ -57,6 +57,7 @@ test-slow: setup
 
 fuzz: setup
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
+	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q $(shell grep -rl "from hypothesis" tests --include="test_*.py")
 
 bench: setup
 	$(PYTHON) -m tests.bench.run

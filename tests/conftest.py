@@ -7,9 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
 np.seterr(divide="raise", over="raise", invalid="raise")
+
+# a change is judged on the same examples every time; `make fuzz` looks for new ones
+settings.register_profile("same", derandomize=True, deadline=None, database=None)
+settings.register_profile("new", deadline=None, print_blob=True)
+settings.load_profile(os.environ.get("LIGATURE_EXAMPLES", "same"))
 
 
 def _shared(variable: str, default: Path) -> Path:

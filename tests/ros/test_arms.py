@@ -453,8 +453,8 @@ def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     local, reference = arm.hear("local/measured_cp"), arm.hear("measured_cp").header.frame_id
     before = arm.measured_cp()
     arm.tell("set_base_frame", base)
-    deadline = time.monotonic() + 2.0
-    while arm.hear("measured_cp").header.frame_id != "table":
+    deadline = time.monotonic() + 5.0
+    while any(arm.hear(reading).header.frame_id != "table" for reading in ("measured_cp", "setpoint_cp")):
         assert time.monotonic() < deadline
         time.sleep(0.01)
     there = arm.setpoint_cp()
