@@ -235,6 +235,22 @@ def demo(
     raise typer.Exit(run_demo(throws, seed, out, Console(highlight=False, soft_wrap=True)))
 
 
+@app.command()
+def teleop(
+    config: Annotated[Path, typer.Argument(help="Teleoperation file, or a launch file with input devices.")],
+    record: Annotated[Optional[Path], typer.Option(help="File to write what devices say to.")] = None,  # noqa: UP045
+    replay: Annotated[Optional[Path], typer.Option(help="Recorded file that speaks for the devices.")] = None,  # noqa: UP045
+    calibrate: Annotated[Optional[str], typer.Option(help="Device to calibrate.")] = None,  # noqa: UP045
+    check: Annotated[bool, typer.Option("--check", help="Only read the file, and tell who leads whom.")] = False,
+    devices: Annotated[Optional[str], typer.Option("-i", help="Indices of a launch file's input devices.")] = None,  # noqa: UP045
+) -> None:
+    """Lead arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""
+    from ligature.cli.teleop import teleop as run_teleop
+
+    console = Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_teleop(config, record, replay, calibrate, check, indices(devices), console))
+
+
 def main() -> None:
     """Entry point of the command."""
     app()

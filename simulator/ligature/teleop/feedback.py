@@ -17,12 +17,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FeedbackSettings:
-    """``gain`` of forces, ``limit`` in N, ``damping`` of the hand in N·s/m, ``most_damping`` that may brake it."""
+    """``gain`` of forces, ``limit`` in N, ``damping`` of the hand in N·s/m, ``most_damping`` that may brake it.
+
+    Contacts weaker than ``deadband`` N are not felt.
+    """
 
     gain: float = 1.0
     limit: float = 3.0
     damping: float = 0.5
     most_damping: float = 30.0
+    deadband: float = 0.0
 
 
 class Feedback:
@@ -51,7 +55,8 @@ class Feedback:
         settings = self.settings
         if not (np.isfinite(contact).all() and np.isfinite(velocity).all()):
             return np.zeros(3)
-        force = settings.gain * contact - settings.damping * velocity
+        felt = contact if np.linalg.norm(contact) >= settings.deadband else np.zeros(3)
+        force = settings.gain * felt - settings.damping * velocity
         size = float(np.linalg.norm(force))
         if size > settings.limit:
             force = force * (settings.limit / size)

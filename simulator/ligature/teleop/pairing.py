@@ -74,9 +74,10 @@ class Status(enum.Enum):
     SILENT = "the leader is silent"
     LEAPT = "the leader leapt"
     BROKEN = "the leader sends numbers that are no pose"
+    CONTESTED = "another leader claims the follower"
 
 
-HOLDING = (Status.SILENT, Status.LEAPT, Status.BROKEN)
+HOLDING = (Status.SILENT, Status.LEAPT, Status.BROKEN, Status.CONTESTED)
 """The follower stays where it is, until the pairing is engaged again."""
 
 
@@ -122,6 +123,16 @@ class Pairing:
     def release(self) -> None:
         """Lead no more."""
         self.status = Status.IDLE
+
+    def contest(self) -> None:
+        """Lead no more because somebody else wants the follower, until the pairing is engaged again."""
+        self.status = Status.CONTESTED
+
+    def change(self, settings: Settings) -> None:
+        """Go on from here with other settings; the follower does not jump."""
+        self.settings = settings
+        if self.status is Status.FOLLOWING and self._last is not None:
+            self._anchor(self._last, self._goal)
 
     def _anchor(self, hand: Hand, tip: Tip) -> None:
         self._anchor_hand, self._anchor_tip = hand.T_view_hand.copy(), tip.T_camera_tip.copy()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.teleop.camera import CameraDrive
-from ligature.teleop.pairing import Hand, Pairing, Settings, Status, Tip
+from ligature.teleop.pairing import HOLDING, Hand, Pairing, Settings, Status, Tip, is_pose
 
 Array = NDArray[np.float64]
 
@@ -24,13 +24,18 @@ class Conflict(ValueError):
 
 @dataclass
 class Leader:
-    """A device: the followers it may lead, the one that it leads, and its newest sample."""
+    """A device: the followers it may lead, the one that it leads, and its newest sample.
+
+    ``clutched`` says whether its own clutch is pressed, ``allowed`` whether it may lead (its arms are ready).
+    """
 
     name: str
     followers: tuple[str, ...]
     selected: str | None = None
     hand: Hand | None = None
     pairing: Pairing = field(default_factory=Pairing)
+    clutched: bool = False
+    allowed: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,17 +67,32 @@ class Seat:
     def __init__(
         self, pairs: Mapping[str, Sequence[str]], settings: Settings | None = None, camera_scale: float = 1.0
     ) -> None:
-        self._settings = settings or Settings()
         self._leaders = {
-            name: Leader(name, tuple(followers), pairing=Pairing(self._settings)) for name, followers in pairs.items()
+            name: Leader(name, tuple(followers), pairing=Pairing(settings)) for name, followers in pairs.items()
         }
         self._enabled = False
         self._clutched = False
         self._camera = CameraDrive(camera_scale)
         self._camera_hands: list[str] = []
+        self._camera_last: list[Array] = []
         for name, followers in pairs.items():
             if followers:
                 self.select(name, followers[0])
+
+    @property
+    def camera_scale(self) -> float:
+        """Metres of the camera for a metre of the hands."""
+        return self._camera.scale
+
+    @camera_scale.setter
+    def camera_scale(self, scale: float) -> None:
+        self._camera.release()
+        self._camera.scale = scale
+
+    @property
+    def leads_camera(self) -> tuple[str, ...]:
+        """The leaders that have the camera in hand."""
+        return tuple(self._camera_hands)
 
     @property
     def leaders(self) -> Mapping[str, Leader]:
@@ -113,11 +133,18 @@ class Seat:
         self.select(leader, free[(at + 1) % len(free)])
         return chosen.selected
 
-    def change(self, **values: object) -> None:
-        """Change `Settings` of all pairings."""
-        self._settings = replace(self._settings, **values)  # type: ignore[arg-type]
-        for leader in self._leaders.values():
-            leader.pairing.settings = self._settings
+    def change(self, leader: str | None = None, **values: object) -> None:
+        """Change `Settings` of a leader, or of all; followers do not jump."""
+        for chosen in [self._leader(leader)] if leader is not None else self._leaders.values():
+            settings: Settings = replace(chosen.pairing.settings, **values)  # type: ignore[arg-type]
+            chosen.pairing.change(settings)
+
+    def allow(self, leader: str, on: bool) -> None:
+        """Whether a leader may lead its follower; it begins where both are then."""
+        chosen = self._leader(leader)
+        chosen.allowed = on
+        if not on and chosen.pairing.status not in HOLDING:
+            chosen.pairing.release()
 
     # --- pedals -----------------------------------------------------------------------------
 
@@ -129,14 +156,24 @@ class Seat:
                 leader.pairing.release()
             self._camera.release()
 
-    def clutch(self, pressed: bool) -> None:
-        """The clutch pedal: hands move without followers while it is pressed."""
-        self._clutched = pressed
-        for leader in self._leaders.values():
+    def clutch(self, pressed: bool, leader: str | None = None) -> None:
+        """The clutch pedal, or the clutch of one leader: hands move without followers while it is pressed.
+
+        A leader that is not trusted any more (`HOLDING`) leads again after its clutch was pressed and released.
+        """
+        if leader is None:
+            self._clutched = pressed
+        for chosen in [self._leader(leader)] if leader is not None else self._leaders.values():
+            if leader is not None:
+                chosen.clutched = pressed
             if pressed:
-                leader.pairing.clutch()
-            elif leader.pairing.status is Status.CLUTCHED:
-                leader.pairing.release()
+                chosen.pairing.clutch()
+            elif not self.is_clutched(chosen.name) and chosen.pairing.status in (Status.CLUTCHED, *HOLDING):
+                chosen.pairing.release()
+
+    def is_clutched(self, leader: str) -> bool:
+        """Whether the pedal or the leader's own clutch is pressed."""
+        return self._clutched or self._leader(leader).clutched
 
     def camera(self, pressed: bool, hands: Sequence[str] = ()) -> None:
         """The camera pedal: ``hands`` (all leaders, at most two, when empty) lead the camera instead of followers."""
@@ -160,7 +197,7 @@ class Seat:
         if not self._enabled:
             return Orders({})
         if self._camera_hands:
-            return Orders({}, self._lead_camera(T_world_camera))
+            return Orders({}, self._lead_camera(now, T_world_camera))
         goals = {}
         for leader in self._leaders.values():
             goal = self._lead(leader, now, tips)
@@ -172,8 +209,9 @@ class Seat:
         if leader.hand is None or leader.selected is None or leader.selected not in tips:
             return None
         pairing = leader.pairing
-        if pairing.status is Status.IDLE and not self._clutched:
-            if now - leader.hand.time <= self._settings.patience:
+        if pairing.status is Status.IDLE:
+            ready = leader.allowed and not self.is_clutched(leader.name)
+            if ready and now - leader.hand.time <= pairing.settings.patience:
                 pairing.engage(leader.hand, tips[leader.selected])
             return None
         goal = pairing.update(leader.hand)
@@ -181,11 +219,30 @@ class Seat:
             return None
         return goal
 
-    def _lead_camera(self, T_world_camera: Array) -> Array | None:
-        hands = [self._leaders[name].hand for name in self._camera_hands]
-        poses = [hand.T_view_hand for hand in hands if hand is not None]
+    def _lead_camera(self, now: float, T_world_camera: Array) -> Array | None:
+        """Goal of the camera; None while a hand is missing, silent or no pose, and from there on it begins anew."""
+        poses = []
+        for name in self._camera_hands:
+            leader = self._leaders[name]
+            hand, patience = leader.hand, leader.pairing.settings.patience
+            if hand is not None and now - hand.time <= patience and is_pose(hand.T_view_hand):
+                poses.append(hand.T_view_hand)
         if len(poses) != len(self._camera_hands):
+            self._camera.release()
             return None
         if not self._camera.engaged:
             self._camera.engage(poses, T_world_camera)
+        elif leapt := self._leapt(poses):
+            self._camera.release()
+            self._camera_hands = []
+            self._leaders[leapt].pairing.status = Status.LEAPT
+            return None
+        self._camera_last = poses
         return self._camera.update(poses)
+
+    def _leapt(self, poses: Sequence[Array]) -> str:
+        """The leader whose hand is too far from where it was for the camera to follow, if any."""
+        for name, now, then in zip(self._camera_hands, poses, self._camera_last, strict=True):
+            if np.linalg.norm(now[:3, 3] - then[:3, 3]) > self._leaders[name].pairing.settings.leap:
+                return name
+        return ""

@@ -1,0 +1,74 @@
+"""The command ``ligature teleop``: devices lead arms on ROS, whoever runs those."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from contextlib import ExitStack
+from pathlib import Path
+
+from rich.console import Console
+
+from ligature.adf.diagnostics import AdfError
+from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.teleop import config
+from ligature.teleop.config import TeleopConfig
+
+
+def teleop(
+    file: Path, record: Path | None, replay: Path | None, calibrate: str | None, check: bool,
+    devices: tuple[int, ...] | None, console: Console,
+) -> int:  # fmt: skip
+    """Lead until Ctrl-C; returns the exit status."""
+    try:
+        wanted = _configuration(file, devices)
+    except (AdfError, OSError) as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
+    if check:
+        for leader, arms in wanted.pairs.items():
+            console.print(f"{leader} ({wanted.devices[leader].kind}) leads {', '.join(arms)}", markup=False)
+        return 0
+    uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
+    if not master_answers(uri):
+        console.print(f"no ROS master answers at {uri}; start the simulator with 'ligature run' first", markup=False)
+        return 1
+    return _on_ros(wanted, record, replay, calibrate, console)
+
+
+def _configuration(file: Path, devices: tuple[int, ...] | None) -> TeleopConfig:
+    """That of a teleoperation file, or what the input devices of a launch file say."""
+    text = file.read_text("utf-8")
+    if "multibody configs" in text:
+        from ligature.teleop.launch import of_launch_file
+
+        return of_launch_file(file, devices)
+    return config.from_text(text, file)
+
+
+def _on_ros(
+    wanted: TeleopConfig, record: Path | None, replay: Path | None, calibrate: str | None, console: Console
+) -> int:
+    from ligature.teleop.guide import calibration_of
+    from ligature.teleop.node import Teleop, begin_node
+    from ligature.teleop.record import Recorder, Replay
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    begin_node()
+    try:
+        if calibrate is not None:
+            block = calibration_of(wanted, calibrate, console.input, console.print)
+            console.print(block, markup=False, end="")
+            return 0
+        with ExitStack() as files:
+            recorder = Recorder(files.enter_context(record.open("w", encoding="utf-8"))) if record else None
+            node = Teleop(wanted, recorder, Replay(replay) if replay else None)
+            console.print(f"leading: {', '.join(f'{leader} → {arms[0]}' for leader, arms in wanted.pairs.items())}")
+            node.run(stop.is_set)
+    except (ValueError, OSError, RuntimeError) as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
+    return 0

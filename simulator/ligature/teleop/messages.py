@@ -1,0 +1,74 @@
+"""Messages of packages that need not be installed: what is heard brings its own definition along.
+
+A publisher tells the definition of its messages when a subscriber connects, so readings of any driver's generation
+are understood. To send a message its package must be there; it is imported when the device is asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+import genpy.dynamic
+import rospy
+
+
+class MissingPackage(RuntimeError):
+    """The package of a message type is not installed; the message says which."""
+
+
+def message_class(type_: str, what: str) -> Any:
+    """The class of ``package/Name``; raises `MissingPackage`, which tells that ``what`` needs it."""
+    package, _, name = type_.partition("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError) as error:
+        raise MissingPackage(
+            f"{what} needs messages {type_}: install the ROS package '{package}' and source its workspace ({error})"
+        ) from error
+
+
+class Listener:
+    """Hears a topic whatever its type; ``take`` gets messages, and the name of the node that sent each."""
+
+    def __init__(self, topic: str, take: Callable[[Any, str], None]) -> None:
+        self._take, self._topic = take, topic
+        self._classes: dict[str, Any] = {}
+        self._subscriber = rospy.Subscriber(topic, rospy.AnyMsg, self._decode, queue_size=10, tcp_nodelay=True)
+
+    def _decode(self, raw: Any) -> None:
+        header = raw._connection_header
+        cls = self._class_of(header["md5sum"], header["type"], header.get("message_definition", ""))
+        if cls is None:
+            return
+        message = cls()
+        message.deserialize(raw._buff)
+        self._take(message, header["callerid"])
+
+    def _class_of(self, md5: str, type_: str, definition: str) -> Any:
+        if md5 not in self._classes:
+            self._classes[md5] = _generated(type_, definition)
+            if self._classes[md5] is None:
+                rospy.logerr(f"{self._topic}: its publisher tells no usable definition of {type_}")
+        return self._classes[md5]
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._subscriber.unregister()
+
+
+def _generated(type_: str, definition: str) -> Any:
+    """A class made from a definition as publishers tell it; None when that is not one."""
+    try:
+        return genpy.dynamic.generate_dynamic(type_, definition)[type_]
+    except (genpy.MsgGenerationException, KeyError, SyntaxError):
+        return None
+
+
+def pose_numbers(message: Any) -> list[float]:
+    """Seven numbers of a PoseStamped, a TransformStamped (older systems), a Pose or a Transform."""
+    inner = getattr(message, "pose", None) or getattr(message, "transform", None) or message
+    p = getattr(inner, "position", None) or inner.translation
+    q = getattr(inner, "orientation", None) or inner.rotation
+    return [p.x, p.y, p.z, q.x, q.y, q.z, q.w]

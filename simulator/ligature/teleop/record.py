@@ -1,0 +1,89 @@
+"""Streams of devices and pedals as lines of JSON, and their replay: a demonstration on another scene.
+
+A line is ``{"t": seconds since the start, "device": name, "pose": [x y z qx qy qz qw], "grip": …, "buttons": {…}}`` or
+``{"t": …, "event": name, "value": …}``. Poses are the device's own, before calibration. Numbers that are none are
+written as JSON's ``NaN``, because a device may send them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from ligature.teleop.devices.device import Reading
+
+
+class Recorder:
+    """Writes what devices and pedals say to a text file; the first entry is second zero."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+        self._start: float | None = None
+
+    def _line(self, now: float, **values: Any) -> None:
+        if self._start is None:
+            self._start = now
+        self._out.write(json.dumps({"t": round(now - self._start, 6), **values}) + "\n")
+
+    def reading(self, device: str, reading: Reading) -> None:
+        """Write a reading of a device."""
+        buttons = {name: True for name, down in reading.buttons.items() if down}
+        self._line(reading.time, device=device, pose=reading.pose.tolist(), grip=reading.grip, buttons=buttons)
+
+    def event(self, now: float, name: str, value: Any) -> None:
+        """Write a pedal or a switch."""
+        self._line(now, event=name, value=value)
+
+
+class Replay:
+    """What a recorded file says, at its pace; raises ValueError with the line that is none."""
+
+    def __init__(self, path: Path) -> None:
+        self._rows = list(_rows(path))
+        self._next = 0
+        self._start: float | None = None
+
+    @property
+    def devices(self) -> set[str]:
+        """The devices that speak."""
+        return {row["device"] for row in self._rows if "device" in row}
+
+    @property
+    def finished(self) -> bool:
+        """Whether all was said."""
+        return self._next >= len(self._rows)
+
+    def due(self, now: float) -> Iterator[tuple[str, Any]]:
+        """What is said up to ``now``: ``("reading", (device, Reading))`` or the name and value of an event."""
+        if self._start is None:
+            self._start = now
+        while self._next < len(self._rows) and self._rows[self._next]["t"] <= now - self._start:
+            row = self._rows[self._next]
+            self._next += 1
+            if "device" in row:
+                time = self._start + row["t"]
+                yield "reading", (row["device"], Reading(time, np.array(row["pose"]), row["grip"], row["buttons"]))
+            else:
+                value = row["value"]
+                yield row["event"], tuple(value) if isinstance(value, list) else value
+
+
+def _rows(path: Path) -> Iterator[dict[str, Any]]:
+    with path.open(encoding="utf-8") as file:
+        for number, line in enumerate(file, 1):
+            try:
+                row = json.loads(line)
+                if "device" in row:
+                    valid = len([float(x) for x in row["pose"]]) == 7 and isinstance(row["buttons"], dict)
+                else:
+                    valid = isinstance(row["event"], str) and "value" in row
+                valid = valid and np.isfinite(row["t"])
+            except (ValueError, KeyError, TypeError):
+                valid = False
+            if not valid:
+                raise ValueError(f"{path}:{number}: no reading of a device and no event")
+            yield row
