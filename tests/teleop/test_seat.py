@@ -115,3 +115,62 @@ def test_two_hands_roll_the_camera_by_the_line_between_them() -> None:
 def test_unknown_names_are_told_with_the_known_ones(seat: Seat) -> None:
     with pytest.raises(Conflict, match="no leader 'omni'; there are MTML, MTMR"):
         seat.sample("omni", Hand(0.0, np.eye(4)))
+
+
+def test_the_clutch_of_one_leader_leaves_the_others_leading(seat: Seat) -> None:
+    for leader in ("MTMR", "MTML"):
+        feed(seat, 0.0, leader=leader)
+    feed(seat, 0.001)
+    seat.clutch(True, "MTMR")
+    feed(seat, 0.01, 0.02)
+    goals = feed(seat, 0.02, 0.02, leader="MTML")
+    assert list(goals) == ["PSM2"]
+    seat.clutch(False, "MTMR")
+    assert seat.status("MTMR") is Status.IDLE
+
+
+def test_a_clutch_tap_makes_a_silent_leader_trusted_again(seat: Seat) -> None:
+    feed(seat, 0.0)
+    seat.update(0.2, TIPS, CAMERA)
+    seat.clutch(True)
+    assert seat.status("MTMR") is Status.SILENT
+    seat.clutch(False)
+    feed(seat, 0.31)
+    assert "PSM1" in feed(seat, 0.32)
+
+
+def test_a_leader_leads_only_while_it_is_allowed_to(seat: Seat) -> None:
+    seat.allow("MTMR", False)
+    feed(seat, 0.0)
+    assert feed(seat, 0.01, 0.01) == {}
+    seat.allow("MTMR", True)
+    feed(seat, 0.02, 0.01)
+    assert feed(seat, 0.03, 0.02)["PSM1"].T_camera_tip[0, 3] == pytest.approx(0.01)
+
+
+def test_another_scale_while_leading_moves_nothing(seat: Seat) -> None:
+    feed(seat, 0.0)
+    before = feed(seat, 0.01, 0.02)["PSM1"].T_camera_tip[0, 3]
+    seat.change("MTMR", scale=0.1)
+    assert feed(seat, 0.02, 0.02)["PSM1"].T_camera_tip[0, 3] == pytest.approx(before)
+    assert feed(seat, 0.03, 0.03)["PSM1"].T_camera_tip[0, 3] == pytest.approx(before + 0.001)
+
+
+def test_a_hand_that_leaps_lets_the_camera_go(seat: Seat) -> None:
+    seat.camera(True, ["MTMR"])
+    for k in range(2):
+        seat.sample("MTMR", Hand(0.01 * k, np.eye(4)))
+        assert seat.update(0.01 * k, TIPS, CAMERA).camera is not None
+    seat.sample("MTMR", Hand(0.02, frame(np.eye(3), (0.2, 0, 0))))
+    assert seat.update(0.02, TIPS, CAMERA).camera is None
+    assert seat.status("MTMR") is Status.LEAPT
+    assert seat.leads_camera == ()
+
+
+def test_a_silent_hand_lets_the_camera_rest_and_begins_anew(seat: Seat) -> None:
+    seat.camera(True, ["MTMR"])
+    seat.sample("MTMR", Hand(0.0, np.eye(4)))
+    seat.update(0.0, TIPS, CAMERA)
+    assert seat.update(0.2, TIPS, CAMERA).camera is None
+    seat.sample("MTMR", Hand(0.3, frame(np.eye(3), (0.2, 0, 0))))
+    assert seat.update(0.3, TIPS, CAMERA).camera == pytest.approx(CAMERA)

@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 
 PERIOD = 0.005
 READINGS_PERIOD = 0.02
+HELD_UP = 0.05
+"""Seconds after which this process was kept waiting: what was sent meanwhile is heard before it counts as silence."""
+
 VIEW = "teleoperation view"
 """Name of the camera's frame as it was when hands began to lead: a camera that trembles must not shake instruments."""
 
@@ -154,10 +157,14 @@ class Teleop:
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Lead until ``stop`` says so, or a replay has ended."""
+        last = time.monotonic()
         while not stop() and not (self._replay is not None and self._replay.finished):
             self._wake.wait(PERIOD)
             self._wake.clear()
-            self.tick(time.monotonic())
+            if time.monotonic() - last > HELD_UP:
+                time.sleep(PERIOD)
+            last = time.monotonic()
+            self.tick(last)
         for haptics in self._haptics.values():
             haptics.rest()
         for device in self._devices.values():
@@ -234,6 +241,8 @@ class Teleop:
                 self.arms[name].go_jaw(tip.jaw)
         if orders.camera is not None and self._camera is not None and seen is not None:
             self._camera.go(orders.camera, seen[0])
+        if self._camera_pressed:
+            self._tell_camera(orders.camera is not None)
         for name, haptics in self._haptics.items():
             leader = self.seat.leaders[name]
             if leader.selected is None or leader.pairing.status is not Status.FOLLOWING or leader.hand is None:
@@ -244,17 +253,20 @@ class Teleop:
 
     def _camera_ready(self) -> bool:
         """Whether the camera can be led; it is asked for power and homing."""
-        topics, leads = self._camera_topics, bool(self.seat.leads_camera)
-        if self._camera is None:
-            obstacle = "the camera is fixed"
-        else:
-            obstacle = self._camera.obstacle()
-            if obstacle and self._camera.tells:
-                self._camera.make_ready()
-        topics.tell("current_state", SETTING if obstacle else ENABLED)
-        topics.tell("following", leads and not obstacle)
-        topics.tell("status", obstacle or ("following" if leads else "a hand leapt; press the pedal again"))
+        camera = self._camera
+        obstacle = "the camera is fixed" if camera is None else camera.obstacle()
+        if obstacle and camera is not None and camera.tells:
+            camera.make_ready()
+        self._camera_topics.tell("current_state", SETTING if obstacle else ENABLED)
+        if obstacle:
+            self._camera_topics.tell("status", obstacle)
         return not obstacle
+
+    def _tell_camera(self, follows: bool) -> None:
+        hands = " and ".join(self.seat.leads_camera)
+        why = "following" if follows else f"{hands} must both speak" if hands else "a hand leapt; press the pedal again"
+        self._camera_topics.tell("following", follows)
+        self._camera_topics.tell("status", why)
 
     def _leader_of(self, follower: str) -> Leader:
         return next(leader for leader in self.seat.leaders.values() if leader.selected == follower)

@@ -1,0 +1,71 @@
+"""Teleoperation files: what they mean, and what is told about those that are wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ligature.adf.diagnostics import AdfError
+from ligature.teleop.config import TeleopConfig, from_text
+
+GOOD = """
+camera: ECM
+camera scale: 0.5
+settings: {scale: 0.3, workspace: [[-1, -1, 0], [1, 1, 1]]}
+devices:
+  MTMR: {kind: mtm, force: {gain: 0.5, most damping: 10}}
+  pen: {kind: touch, topic: /arm1/, unit: 0.001, axes: [right, up, near], buttons: {grey: clutch}, settings: {scale: 1}}
+  pad: {kind: joy, moves: ["-0", "-1", "+7"], speed: 0.2}
+pairs: {MTMR: [PSM1, PSM3], pen: PSM2, pad: []}
+"""
+
+
+def read(text: str) -> TeleopConfig:
+    return from_text(text, Path("teleop.yaml"))
+
+
+def test_a_file_says_who_leads_whom_and_how() -> None:
+    config = read(GOOD)
+    assert config.pairs == {"MTMR": ("PSM1", "PSM3"), "pen": ("PSM2",), "pad": ()}
+    assert config.camera_scale == 0.5
+    assert config.devices["MTMR"].topic == "/MTMR/"
+    assert config.devices["MTMR"].force is not None
+    assert config.devices["MTMR"].force.most_damping == 10.0
+    pen = config.devices["pen"]
+    assert (pen.settings.scale, pen.settings.workspace) == (1.0, ((-1, -1, 0), (1, 1, 1)))
+    assert pen.options["unit"] == 0.001
+    assert pen.calibration.axes == pytest.approx(np.diag([1.0, -1.0, -1.0]))
+    assert config.devices["pad"].topic == "/joy"
+    assert config.devices["pad"].options["speed"] == 0.2
+
+
+def test_a_fixed_camera_stands_in_the_world() -> None:
+    config = read(GOOD.replace("camera: ECM", "camera: {position: [0, 0, 1], rpy: [3.14159265, 0, 0]}"))
+    assert config.camera == ""
+    assert config.T_world_camera is not None
+    assert config.T_world_camera[:3, 3] == pytest.approx([0, 0, 1])
+    assert config.T_world_camera[2, 2] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "message"),
+    [
+        ("kind: mtm", "kind: glove", "6:16: error: device MTMR is of no known kind 'glove'; known are mtm, touch"),
+        ("scale: 0.3", "size: 0.3", "settings has no key 'size'; known are scale"),
+        ("scale: 0.3", "scale: big", "4:19: error: scale must be a number, not 'big'"),
+        ("scale: 0.3", "scale: -1", "scale must be within 0"),
+        ("grey: clutch", "grey: fly", "a button cannot 'fly'; it can clutch, camera"),
+        ("[right, up, near]", "[right, up, away]", "axes right, up, away are no right-handed frame"),
+        ("pen: PSM2", "pen: PSM1", "pen and MTMR would both begin with PSM1"),
+        ("pen: PSM2", "pan: PSM2", "there is no device 'pan'; there are MTMR, pen, pad"),
+        ('["-0", "-1", "+7"]', '["-0", "-1"]', "moves must be a list of 3"),
+        ("[[-1, -1, 0], [1, 1, 1]]", "[[1, 1, 1], [0, 0, 0]]", "first corner of the workspace must be below"),
+        ("pairs:", "pears:", "a teleoperation has no key 'pears'"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place_and_what_would_be_right(wrong: str, right: str, message: str) -> None:
+    with pytest.raises(AdfError) as error:
+        read(GOOD.replace(wrong, right, 1))
+    assert message in str(error.value)
+    assert str(error.value).startswith("teleop.yaml:")
