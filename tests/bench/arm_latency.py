@@ -34,9 +34,10 @@ BOUND = 10.0
 
 
 class Watcher:
-    """Waits for the measured tip to leave a place."""
+    """Waits for the measured tip to leave a place along a direction (3,)."""
 
-    def __init__(self) -> None:
+    def __init__(self, along: Sequence[float] = (1.0, 0.0, 0.0)) -> None:
+        self.along = along
         self.arrivals: list[float] = []
         self.x = 0.0
         self._rest: float | None = None
@@ -47,7 +48,8 @@ class Watcher:
         """A new measured pose."""
         now = time.perf_counter()
         self.arrivals.append(now)
-        self.x = message.pose.position.x  # type: ignore[attr-defined]
+        p = message.pose.position  # type: ignore[attr-defined]
+        self.x = p.x * self.along[0] + p.y * self.along[1] + p.z * self.along[2]
         if self._rest is not None and abs(self.x - self._rest) > MOVED:
             self._seen, self._rest = now, None
             self._moved.set()
