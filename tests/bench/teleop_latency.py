@@ -29,7 +29,7 @@ MODELS = "1,3"
 """Both arms of the small scene; the view is a fixed one."""
 
 RATE = 200.0
-STEPS = 300
+STEPS = 200
 UPDATES_PER_STEP = 20
 STEP = 2e-3
 BOUND = 15.0
