@@ -97,6 +97,15 @@ def teleop(arms: dict[str, Any], start: Callable[..., Any], tmp_path_factory: py
     return program
 
 
+def wait_for_listener(publisher: Any, count: int = 1) -> Any:
+    """What is said before somebody listens is lost; the console's topics have two who do. Returns the publisher."""
+    deadline = time.monotonic() + 10.0
+    while publisher.get_num_connections() < count:
+        assert time.monotonic() < deadline, f"fewer than {count} listen to {publisher.name}"
+        time.sleep(0.01)
+    return publisher
+
+
 class Pen:
     """A haptic pen's driver: a pose at 200 Hz, and buttons."""
 
@@ -107,10 +116,12 @@ class Pen:
         self.buttons_type = genpy.dynamic.generate_dynamic("omni_msgs/OmniButtonEvent", BUTTONS)[
             "omni_msgs/OmniButtonEvent"
         ]
-        self._pose = rospy.Publisher("/arm1/pose", PoseStamped, queue_size=1, tcp_nodelay=True)
+        self._pose = rospy.Publisher("/arm1/pose", PoseStamped, queue_size=100, tcp_nodelay=True)
         self._buttons = rospy.Publisher("/arm1/button", self.buttons_type, queue_size=10, latch=True)
         self._message = PoseStamped()
         self.T = np.eye(4)
+        for publisher in (self._pose, self._buttons):
+            wait_for_listener(publisher)
         self.press()
 
     def press(self, grey: int = 0, white: int = 0) -> None:
@@ -273,7 +284,8 @@ def test_the_pen_switches_to_the_other_arm_without_a_jump(
 ) -> None:  # fmt: skip
     from std_msgs.msg import String
 
-    select, unselect = publish("/console/teleop/select", String), publish("/console/teleop/unselect", String)
+    select = wait_for_listener(publish("/console/teleop/select", String), 2)
+    unselect = wait_for_listener(publish("/console/teleop/unselect", String), 2)
     selected = listen("/console/teleop/selected", String)
     before = {name: measured(arms, name) for name in ("PSM1", "PSM2")}
     unselect.publish("paddle_PSM2")
@@ -299,7 +311,7 @@ def test_an_arm_that_two_leaders_claim_holds_and_the_claim_is_told(
 
     status = listen("/pen_PSM1/status", String)
     pen.rest(0.1)
-    publish("/console/teleop/select", String).publish("paddle_PSM1")
+    wait_for_listener(publish("/console/teleop/select", String), 2).publish("paddle_PSM1")
     pen.rest(0.1)
     before = measured(arms, "PSM1")
     pen.glide((0.02, 0.0, 0.0), seconds=0.2)
@@ -345,10 +357,7 @@ class Paddle:
         self._types = types
         self._publisher = rospy.Publisher("/hydra_calib", types["razer_hydra/Hydra"], queue_size=1, tcp_nodelay=True)
         self.T = np.eye(4)
-        deadline = time.monotonic() + 10.0
-        while self._publisher.get_num_connections() == 0:
-            assert time.monotonic() < deadline, "nobody listens to the paddles"
-            time.sleep(0.01)
+        wait_for_listener(self._publisher)
 
     def send(self, trigger: float = 0.0) -> None:
         paddles = []
@@ -365,7 +374,9 @@ class Paddle:
         self._publisher.unregister()
 
 
-def test_what_devices_said_was_written_down(teleop: Any) -> None:
+def test_what_devices_said_is_written_down_and_can_be_said_again(
+    teleop: Any, arms: dict[str, Any], start: Callable[..., Any], tmp_path: Path
+) -> None:
     from ligature.teleop.record import Replay
 
     assert teleop.end() == 0
@@ -374,3 +385,22 @@ def test_what_devices_said_was_written_down(teleop: Any) -> None:
     told = [*replay.due(0.0), *replay.due(1e6)]
     assert sum(name == "reading" for name, _ in told) > 1000
     assert [value for name, value in told if name == "camera"] == [True, False]
+    lines = teleop.record.read_text().splitlines()
+    (tmp_path / "part.jsonl").write_text("\n".join(_first_motion(lines)) + "\n")
+    (tmp_path / "teleop.yaml").write_text(CONFIG)
+    before = measured(arms, "PSM1")
+    again = start(BIN / "ligature", "teleop", tmp_path / "teleop.yaml", "--replay", tmp_path / "part.jsonl")
+    assert again.process.wait(30.0) == 0
+    time.sleep(0.3)
+    assert 5.0 < apart(measured(arms, "PSM1"), before)[0] < 30.0
+
+
+def _first_motion(lines: list[str]) -> list[str]:
+    """Three seconds of the pen at rest, for the arm to become ready, then what it did first."""
+    import json
+
+    rows = [row for row in map(json.loads, lines) if row.get("device") == "pen"]
+    start = next(k for k, row in enumerate(rows) if row["pose"][0] > 0.0)
+    rest = [{**rows[0], "buttons": {}, "t": 0.02 * k} for k in range(150)]
+    moved = [{**row, "buttons": {}, "t": row["t"] - rows[start]["t"] + 3.0} for row in rows[start : start + 100]]
+    return [json.dumps(row) for row in (*rest, *moved)]

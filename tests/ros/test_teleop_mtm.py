@@ -12,7 +12,7 @@ import pytest
 from ligature.model.frames import pose7_matrix
 
 from tests.ros.conftest import BIN
-from tests.ros.test_teleop import apart, camera_of, measured
+from tests.ros.test_teleop import apart, camera_of, measured, wait_for_listener
 
 pytestmark = pytest.mark.ros
 
@@ -58,7 +58,7 @@ def component(arms: dict[str, Any], listen: Callable[..., Any], publish: Callabl
 
     heard = {name: listen(f"/MTMR_PSM1/{name}", String) for name in ("current_state", "desired_state", "status")}
     heard["following"] = listen("/MTMR_PSM1/following", Bool)
-    publish("/console/teleop/enable", Bool).publish(True)
+    wait_for_listener(publish("/console/teleop/enable", Bool), 2).publish(True)
     try:
         heard["following"].wait(lambda m: m.data, 20.0)
     except AssertionError as error:

@@ -75,7 +75,8 @@ class Teleop:
         self._config, self._recorder, self._replay = config, recorder, replay
         self._inbox: deque[tuple[str, Any]] = deque()
         self._wake = threading.Event()
-        self._enabled, self._present, self._camera_pressed = config.enabled, True, False
+        self._enabled, self._camera_pressed = config.enabled, False
+        self._present = not any("present" in spec.buttons.values() for spec in config.devices.values())
         self._warned: dict[str, Status] = {}
         self._next_readings = 0.0
         self.frames = Frames()
