@@ -36,6 +36,15 @@ def indices(text: str | None) -> tuple[int, ...] | None:
         raise typer.BadParameter(str(error)) from None
 
 
+def task_name(text: str) -> str:
+    """``text``, unless it is given and no task has that name."""
+    from ligature.tasks import TASKS
+
+    if text and text not in TASKS:
+        raise typer.BadParameter(f"there is no task '{text}'; there are {', '.join(TASKS)}")
+    return text
+
+
 @app.command()
 def run(
     launch: Launch,
@@ -61,6 +70,9 @@ def run(
         ),
     ] = None,
     window: Annotated[bool, typer.Option("--window", help="Show the scene in a window.")] = False,
+    task: Annotated[
+        str, typer.Option(help="Judge a task on ROS: pose_estimation, insertion or suture.", callback=task_name)
+    ] = "",
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -74,6 +86,7 @@ def run(
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
+        task=task,
         notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())

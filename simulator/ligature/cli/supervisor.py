@@ -127,6 +127,10 @@ class Supervisor:
             self._children["ros"] = Child(
                 "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
             )
+            if self._options.task:
+                self._children["tasks"] = Child(
+                    "tasks", [sys.executable, "-m", "ligature.cli.tasks_process", text], self._events, self._env
+                )
 
     def _start_drawing(self, name: str, module: str) -> None:
         """Start a process that draws, behind all others; without a ROS master the run is over."""
@@ -211,7 +215,7 @@ class Supervisor:
         self._stop = True
         self._progress.stop()
         deadline = time.monotonic() + END_PATIENCE
-        order = [self._children[n] for n in (*_DRAWING, "ros", "physics", "master") if n in self._children]
+        order = [self._children[n] for n in (*_DRAWING, "tasks", "ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
             if child.process.poll() is None:
                 child.process.terminate()

@@ -1,5 +1,6 @@
 """Suturing tasks: what counts as done, how well, and everything that was measured on the way."""
 
+from ligature.tasks.attempt import TASKS, Attempt
 from ligature.tasks.monitor import Measures, Monitor
 from ligature.tasks.scenery import MissingBodies, Scenery
 from ligature.tasks.scores import (
@@ -12,6 +13,8 @@ from ligature.tasks.scores import (
 )
 
 __all__ = [
+    "TASKS",
+    "Attempt",
     "EstimationScore",
     "InsertionScore",
     "Measures",

@@ -13,6 +13,7 @@ from ligature.tasks.passages import Passage, PassageWatch
 from ligature.tasks.scenery import Scenery
 
 Array = NDArray[np.float64]
+Number = float | int | bool
 
 STILL = 1e-5
 """Metres that a tip must move to count: less is the trembling of a standing arm."""
@@ -37,6 +38,14 @@ class Measures:
     path_lengths: dict[str, float]
     drops: int
 
+    def report(self) -> dict[str, Number]:
+        """The figures by name: seconds, newtons, metres."""
+        return {
+            "time": self.time, "passages": len(self.passages), "tissue_force": self.tissue_force,
+            "tissue_force_mean": self.tissue_force_mean, "thread_tension": self.thread_tension,
+            **{f"path_length_{name}": way for name, way in self.path_lengths.items()}, "drops": self.drops,
+        }  # fmt: skip
+
     def lines(self) -> list[str]:
         """One figure a line."""
         ways = ", ".join(f"{name} {way:.2f} m" for name, way in self.path_lengths.items())
@@ -52,11 +61,11 @@ class Measures:
 class Monitor:
     """Takes one state record after the other; any rate of 100 Hz and more will do.
 
-    Raises `ligature.tasks.MissingBodies` for a scene without needle or holes.
+    Raises `ligature.tasks.MissingBodies` for a scene without needle or holes, unless it is told the ``scenery``.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scenery = Scenery.of(scene)
+    def __init__(self, scene: Scene, scenery: Scenery | None = None) -> None:
+        self.scenery = scenery or Scenery.of(scene)
         self._watch = PassageWatch(self.scenery)
         self._names = [arm.name for arm in scene.arms if arm.kind is ArmKind.PSM]
         self._tips = list(self.scenery.tips)

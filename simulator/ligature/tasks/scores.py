@@ -1,6 +1,6 @@
 """How well a task was done: the challenge's three tasks, with what its reports say. Metres, seconds.
 
-Success and fields are those of interface reference §4.6; `lines` are what a person reads.
+Success and fields are those of interface reference §4.6; `lines` are what a person reads, `report` what a program does.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from ligature.tasks.passages import Passage
 from ligature.tasks.scenery import Scenery
 
 Array = NDArray[np.float64]
+Report = dict[str, float | int | bool | str]
 
 RECOMMENDED_AXIAL = 0.005
 """How far the tip should have come out of the exit at the end."""
@@ -41,6 +42,13 @@ class EstimationScore:
     def total(self) -> float:
         """Sum of the three."""
         return self.E_base + self.E_mid + self.E_tip
+
+    def report(self) -> Report:
+        """The challenge's fields."""
+        return {
+            "success": True, "completion_time": self.completion_time, "E_base": self.E_base, "E_mid": self.E_mid,
+            "E_tip": self.E_tip, "total": self.total,
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """One figure a line."""
@@ -70,6 +78,14 @@ class InsertionScore:
     exit: Passage | None
     why: str = ""
 
+    def report(self) -> Report:
+        """The challenge's fields; laterals are x and y in the hole's frame. Without success only the reason."""
+        if not self.success:
+            return {"success": False, "completion_time": self.completion_time, "why": self.why}
+        assert self.entry is not None and self.exit is not None
+        begun = {"success": True, "completion_time": self.completion_time, "hole": self.pair, "axial": self.axial}
+        return {**begun, **_laterals("entry", self.entry), **_laterals("exit", self.exit)}
+
     def lines(self) -> list[str]:
         """One figure a line."""
         if not self.success:
@@ -80,6 +96,15 @@ class InsertionScore:
             f"tip {1e3 * self.axial:.1f} mm beyond the exit (recommended {1e3 * RECOMMENDED_AXIAL:.0f} mm)",
             f"entry missed by {1e3 * self.entry.miss:.2f} mm, exit by {1e3 * self.exit.miss:.2f} mm",
         ]
+
+
+def _laterals(name: str, passage: Passage) -> Report:
+    """How far beside the hole's middle the tip passed: distance, largest component, and vector."""
+    x, y = passage.lateral
+    return {
+        f"{name}_lateral": passage.miss, f"{name}_lateral_max": max(abs(x), abs(y)), f"{name}_lateral_x": x,
+        f"{name}_lateral_y": y,
+    }  # fmt: skip
 
 
 def judge_insertion(scenery: Scenery, body_pose: Array, passages: Sequence[Passage], time: float) -> InsertionScore:
@@ -121,6 +146,14 @@ class SutureScore:
     axial: float
     misses: tuple[float, ...]
     why: str = ""
+
+    def report(self) -> Report:
+        """The challenge's fields. Without success only the reason."""
+        if not self.success:
+            return {"success": False, "completion_time": self.completion_time, "why": self.why}
+        begun: Report = {"success": True, "completion_time": self.completion_time, "axial": self.axial}
+        sides = [f"{side}{pair}" for pair in range(1, len(self.misses) // 2 + 1) for side in ("entry", "exit")]
+        return begun | {f"{side}_lateral": miss for side, miss in zip(sides, self.misses, strict=True)}
 
     def lines(self) -> list[str]:
         """One figure a line."""

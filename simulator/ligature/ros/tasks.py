@@ -1,0 +1,161 @@
+"""Tasks on ROS: takes the reports that participants of the suturing challenge send, publishes scores and measures.
+
+Reports have the challenge's topics and types (interface reference §4.5). What is published stands below
+``/ligature/tasks/NAME``; docs/tasks.md lists it. SI units.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import rospy
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PointStamped, PoseStamped
+from numpy.typing import NDArray
+from std_msgs.msg import Bool, Empty
+
+from ligature.bus import Block
+from ligature.model.frames import pose7_matrix
+from ligature.model.scene import Scene
+from ligature.model.state import new_state
+from ligature.ros.master import NO_ANSWER, MasterWatch, node_name, require_free
+from ligature.tasks.attempt import TASKS, Attempt
+
+Array = NDArray[np.float64]
+
+REPORTS = "/surgical_robotics_challenge/completion_report"
+SAMPLING = 0.005
+"""Wall seconds between two looks at the state; 100 Hz of simulated time is what the challenge's evaluation takes."""
+
+TELLING, LOOKING = 0.1, 0.2
+"""Seconds between two publications of measures, and between two looks for new teams."""
+
+PHYSICS_SILENCE = 5.0
+"""Seconds without a sign of life of the physics process after which this one ends."""
+
+QUEUE = 10
+
+
+class TaskNode:
+    """Judges one attempt after the other at ``task``; ``say`` is told what a person may want to read.
+
+    Raises `ligature.tasks.MissingBodies`, and `ligature.ros.master.NameTaken`.
+    """
+
+    def __init__(self, scene: Scene, bus: str, task: str, say: Callable[[str], None]) -> None:
+        self._attempt, self._say = Attempt(scene, task), say
+        self._state = new_state(scene)
+        self._block = Block.attach(bus, self._state.dtype)
+        self._lock = threading.Lock()
+        name = f"{node_name(scene.world.topic)}_tasks"
+        require_free(f"/{name}")
+        rospy.init_node(name, disable_signals=True)
+        root = f"{scene.world.topic.rpartition('/ambf/')[0]}/ligature/tasks/{task}"
+        self._score = rospy.Publisher(f"{root}/score", DiagnosticStatus, queue_size=QUEUE, latch=True)
+        self._measures = rospy.Publisher(f"{root}/measures", DiagnosticStatus, queue_size=QUEUE)
+        self._passages = rospy.Publisher(f"{root}/passages", PointStamped, queue_size=QUEUE)
+        rospy.Subscriber(f"{root}/restart", Empty, self._restart, queue_size=QUEUE)
+        self._teams: set[str] = set()
+        self._told = 0
+
+    def run(self, stop: threading.Event) -> None:
+        """Watch until ``stop`` is set or the physics process is gone."""
+        MasterWatch().start()
+        telling, looking, tick = 0.0, 0.0, -1
+        while not stop.is_set() and not rospy.is_shutdown() and self._block.age < PHYSICS_SILENCE:
+            now = time.monotonic()
+            if self._block.read(self._state) and int(self._state["tick"][0]) != tick:
+                tick = int(self._state["tick"][0])
+                with self._lock:
+                    self._attempt.observe(self._state[0])
+                    self._tell_passages()
+            if now >= looking:
+                looking = now + LOOKING
+                self._look_for_teams()
+            if now >= telling:
+                telling = now + TELLING
+                self._tell_measures()
+            time.sleep(SAMPLING)
+
+    def _restart(self, message: Any) -> None:
+        with self._lock:
+            self._attempt.restart()
+
+    def _look_for_teams(self) -> None:
+        """Subscribe the reports of every team that has advertised them since the last look."""
+        number = TASKS[self._attempt.task]
+        wanted = re.compile(rf"{REPORTS}/(?P<team>[^/]+)/task{number}/?\Z")
+        try:
+            topics = [name for name, _ in rospy.get_published_topics(REPORTS)]
+        except (*NO_ANSWER, rospy.ROSException):
+            return
+        for topic in topics:
+            match = wanted.match(topic)
+            if match is not None and match["team"] not in self._teams:
+                self._teams.add(match["team"])
+                self._subscribe(topic, match["team"])
+
+    def _subscribe(self, topic: str, team: str) -> None:
+        """Take the reports of ``team``."""
+        if self._attempt.task == "pose_estimation":
+            rospy.Subscriber(topic, PoseStamped, self._take_pose, team, queue_size=QUEUE)
+        else:
+            rospy.Subscriber(topic, Bool, self._take_end, team, queue_size=QUEUE)
+
+    def _take_pose(self, message: PoseStamped, team: str) -> None:
+        p, q = message.pose.position, message.pose.orientation
+        pose = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
+        if not np.isfinite(pose).all() or abs(np.linalg.norm(pose[3:]) - 1.0) > 1e-2:
+            rospy.logwarn(f"{team} reports a pose that is none: numbers must be finite, the quaternion of length 1")
+            return
+        self._judge(team, pose7_matrix(pose))
+
+    def _take_end(self, message: Bool, team: str) -> None:
+        if message.data:
+            self._judge(team)
+
+    def _judge(self, team: str, T_camera_needle: Array | None = None) -> None:
+        """Judge and publish; a task that goes on may be reported again."""
+        try:
+            with self._lock:
+                score, measures = self._attempt.judge(T_camera_needle), self._attempt.monitor.measures()
+        except ValueError as error:
+            rospy.logwarn(f"{team}: {error}")
+            return
+        report = score.report()
+        said = "done" if score.success else f"not done: {report['why']}"
+        level = DiagnosticStatus.OK if score.success else DiagnosticStatus.WARN
+        self._score.publish(_status(self._attempt.task, level, said, team, report))
+        self._measures.publish(_status(self._attempt.task, level, "", "", measures.report()))
+        for line in (f"{team}:", *score.lines(), *measures.lines()):
+            self._say(line)
+
+    def _tell_measures(self) -> None:
+        with self._lock:
+            report = self._attempt.monitor.measures().report()
+        self._measures.publish(_status(self._attempt.task, DiagnosticStatus.OK, "", "", report))
+
+    def _tell_passages(self) -> None:
+        """Publish where the tip went through holes since the last time, each in the frame of its hole."""
+        found = self._attempt.monitor.passages
+        self._told = min(self._told, len(found))
+        for passage in found[self._told :]:
+            point = PointStamped()
+            point.header.stamp = rospy.Time.now()
+            point.header.frame_id = f"{'Exit' if passage.exit else 'Entry'}{passage.pair}"
+            point.point.x, point.point.y = passage.lateral
+            self._passages.publish(point)
+        self._told = len(found)
+
+
+def _status(name: str, level: int, message: str, who: str, report: Mapping[str, object]) -> DiagnosticStatus:
+    """Figures as a status message; numbers are written so that reading them gives the same bits."""
+    values = [
+        KeyValue(key=key, value=value if isinstance(value, str) else repr(value)) for key, value in report.items()
+    ]
+    return DiagnosticStatus(name=name, level=level, message=message, hardware_id=who, values=values)

@@ -1,0 +1,91 @@
+"""One attempt at a task of the suturing challenge: watched from its start, judged when its end is reported.
+
+SI units, world axes; times are simulated seconds since the attempt began.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.frames import pose7_matrix
+from ligature.model.scene import Scene
+from ligature.tasks.monitor import Monitor
+from ligature.tasks.scenery import MissingBodies, Scenery
+from ligature.tasks.scores import (
+    SUTURE_PAIRS,
+    EstimationScore,
+    InsertionScore,
+    SutureScore,
+    judge_estimate,
+    judge_insertion,
+    judge_suture,
+)
+
+Array = NDArray[np.float64]
+Score = EstimationScore | InsertionScore | SutureScore
+
+TASKS = {"pose_estimation": 1, "insertion": 2, "suture": 3}
+"""Names of the tasks, with the numbers that the challenge gives them (interface reference §4.6)."""
+
+CAMERA = "CameraFrame"
+"""Name of the body in whose frame needle poses are reported."""
+
+
+class Attempt:
+    """Watches ``task`` in ``scene``; begins anew when the scene is reset.
+
+    Raises ValueError for a task that there is not, `MissingBodies` for a scene in which it cannot be done.
+    """
+
+    def __init__(self, scene: Scene, task: str, pairs: int = SUTURE_PAIRS) -> None:
+        if task not in TASKS:
+            raise ValueError(f"there is no task '{task}'; there are {', '.join(TASKS)}")
+        self.task, self._scene, self._pairs = task, scene, pairs
+        needed = {"pose_estimation": 0, "insertion": 1, "suture": pairs}[task]
+        self._scenery = Scenery.of(scene, needed)
+        cameras = [body.index for body in scene.bodies if body.identity.name == CAMERA]
+        if task == "pose_estimation" and not cameras:
+            raise MissingBodies(f"the scene '{scene.name}' has no body '{CAMERA}', in whose frame poses are reported")
+        self._camera = cameras[0] if cameras else -1
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew with the next state."""
+        self.monitor = Monitor(self._scene, self._scenery)
+        self._resets: int | None = None
+        self._begin = self._now = 0.0
+        self._poses: Array | None = None
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the attempt began."""
+        return self._now - self._begin
+
+    def observe(self, state: Any) -> None:
+        """Take a state record (`ligature.model.state`), one element of it; 100 Hz and more will do."""
+        resets, now = int(state["resets"]), float(state["sim_time"])
+        if self._resets is not None and resets != self._resets:
+            self.restart()
+        if self._resets is None:
+            self._resets, self._begin = resets, now
+        self._now, self._poses = now, np.array(state["body_pose"])
+        self.monitor.observe(state)
+
+    def judge(self, T_camera_needle: Array | None = None) -> Score:
+        """The score for ending now; a pose estimation needs the reported pose (4, 4) of the needle's body.
+
+        Raises ValueError before the first state, and without a pose where one is needed.
+        """
+        if self._poses is None:
+            raise ValueError("the task cannot be judged before its first state")
+        scenery, poses = self._scenery, self._poses
+        if self.task == "insertion":
+            return judge_insertion(scenery, poses, self.monitor.passages, self.time)
+        if self.task == "suture":
+            return judge_suture(scenery, poses, self.monitor.passages, self.time, self._pairs)
+        if T_camera_needle is None:
+            raise ValueError("a pose estimation is judged by the pose that is reported")
+        return judge_estimate(scenery, poses, pose7_matrix(poses[self._camera]), T_camera_needle, self.time)

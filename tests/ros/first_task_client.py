@@ -1,0 +1,72 @@
+#!/usr/bin/python3
+"""A participant of the challenge's first task, on ROS alone: looks, reports where the needle is, reads the score."""
+
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from ambf_msgs.msg import RigidBodyState
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+
+PATIENCE = 90.0
+REPORT = "/surgical_robotics_challenge/completion_report/testers/task1/"
+SCORE = "/ligature/tasks/pose_estimation/score"
+
+
+def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Vector (3,) turned by a quaternion x y z w."""
+    across = 2.0 * np.cross(q[:3], v)
+    return v + q[3] * across + np.cross(q[:3], across)
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Quaternion product, x y z w."""
+    return np.append(a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3]), a[3] * b[3] - a[:3] @ b[:3])
+
+
+def seen(name: str) -> tuple[np.ndarray, np.ndarray]:
+    pose = rospy.wait_for_message(f"/ambf/env/{name}/State", RigidBodyState, PATIENCE).pose
+    p, q = pose.position, pose.orientation
+    return np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+
+
+class FirstTask(unittest.TestCase):
+    def setUp(self) -> None:
+        self.scores: list[DiagnosticStatus] = []
+        rospy.Subscriber(SCORE, DiagnosticStatus, self.scores.append, queue_size=10)
+        self.report = rospy.Publisher(REPORT, PoseStamped, queue_size=1)
+
+    def judged(self, position: np.ndarray, q: np.ndarray) -> dict[str, str]:
+        """The score for a report of the needle's pose in the camera's frame."""
+        end = rospy.get_time() + PATIENCE
+        while self.report.get_num_connections() == 0 and rospy.get_time() < end:
+            rospy.sleep(0.05)
+        before = len(self.scores)
+        message = PoseStamped(pose=Pose(Point(*position), Quaternion(*q)))
+        message.header.frame_id = "CameraFrame"
+        self.report.publish(message)
+        while len(self.scores) == before:
+            self.assertLess(rospy.get_time(), end, "no score")
+            rospy.sleep(0.02)
+        self.assertEqual(self.scores[-1].level, DiagnosticStatus.OK)
+        self.assertEqual(self.scores[-1].hardware_id, "testers")
+        return {row.key: row.value for row in self.scores[-1].values}
+
+    def test_from_launch_file_to_score(self) -> None:
+        (camera, camera_q), (needle, needle_q) = seen("CameraFrame"), seen("Needle")
+        back = camera_q * [-1, -1, -1, 1]
+        position, q = turned(back, needle - camera), product(back, needle_q)
+        exact = self.judged(position, q)
+        self.assertEqual(set(exact), {"success", "completion_time", "E_base", "E_mid", "E_tip", "total"})
+        self.assertLess(float(exact["total"]), 3e-4)
+        self.assertGreater(float(exact["completion_time"]), 0.0)
+        off = self.judged(position + [0.003, 0.0, 0.0], q)
+        for point in ("E_base", "E_mid", "E_tip"):
+            self.assertAlmostEqual(float(off[point]), 0.003, delta=2e-4)
+
+
+if __name__ == "__main__":
+    rospy.init_node("first_task")
+    rostest.rosrun("ligature", "first_task", FirstTask)
