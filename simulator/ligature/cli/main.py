@@ -73,6 +73,10 @@ def run(
     task: Annotated[
         str, typer.Option(help="Judge a task on ROS: pose_estimation, insertion or suture.", callback=task_name)
     ] = "",
+    record: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="File to write all commands to, from which 'ligature replay' simulates the run again."),
+    ] = None,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -86,7 +90,7 @@ def run(
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
-        task=task,
+        task=task, record=str(record) if record else "",
         notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
@@ -246,6 +250,48 @@ def demo(
     from ligature.cli.demo import demo as run_demo
 
     raise typer.Exit(run_demo(throws, seed, out, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def record(
+    out: Annotated[Path, typer.Argument(help="The bag to write.")],
+    exclude: Annotated[str, typer.Option(help="Regular expression of topics to leave out.")] = "",
+    seconds: Annotated[float, typer.Option(help="How long; 0 until Ctrl-C.", min=0)] = 0.0,
+    keep_free: Annotated[float, typer.Option(help="Gigabytes of the disk that stay free.", min=0)] = 1.0,
+) -> None:
+    """Record everything on ROS into a bag, which gets its name when it is whole."""
+    from ligature.cli.record import record as run_record
+
+    raise typer.Exit(run_record(out, exclude, seconds, keep_free, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(help="A record of 'ligature run --record', or a bag.")],
+    scene: Annotated[Optional[Path], typer.Option(help="Launch file, instead of the recorded one.")] = None,  # noqa: UP045
+    joints: Annotated[str, typer.Option(help="Of a bag: measured or setpoint joints instead of commands.")] = "",
+    speed: Annotated[float, typer.Option("-s", help="Of a bag: its time over wall time.", min=0.001)] = 1.0,
+) -> None:
+    """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
+    from ligature.cli.replay import replay as run_replay
+
+    if joints not in ("", "measured", "setpoint"):
+        raise typer.BadParameter(f"--joints is 'measured' or 'setpoint', not '{joints}'")
+    raise typer.Exit(run_replay(file, scene, joints, speed, Console(highlight=False, soft_wrap=True)))
+
+
+@app.command()
+def score(
+    task: Annotated[str, typer.Argument(help="pose_estimation, insertion or suture.", callback=task_name)],
+    file: Annotated[Optional[Path], typer.Argument(help="A bag or a run's record; else the run that goes on.")] = None,  # noqa: UP045
+    scene: Annotated[Optional[Path], typer.Option(help="Launch file; of a record, instead of its own.")] = None,  # noqa: UP045
+    patience: Annotated[float, typer.Option(help="Seconds to wait for a report.", min=1)] = 3600.0,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Tell how well a task was done; exit status 0 done, 1 not done, 2 not judged."""
+    from ligature.cli.score import score as run_score
+
+    raise typer.Exit(run_score(task, file, scene, patience, json, Console(highlight=False, soft_wrap=True)))
 
 
 @app.command()

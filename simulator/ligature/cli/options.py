@@ -19,7 +19,8 @@ class RunOptions:
     ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
     tells whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` says
     whether pictures are published (None: of the cameras for which the scene says so), ``window`` whether
-    one is shown, ``task`` is a task that is judged, ``notes`` are lines to tell the user at the start.
+    one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``notes`` are
+    lines to tell the user at the start.
     """
 
     scene: str
@@ -38,6 +39,7 @@ class RunOptions:
     cameras: bool | None = None
     window: bool = False
     task: str = ""
+    record: str = ""
     notes: tuple[str, ...] = ()
 
     def load(self) -> Scene:

@@ -7,6 +7,7 @@ import math
 import sys
 import time
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ligature.adf import Severity
 from ligature.bus import Block, BusError, Mailbox, Pacer, Throttle
 from ligature.bus.codec import Message
 from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.record import Header, RecordWriter
 from ligature.cli.options import RunOptions
 from ligature.simulation import Simulation
 
@@ -55,6 +57,8 @@ def main() -> None:
         loop = Loop(simulation, block, options)
         simulation.step(simulation.ticks_per_update)
         loop.publish()
+        if options.record:
+            loop.record(Path(options.record))
         if options.shown_cameras(scene):
             tell("cameras")
         gc.collect()
@@ -63,6 +67,7 @@ def main() -> None:
         tell("ready", f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.rods)} rods")
         while not stop.is_set():
             loop.turn()
+        loop.end()
     finally:
         block.close()
 
@@ -71,7 +76,8 @@ class Loop:
     """One turn takes commands, waits for its time, and advances one update."""
 
     def __init__(self, simulation: Simulation, block: Block, options: RunOptions) -> None:
-        self._simulation, self._block = simulation, block
+        self._simulation, self._block, self._options = simulation, block, options
+        self._record: RecordWriter | None = None
         self._ticks = simulation.ticks_per_update
         self._period = self._ticks * TICK
         self._mailbox = Mailbox(simulation.scene, block.rings)
@@ -81,6 +87,37 @@ class Loop:
         self._updates = 0
         self._mark_updates = 0
         self._warned = 0
+
+    def record(self, path: Path) -> None:
+        """Write all commands from now on to ``path``; without a file there is no run."""
+        try:
+            self._record = RecordWriter(path, Header(self._options.to_text(), self._simulation.state_hash()))
+        except OSError as error:
+            tell("error", f"the run cannot be recorded: {error.strerror or error}: '{path}'")
+            sys.exit(1)
+
+    def end(self) -> None:
+        """Give the record its end and its name."""
+        if self._record is not None:
+            try:
+                self._record.finish(self._updates + 1, self._simulation.state_hash())
+            except OSError as error:
+                self._give_up_record(error)
+
+    def _note(self, message: Message) -> None:
+        """Write a command to the record."""
+        if self._record is not None and not isinstance(message, Throttle):
+            try:
+                self._record.write(self._updates + 1, message)
+            except OSError as error:
+                self._give_up_record(error)
+
+    def _give_up_record(self, error: OSError) -> None:
+        """Go on without a record, and say so: a run matters more than its record."""
+        assert self._record is not None
+        part = self._record.abandon()
+        self._record = None
+        tell("error", f"the run is not recorded any more: {error.strerror}; '{part}' ends before the run does")
 
     def turn(self) -> None:
         """Sleep, take commands, and run an update when it is due; the commands may say that it is not."""
@@ -118,6 +155,7 @@ class Loop:
             if isinstance(message, Throttle):
                 self._pacer.throttle(message)
             else:
+                self._note(message)
                 self._simulation.apply(message)
 
     def _figures(self) -> None:
@@ -137,6 +175,11 @@ class Loop:
         for name in ("received", "coalesced", "rejected"):
             figures[name] = getattr(self._mailbox, name)
         self._mark, self._mark_updates = now, self._updates
+        if self._record is not None:
+            try:
+                self._record.flush()
+            except OSError as error:
+                self._give_up_record(error)
         if self._mailbox.rejected > self._warned:
             tell(
                 "warning",

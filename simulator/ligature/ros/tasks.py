@@ -20,15 +20,14 @@ from numpy.typing import NDArray
 from std_msgs.msg import Bool, Empty
 
 from ligature.bus import Block
-from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
+from ligature.ros.bags import REPORTS, reported_pose
 from ligature.ros.master import NO_ANSWER, MasterWatch, node_name, require_free
 from ligature.tasks.attempt import TASKS, Attempt
 
 Array = NDArray[np.float64]
 
-REPORTS = "/surgical_robotics_challenge/completion_report"
 SAMPLING = 0.005
 """Wall seconds between two looks at the state; 100 Hz of simulated time is what the challenge's evaluation takes."""
 
@@ -108,12 +107,12 @@ class TaskNode:
             rospy.Subscriber(topic, Bool, self._take_end, team, queue_size=QUEUE)
 
     def _take_pose(self, message: PoseStamped, team: str) -> None:
-        p, q = message.pose.position, message.pose.orientation
-        pose = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
-        if not np.isfinite(pose).all() or abs(np.linalg.norm(pose[3:]) - 1.0) > 1e-2:
-            rospy.logwarn(f"{team} reports a pose that is none: numbers must be finite, the quaternion of length 1")
+        try:
+            T_camera_needle = reported_pose(message)
+        except ValueError as error:
+            rospy.logwarn(f"{team}: {error}")
             return
-        self._judge(team, pose7_matrix(pose))
+        self._judge(team, T_camera_needle)
 
     def _take_end(self, message: Bool, team: str) -> None:
         if message.data:

@@ -52,6 +52,13 @@ class Attempt:
         self._camera = cameras[0] if cameras else -1
         self.restart()
 
+    @property
+    def needed(self) -> tuple[int, ...]:
+        """The bodies that the score depends on: the needle, and the camera's body or the holes."""
+        if self.task == "pose_estimation":
+            return self._scenery.needle, self._camera
+        return self._scenery.needle, *self._scenery.entries, *self._scenery.exits
+
     def restart(self) -> None:
         """Begin anew with the next state."""
         self.monitor = Monitor(self._scene, self._scenery)

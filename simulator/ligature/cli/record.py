@@ -1,0 +1,111 @@
+"""``ligature record``: everything on ROS into one bag by ROS's own recorder; a whole bag gets its name."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from rich.console import Console
+
+from ligature.bus.process import end_with_parent
+from ligature.cli.master import DEFAULT_MASTER, master_answers
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m|\[[0-9.]+\]: |\[ ?(INFO|WARN|ERROR)\] ")
+_LOUD = ("error", "less than", "what()")
+"""What lines of the recorder begin with, in small letters, that tell why it gave up."""
+
+END_PATIENCE = 60.0
+"""Seconds that the recorder is given to write its index."""
+
+
+def recorder() -> Path | None:
+    """ROS's recorder, beside the program ``rosbag``."""
+    program = shutil.which("rosbag")
+    found = None if program is None else Path(program).resolve().parents[1] / "lib" / "rosbag" / "record"
+    return found if found is not None and found.is_file() else None
+
+
+def record(out: Path, exclude: str, seconds: float, keep_free: float, console: Console) -> int:
+    """Record until Ctrl-C, or for ``seconds``; ``keep_free`` gigabytes stay free. Returns the exit status."""
+    problem = _obstacle(out)
+    if problem:
+        console.print(problem, style="red", markup=False)
+        return 1
+    part = out.with_name(f"{out.stem}.part.bag")
+    command = [str(recorder()), "-a", "-O", str(part), f"--min-space={max(1, round(1e6 * keep_free))}k"]
+    if exclude:
+        command += ["-x", exclude]
+    console.print(f"recording to '{out}'; Ctrl-C ends it", markup=False)
+    lines, status = _run(command, seconds)
+    reason = _reason(lines)
+    if reason or status != 0 or not part.is_file():
+        console.print(
+            f"the recording failed: {reason or f'the recorder ended with {status}'}", style="red", markup=False
+        )
+        _tell_rest(part, console)
+        return 1
+    part.replace(out)
+    console.print(f"{out}: {out.stat().st_size / 1e6:.1f} MB", markup=False)
+    return 0
+
+
+def _obstacle(out: Path) -> str:
+    """Why nothing can be recorded; empty when nothing stands in the way."""
+    if recorder() is None:
+        return "ROS's bag recorder is not installed (Debian package python3-rosbag)"
+    if out.suffix != ".bag":
+        return f"'{out}' must end in .bag"
+    if out.exists():
+        return f"'{out}' exists already; recordings replace nothing"
+    if not os.access(out.parent, os.W_OK):
+        return f"nothing can be written to the folder '{out.parent}'"
+    uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
+    if not master_answers(uri):
+        return f"no ROS master answers at {uri}; start the simulator with 'ligature run' first"
+    return ""
+
+
+def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
+    """What the recorder said, and its status; a signal to this program or the end of time has it end well."""
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _: stopped.append(number))
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+        start_new_session=True, preexec_fn=end_with_parent,
+    )  # fmt: skip
+    output: list[str] = []
+    deadline = time.monotonic() + seconds if seconds > 0 else float("inf")
+    asked = False
+    while True:
+        if not asked and (stopped or time.monotonic() > deadline):
+            process.send_signal(signal.SIGINT)
+            deadline, asked = time.monotonic() + END_PATIENCE, True
+        elif asked and time.monotonic() > deadline:
+            process.kill()
+        try:
+            text, _ = process.communicate(timeout=0.1)
+        except subprocess.TimeoutExpired:
+            continue
+        output += text.splitlines()
+        return output, process.returncode
+
+
+def _reason(lines: list[str]) -> str:
+    """Why the recorder gave up; empty when it did not."""
+    plain = [_COLOUR.sub("", line).strip() for line in lines]
+    loud = [line for line in plain if line.lower().startswith(_LOUD)]
+    return loud[-1].removeprefix("what():").strip() if loud else ""
+
+
+def _tell_rest(part: Path, console: Console) -> None:
+    """Remove a bag that holds nothing; say where one is that was cut off."""
+    part.unlink(missing_ok=True)
+    active = part.with_name(f"{part.name}.active")
+    if active.exists():
+        console.print(f"what was recorded before is in '{active}'; 'rosbag reindex' may repair it", markup=False)

@@ -1,0 +1,96 @@
+"""``ligature replay``: a run's record simulated again bit for bit, or a bag played into a running simulator."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+
+import ligature
+from ligature.bus.record import Record, is_record
+from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.cli.options import RunOptions
+
+TICK = 1e-3
+
+
+class Differs(ValueError):
+    """A scene that is not the one that a record was made with."""
+
+
+def resimulate(
+    record: Record, scene: Path | None, watch: Callable[[ligature.Simulation], None] = lambda _: None
+) -> ligature.Simulation:
+    """Simulate a recorded run again; ``scene`` replaces the launch file that the record names.
+
+    ``watch`` sees the simulation after each update. Raises `ligature.SceneError`, and `Differs` when the scene does
+    not begin as the recorded one did.
+    """
+    options = RunOptions.from_text(record.header.options)
+    if scene is not None:
+        options = replace(options, scene=str(scene))
+    simulation = ligature.Simulation(options.load(), TICK, 1.0 / options.rate)
+    ticks = simulation.ticks_per_update
+    simulation.step(ticks)
+    if simulation.state_hash() != record.header.begin:
+        simulation.close()
+        raise Differs(
+            f"'{options.scene}' begins otherwise than when the run was recorded: the scene or the version changed"
+        )
+
+    def update() -> None:
+        simulation.step(ticks)
+        watch(simulation)
+
+    watch(simulation)
+    record.replay(update, simulation.apply)
+    return simulation
+
+
+def replay(file: Path, scene: Path | None, joints: str, speed: float, console: Console) -> int:
+    """Replay ``file``; returns the exit status, 1 when a run did not repeat bit for bit."""
+    try:
+        if is_record(file):
+            return _again(Record.read(file), scene, console)
+        return _play(file, joints, speed, console)
+    except ligature.SceneError as error:
+        for diagnostic in error.diagnostics:
+            console.print(str(diagnostic), style="red", markup=False)
+    except OSError as error:
+        console.print(f"{file}: {error.strerror or error}", style="red", markup=False)
+    except (ValueError, RuntimeError) as error:
+        console.print(str(error), style="red", markup=False)
+    return 1
+
+
+def _again(record: Record, scene: Path | None, console: Console) -> int:
+    begin = time.perf_counter()
+    simulation = resimulate(record, scene)
+    took, found = time.perf_counter() - begin, simulation.state_hash()
+    console.print(f"{len(record.commands)} commands, {simulation.time:.3f} s simulated in {took:.1f} s", markup=False)
+    simulation.close()
+    if found != record.end:
+        console.print(f"the run ended otherwise: {found}, not {record.end}", style="red", markup=False)
+        return 1
+    console.print(f"the same bits: {found}", markup=False)
+    return 0
+
+
+def _play(file: Path, joints: str, speed: float, console: Console) -> int:
+    uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
+    from ligature.ros.bags import opened
+
+    with opened(file):
+        pass
+    if not master_answers(uri):
+        console.print(f"no ROS master answers at {uri}; start the simulator with 'ligature run' first", markup=False)
+        return 1
+    from ligature.ros.playback import play
+
+    sent = play(file, joints, speed, lambda text: console.print(text, markup=False))
+    console.print(f"{sent} commands sent", markup=False)
+    return 0

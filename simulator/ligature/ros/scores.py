@@ -1,0 +1,50 @@
+"""Waits for the score that a running simulator publishes."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
+
+LOOKING = 10.0
+"""Seconds to look for a simulator that judges."""
+
+
+def next_score(task: str, patience: float) -> tuple[dict[str, object], dict[str, object]]:
+    """The newest score of ``task`` and the newest measures, waiting ``patience`` seconds for a report.
+
+    Raises RuntimeError when no simulator judges the task, or no report comes.
+    """
+    rospy.init_node("ligature_score", anonymous=True, disable_signals=True)
+    scores: list[Any] = []
+    measures: list[Any] = []
+    root = f"/ligature/tasks/{task}"
+    subscriber = rospy.Subscriber(f"{root}/score", DiagnosticStatus, scores.append, queue_size=10)
+    rospy.Subscriber(f"{root}/measures", DiagnosticStatus, measures.append, queue_size=10)
+    begin = time.monotonic()
+    while not (scores and measures):
+        waited = time.monotonic() - begin
+        if subscriber.get_num_connections() == 0 and waited > LOOKING:
+            raise RuntimeError(f"no simulator judges '{task}'; start it with 'ligature run … --task {task}'")
+        if waited > patience:
+            raise RuntimeError(f"nobody reported the end of '{task}' within {patience:g} s")
+        time.sleep(0.02)
+    return _values(scores[-1]), _values(measures[-1])
+
+
+def _values(status: Any) -> dict[str, object]:
+    return {row.key: _value(row.value) for row in status.values}
+
+
+def _value(text: str) -> object:
+    """A value as it was before it was written."""
+    if text in ("True", "False"):
+        return text == "True"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

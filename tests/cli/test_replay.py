@@ -1,0 +1,70 @@
+"""Records are simulated again: with their own commands to the same bits, with others not."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import ligature
+import pytest
+from ligature.bus.record import Header, Record, RecordWriter
+from ligature.cli.options import RunOptions
+from ligature.cli.replay import replay
+from ligature.model.commands import ArmCommand
+from rich.console import Console
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
+MODELS = (3, 4)
+"""The second arm and its jaw alone."""
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fifth of a second in which an arm begins to move."""
+    path = tmp_path_factory.mktemp("record") / "run.record"
+    options = RunOptions(str(SCENE), MODELS, rate=500.0)
+    simulation = ligature.Simulation(options.load(), 1e-3, 2e-3)
+    simulation.step(2)
+    writer = RecordWriter(path, Header(options.to_text(), simulation.state_hash()))
+    commands = {1: ("place_jp", (0.1, 0.1, 0.12, 0.0, 0.0, 0.0)), 20: ("servo_jp", (0.12, 0.1, 0.12, 0.0, 0.0, 0.1))}
+    for update in range(1, 100):
+        if update in commands:
+            command = ArmCommand(0, *commands[update])
+            writer.write(update, command)
+            simulation.apply(command)
+        simulation.step(2)
+    writer.finish(100, simulation.state_hash())
+    return path
+
+
+def said(file: Path) -> tuple[int, str]:
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    return replay(file, None, "", 1.0, console), console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def test_a_record_ends_in_the_same_bits(recorded: Path) -> None:
+    status, text = said(recorded)
+    assert status == 0, text
+    assert f"the same bits: {Record.read(recorded).end}" in text
+
+
+def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) -> None:
+    record, path = Record.read(recorded), tmp_path / "changed.record"
+    writer = RecordWriter(path, record.header)
+    for update, command in record.commands:
+        assert isinstance(command, ArmCommand)
+        writer.write(update, replace(command, values=(command.values[0] + 1e-9, *command.values[1:])))
+    writer.finish(record.updates, record.end)
+    status, text = said(path)
+    assert status == 1
+    assert "the run ended otherwise" in text
+
+
+def test_a_file_that_is_missing_or_cut_off_is_told(recorded: Path, tmp_path: Path) -> None:
+    assert said(tmp_path / "none.record") == (1, f"{tmp_path / 'none.record'}: No such file or directory\n")
+    cut = tmp_path / "cut.record"
+    cut.write_bytes(recorded.read_bytes()[:-10])
+    status, text = said(cut)
+    assert status == 1
+    assert "cut off after 2 commands" in text

@@ -1,0 +1,205 @@
+"""A run is recorded by one command, scored from what was recorded, played again, and simulated again bit for bit."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from tests.ros.conftest import BIN, ROOT, Program
+
+pytestmark = pytest.mark.ros
+SCENE = ROOT / "scenes" / "suturing" / "launch.yaml"
+RUN = ("run", SCENE, "-l", "0,1,2,3", "-p", "200", "--no-cameras", "--names", "src", "--task", "insertion")
+
+
+@dataclass
+class Session:
+    """What a session on ROS left behind."""
+
+    env: dict[str, str]
+    bag: Path
+    record: Path
+
+    def ligature(self, *words: object) -> subprocess.CompletedProcess[str]:
+        command = [BIN / "ligature", *map(str, words)]
+        return subprocess.run(command, env=self.env, capture_output=True, text=True, timeout=120)
+
+
+def scored(task: str, file: Path, scene: Path | None = None, json: bool = False) -> tuple[int, str]:
+    """Status and output of ``ligature score`` in this process."""
+    from ligature.cli.score import score
+
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    return score(task, file, scene, 1.0, json, console), console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def replayed(file: Path, scene: Path | None = None) -> tuple[int, str]:
+    """The same of ``ligature replay`` of a record."""
+    from ligature.cli.replay import replay
+
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    return replay(file, scene, "", 1.0, console), console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def moved(node: Any) -> None:
+    """PSM1 gets ready and goes somewhere; a report ends the task."""
+    from std_msgs.msg import Bool
+
+    from tests.ros.crtk import Psm
+
+    psm = Psm(node, "PSM1")
+    psm.check_connections(10.0)
+    assert psm.enable(10.0)
+    assert psm.home(20.0)
+    assert psm.move_jp(psm.setpoint_jp() + [0.2, -0.1, 0.02, 0.4, 0.2, -0.2]).wait()
+    report = node.Publisher("/surgical_robotics_challenge/completion_report/testers/task2", Bool, queue_size=1)
+    deadline = time.monotonic() + 10.0
+    while report.get_num_connections() < 2:
+        assert time.monotonic() < deadline, "recorder and judge do not listen"
+        time.sleep(0.05)
+    report.publish(Bool(data=True))
+    time.sleep(0.5)
+    psm.close()
+    report.unregister()
+
+
+@pytest.fixture(scope="module")
+def session(ros_env: dict[str, str], node: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
+    folder = tmp_path_factory.mktemp("session")
+    found = Session(ros_env, folder / "session.bag", folder / "session.record")
+    program = Program([str(BIN / "ligature"), *map(str, RUN), "--record", str(found.record)], ros_env)
+    try:
+        program.wait_for("first state published")
+        program.wait_for("judging 'insertion'")
+        recorder = Program([str(BIN / "ligature"), "record", str(found.bag)], ros_env)
+        recorder.wait_for("recording to")
+        part = folder / "session.part.bag.active"
+        deadline = time.monotonic() + 30.0
+        while not part.exists():
+            assert time.monotonic() < deadline, recorder.output
+            time.sleep(0.05)
+        moved(node)
+        live = found.ligature("score", "insertion", "--json")
+        assert live.returncode == 1, live.stdout + live.stderr
+        assert json.loads(live.stdout)["measures"]["path_length_PSM1"] > 0.01
+        assert not found.bag.exists(), "half a bag has the final name"
+        assert not found.record.exists(), "half a record has the final name"
+        assert recorder.end(60) == 0, recorder.output
+    finally:
+        program.end()
+    yield found
+
+
+def test_both_recordings_get_their_names_when_they_are_whole(session: Session) -> None:
+    assert {path.name for path in session.bag.parent.iterdir()} >= {"session.bag", "session.record"}
+    assert not list(session.bag.parent.glob("*.active"))
+
+
+def test_the_bag_holds_everything(session: Session) -> None:
+    import rosbag
+
+    with rosbag.Bag(str(session.bag)) as bag:
+        topics = bag.get_type_and_topic_info().topics
+    wanted = {
+        "/ambf/env/World/State", "/ambf/env/Needle/State", "/PSM1/measured_js", "/PSM1/move_jp", "/diagnostics",
+        "/ligature/tasks/insertion/score", "/surgical_robotics_challenge/completion_report/testers/task2",
+    }  # fmt: skip
+    assert wanted <= set(topics)
+
+
+def test_the_record_simulated_again_ends_in_the_same_bits(session: Session) -> None:
+    status, said = replayed(session.record)
+    assert status == 0, said
+    assert "the same bits: " in said
+
+
+def test_a_record_is_not_replayed_on_another_scene(session: Session) -> None:
+    other = ROOT / "scenes" / "suturing_small" / "launch.yaml"
+    status, said = replayed(session.record, other)
+    assert status == 1
+    assert "begins otherwise than when the run was recorded" in said
+
+
+def test_the_task_is_scored_from_the_record_and_from_the_bag(session: Session) -> None:
+    scores = []
+    for status, said in (
+        scored("insertion", session.record, json=True),
+        scored("insertion", session.bag, SCENE, json=True),
+    ):
+        assert status == 1, said
+        scores.append(json.loads(said))
+    assert scores[0]["score"]["why"] == scores[1]["score"]["why"]
+    assert {"tissue_force", "thread_tension", "drops", "path_length_PSM1"} <= set(scores[0]["measures"])
+    assert scores[0]["measures"]["path_length_PSM1"] > 0.01
+
+
+def test_what_cannot_be_scored_is_told(session: Session, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.bag"
+    cut.write_bytes(session.bag.read_bytes()[:200_000])
+    small = ROOT / "scenes" / "suturing_small" / "launch.yaml"
+    for words, message in (
+        (("insertion", cut, SCENE), "the bag is cut off"),
+        (("insertion", session.bag), "name the launch file"),
+        (("insertion", session.bag, small), "has 0 pairs of holes"),
+        (("pose_estimation", session.bag, SCENE), "nobody reports a pose in it"),
+        (("pose_estimation", session.record), "holds no reports"),
+        (("insertion", tmp_path / "none.bag"), "No such file"),
+    ):
+        status, said = scored(*words)
+        assert status == 2, said
+        assert message in said
+
+
+@pytest.mark.slow
+def test_recorded_joints_lead_the_arm_along_the_same_way(
+    session: Session, node: Any, listen: Callable[..., Any]
+) -> None:
+    import rosbag
+    from sensor_msgs.msg import JointState
+
+    with rosbag.Bag(str(session.bag)) as bag:
+        wanted = [message.position for _, message, _ in bag.read_messages("/PSM1/setpoint_js")][-1]
+    program = Program([str(BIN / "ligature"), "run", str(SCENE), "-p", "500", "--no-cameras"], session.env)
+    try:
+        program.wait_for("first state published")
+        joints = listen("/PSM1/measured_js", JointState)
+        done = session.ligature("replay", session.bag, "--joints", "setpoint", "-s", "2")
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "/PSM1/setpoint_js" in done.stdout
+        joints.wait(lambda message: np.abs(np.array(message.position) - wanted).max() < 2e-3)
+    finally:
+        program.end()
+
+
+def test_recordings_that_cannot_be_made_are_told_and_leave_nothing(session: Session, tmp_path: Path) -> None:
+    from ligature.cli.record import record
+
+    there = tmp_path / "there.bag"
+    there.write_text("mine")
+    for out, free, message in (
+        (tmp_path / "a.bag", 1e9, "space free on disk"),
+        (there, 1.0, "exists already"),
+        (tmp_path / "a.txt", 1.0, "must end in .bag"),
+        (tmp_path / "no" / "a.bag", 1.0, "nothing can be written to the folder"),
+    ):
+        console = Console(file=io.StringIO(), soft_wrap=True)
+        assert record(out, "", 2.0, free, console) == 1
+        assert message in console.file.getvalue()  # type: ignore[attr-defined]
+    assert [path.name for path in tmp_path.iterdir()] == ["there.bag"]
+    assert there.read_text() == "mine"
+
+
+def test_a_run_whose_record_exists_ends_and_says_so(session: Session) -> None:
+    done = session.ligature(*RUN, "--record", session.record)
+    assert done.returncode != 0
+    assert "cannot be recorded" in done.stdout
