@@ -146,8 +146,12 @@ class Surgeon:
         self.line(name, T_world_tool)
         self.jaw(name, SHUT, 0.5)
         self.wait(0.2)
-        if self.simulation.grasps[name] is None:
+        if not self.holds(name):
             raise Failure(f"{name} closed on nothing")
+
+    def holds(self, name: str) -> bool:
+        """Whether something is between the fingers."""
+        return self.simulation.grasps[name] is not None
 
     def leave(self, name: str) -> None:
         """Open, and draw back along the tool."""

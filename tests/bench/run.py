@@ -5,7 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 
-BENCHMARKS = ("scenes", "on_ros", "latency", "arm_latency", "kinematics", "cameras", "render")
+BENCHMARKS = (
+    "scenes", "on_ros", "latency", "arm_latency", "teleop_latency", "teleop_suture", "kinematics", "cameras", "render",
+)  # fmt: skip
 
 
 def main() -> int:

@@ -135,7 +135,7 @@ def start(ros_env: dict[str, str]) -> Iterator[Callable[..., Program]]:
 
     yield run
     for program in programs:
-        program.end()
+        program.end(30.0)
 
 
 class Listener:
@@ -150,7 +150,7 @@ class Listener:
         self.times.append(time.monotonic())
         self.messages.append(message)
 
-    def wait(self, condition: Callable[[Any], bool] = lambda _: True, seconds: float = 10.0) -> Any:
+    def wait(self, condition: Callable[[Any], bool] = lambda _: True, seconds: float = 20.0) -> Any:
         """The newest message once it satisfies ``condition``."""
         deadline = time.monotonic() + seconds
         while not (self.messages and condition(self.messages[-1])):

@@ -11,19 +11,14 @@ import pytest
 from ligature.teleop.devices import module
 from ligature.teleop.devices.device import Reading
 
+from tests.ros.drivers import until
+
 pytestmark = pytest.mark.ros
 
 
 def adapter(kind: str, topic: str, **options: Any) -> tuple[Any, list[Reading]]:
     found, readings = module(kind), []
     return found.Adapter(topic, {**found.OPTIONS, **options}, readings.append), readings
-
-
-def until(condition: Callable[[], Any], seconds: float = 5.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 @pytest.mark.parametrize(
@@ -159,6 +154,7 @@ def test_the_guide_asks_for_motions_and_tells_the_block(node: Any, publish: Call
     def ask(question: str) -> str:
         p = message.pose.position
         p.x, p.y, p.z = next(places)
+        time.sleep(0.2)  # the hand is still when Enter is pressed
         return ""
 
     try:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import ligature
+import numpy as np
 import pytest
 from ligature.adf.diagnostics import AdfError
 from ligature.model.scene import InputDevice
@@ -15,7 +18,7 @@ SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "lau
 
 @pytest.fixture(scope="module")
 def scene() -> ligature.Scene:
-    return ligature.load(SMALL, models=[1, 2, 3])
+    return ligature.load(SMALL)
 
 
 def device(key: str, hardware: str, root: str = "", **settings: object) -> InputDevice:
@@ -41,5 +44,82 @@ def test_a_device_leads_the_arm_of_its_root_link_with_its_gains_and_buttons(scen
 def test_devices_that_nobody_knows_are_passed_over_and_none_at_all_is_told(scene: ligature.Scene) -> None:
     config = of_devices(scene, [device("a", "Abacus"), device("b", "Razer Hydra")], SMALL)
     assert list(config.pairs) == ["b"]
-    with pytest.raises(AdfError, match="none of its input devices can lead an arm; arms: PSM1"):
+    assert config.notes[0].startswith("a: no hardware 'Abacus' is known; known names hold mtm")
+    with pytest.raises(AdfError, match="none of its input devices can lead an arm; a: no hardware 'Abacus' is known"):
         of_devices(scene, [device("a", "Abacus")], SMALL)
+
+
+def test_a_hydra_is_claimed_paddle_by_paddle_and_a_master_once(scene: ligature.Scene) -> None:
+    hydras = [device(f"Razer Hydra{k}", "Razer Hydra") for k in range(3)]
+    config = of_devices(scene, hydras, SMALL)
+    assert [spec.options["paddle"] for spec in config.devices.values()] == ["left", "right"]
+    assert config.notes == ("Razer Hydra2: 'Razer Hydra' is claimed by another input device",)
+    config = of_devices(scene, [device("a", "MTMR"), device("b", "MTMR")], SMALL)
+    assert list(config.devices) == ["MTMR"]
+
+
+def test_a_root_link_that_is_of_no_arm_is_refused_and_too_many_devices_are_told(scene: ligature.Scene) -> None:
+    lost = device("lost", "Falcon", "/ambf/env/BODY gripper palm link")
+    config = of_devices(scene, [lost, *(device(f"pen{k}", "Falcon") for k in range(3))], SMALL)
+    assert config.notes == (
+        "lost: its root link '/ambf/env/BODY gripper palm link' is of no arm, and nothing else can be led",
+        "pen2: it leads nothing, because no arm is left",
+    )
+
+
+def test_what_has_no_effect_on_an_arm_is_told(scene: ligature.Scene) -> None:
+    settings = {
+        "simulated multibody": "pr2.yaml", "controller gain": {}, "max force": "2", "enable joint control": "False",
+        "pair cameras": ["nowhere", "cameraR"], "button mapping": {"prev mode": "1"},
+    }  # fmt: skip
+    config = of_devices(scene, [device("pen", "PHANTOM Omni", **settings)], SMALL)
+    assert config.notes == (
+        "pen: it leads the arm itself, so that its shadow model is not loaded",
+        "pen: controller gain, max force: no effect on an arm",
+        "pen: enable joint control: a grip leads the jaw all the same",
+        "pair cameras: the scene has no camera 'nowhere'",
+    )
+    assert config.camera == "ECM"
+    assert config.devices["pen"].buttons == {"white": "previous"}
+
+
+def test_the_paired_camera_makes_the_view_of_a_scene_without_an_endoscope(scene: ligature.Scene) -> None:
+    blind = replace(scene, arms=tuple(arm for arm in scene.arms if arm.name != "ECM"))
+    config = of_devices(blind, [device("pen", "Falcon", **{"pair cameras": ["cameraR"]})], SMALL)
+    assert config.camera == ""
+    assert config.notes == ("the view is that of the camera 'cameraR' where the scene has it",)
+    T = config.T_world_camera
+    assert T is not None
+    block = next(body for body in scene.bodies if body.identity.topic.endswith("/Block")).T_world_body[:3, 3]
+    ahead = T[:3, :3].T @ (block - T[:3, 3])
+    assert ahead[2] > np.hypot(ahead[0], ahead[1])
+
+
+@pytest.mark.corpus
+def test_each_input_device_of_others_is_understood_or_refused_with_a_reason(
+    scene: ligature.Scene, corpus: Path, tmp_path: Path
+) -> None:
+    files = sorted(corpus.rglob("input_devices/*.yaml"))
+    assert files
+    for name in ("world", "environment", "colors"):
+        shutil.copy(SMALL.parent / f"{name}.yaml", tmp_path)
+    launch = tmp_path / "launch.yaml"
+    launch.write_text(
+        "world config: world.yaml\ncolor config: colors.yaml\ninput devices config: devices.yaml\nmultibody configs: []\n"
+    )
+    for file in files:
+        shutil.copy(file, tmp_path / "devices.yaml")
+        devices = ligature.load(launch).input_devices
+        assert len(devices) == 7, file
+        for each in devices:  # alone, as chosen with -i
+            try:
+                config = of_devices(scene, [each], file)
+            except AdfError as error:
+                assert each.root_link, each
+                assert f"{each.key}: its root link '{each.root_link}' is of no arm" in str(error)
+                continue
+            (spec,) = config.devices.values()
+            assert spec.settings.scale == float(each.settings["workspace scaling"])
+            assert spec.force is not None
+        notes = "\n".join(of_devices(scene, devices, file).notes)
+        assert notes.count("because no arm is left") + notes.count("is of no arm") == 5, file

@@ -26,6 +26,8 @@ def teleop(
     except (AdfError, OSError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
+    for note in wanted.notes:
+        console.print(note, style="yellow", markup=False)
     if check:
         for leader, arms in wanted.pairs.items():
             console.print(f"{leader} ({wanted.devices[leader].kind}) leads {', '.join(arms)}", markup=False)

@@ -50,7 +50,7 @@ class TeleopConfig:
 
     ``pairs`` are the followers that each device may lead, the first one first. ``camera`` is the arm whose tip makes
     the view, or, when there is none, ``T_world_camera`` (4, 4) the view in the world. ``rcm_guard`` is the least
-    distance of a tip from its remote centre in metres.
+    distance of a tip from its remote centre in metres. ``notes`` are lines to tell the user.
     """
 
     devices: Mapping[str, DeviceSpec]
@@ -61,6 +61,7 @@ class TeleopConfig:
     enabled: bool = True
     prefix: str = "/"
     rcm_guard: float = 0.05
+    notes: tuple[str, ...] = ()
 
 
 def read(path: Path) -> TeleopConfig:

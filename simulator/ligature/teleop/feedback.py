@@ -1,8 +1,10 @@
 """What the leader's hand feels of the follower's contacts: scaled, bounded, damped, and never more than it put in.
 
 Delay makes reflected forces give energy back that the hand never spent, and the device shakes. A passivity observer
-counts the energy that flowed to the hand, and a controller brakes as much as there is too much of it (Hannaford and
-Ryu, *Time-domain passivity control of haptic interfaces*, IEEE T-RA 18, 2002). Newtons, metres, seconds.
+counts the energy that flowed to the hand: a force that stays until the next one does exactly ``F · Δx``. What pushes
+the hand along is cut down to the energy that the hand has spent before, and where that was not enough, the hand is
+braked (after Hannaford and Ryu, *Time-domain passivity control of haptic interfaces*, IEEE T-RA 18, 2002). Newtons,
+metres, seconds.
 """
 
 from __future__ import annotations
@@ -13,6 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+SMOOTHING = 0.01
+"""Time constant of the velocity that is damped, in seconds: devices tell their places in steps."""
+
+STILL = 1e-6
+"""Metres per second below which a hand rests."""
 
 
 @dataclass(frozen=True)
@@ -34,36 +42,53 @@ class Feedback:
 
     def __init__(self, settings: FeedbackSettings | None = None) -> None:
         self.settings = settings or FeedbackSettings()
-        self.energy = 0.0
+        self.reset()
 
     def reset(self) -> None:
         """Forget the past, when leading begins."""
         self.energy = 0.0
+        self._force = np.zeros(3)
+        self._smooth = np.zeros(3)
+        self._last: tuple[float, Array] | None = None
 
-    def force(self, contact: Array, velocity: Array, dt: float) -> Array:
-        """Force (3,) on the hand.
+    def force(self, contact: Array, place: Array, now: float) -> Array:
+        """Force (3,) on the hand, which stays on it until the next call.
 
         Parameters
         ----------
         contact
             Force (3,) of the world on the follower's tip, in axes of the view.
-        velocity
-            Velocity (3,) of the hand, in the same axes.
-        dt
-            Seconds until the next call.
+        place
+            Where the hand is (3,), in the same axes.
+        now
+            Seconds.
         """
+        if not (np.isfinite(contact).all() and np.isfinite(place).all()):
+            self._force, self._last = np.zeros(3), None
+            return self._force.copy()
+        velocity, dt = self._observe(place, now)
         settings = self.settings
-        if not (np.isfinite(contact).all() and np.isfinite(velocity).all()):
-            return np.zeros(3)
         felt = contact if np.linalg.norm(contact) >= settings.deadband else np.zeros(3)
-        force = settings.gain * felt - settings.damping * velocity
+        force = self._bounded(settings.gain * felt - settings.damping * self._smooth)
+        speed = float(np.linalg.norm(velocity))
+        if speed > STILL:
+            along = velocity / speed
+            most = max(-self.energy / (speed * dt), -settings.most_damping * speed)
+            force = self._bounded(force - max(float(force @ along) - most, 0.0) * along)
+        self._force = force
+        return force.copy()
+
+    def _observe(self, place: Array, now: float) -> tuple[Array, float]:
+        """Count what the last force did; the hand's velocity (3,) since, and for how long."""
+        last, self._last = self._last, (now, place.copy())
+        if last is None or now <= last[0]:
+            return np.zeros(3), 0.0
+        dt, moved = now - last[0], place - last[1]
+        self.energy += float(self._force @ moved)
+        velocity = moved / dt
+        self._smooth += (velocity - self._smooth) * min(dt / SMOOTHING, 1.0)
+        return velocity, dt
+
+    def _bounded(self, force: Array) -> Array:
         size = float(np.linalg.norm(force))
-        if size > settings.limit:
-            force = force * (settings.limit / size)
-        power, speed = float(force @ velocity), float(velocity @ velocity)
-        surplus = self.energy + power * dt
-        if surplus > 0.0 and speed > 1e-12:
-            brake = min(surplus / (speed * dt), settings.most_damping)
-            force = force - brake * velocity
-        self.energy += float(force @ velocity) * dt
-        return np.asarray(force)
+        return np.asarray(force * (self.settings.limit / size) if size > self.settings.limit else force)

@@ -147,7 +147,9 @@ class Arm:
         self._servo.publish(message)
 
     def go_jaw(self, angle: float) -> None:
-        """Servo the jaw."""
+        """Servo the jaw, unless it is sent there already."""
+        if angle == self._jaw:
+            return
         message = JointState(name=["jaw"], position=[angle])
         message.header.stamp = rospy.Time.now()
         self._jaw_servo.publish(message)

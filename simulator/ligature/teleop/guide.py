@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 PATIENCE = 5.0
 SETTLED = 0.3
-"""Seconds over which a device that rests is averaged."""
+"""Seconds over which the median of a device that rests is taken."""
 
 
 class Ear:
@@ -39,7 +39,7 @@ class Ear:
             places = np.array([T[:3, 3] for T in poses if np.isfinite(T).all()])
             if len(places):
                 grips = [reading.grip for reading in list(self.readings) if reading.grip is not None]
-                return places.mean(axis=0), float(np.mean(grips)) if grips else None
+                return np.median(places, axis=0), float(np.median(grips)) if grips else None
         raise Unclear(f"the device said nothing for {PATIENCE:g} s, or no poses; is its driver running?")
 
 

@@ -9,9 +9,9 @@ from ligature.teleop.calibration import Calibration
 from ligature.teleop.devices.device import Reading
 from ligature.teleop.pairing import Hand
 
-ACTIONS = ("clutch", "camera", "close", "toggle", "next", "present")
+ACTIONS = ("clutch", "camera", "close", "toggle", "next", "previous", "present")
 """What a button may do: ``close`` keeps the jaw closed while down, ``toggle`` opens or closes with each press, ``next``
-selects the next follower, ``present`` tells that the operator is there while down."""
+and ``previous`` select another follower, ``present`` tells that the operator is there while down."""
 
 
 @dataclass(frozen=True)

@@ -5,19 +5,26 @@ The hardware's name tells the kind and the topics, the root link the arm. Metres
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.adf.diagnostics import AdfError, Diagnostic, Severity
 from ligature.model.frames import rpy_matrix
 from ligature.model.load import load as load_scene
+from ligature.model.optics import T_CAMERA_OPTICAL
 from ligature.model.scene import ArmKind, InputDevice, Scene
 from ligature.teleop.calibration import Calibration
 from ligature.teleop.config import TOPICS, DeviceSpec, TeleopConfig
 from ligature.teleop.devices import module
 from ligature.teleop.feedback import FeedbackSettings
 from ligature.teleop.pairing import Settings
+
+Array = NDArray[np.float64]
 
 HARDWARE = (
     ("mtm", "mtm"), ("omni", "touch"), ("phantom", "touch"), ("touch", "touch"), ("geomagic", "touch"),
@@ -26,8 +33,15 @@ HARDWARE = (
 )  # fmt: skip
 """Parts of hardware names, in lower case, and the kinds of devices that they mean."""
 
-BUTTONS = {"a1": "clutch", "a2": "camera", "g1": "close", "next mode": "next"}
-NAMES_OF_BUTTONS = {"touch": ("grey", "white"), "hydra": ("bumper", "1", "2", "3", "4", "middle", "stick")}
+BUTTONS = {"a1": "clutch", "a2": "camera", "g1": "close", "next mode": "next", "prev mode": "previous"}
+NAMES_OF_BUTTONS = {
+    "mtm": (), "touch": ("grey", "white"), "hydra": ("bumper", "1", "2", "3", "4", "middle", "stick"),
+}  # fmt: skip
+"""By their indices; a master arm has pedals instead."""
+
+PADDLES = ("left", "right")
+"""Of a Razer Hydra, as its input devices claim them one after the other."""
+
 HAPTIC_GAIN = 10.0
 """Linear gain in N/m that means forces as they are; others scale them."""
 
@@ -40,35 +54,103 @@ def of_launch_file(path: Path, indices: tuple[int, ...] | None = None) -> Teleop
     scene = load_scene(path)
     devices = scene.input_devices
     for index in indices or ():
-        if index >= len(devices):
-            raise _problem(path, f"there is no input device {index}", f"there are {len(devices)}, from 0")
+        if not 0 <= index < len(devices):
+            raise _problem(path, f"there is no input device {index}", f"there are {len(devices)}, counted from 0")
     return of_devices(scene, devices if indices is None else [devices[index] for index in indices], path)
 
 
 def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> TeleopConfig:
     """The teleoperation of some devices of a scene.
 
-    A device leads the arm that has its root link, else the first arm that is free; it may be switched to all others.
-    Devices that no adapter knows, and those for which no arm is left, are passed over.
+    A device leads the arm that has its root link, one without a root link the first arm that is free; it may be
+    switched to all others. Devices that cannot lead are passed over; the notes say why, and what of the others has no
+    effect.
     """
     arms = [arm.name for arm in scene.arms if arm.kind is ArmKind.PSM]
-    known = [(device, spec) for device in devices if (spec := _spec(device)) is not None]
-    wanted = {spec.name: arm for device, spec in known if (arm := _arm_of(scene, device)) is not None}
+    specs, wanted, notes = _specs(scene, devices)
     pairs: dict[str, tuple[str, ...]] = {}
-    for _, spec in known:
+    for device, spec in specs:
         taken = {followers[0] for followers in pairs.values()}
         free = [arm for arm in arms if arm not in taken and arm not in wanted.values()]
         first = wanted.get(spec.name) or next(iter(free), None)
-        if first is not None and first not in taken:
-            pairs[spec.name] = (first, *(arm for arm in arms if arm != first))
+        if first is None or first in taken:
+            why = f"{first} is led already" if first else "no arm is left" if arms else "the scene has no arm"
+            notes.append(f"{device.key}: it leads nothing, because {why}")
+            continue
+        pairs[spec.name] = (first, *(arm for arm in arms if arm != first))
+        notes += [f"{device.key}: {note}" for note in _without_effect(device)]
     if not pairs:
-        raise _problem(
-            path, "none of its input devices can lead an arm",
-            f"arms: {', '.join(arms) or 'none'}; known names hold {', '.join(part for part, _ in HARDWARE)}",
-        )  # fmt: skip
-    cameras = [arm.name for arm in scene.arms if arm.kind is ArmKind.ECM]
-    specs = {spec.name: spec for _, spec in known if spec.name in pairs}
-    return TeleopConfig(specs, pairs, camera=cameras[0] if cameras else "ECM")
+        raise _problem(path, "none of its input devices can lead an arm", "; ".join(notes) or "it has none")
+    chosen = [(device, spec) for device, spec in specs if spec.name in pairs]
+    camera, T_world_camera = _view(scene, [device for device, _ in chosen], notes)
+    return TeleopConfig(
+        {spec.name: spec for _, spec in chosen}, pairs, camera, T_world_camera, notes=tuple(dict.fromkeys(notes))
+    )
+
+
+def _specs(
+    scene: Scene, devices: Sequence[InputDevice]
+) -> tuple[list[tuple[InputDevice, DeviceSpec]], dict[str, str], list[str]]:
+    """Devices that can lead, the arms that some of them name, and why the others cannot."""
+    found: list[tuple[InputDevice, DeviceSpec]] = []
+    wanted: dict[str, str] = {}
+    notes: list[str] = []
+    claimed: Counter[str] = Counter()
+    for device in devices:
+        kind = next((kind for part, kind in HARDWARE if part in device.hardware_name.lower()), None)
+        if kind is None:
+            known = ", ".join(part for part, _ in HARDWARE)
+            notes.append(f"{device.key}: no hardware '{device.hardware_name}' is known; known names hold {known}")
+            continue
+        one = kind if kind in TOPICS else device.hardware_name if kind == "mtm" else device.key
+        if claimed[one] >= (len(PADDLES) if kind == "hydra" else 1):
+            notes.append(f"{device.key}: '{device.hardware_name}' is claimed by another input device")
+            continue
+        arm = _arm_of(scene, device)
+        if device.root_link and arm is None and "simulated multibody" not in device.settings:
+            notes.append(f"{device.key}: its root link '{device.root_link}' is of no arm, and nothing else can be led")
+            continue
+        spec = _spec(device, kind, claimed[one])
+        claimed[one] += 1
+        found.append((device, spec))
+        if arm is not None:
+            wanted[spec.name] = arm
+    return found, wanted, notes
+
+
+def _without_effect(device: InputDevice) -> list[str]:
+    """What a device asks for that means nothing where arms are led."""
+    settings = device.settings
+    notes = []
+    if settings.get("simulated multibody"):
+        notes.append("it leads the arm itself, so that its shadow model is not loaded")
+    unused = [key for key in ("controller gain", "location", "max force", "max jerk") if key in settings]
+    if "angular" in (settings.get("haptic gain") or {}) and float(settings["haptic gain"]["angular"]) != 0.0:
+        unused.append("haptic gain: angular")
+    if unused:
+        notes.append(f"{', '.join(unused)}: no effect on an arm")
+    if str(settings.get("enable joint control", True)).lower() in ("false", "0"):
+        notes.append("enable joint control: a grip leads the jaw all the same")
+    return notes
+
+
+def _view(scene: Scene, devices: Sequence[InputDevice], notes: list[str]) -> tuple[str, Array | None]:
+    """The arm that makes the view; in a scene without one, the pose (4, 4) of the first camera of a pair, or of all."""
+    wanted = [name for device in devices for name in device.settings.get("pair cameras") or ()]
+    cameras = {camera.identity.topic.rpartition("/")[2]: camera for camera in scene.cameras}
+    notes += [f"pair cameras: the scene has no camera '{name}'" for name in wanted if name not in cameras]
+    ecm = next((arm.name for arm in scene.arms if arm.kind is ArmKind.ECM), "")
+    if ecm:
+        return ecm, None
+    chosen = next((name for name in wanted if name in cameras), next(iter(cameras), None))
+    if chosen is None:
+        return "ECM", None
+    attachment = cameras[chosen].attachment
+    T_world_camera = attachment.T_parent_object
+    if attachment.parent is not None and attachment.parent[0] == "body":
+        T_world_camera = scene.bodies[attachment.parent[1]].T_world_body @ T_world_camera
+    notes.append(f"the view is that of the camera '{chosen}' where the scene has it")
+    return "", T_world_camera @ T_CAMERA_OPTICAL
 
 
 def _arm_of(scene: Scene, device: InputDevice) -> str | None:
@@ -85,20 +167,19 @@ def _arm_of(scene: Scene, device: InputDevice) -> str | None:
     return None
 
 
-def _spec(device: InputDevice) -> DeviceSpec | None:
-    hardware = device.hardware_name
-    kind = next((kind for part, kind in HARDWARE if part in hardware.lower()), None)
-    if kind is None:
-        return None
+def _spec(device: InputDevice, kind: str, number: int) -> DeviceSpec:
+    """The device of a kind; ``number`` counts those that share its topics."""
     adapter, settings = module(kind), device.settings
-    name = hardware if kind == "mtm" else device.key.replace(" ", "_")
+    name = device.hardware_name if kind == "mtm" else device.key.replace(" ", "_")
+    options = dict(adapter.OPTIONS)
+    if kind == "hydra":
+        options["paddle"] = PADDLES[number]
     base: Calibration = adapter.DEFAULTS
     offset = settings.get("orientation offset") or {}
     handle = rpy_matrix(*(float(offset.get(axis, 0.0)) for axis in "rpy"))
     return DeviceSpec(
-        name, kind, TOPICS.get(kind, f"/{name}/"), dict(adapter.OPTIONS),
-        Calibration(base.axes, handle, base.closed, base.opened), _buttons(settings, kind), _force(settings),
-        Settings(scale=float(settings.get("workspace scaling", 1.0))),
+        name, kind, TOPICS.get(kind, f"/{name}/"), options, Calibration(base.axes, handle, base.closed, base.opened),
+        _buttons(settings, kind), _force(settings), Settings(scale=float(settings.get("workspace scaling", 1.0))),
     )  # fmt: skip
 
 

@@ -68,7 +68,7 @@ class Teleop:
     recorder
         Writes down what devices and pedals say.
     replay
-        Speaks for the devices, which are not opened then.
+        Speaks for the devices, which are not opened then, as soon as the arms are ready.
     """
 
     def __init__(self, config: TeleopConfig, recorder: Recorder | None = None, replay: Replay | None = None) -> None:
@@ -175,10 +175,10 @@ class Teleop:
         """Take what came in, and lead."""
         for device in self._devices.values():
             device.poll(now)
-        if self._replay is not None:
-            self._inbox.extend(self._replay.due(now))
         self._look_at_camera()
         tips = {name: arm.tip(VIEW) for name, arm in self.arms.items()}
+        if self._replay is not None and (self._replay.started or self._arms_ready(tips)):
+            self._inbox.extend(self._replay.due(now))
         self._take_in(now, tips)
         idle = self._why_idle()
         for pair in self.pairs.values():
@@ -189,14 +189,20 @@ class Teleop:
             self._next_readings = now + READINGS_PERIOD
             self._tell_readings(tips)
 
+    def _arms_ready(self, tips: dict[str, Tip | None]) -> bool:
+        """Whether all arms that are to be led can be: what was recorded while they were is said no sooner."""
+        led = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
+        return all(tips[arm.name] is not None and not arm.obstacle() for arm in led)
+
     def _take_in(self, now: float, tips: dict[str, Tip | None]) -> None:
-        """Empty the queue; of a leader that leads, no reading is passed over."""
+        """Empty the queue; of a leader that leads, no reading is passed over but those that came too late to matter."""
         unled: set[str] = set()
         for _ in range(len(self._inbox)):
             name, value = self._inbox.popleft()
             if name == "reading":
-                leader = value[0]
-                if leader in unled and self.seat.status(leader) is Status.FOLLOWING:
+                leader, reading = value
+                late = now - reading.time > HELD_UP
+                if leader in unled and not late and self.seat.status(leader) is Status.FOLLOWING:
                     self._lead(now, tips)
                     unled.clear()
                 unled.add(leader)
@@ -250,7 +256,7 @@ class Teleop:
                 haptics.rest()
                 continue
             pair = self.pairs[name, leader.selected]
-            haptics.press(now, leader.hand, pair.arm.force_in(VIEW), pair.topics.haptic)
+            haptics.press(leader.hand, pair.arm.force_in(VIEW), pair.topics.haptic)
 
     def _camera_ready(self) -> bool:
         """Whether the camera can be led; it is asked for power and homing."""
@@ -309,8 +315,8 @@ class Teleop:
         hand, presses = self._handsets[name].take(reading)
         self.seat.sample(name, hand)
         for press in presses:
-            if press.action == "next" and press.pressed:
-                self._on_cycle(name)
+            if press.action in ("next", "previous") and press.pressed:
+                self._on_cycle(name, 1 if press.action == "next" else -1)
             elif press.action == "clutch":
                 self.seat.clutch(press.pressed, name)
             elif press.action == "camera":
@@ -343,11 +349,11 @@ class Teleop:
         leader, follower = value
         self._select(leader, follower or None)
 
-    def _on_cycle(self, leader: str) -> None:
+    def _on_cycle(self, leader: str, step: int = 1) -> None:
         if leader not in self.seat.leaders:
             raise Conflict(f"there is no leader '{leader}'; there are {', '.join(self.seat.leaders)}")
         before = self.seat.leaders[leader].selected
-        after = self.seat.next_follower(leader)
+        after = self.seat.next_follower(leader, step)
         self._selected(leader, before, after)
 
     def _on_clutch(self, pressed: bool) -> None:

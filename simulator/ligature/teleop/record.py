@@ -53,6 +53,11 @@ class Replay:
         return {row["device"] for row in self._rows if "device" in row}
 
     @property
+    def started(self) -> bool:
+        """Whether the file has begun to speak."""
+        return self._start is not None
+
+    @property
     def finished(self) -> bool:
         """Whether all was said."""
         return self._next >= len(self._rows)

@@ -26,7 +26,8 @@ class Conflict(ValueError):
 class Leader:
     """A device: the followers it may lead, the one that it leads, and its newest sample.
 
-    ``clutched`` says whether its own clutch is pressed, ``allowed`` whether it may lead (its arms are ready).
+    ``clutched`` says whether its own clutch is pressed, ``allowed`` whether it may lead (its arms are ready),
+    ``led`` is the sample that it led with last.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Leader:
     pairing: Pairing = field(default_factory=Pairing)
     clutched: bool = False
     allowed: bool = True
+    led: Hand | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +124,15 @@ class Seat:
         chosen.pairing.release()
         chosen.selected = follower
 
-    def next_follower(self, leader: str) -> str | None:
-        """Select the next follower of a leader that is free; returns it."""
+    def next_follower(self, leader: str, step: int = 1) -> str | None:
+        """Select the next follower of a leader that is free, or with a ``step`` of -1 the one before; returns it."""
         chosen = self._leader(leader)
         taken = {each.selected for each in self._leaders.values() if each is not chosen}
         free = [name for name in chosen.followers if name not in taken]
         if not free:
             return chosen.selected
-        at = free.index(chosen.selected) if chosen.selected in free else -1
-        self.select(leader, free[(at + 1) % len(free)])
+        at = free.index(chosen.selected) if chosen.selected in free else -max(step, 0)
+        self.select(leader, free[(at + step) % len(free)])
         return chosen.selected
 
     def change(self, leader: str | None = None, **values: object) -> None:
@@ -193,7 +195,7 @@ class Seat:
         self._leader(leader).hand = hand
 
     def update(self, now: float, tips: Mapping[str, Tip], T_world_camera: Array) -> Orders:
-        """Goals for ``now``, from the newest samples, the followers' set-points, and the camera's pose (4, 4)."""
+        """Goals for ``now``, from new samples, the followers' set-points, and the camera's pose (4, 4)."""
         if not self._enabled:
             return Orders({})
         if self._camera_hands:
@@ -215,7 +217,8 @@ class Seat:
                 pairing.engage(leader.hand, tips[leader.selected])
             return None
         goal = pairing.update(leader.hand)
-        if not pairing.watch(now) or pairing.status is not Status.FOLLOWING:
+        new, leader.led = leader.hand is not leader.led, leader.hand
+        if not pairing.watch(now) or pairing.status is not Status.FOLLOWING or not new:
             return None
         return goal
 

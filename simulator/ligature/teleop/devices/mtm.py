@@ -22,7 +22,9 @@ from ligature.teleop.messages import Listener, pose_numbers
 
 Array = NDArray[np.float64]
 
-DEFAULTS = Calibration(axes=axes_of_words("left", "up", "away"), closed=0.0, opened=float(np.deg2rad(60.0)))
+DEFAULTS = Calibration(axes=axes_of_words("left", "up", "away"), closed=-0.35, opened=1.05)
+"""A gripper's angle is the jaw's, from 60° open to fingers pressed beyond closed (§5.4, §7.4)."""
+
 OPTIONS: dict[str, Any] = {}
 
 POSES = ("measured_cp", "position_cartesian_current")
