@@ -1,7 +1,8 @@
-"""Whole scenes: the launch file on the Blender scene, with its world and models as collections."""
+"""Whole scenes: the launch file on the Blender scene, with all files that it names as collections."""
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from pathlib import Path
 
 import bpy
@@ -12,14 +13,14 @@ from .ligature.adf.update import given_values, new_text, updated
 from .ligature.authoring.save import SaveError, checked_text, save_all
 from .read_file import Import, import_file
 from .schema_properties import fetch, store
-from .write_file import ExportError, after_export, export_file, unheld_top
+from .write_file import ExportError, after_export, prepared, unheld_top
 
 DEVICES_TEXT = "input devices: []\n"
 COLOURS_TEXT = "white: {r: 255, g: 255, b: 255, a: 255}\n"
 
 
 def import_launch(path: Path, scene: bpy.types.Scene, indices: tuple[int, ...] | None = None) -> list[Import]:
-    """Bring a launch file in with its world and models, or those of ``indices``; raises `AdfError`.
+    """Bring a launch file in with all that it names, or the models of ``indices``; raises `AdfError`.
 
     Files that cannot be read are left out; their findings are in an `Import` of their own.
     """
@@ -27,6 +28,7 @@ def import_launch(path: Path, scene: bpy.types.Scene, indices: tuple[int, ...] |
     launch = read_launch(path, resolver)
     stored = scene.adf
     stored.filepath, stored.source = str(path), launch.text
+    stored.byte_order_mark = path.read_bytes().startswith(BOM_UTF8)
     store(stored.launch, "launch", given_values(launch.top))
     stored.world_path = launch.world.text if launch.world else ""
     stored.devices_path = launch.devices.text if launch.devices else ""
@@ -39,9 +41,10 @@ def import_launch(path: Path, scene: bpy.types.Scene, indices: tuple[int, ...] |
         if indices is None or index in indices:
             made = _opened(reference, scene, done)
             entry.collection = made.collection if made else None
-    if launch.world is not None:
-        made = _opened(launch.world, scene, done)
-        stored.world = made.collection if made else None
+    for name in ("world", "devices", "colours"):
+        reference = getattr(launch, name)
+        made = _opened(reference, scene, done) if reference is not None else None
+        setattr(stored, name, made.collection if made else None)
     return done
 
 
@@ -65,23 +68,26 @@ def export_scene(scene: bpy.types.Scene, path: Path, remember: bool = True) -> l
     """
     stored = scene.adf
     folder = path.parent
-    written: list[Path] = []
-    targets = [(entry.collection, entry.path) for entry in stored.models] + [(stored.world, stored.world_path)]
+    targets = [(entry.collection, entry.path) for entry in stored.models]
+    targets += [(getattr(stored, name), getattr(stored, f"{name}_path")) for name in ("world", "devices", "colours")]
+    files: dict[Path, bytes] = {}
     texts: list[tuple[bpy.types.Collection, Path, str]] = []
     for collection, name in targets:
-        if collection is None:
+        if collection is None or not name:
             continue
         try:
-            result = export_file(collection, folder / name)
+            done, own = prepared(collection, folder / name)
         except ExportError as error:
             raise ExportError(f"{collection.name}: {error}") from error
-        written += result.written
-        texts.append((collection, folder / name, result.text))
+        files.update(own)
+        texts.append((collection, folder / name, done.text))
+    for name, content in ((stored.devices_path, DEVICES_TEXT), (stored.colours_path, COLOURS_TEXT)):
+        if name and folder / name not in files and not (folder / name).exists():
+            files[folder / name] = content.encode()
     try:
         text = launch_text(scene)
-        extra = {folder / stored.devices_path: DEVICES_TEXT, folder / stored.colours_path: COLOURS_TEXT}
-        files = {file: content.encode() for file, content in extra.items() if not file.exists()}
-        written += save_all({**files, path: checked_text(text, path)})
+        data = checked_text(text, path)
+        written = save_all({**files, path: BOM_UTF8 + data if stored.byte_order_mark else data})
     except (SaveError, PatchError) as error:
         raise ExportError(str(error)) from error
     if not remember:
@@ -95,13 +101,13 @@ def export_scene(scene: bpy.types.Scene, path: Path, remember: bool = True) -> l
 def launch_text(scene: bpy.types.Scene) -> str:
     """The launch file as it would be written now."""
     stored = scene.adf
-    top = {
-        **fetch(stored.launch, "launch"),
+    named = {
         "world config": stored.world_path,
         "input devices config": stored.devices_path,
         "color config": stored.colours_path,
         "multibody configs": tuple(entry.path for entry in stored.models),
     }
+    top = {**fetch(stored.launch, "launch"), **{key: value for key, value in named.items() if value}}
     if not stored.source:
         return new_text("launch", top, [])
     return updated(stored.source, "launch", {**unheld_top("launch", stored.source), **top}, [])

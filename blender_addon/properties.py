@@ -135,7 +135,10 @@ class ADF_PG_scene(bpy.types.PropertyGroup):
 
     filepath: bpy.props.StringProperty(name="Launch File", subtype="FILE_PATH")
     source: bpy.props.StringProperty(options={"HIDDEN"})
+    byte_order_mark: bpy.props.BoolProperty(options={"HIDDEN"})
     world: bpy.props.PointerProperty(type=bpy.types.Collection, name="World")
+    devices: bpy.props.PointerProperty(type=bpy.types.Collection, name="Input Devices")
+    colours: bpy.props.PointerProperty(type=bpy.types.Collection, name="Colours")
     world_path: bpy.props.StringProperty(name="World File", default="world.yaml")
     devices_path: bpy.props.StringProperty(name="Input Devices File", default="input_devices.yaml")
     colours_path: bpy.props.StringProperty(name="Colours File", default="colors.yaml")

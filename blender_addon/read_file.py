@@ -6,6 +6,7 @@ Nothing is rejected silently: what could not be brought in is in `Import.problem
 from __future__ import annotations
 
 import json
+from codecs import BOM_UTF8
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -47,7 +48,7 @@ def import_file(path: Path, scene: bpy.types.Scene, roots: tuple[Path, ...] = ()
     stored = collection.adf
     stored.filepath = str(path)
     stored.source = document.text
-    stored.byte_order_mark = path.read_bytes().startswith(b"\xef\xbb\xbf")
+    stored.byte_order_mark = path.read_bytes().startswith(BOM_UTF8)
     stored.kind = {"model": "MODEL", "world": "WORLD", "input devices": "INPUT_DEVICES"}.get(document.kind, "OTHER")
     done = Import(collection, document, [str(d) for d in document.diagnostics if d.severity >= Severity.ERROR])
     if stored.kind == "OTHER":

@@ -7,6 +7,7 @@ written, and a failure leaves files and scene as they were.
 from __future__ import annotations
 
 import json
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -50,8 +51,18 @@ def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
 
 def export_file(collection: bpy.types.Collection, path: Path) -> Export:
     """Write a collection with its meshes; raises `ExportError`."""
+    done, files = prepared(collection, path)
     try:
-        return _export(collection, path)
+        done.written = save_all(files)
+    except SaveError as error:
+        raise ExportError(str(error)) from error
+    return done
+
+
+def prepared(collection: bpy.types.Collection, path: Path) -> tuple[Export, dict[Path, bytes]]:
+    """A collection's file at ``path`` and its meshes, by path, checked and not yet written; raises `ExportError`."""
+    try:
+        return _prepared(collection, path)
     except (ValueError, AdfError, SaveError, PatchError, MeshWriteError) as error:
         raise ExportError(str(error)) from error
 
@@ -123,7 +134,7 @@ def after_export(collection: bpy.types.Collection, path: Path, text: str) -> Non
             obj.adf.mesh_print = mesh_print(obj)
 
 
-def _export(collection: bpy.types.Collection, path: Path) -> Export:
+def _prepared(collection: bpy.types.Collection, path: Path) -> tuple[Export, dict[Path, bytes]]:
     done = Export()
     stored = collection.adf
     meshes: dict[str, dict] = {}
@@ -133,9 +144,8 @@ def _export(collection: bpy.types.Collection, path: Path) -> Export:
     done.text = text_of(collection, meshes)
     data = checked_text(done.text, path)
     if stored.byte_order_mark:
-        data = b"\xef\xbb\xbf" + data
-    done.written = save_all({**files, path: data})
-    return done
+        data = BOM_UTF8 + data
+    return done, {**files, path: data}
 
 
 def _file_kind(kind: str) -> str:
@@ -297,4 +307,4 @@ def _with_companions(path: Path) -> Iterator[Path]:
                 yield texture
 
 
-__all__ = ["Export", "ExportError", "after_export", "export_file", "has_mesh", "members", "text_of"]
+__all__ = ["Export", "ExportError", "after_export", "export_file", "has_mesh", "members", "prepared", "text_of"]
