@@ -170,12 +170,15 @@ class Textures:
         self.problems: list[str] = []
 
     def name_of(self, image: bpy.types.Image | None, user: str) -> str:
-        """The file name under which an image is saved; empty, with a problem noted, when it cannot be read."""
+        """The file name under which an image is saved; empty, with a problem noted, when it cannot be read.
+
+        ``user`` is the object that shows it.
+        """
         if image is None:
             return ""
         data = _image_bytes(image)
         if data is None:
-            self.problems.append(f"'{user}': the texture '{image.name}' has no file at '{image.filepath}'")
+            self.problems.append(f"'{user}': the texture '{image.name}' cannot be read from '{image.filepath}'")
             return ""
         name = bpy.path.clean_name(Path(image.name).stem) + (Path(image.filepath_raw or image.name).suffix or ".png")
         while name in self.files and self.files[name] != data:
@@ -194,8 +197,8 @@ def _image_bytes(image: bpy.types.Image) -> bytes | None:
         return None
 
 
-def paint_of(material: bpy.types.Material | None, name: str, textures: Textures | None) -> Paint:
-    """A material in the dialect of MTL files; without ``textures`` its colours only."""
+def paint_of(material: bpy.types.Material | None, name: str, textures: Textures | None, user: str = "") -> Paint:
+    """A material of the object ``user`` in the dialect of MTL files; without ``textures`` its colours only."""
     if material is None:
         return Paint(name)
     shader = principled(material)
@@ -210,8 +213,8 @@ def paint_of(material: bpy.types.Material | None, name: str, textures: Textures 
         (level, level, level),
         shininess_of(shader.inputs["Roughness"].default_value),
         shader.inputs["Alpha"].default_value,
-        textures.name_of(_linked_image(shader.inputs["Base Color"]), material.name) if textures else "",
-        textures.name_of(_linked_image(shader.inputs["Normal"]), material.name) if textures else "",
+        textures.name_of(_linked_image(shader.inputs["Base Color"]), user) if textures else "",
+        textures.name_of(_linked_image(shader.inputs["Normal"]), user) if textures else "",
     )
 
 
@@ -288,7 +291,7 @@ def surfaces_of(
     found = []
     for index in range(len(slots)):
         chosen = material == index if index < len(slots) - 1 else material >= index
-        paint = paint_of(slots[index], f"material_{index:03d}", textures)
+        paint = paint_of(slots[index], f"material_{index:03d}", textures, obj.name)
         part = (None if v is None else v[chosen] for v in (normals, uvs))
         found.append(Surface(paint, vertices, triangles[chosen], *part))
     return [surface for surface in found if len(surface.triangles)]
@@ -306,14 +309,16 @@ def fingerprint(obj: bpy.types.Object) -> str:
     """A text that changes when the mesh that would be written changes."""
     if obj.type != "MESH":
         return obj.type
-    if obj.modifiers:
-        return "modified:" + ",".join(f"{m.type}{m.name}" for m in obj.modifiers)
-    mesh, digest = obj.data, hashlib.blake2b(digest_size=16)
-    digest.update(_floats(mesh.vertices, "co", 3).tobytes())
-    digest.update(_ints(mesh.loops, "vertex_index", 1).tobytes())
-    digest.update(_ints(mesh.polygons, "material_index", 1).tobytes())
-    if mesh.uv_layers.active:
-        digest.update(_floats(mesh.uv_layers.active.data, "uv", 2).tobytes())
+    digest = hashlib.blake2b(digest_size=16)
+    with _Evaluated(obj) as mesh:
+        digest.update(_floats(mesh.vertices, "co", 3).tobytes())
+        digest.update(_ints(mesh.loops, "vertex_index", 1).tobytes())
+        digest.update(_ints(mesh.polygons, "material_index", 1).tobytes())
+        smooth = np.empty(len(mesh.polygons), dtype=bool)
+        mesh.polygons.foreach_get("use_smooth", smooth)
+        digest.update(smooth.tobytes())
+        if mesh.uv_layers.active:
+            digest.update(_floats(mesh.uv_layers.active.data, "uv", 2).tobytes())
     digest.update(np.round(scaling(obj)[:3, :3], 6).tobytes())
     for slot in obj.material_slots:
         digest.update(repr(_look(slot.material)).encode())

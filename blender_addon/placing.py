@@ -34,6 +34,9 @@ from .properties import KIND_OF_ROLE
 from .schema_properties import decimal, decimals
 
 SHAPED = ("BODY", "GHOST_OBJECT", "SOFT_BODY")
+FAR = 1e9
+"""Metres beyond which a place is an accident: Blender makes an infinite location the greatest float."""
+
 TINY = 1e-9
 """Numbers below this are the noise of single precision and become zero."""
 
@@ -51,8 +54,10 @@ def rest_matrix(obj: bpy.types.Object) -> np.ndarray:
 def rest_pose(obj: bpy.types.Object) -> np.ndarray:
     """Rigid world pose (4, 4); raises ValueError for what has no place, with the object's name."""
     matrix = rest_matrix(obj)
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"'{obj.name}' has a transform that is not a number; clear its location, rotation and scale")
+    if not (np.abs(matrix) < FAR).all():
+        raise ValueError(
+            f"'{obj.name}' has a transform that is not a number or beyond all measure; clear location, rotation, scale"
+        )
     if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
         raise ValueError(f"'{obj.name}' has a scale of zero; give it a size")
     return rigid(matrix)

@@ -6,6 +6,7 @@ Nothing is rejected silently: what could not be brought in is in `Import.problem
 from __future__ import annotations
 
 import json
+import os
 from codecs import BOM_UTF8
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -191,17 +192,23 @@ class _Importer:
         """A mesh file of the element, from the folder that its own or the file's path names."""
         if not name or name in self.given_meshes:
             return self.given_meshes.get(name)
-        folder = f"{self.document.top.text(path_key)}/{element.text(path_key)}"
+        file = os.path.join(self.document.top.text(path_key), element.text(path_key), name)
         try:
-            path = self.resolver.resolve(
-                f"{folder}/{name}".lstrip("/") if not folder.startswith("/") else f"{folder}/{name}", self.folder
-            )
+            path = self.resolver.resolve(file, self.folder)
             if path not in self.files:
                 self.files[path] = load_mesh(path, self.resolver)
+            self._tell_missing_textures(element, self.files[path])
         except (MeshError, AdfError) as error:
             self.done.problems.append(f"{element.kind} '{element.key}': {error}")
             return None
         return self.files[path]
+
+    def _tell_missing_textures(self, element: Element, mesh: Mesh) -> None:
+        looks = {part.material for part in mesh.parts if part.material is not None}
+        named = sorted({file for look in looks for file in (look.texture, look.normal_map) if file is not None})
+        for file in named:
+            if not file.is_file():
+                self.done.problems.append(f"{element.kind} '{element.key}': the texture '{file}' is missing")
 
     def _colour(self, obj: bpy.types.Object, values: dict) -> None:
         rgb = [values.get(f"color components.diffuse.{c}") for c in "rgb"]

@@ -7,9 +7,11 @@ written, and a failure leaves files and scene as they were.
 from __future__ import annotations
 
 import json
+import os
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 
 import bpy
@@ -77,6 +79,7 @@ def text_of(collection: bpy.types.Collection, meshes: dict[str, dict] | None = N
     root = parse(stored.source, Path(stored.filepath or "new.yaml")) if stored.source else None
     objects = members(collection)
     _check_keys(objects)
+    _check_numbers(objects)
     items = [_item(obj, root, (meshes or {}).get(obj.adf.key, {})) for obj in objects]
     top = fetch(group, kind)
     if root is None:
@@ -162,6 +165,15 @@ def _check_keys(objects: list[bpy.types.Object]) -> None:
         users[obj.adf.key] = obj.name
 
 
+def _check_numbers(objects: list[bpy.types.Object]) -> None:
+    for obj in objects:
+        kind = KIND_OF_ROLE[obj.adf.role]
+        for path, value in fetch(getattr(obj.adf, identifier(kind)), kind).items():
+            numbers = value if isinstance(value, (tuple, list)) else (value,)
+            if any(isinstance(v, float) and not isfinite(v) for v in numbers):
+                raise ExportError(f"'{obj.name}' has a {path} that is not a finite number; give it one")
+
+
 def _item(obj: bpy.types.Object, root: Mapping | None, meshes: dict) -> Item:
     """The object as it is to stand in the file."""
     kind = KIND_OF_ROLE[obj.adf.role]
@@ -238,7 +250,7 @@ def _object_meshes(
     """Mesh keys of one object; its OBJ and MTL files are put into ``files``."""
     scale = own.scale or 1.0
     if obj.type == "MESH":
-        name = own.mesh or f"{_file_name(obj)}.OBJ"
+        name = own.mesh or free_name(obj, "", high, low, files)
         if print_now in shared and not own.mesh:
             name = shared[print_now]  # linked duplicates share one file
         else:
@@ -247,7 +259,7 @@ def _object_meshes(
         yield "mesh", name
     hulls = children_with(obj, "HULL")
     if hulls:
-        name = own.collision_mesh or f"{_file_name(obj)}_collision.OBJ"
+        name = own.collision_mesh or free_name(obj, "_collision", high, low, files)
         surfaces = []
         for number, hull in enumerate(hulls):
             for surface in surfaces_of(hull, obj, corners=False):
@@ -273,8 +285,19 @@ def _obj_files(path: Path, surfaces: list, name: str, scale: float) -> dict[Path
     return {path: obj.encode("utf-8"), library: mtl.encode("utf-8")}
 
 
-def _file_name(obj: bpy.types.Object) -> str:
-    return "_".join(bpy.path.clean_name(obj.name).split())
+def free_name(obj: bpy.types.Object, end: str, high: Path, low: Path, files: dict) -> str:
+    """A mesh file's name after the object: one that no other object of this export, or of its file, has taken.
+
+    Names that differ only in case count as one, since they are one file where disks fold case.
+    """
+    groups = [getattr(o.adf, o.adf.role.lower()) for o in bpy.data.objects if o.adf.role in SHAPED and o is not obj]
+    taken = {name.lower() for group in groups for name in (group.mesh, group.collision_mesh)}
+    taken |= {path.name.lower() for path in files if path.parent in (high, low)}
+    base = "_".join(bpy.path.clean_name(obj.name).split()) + end
+    name, number = f"{base}.OBJ", 2
+    while name.lower() in taken or f"{Path(name).stem.lower()}.mtl" in taken:
+        name, number = f"{base}_{number}.OBJ", number + 1
+    return name
 
 
 def _moved(collection: bpy.types.Collection, obj, own, path: Path) -> dict[Path, bytes]:
@@ -284,7 +307,7 @@ def _moved(collection: bpy.types.Collection, obj, own, path: Path) -> dict[Path,
         return {}
     found: dict[Path, bytes] = {}
     for key, name in ((HIGH, own.mesh), (LOW, own.collision_mesh or own.mesh)):
-        folder = "/".join((getattr(collection.adf.model, identifier(key)), getattr(own, identifier(key))))
+        folder = os.path.join(getattr(collection.adf.model, identifier(key)), getattr(own, identifier(key)))
         source, target = before / folder / name, (path.parent / folder / name).resolve()
         if name and source.is_file() and source.resolve() != target:
             for file in _with_companions(source):

@@ -49,3 +49,14 @@ def test_what_cannot_be_written_is_told_with_its_name() -> None:
         obj_texts([Surface(Paint("m"), VERTICES, FACES[:0])], "m.mtl", "part")
     with pytest.raises(MeshWriteError, match="'part' has a vertex that is not finite"):
         obj_texts([Surface(Paint("m"), VERTICES * np.nan, FACES)], "m.mtl", "part")
+
+
+def test_materials_whose_names_become_one_word_stay_two() -> None:
+    surfaces = [Surface(Paint(name), VERTICES, FACES) for name in ("a b", "a_b", "a b")]
+    obj, mtl = obj_texts(surfaces, "m.mtl", "parts")
+    assert [line for line in obj.splitlines() if line.startswith("usemtl")] == [
+        "usemtl a_b",
+        "usemtl a_b_2",
+        "usemtl a_b",
+    ]
+    assert "newmtl a_b_2" in mtl

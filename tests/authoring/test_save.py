@@ -31,6 +31,15 @@ def test_a_failure_leaves_every_file_as_it_was(tmp_path: Path, monkeypatch: pyte
     assert (tmp_path / "a").read_bytes() == b"old" and sorted(p.name for p in tmp_path.iterdir()) == ["a", "file"]
 
 
+def test_what_took_its_place_goes_back_when_a_later_file_cannot(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"old")
+    (tmp_path / "z").mkdir()
+    with pytest.raises(SaveError, match="z' cannot be written"):
+        save_all({tmp_path / "a": b"new", tmp_path / "deep" / "er" / "b": b"new", tmp_path / "z": b"new"})
+    assert (tmp_path / "a").read_bytes() == b"old"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "z"]
+
+
 def test_text_that_cannot_be_read_back_is_refused(tmp_path: Path) -> None:
     assert checked_text("a: 1\n", tmp_path / "m.yaml") == b"a: 1\n"
     with pytest.raises(SaveError, match="'m.yaml' would not be readable"):

@@ -32,7 +32,7 @@ def blender(scripts: Path, corpus: Path) -> Callable[..., str]:
     if binary is None:
         pytest.skip("Blender is not installed")
 
-    def run(*arguments: str, limit: float = 290.0) -> str:
+    def run(*arguments: str, limit: float = 880.0) -> str:
         environment = {
             **os.environ,
             "BLENDER_USER_SCRIPTS": str(scripts),

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import sysconfig
 import time
 from collections.abc import Iterator
@@ -15,7 +16,13 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-pytestmark = pytest.mark.slow
+UNTOUCHING = {"copy_findings", "export_variants"}
+"""Operators that write a file or the clipboard and leave the scene alone."""
+
+LIMIT = 800
+"""Seconds for the session: half a minute on an idle machine, whose processor draws the windows."""
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 @pytest.fixture
@@ -47,6 +54,8 @@ def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Pat
         **os.environ, "DISPLAY": display, "LIBGL_ALWAYS_SOFTWARE": "1", "BLENDER_USER_SCRIPTS": str(scripts),
         "BLENDER_USER_CONFIG": str(tmp_path / "config"), "PYTHONDONTWRITEBYTECODE": "1",
         "LIGATURE_TEST_PACKAGES": sysconfig.get_paths()["purelib"],
+        "LIGATURE_COMMAND": str(Path(sys.executable).parent / "ligature"),
+        "PYTHONPATH": str(ROOT / "simulator"),
     }  # fmt: skip
     environment.pop("WAYLAND_DISPLAY", None)
     blank = tmp_path / "blank.blend"  # with a file to open, Blender shows no splash
@@ -70,11 +79,16 @@ def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Pat
     ]
     command += ["--python", str(HERE / "gui" / "session.py"), "--", str(tmp_path)]
     start = time.monotonic()
-    done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=280, check=False, cwd=tmp_path
-    )
-    output = f"{done.stdout}{done.stderr}\nafter {time.monotonic() - start:.0f} s, status {done.returncode}"
-    told = [line for line in done.stdout.splitlines() if line.startswith("RESULT ")]
+    log = tmp_path / "log"
+    with log.open("w") as stream:
+        process = subprocess.Popen(command, env=environment, stdout=stream, stderr=subprocess.STDOUT, cwd=tmp_path)
+        try:
+            process.wait(timeout=LIMIT)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    output = f"{log.read_text(errors='replace')}\nafter {time.monotonic() - start:.0f} s, status {process.returncode}"
+    told = [line for line in output.splitlines() if line.startswith("RESULT ")]
     assert told, output[-5000:]
     return json.loads(told[-1].removeprefix("RESULT ")), output, tmp_path
 
@@ -94,9 +108,11 @@ def test_panels_draw_operators_are_undone_and_nothing_is_left(session: tuple[dic
         "LIGHT",
         "SUTURE",
     }
-    wrong = {name: how for name, how in found["undone"].items() if how not in ("undone", "same", "poll")}
+    tried = {label.split()[0]: how for label, how in found["undone"].items()}
+    assert {f"adf.{name}" for name in tried} == set(found["operators"])  # a new operator needs a recipe in session.py
+    expected = {name: "same" if name in UNTOUCHING else "undone" for name in tried}
+    wrong = {label: how for label, how in found["undone"].items() if how != expected[label.split()[0]]}
     assert wrong == {}
-    assert sum(how == "undone" for how in found["undone"].values()) >= 17, found["undone"]
     assert found["left"] == []
     for name in found["pictures"]:
         assert (folder / f"{name}.png").stat().st_size > 20_000

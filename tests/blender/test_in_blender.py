@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+# under a minute on an idle machine
+pytestmark = pytest.mark.timeout(900)
+
 INSIDE = Path(__file__).resolve().parent / "inside"
 
 

@@ -14,6 +14,9 @@ INSIDE = Path(__file__).resolve().parent / "inside"
 PYTHONS = os.environ.get("BLENDER_MODULES", "").split()
 
 
+pytestmark = pytest.mark.timeout(900)
+
+
 def named(python: str) -> str:
     """The folder of the module's environment, such as bpy-5.0.1, in the names of tests."""
     return Path(python).parent.parent.name
@@ -43,7 +46,7 @@ def test_the_add_on_holds_in_the_blender_module(python: str, scripts: Path, corp
     words = ["-q", "-ra", "-p", "no:cacheprovider", "-c", os.devnull, "--rootdir", str(INSIDE)]
     command = [python, "-m", "pytest", *words, "--confcutdir", str(INSIDE), file]
     done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=580, check=False, cwd=INSIDE
+        command, env=environment, capture_output=True, text=True, timeout=880, check=False, cwd=INSIDE
     )
     output = done.stdout + done.stderr
     assert done.returncode == 0 and " passed" in output, output[-8000:]

@@ -54,13 +54,15 @@ def obj_texts(surfaces: Sequence[Surface], library: str, name: str) -> tuple[str
         raise MeshWriteError(f"'{name}' has no face; an empty mesh file is of no use")
     lines = [f"mtllib {library}", f"o {_word(name)}"]
     counts = [1, 1, 1]
-    for surface in surfaces:
-        if len(surface.triangles):
-            lines += _surface_lines(surface, counts, name)
-    return "\n".join(lines) + "\n", "\n".join(_paint_lines(s.paint) for s in surfaces if len(s.triangles))
+    written = [surface for surface in surfaces if len(surface.triangles)]
+    words = _words([surface.paint.name for surface in written])
+    for surface, word in zip(written, words, strict=True):
+        lines += _surface_lines(surface, counts, name, word)
+    paints = [_paint_lines(surface.paint, word) for surface, word in zip(written, words, strict=True)]
+    return "\n".join(lines) + "\n", "\n".join(paints)
 
 
-def _surface_lines(surface: Surface, counts: list[int], name: str) -> list[str]:
+def _surface_lines(surface: Surface, counts: list[int], name: str, material: str) -> list[str]:
     vertices = np.asarray(surface.vertices, dtype=float)
     if not np.isfinite(vertices).all():
         raise MeshWriteError(f"'{name}' has a vertex that is not finite; check its modifiers and its transform")
@@ -75,7 +77,7 @@ def _surface_lines(surface: Surface, counts: list[int], name: str) -> list[str]:
         lines += [f"{letter} {row}" for row in distinct]
         corners.append(index + counts[place])
         counts[place] += len(distinct)
-    lines.append(f"usemtl {_word(surface.paint.name)}")
+    lines.append(f"usemtl {material}")
     separator = "//" if surface.uvs is None and surface.normals is not None else "/"
     words = [separator.join(map(str, corner)) for corner in zip(*(c.tolist() for c in corners), strict=True)]
     return lines + [f"f {words[i]} {words[i + 1]} {words[i + 2]}" for i in range(0, len(words), 3)]
@@ -93,8 +95,8 @@ def _distinct(rows: Array) -> tuple[list[str], NDArray[np.int64]]:
     return texts, rank[inverse.reshape(-1)]
 
 
-def _paint_lines(paint: Paint) -> str:
-    lines = [f"newmtl {_word(paint.name)}", "Ka 1 1 1"]
+def _paint_lines(paint: Paint, material: str) -> str:
+    lines = [f"newmtl {material}", "Ka 1 1 1"]
     lines += [
         f"{key} {' '.join(f'{v:.6g}' for v in values)}"
         for key, values in (("Kd", paint.diffuse), ("Ks", paint.specular))
@@ -102,6 +104,17 @@ def _paint_lines(paint: Paint) -> str:
     lines += [f"Ns {paint.shininess:.6g}", f"d {paint.alpha:.6g}"]
     lines += [f"{key} {file}" for key, file in (("map_Kd", paint.texture), ("map_Bump", paint.normal_map)) if file]
     return "\n".join(lines) + "\n"
+
+
+def _words(names: Sequence[str]) -> list[str]:
+    """Names of one word each; different names stay different."""
+    found: dict[str, str] = {}
+    for name in names:
+        word, number = _word(name), 2
+        while name not in found and word in found.values():
+            word, number = f"{_word(name)}_{number}", number + 1
+        found.setdefault(name, word)
+    return [found[name] for name in names]
 
 
 def _word(name: str) -> str:

@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError
@@ -22,26 +23,42 @@ class SaveError(OSError):
 def save_all(files: Mapping[Path, bytes]) -> list[Path]:
     """Write ``files``; those that hold their content already are left alone.
 
-    All are on the disk before the first takes its place, so that a full disk or a folder that cannot
-    be written leaves everything as it was. Returns the paths that were written. Raises `SaveError`.
+    All are on the disk before the first takes its place, and what took its place goes back when a
+    later one cannot: a full disk or a folder that cannot be written leaves everything as it was, new
+    folders too. Returns the paths that were written. Raises `SaveError`.
     """
-    changed = {path: data for path, data in files.items() if _content(path) != data}
+    before = {path: _content(path) for path in files}
+    changed = {path: data for path, data in files.items() if before[path] != data}
+    folders = [folder for path in changed for folder in (path.parent, *path.parent.parents) if not folder.exists()]
     with ThreadPoolExecutor(WRITERS) as pool:  # most of the time goes to waiting for the disk
         writing = [(pool.submit(_staged, path, data), path) for path, data in changed.items()]
     staged = [(job.result(), path) for job, path in writing if job.exception() is None]
-    failed = [job.exception() for job, _ in writing if job.exception() is not None]
+    placed: list[Path] = []
     try:
-        if failed:
-            raise failed[0] or OSError()
+        for job, _ in writing:
+            job.result()
         for name, path in staged:
             os.replace(name, path)
+            placed.append(path)
     except OSError as error:
-        for name, _ in staged:
-            if os.path.exists(name):
-                os.unlink(name)
-        path = Path(error.filename or next(iter(changed)))
+        _take_back({path: before[path] for path in placed}, [name for name, _ in staged], folders)
+        path = Path(error.filename2 or error.filename or next(iter(changed)))
         raise SaveError(f"'{path}' cannot be written: {error.strerror or error}") from error
     return list(changed)
+
+
+def _take_back(replaced: Mapping[Path, bytes | None], staged: list[str], folders: list[Path]) -> None:
+    """Put back what was there before, and remove what was added."""
+    for name in staged:
+        Path(name).unlink(missing_ok=True)
+    for path, data in replaced.items():
+        if data is None:
+            path.unlink(missing_ok=True)
+        else:
+            os.replace(_staged(path, data), path)
+    for folder in sorted(set(folders), key=lambda f: len(f.parts), reverse=True):
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def checked_text(text: str, path: Path) -> bytes:

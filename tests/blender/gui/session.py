@@ -3,10 +3,10 @@
 Started with the folder for pictures after ``--``; prints one line ``RESULT {…}`` and quits.
 """
 
-import hashlib
 import json
 import os
 import sys
+import time
 import traceback
 from pathlib import Path
 
@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "inside"))
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
 RESULT = {"undone": {}, "drawn": [], "pictures": [], "errors": []}
 STEPS = []
+START = time.monotonic()
 
 
 def step(function):
@@ -51,31 +52,32 @@ def picture(name):
 
 
 def plain(value):
-    """A stored value without the address that its own text would show."""
+    """A stored value as text that is the same whenever the value is: names for objects, never addresses."""
     if hasattr(value, "to_dict"):
-        return value.to_dict()
-    if isinstance(value, list):
+        return plain(value.to_dict())
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in sorted(value.items())}
+    if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    return str(value)
+    return repr(value)
 
 
 def scene_print():
+    """Everything of the scene that a user could miss after an undo."""
     told = []
+    bpy.context.view_layer.update()
     for obj in sorted(bpy.data.objects, key=lambda o: o.name):
-        group = getattr(obj.adf, obj.adf.role.lower(), None)
-        keys = sorted((k, plain(v)) for k, v in group.items()) if group is not None and hasattr(group, "items") else []
-        told.append(
-            [
-                obj.name,
-                [[round(v, 6) for v in row] for row in obj.matrix_basis],
-                obj.adf.role,
-                obj.adf.key,
-                keys,
-                obj.parent.name if obj.parent else "",
-            ]
-        )
-    told.append(sorted((c.name, sorted(o.name for o in c.objects), c.adf.kind) for c in bpy.data.collections))
-    return hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest()
+        told.append([obj.name, [[round(v, 6) for v in row] for row in obj.matrix_world], plain(obj.get("adf"))])
+        told.append([obj.parent.name if obj.parent else "", obj.data.name if obj.data else "", list(obj.color)])
+        told.append([len(obj.modifiers), obj.hide_render, obj.display_type, obj.select_get(), obj.empty_display_type])
+        if obj.type == "MESH":
+            told.append([len(obj.data.vertices), [slot.name for slot in obj.material_slots]])
+    for collection in sorted(bpy.data.collections, key=lambda c: c.name):
+        told.append([collection.name, sorted(o.name for o in collection.objects), plain(collection.get("adf"))])
+    scene = bpy.context.scene
+    told.append([plain(scene.get("adf")), plain(scene.get("adf_rest")), scene.frame_end, len(bpy.data.actions)])
+    told.append(getattr(bpy.context.view_layer.objects.active, "name", ""))
+    return json.dumps(told)
 
 
 def select(*objects):
@@ -172,63 +174,157 @@ def pictures():
     picture("blender_needle")
 
 
+def on(role, name="", *more):
+    """Selects an object, and others named after it, before an operator runs."""
+    return lambda: select(*(find(role, word) for word in (name, *more)))
+
+
+def nothing():
+    """The operator needs no selection."""
+
+
 def add_sensor():
     bpy.ops.adf.add(role="SENSOR")
     select(find("SENSOR"))
 
 
-OPERATORS = [
-    ("new_file", {"kind": "MODEL", "name": "other"}, lambda: None),
-    ("make", {"role": "GHOST_OBJECT"}, lambda: select(find("BODY", "phantom"))),
-    ("clear_role", {}, lambda: select(find("BODY", "phantom"))),
-    ("add", {"role": "SENSOR"}, lambda: select(find("BODY", "phantom"))),
-    ("add", {"role": "ACTUATOR"}, lambda: select(find("BODY", "phantom"))),
-    ("add", {"role": "SOFT_BODY"}, lambda: None),
-    ("add", {"role": "VOLUME"}, lambda: None),
-    ("connect", {"type": "cone twist"}, lambda: select(find("BODY", "phantom"), find("BODY", "base"))),
-    ("add_shape", {"kind": "CAPSULE"}, lambda: select(find("BODY", "phantom"))),
-    ("redraw_shape", {}, lambda: select(find("SHAPE"))),
-    ("fit_shape", {"kind": "SPHERE"}, lambda: select(find("BODY", "link1"))),
-    ("add_hull", {}, lambda: select(find("BODY", "link1"))),
-    ("set_inertia", {"source": "SHAPES"}, lambda: select(find("BODY", "link1"))),
-    ("unset_key", {"name": "mass"}, lambda: select(find("BODY", "link1"))),
-    ("add_needle", {}, lambda: None),
-    ("add_suture", {"form": "CHAIN", "elements": 5}, lambda: select(find("BODY", "phantom"))),
-    ("add_hole", {}, lambda: select(find("BODY", "phantom"))),
-    ("add_grasp", {}, lambda: None),
-    ("add_endoscope", {}, lambda: None),
-    ("check", {}, lambda: None),
-    ("fix", {"everything": True}, lambda: None),
-    ("move_joint", {"part": 0.9}, lambda: select(find("JOINT", "link1"))),
-    ("clear_motion", {}, lambda: None),
-    ("edit_list", {"name": "array", "index": -1}, add_sensor),
-]
+def has_variant():
+    activate("scene")
+    bpy.ops.adf.add_variant(filepath="other.yaml")
+    bpy.ops.adf.export_file(filepath=str(OUT / "scene.yaml"), collection="scene")
+
+
+def activate(name):
+    layers = bpy.context.view_layer
+    layers.active_layer_collection = layers.layer_collection.children[name]
+
+
+def has_finding():
+    find("BODY", "phantom").adf.body.property_unset("mass")
+    bpy.ops.adf.check()
+
+
+def is_moved():
+    select(find("JOINT", "link1"))
+    bpy.ops.adf.move_joint(part=0.9)
+
+
+def is_moving():
+    bpy.ops.adf.simulate(seconds=0.1)
+
+
+def roles(*left_out):
+    return [role for role in FILE_ROLES if role not in left_out]
+
+
+def files():
+    """Files to open: an export of what was authored."""
+    if not (OUT / "files" / "launch.yaml").exists():
+        bpy.ops.adf.export_scene(filepath=str(OUT / "files" / "launch.yaml"))
+
+
+FILE_ROLES = ("BODY", "JOINT", "GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SOFT_BODY", "VEHICLE", "VOLUME",
+              "SUTURE", "INPUT_DEVICE")  # fmt: skip
+ENDS = on("BODY", "phantom", "base")
+JOINT_TYPES = ("revolute", "prismatic", "linear spring", "torsion spring", "p2p", "fixed", "cone twist", "six dof",
+               "six dof spring")  # fmt: skip
+RECIPES = {
+    "unset_key": [({"name": "mass"}, on("BODY", "link1"))],
+    "edit_list": [({"name": "array", "index": -1}, add_sensor), ({"name": "array", "index": 0}, add_sensor)],
+    "import_file": [({"filepath": str(OUT / "files" / "scene.yaml")}, files)],
+    "export_file": [({"filepath": str(OUT / "one.yaml"), "collection": "scene"}, nothing)],
+    "import_launch": [({"filepath": str(OUT / "files" / "launch.yaml")}, files)],
+    "export_scene": [({"filepath": str(OUT / "all" / "launch.yaml")}, nothing)],
+    "add_variant": [({}, lambda: activate("scene"))],
+    "export_variants": [({}, has_variant)],
+    "new_file": [({"kind": kind, "name": "other"}, nothing) for kind in ("MODEL", "WORLD")],
+    "make": [({"role": role}, on("BODY", "phantom")) for role in roles("BODY")],
+    "clear_role": [({}, on("BODY", "phantom"))],
+    "add": [({"role": role}, on("BODY", "phantom")) for role in roles()],
+    "connect": [({"type": kind}, ENDS) for kind in JOINT_TYPES],
+    "add_shape": [({"kind": kind}, on("BODY", "phantom")) for kind in ("BOX", "SPHERE", "CAPSULE", "PLANE")],
+    "redraw_shape": [({}, on("SHAPE"))],
+    "fit_shape": [({"kind": kind}, on("BODY", "link1")) for kind in ("BOX", "SPHERE", "CYLINDER", "CAPSULE", "CONE")],
+    "add_hull": [({}, on("BODY", "link1"))],
+    "set_inertia": [
+        ({"source": "SHAPES"}, on("BODY", "link1")),
+        ({"source": "MESH", "given": "DENSITY"}, on("BODY", "link1")),
+    ],
+    "add_needle": [({}, nothing)],
+    "add_suture": [({"form": form, "elements": 5}, on("BODY", "phantom")) for form in ("CHAIN", "PHYSICAL")],
+    "add_hole": [({}, on("BODY", "phantom"))],
+    "add_grasp": [({}, nothing)],
+    "add_endoscope": [({}, nothing)],
+    "check": [({}, nothing)],
+    "fix": [({"everything": True}, has_finding)],
+    "select_finding": [({"index": 0}, has_finding)],
+    "copy_findings": [({}, has_finding)],
+    "decompose": [({"threshold": 0.5, "max_hulls": 2}, on("BODY", "link1"))],
+    "move_joint": [({"part": 0.9}, on("JOINT", "link1"))],
+    "rest_pose": [({}, is_moved)],
+    "simulate": [({"seconds": 0.1}, nothing)],
+    "clear_motion": [({}, is_moving)],
+}
+"""Each operator with arguments and what is done before it, so that there is something to undo."""
+
+
+def undone(name, arguments, prepare):
+    """Runs an operator on the authored scene, takes it back, and tells how the scene compares."""
+    prepare()
+    bpy.ops.ed.undo_push(message="before")
+    before = scene_print()
+    operator = getattr(bpy.ops.adf, name)
+    if not operator.poll():
+        return "poll"
+    try:
+        done = operator("EXEC_DEFAULT", True, **arguments)
+    except RuntimeError as error:
+        return str(error)
+    if done != {"FINISHED"}:
+        return str(done)
+    if scene_print() == before:
+        return "same"
+    bpy.ops.ed.undo()
+    after = scene_print()
+    if after == before:
+        return "undone"
+    at = next(i for i, (a, b) in enumerate(zip(before, after, strict=False)) if a != b)
+    return f"was {before[max(at - 200, 0) : at + 100]} is {after[max(at - 200, 0) : at + 100]}"
+
+
+def try_operator(name):
+    """A step that tries every recipe of an operator, and goes back to the authored scene after each."""
+
+    def run_it():
+        for arguments, prepare in RECIPES[name]:
+            label = " ".join([name, *(str(v) for v in arguments.values() if isinstance(v, str) and "/" not in v)])
+            RESULT["undone"][label] = undone(name, arguments, prepare)
+            steps = 0
+            while scene_print() != STATE["authored"]:  # what the preparation did goes too
+                bpy.ops.ed.undo()
+                steps += 1
+                if steps > 8:
+                    raise RuntimeError(f"after '{label}' the authored scene does not come back")
+
+    run_it.__name__ = f"undo {name}"
+    return run_it
+
+
+STATE = {}
 
 
 @step
 def undo_every_operator():
+    from adf_studio import registration
+
     view()["space_data"].shading.type = "WIREFRAME"
-    for name, arguments, prepare in OPERATORS:
-        prepare()
-        bpy.ops.ed.undo_push(message="before")
-        before = scene_print()
-        operator = getattr(bpy.ops.adf, name)
-        label = f"{name} {arguments}" if name == "add" else name
-        if not operator.poll():
-            RESULT["undone"][label] = "poll"
-            continue
-        try:
-            done = operator("EXEC_DEFAULT", True, **arguments)
-        except RuntimeError as error:
-            RESULT["undone"][label] = str(error)
-            continue
-        changed = scene_print() != before
-        if done == {"FINISHED"}:
-            bpy.ops.ed.undo()
-        RESULT["undone"][label] = "same" if scene_print() == before else "different"
-        if changed and scene_print() == before:
-            RESULT["undone"][label] = "undone"
-        redraw()
+    bpy.context.preferences.addons["adf_studio"].preferences.simulator = os.environ["LIGATURE_COMMAND"]
+    bpy.context.preferences.edit.undo_steps = 256
+    classes = [cls for module in registration.MODULES for cls in module.CLASSES]
+    RESULT["operators"] = sorted(c.bl_idname for c in classes if issubclass(c, bpy.types.Operator))
+    bpy.ops.ed.undo_push(message="authored")
+    STATE["authored"] = scene_print()
+    STEPS[:0] = [try_operator(name) for name in RECIPES]
 
 
 @step
@@ -244,7 +340,8 @@ def run():
         finish()
         return None
     function = STEPS.pop(0)
-    sys.stderr.write(f"{function.__name__}\n")
+    sys.stderr.write(f"{time.monotonic() - START:.1f} s: {function.__name__}\n")
+    sys.stderr.flush()
     try:
         with bpy.context.temp_override(**view()):
             function()

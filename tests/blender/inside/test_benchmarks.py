@@ -1,10 +1,7 @@
 """What makes the extension better than its forerunner, each a test (benchmarks B1 to B15 of the specification)."""
 
-import hashlib
-import json
 import math
 import time
-from pathlib import Path
 
 import addon_utils
 import bpy
@@ -21,51 +18,7 @@ from adf_studio.object_operators import solid_of
 from adf_studio.placing import rest_pose
 from adf_studio.write_file import export_file
 
-
-def select(*objects):
-    for obj in bpy.context.view_layer.objects:
-        obj.select_set(obj in objects)
-    bpy.context.view_layer.objects.active = objects[-1]
-
-
-def cube(name="part", size=1.0, location=(0, 0, 0)):
-    bpy.ops.mesh.primitive_cube_add(size=size, location=location)
-    bpy.context.object.name = name
-    return bpy.context.object
-
-
-def body(name="part", **kwargs):
-    obj = cube(name, **kwargs)
-    select(obj)
-    bpy.ops.adf.make(role="BODY")
-    return obj
-
-
-def model():
-    bpy.ops.adf.new_file(kind="MODEL", name="model")
-    return bpy.context.scene.adf.models[0].collection
-
-
-def scene_print():
-    """Everything that the user could miss: transforms, data, roles, selection."""
-    told = []
-    for obj in sorted(bpy.data.objects, key=lambda o: o.name):
-        told.append(
-            [
-                obj.name,
-                [list(row) for row in obj.matrix_basis],
-                obj.data.name if obj.data else "",
-                obj.adf.role,
-                obj.adf.key,
-                obj.parent.name if obj.parent else "",
-                obj.hide_get() if obj.name in bpy.context.view_layer.objects else None,
-                obj.select_get() if obj.name in bpy.context.view_layer.objects else None,
-                len(obj.modifiers),
-            ]
-        )
-    told.append(sorted((c.name, len(c.objects)) for c in bpy.data.collections))
-    told.append([len(bpy.data.meshes), len(bpy.data.materials), len(bpy.data.scenes)])
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
+from .scene import body, model, scene_print, select
 
 
 def test_b1_enabling_and_disabling_leaves_nothing_behind():
@@ -302,34 +255,6 @@ def test_b15_check_scene_lists_selects_and_mends():
     bpy.ops.adf.fix(everything=True)
     assert not {f.rule for f in bpy.context.scene.adf.findings} & {"mass-missing", "thin-for-margin"}
     assert part.adf.body.collision_margin == pytest.approx(0.002)
-
-
-def test_bad_input_is_reported_with_its_object_and_changes_nothing(tmp_path):
-    collection = model()
-    part, other = body("part"), body("other", location=(5, 0, 0))
-    export_file(collection, tmp_path / "m.yaml")
-    before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
-
-    def refused(words):
-        with pytest.raises(Exception, match=words):
-            export_file(collection, tmp_path / "m.yaml")
-        assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
-
-    part.location.x = float("nan")
-    refused("'part' has a transform that is not a number")
-    part.location.x = 0.0
-    part.scale = (0.0, 1.0, 1.0)
-    refused("'part' has a scale of zero")
-    part.scale = (1.0, 1.0, 1.0)
-    other.adf.key = part.adf.key
-    refused("'other' and 'part' have one identifier, 'BODY part'|'part' and 'other' have one identifier")
-    other.adf.key = "BODY other"
-    with pytest.raises(Exception, match="cannot be written"):
-        export_file(collection, Path("/proc/nowhere/m.yaml"))
-    with pytest.raises(RuntimeError, match="this is not YAML"):
-        (tmp_path / "bad.yaml").write_text("a: [1\nb: }")
-        bpy.ops.adf.import_file(filepath=str(tmp_path / "bad.yaml"))
-    assert len(bpy.data.collections) == 1
 
 
 def test_a_previewed_joint_moves_its_child_and_comes_back(tmp_path):

@@ -1,0 +1,52 @@
+"""Small scenes that tests start from, and what they compare afterwards."""
+
+import hashlib
+import json
+
+import bpy
+
+
+def select(*objects):
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[-1]
+
+
+def cube(name="part", size=1.0, location=(0, 0, 0)):
+    bpy.ops.mesh.primitive_cube_add(size=size, location=location)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def body(name="part", **kwargs):
+    obj = cube(name, **kwargs)
+    select(obj)
+    bpy.ops.adf.make(role="BODY")
+    return obj
+
+
+def model():
+    bpy.ops.adf.new_file(kind="MODEL", name="model")
+    return bpy.context.scene.adf.models[0].collection
+
+
+def scene_print():
+    """Everything that the user could miss: transforms, data, roles, selection."""
+    told = []
+    for obj in sorted(bpy.data.objects, key=lambda o: o.name):
+        told.append(
+            [
+                obj.name,
+                [list(row) for row in obj.matrix_basis],
+                obj.data.name if obj.data else "",
+                obj.adf.role,
+                obj.adf.key,
+                obj.parent.name if obj.parent else "",
+                obj.hide_get() if obj.name in bpy.context.view_layer.objects else None,
+                obj.select_get() if obj.name in bpy.context.view_layer.objects else None,
+                len(obj.modifiers),
+            ]
+        )
+    told.append(sorted((c.name, len(c.objects)) for c in bpy.data.collections))
+    told.append([len(bpy.data.meshes), len(bpy.data.materials), len(bpy.data.scenes)])
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
