@@ -11,10 +11,14 @@ from rich.console import Console
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "suture.py"
 
 
-def demo(throws: int, seed: int, out: Path, console: Console) -> int:
-    """Run the example; returns its exit status."""
+def demo(throws: int, seed: int, out: Path, dataset: Path | None, console: Console) -> int:
+    """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status."""
     if not EXAMPLE.is_file():
         console.print(f"there is no '{EXAMPLE}': the demonstration comes with the repository, not with the package")
         return 2
-    command = [sys.executable, str(EXAMPLE), "--throws", str(throws), "--seed", str(seed), "--out", str(out)]
+    if dataset is None:
+        command = [sys.executable, str(EXAMPLE), "--throws", str(throws), "--seed", str(seed), "--out", str(out)]
+    else:
+        words = [str(dataset), "--throws", str(throws), "--seed", str(seed)]
+        command = [sys.executable, str(EXAMPLE.with_name("record_dataset.py")), *words]
     return subprocess.run(command, check=False).returncode

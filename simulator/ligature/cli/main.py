@@ -245,11 +245,12 @@ def demo(
     throws: Annotated[int, typer.Option(help="Throws, from the first pair of holes on.", min=1, max=3)] = 2,
     seed: Annotated[int, typer.Option(help="Where the needle lies; 0 is the scene's own place.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
+    dataset: Annotated[Optional[Path], typer.Option(help="HDF5 file to write instead, to learn from.")] = None,  # noqa: UP045
 ) -> None:
     """Have two arms suture by themselves; prints the score, writes pictures."""
     from ligature.cli.demo import demo as run_demo
 
-    raise typer.Exit(run_demo(throws, seed, out, Console(highlight=False, soft_wrap=True)))
+    raise typer.Exit(run_demo(throws, seed, out, dataset, Console(highlight=False, soft_wrap=True)))
 
 
 @app.command()
@@ -271,13 +272,14 @@ def replay(
     scene: Annotated[Optional[Path], typer.Option(help="Launch file, instead of the recorded one.")] = None,  # noqa: UP045
     joints: Annotated[str, typer.Option(help="Of a bag: measured or setpoint joints instead of commands.")] = "",
     speed: Annotated[float, typer.Option("-s", help="Of a bag: its time over wall time.", min=0.001)] = 1.0,
+    dataset: Annotated[Optional[Path], typer.Option(help="Of a record: HDF5 file with pictures and motion.")] = None,  # noqa: UP045
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
     from ligature.cli.replay import replay as run_replay
 
     if joints not in ("", "measured", "setpoint"):
         raise typer.BadParameter(f"--joints is 'measured' or 'setpoint', not '{joints}'")
-    raise typer.Exit(run_replay(file, scene, joints, speed, Console(highlight=False, soft_wrap=True)))
+    raise typer.Exit(run_replay(file, scene, joints, speed, Console(highlight=False, soft_wrap=True), dataset))
 
 
 @app.command()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,11 +52,15 @@ def resimulate(
     return simulation
 
 
-def replay(file: Path, scene: Path | None, joints: str, speed: float, console: Console) -> int:
-    """Replay ``file``; returns the exit status, 1 when a run did not repeat bit for bit."""
+def replay(
+    file: Path, scene: Path | None, joints: str, speed: float, console: Console, dataset: Path | None = None
+) -> int:
+    """Replay ``file``, a record into ``dataset`` too; the exit status is 1 when a run did not repeat bit for bit."""
     try:
         if is_record(file):
-            return _again(Record.read(file), scene, console)
+            return _again(Record.read(file), scene, dataset, console)
+        if dataset is not None:
+            raise ValueError(f"{file}: no record of a run, which a dataset is made from")
         return _play(file, joints, speed, console)
     except ligature.SceneError as error:
         for diagnostic in error.diagnostics:
@@ -67,9 +72,10 @@ def replay(file: Path, scene: Path | None, joints: str, speed: float, console: C
     return 1
 
 
-def _again(record: Record, scene: Path | None, console: Console) -> int:
+def _again(record: Record, scene: Path | None, dataset: Path | None, console: Console) -> int:
     begin = time.perf_counter()
-    simulation = resimulate(record, scene)
+    with ExitStack() as files:
+        simulation = resimulate(record, scene, _sampling(dataset, files) if dataset else lambda _: None)
     took, found = time.perf_counter() - begin, simulation.state_hash()
     console.print(f"{len(record.commands)} commands, {simulation.time:.3f} s simulated in {took:.1f} s", markup=False)
     simulation.close()
@@ -78,6 +84,20 @@ def _again(record: Record, scene: Path | None, console: Console) -> int:
         return 1
     console.print(f"the same bits: {found}", markup=False)
     return 0
+
+
+def _sampling(dataset: Path, files: ExitStack) -> Callable[[ligature.Simulation], None]:
+    """What samples a simulation into ``dataset``, which ``files`` closes."""
+    from ligature.datasets import DatasetWriter
+
+    writers: list[DatasetWriter] = []
+
+    def sample(simulation: ligature.Simulation) -> None:
+        if not writers:
+            writers.append(files.enter_context(DatasetWriter(dataset, simulation)))
+        writers[0].sample()
+
+    return sample
 
 
 def _play(file: Path, joints: str, speed: float, console: Console) -> int:

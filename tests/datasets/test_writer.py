@@ -1,0 +1,144 @@
+"""Datasets: what is sampled is what was there, and a file has its name only when it is whole."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import ligature
+import numpy as np
+import pytest
+from ligature.datasets import DatasetError, DatasetWriter
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
+
+
+@pytest.fixture(scope="module")
+def simulation() -> Iterator[ligature.Simulation]:
+    found = ligature.Simulation(ligature.load(SMALL))
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="module")
+def written(simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two episodes, and beside them what was really there at each sample."""
+    folder = tmp_path_factory.mktemp("dataset")
+    path, truth = folder / "data.h5", []
+    with DatasetWriter(path, simulation, size=(64, 48), rate=50.0, phases=("wait", "work")) as writer:
+        for success in (True, False):
+            for k in range(12):
+                simulation.step(10)
+                if writer.sample("work" if k > 5 else "wait"):
+                    truth.append(
+                        (simulation.time, simulation.bodies["Needle"].pose, simulation.arms["PSM1"].measured_js())
+                    )
+                    picture = simulation.cameras["cameraR"].capture((64, 48))
+            writer.end_episode(success, seed=3)
+        assert not path.exists(), "half a dataset has the final name"
+    np.savez(folder / "truth.npz", time=[t for t, *_ in truth], needle=[n for _, n, _ in truth],
+             joints=[j.position for *_, j in truth], rgb=picture.rgb, depth=picture.depth, ids=picture.ids)  # fmt: skip
+    return path
+
+
+def test_samples_come_at_the_rate_and_say_what_was_there(written: Path) -> None:
+    truth = np.load(written.parent / "truth.npz")
+    with h5py.File(written) as file:
+        episodes = [file[name] for name in ("episode_0000", "episode_0001")]
+        assert [e.attrs["samples"] for e in episodes] == [6, 6]
+        assert [bool(e.attrs["success"]) for e in episodes] == [True, False]
+        assert episodes[0].attrs["seed"] == 3
+        times = np.concatenate([e["time"][:] for e in episodes])
+        assert times == pytest.approx(truth["time"])
+        assert np.diff(episodes[0]["time"][:]) == pytest.approx(0.02)
+        needle = np.concatenate([e["needle/pose"][:] for e in episodes])
+        assert needle == pytest.approx(truth["needle"], abs=1e-6)
+        joints = np.concatenate([e["arms/PSM1/measured_js"][:, 0] for e in episodes])
+        assert joints == pytest.approx(truth["joints"], abs=1e-6)
+        phases = [file.attrs["phases"][k] for k in episodes[0]["phase"][:]]
+        assert phases == ["wait"] * 3 + ["work"] * 3
+        assert episodes[0]["thread/points"].shape == (6, 40, 3)
+        assert "jaw/measured_js" in episodes[0]["arms/PSM2"]
+
+
+def test_pictures_are_those_of_the_camera(written: Path) -> None:
+    truth = np.load(written.parent / "truth.npz")
+    with h5py.File(written) as file:
+        camera = file["episode_0001/cameras/cameraR"]
+        assert (camera["rgb"][-1] == truth["rgb"]).all()
+        assert (camera["ids"][-1] == truth["ids"]).all()
+        seen = np.isfinite(truth["depth"])
+        assert seen.any()
+        assert camera["depth"][-1][seen] * file.attrs["depth_unit"] == pytest.approx(truth["depth"][seen], abs=6e-5)
+        assert (camera["depth"][-1][~seen] == 0).all()
+        names = file["id_names"].asstr()[:]
+        assert any("phantom" in names[i].lower() for i in np.unique(truth["ids"]))
+        assert camera["intrinsics"].shape == (6, 3, 3)
+
+
+def test_the_reader_of_the_examples_reads_it(written: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "examples" / "read_dataset.py", written], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert "episode_0000: 6 samples, success True; wait 3, work 3" in done.stdout
+    assert "picture (48, 64, 3)" in done.stdout
+
+
+def test_an_error_leaves_nothing_behind(simulation: ligature.Simulation, tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), DatasetWriter(tmp_path / "a.h5", simulation, cameras=()) as writer:
+        writer.sample()
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_exists_is_not_replaced(simulation: ligature.Simulation, tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    path.write_text("mine")
+    with pytest.raises(DatasetError, match="exists already; datasets replace nothing"):
+        DatasetWriter(path, simulation)
+    assert path.read_text() == "mine"
+
+
+def test_a_phase_that_was_not_announced_is_refused(simulation: ligature.Simulation, tmp_path: Path) -> None:
+    with (
+        pytest.raises(ValueError, match="no phase is called 'knit'; there are work"),
+        DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), phases=("work",)) as writer,
+    ):
+        writer.sample("knit")
+
+
+FULL = """
+import resource, sys
+import ligature
+from pathlib import Path
+from ligature.datasets import DatasetError, DatasetWriter
+simulation = ligature.Simulation(ligature.load({scene!r}))
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+try:
+    with DatasetWriter(Path({path!r}), simulation, cameras=(), rate=1000.0) as writer:
+        for _ in range(2000):
+            writer.sample()
+            simulation.step()
+except DatasetError as error:
+    print(error)
+    sys.exit(7)
+"""
+
+
+def test_a_file_that_cannot_grow_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+    """A limit of file sizes stands for a full disk: both have writes refused in the middle."""
+    path = tmp_path / "a.h5"
+    done = subprocess.run(
+        [sys.executable, "-c", FULL.format(scene=str(SMALL), path=str(path))],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 7, done.stderr[-2000:]
+    assert f"the dataset '{path}' cannot be written" in done.stdout
+    assert list(tmp_path.iterdir()) == []
