@@ -10,7 +10,7 @@ is released. It ends when the physics process shows no life (`Block.age`) or its
 from ligature.bus.block import Block, BusError
 from ligature.bus.mailbox import Mailbox
 from ligature.bus.outbox import Outbox
-from ligature.bus.pacing import Pacer, Throttle
+from ligature.bus.pacing import Pace, Pacer, Throttle
 from ligature.bus.watchdog import Watchdog
 
-__all__ = ["Block", "BusError", "Mailbox", "Outbox", "Pacer", "Throttle", "Watchdog"]
+__all__ = ["Block", "BusError", "Mailbox", "Outbox", "Pace", "Pacer", "Throttle", "Watchdog"]

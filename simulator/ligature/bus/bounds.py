@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from ligature.bus.codec import Message
+from ligature.bus.pacing import FASTEST as FASTEST_PACE
+from ligature.bus.pacing import SLOWEST, Pace
 from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, PlaceCommand
 
 FARTHEST = 1e4
@@ -31,6 +33,8 @@ def check_bounds(message: Message) -> None:
         _below("the offset", message.offset, FARTHEST, "m")
     elif isinstance(message, PlaceCommand) and message.pose is not None:
         _below("the pose", message.pose, FARTHEST, "m")
+    elif isinstance(message, Pace) and not SLOWEST <= message.speed <= FASTEST_PACE:
+        raise ValueError(f"the speed must be within {SLOWEST:g} … {FASTEST_PACE:g}, not {message.speed:g}")
 
 
 def _below(what: str, values: tuple[float, ...], bound: float, unit: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from ligature.bus.pacing import Throttle
+from ligature.bus.pacing import Pace, Throttle
 from ligature.model.commands import (
     VERBS,
     ActuatorCommand,
@@ -24,7 +24,7 @@ MAX_TEXT = 200
 _TYPES = tuple(sorted(CommandType))
 _KINDS = ("body", "camera", "light", "actuator", "sensor", "ghost", "world", "arm")
 
-Message = Command | Throttle
+Message = Command | Throttle | Pace
 
 
 class CodecError(ValueError):
@@ -56,6 +56,8 @@ def encode(message: Message) -> bytes:
         return struct.pack("<BB", 9, message.enabled)
     if isinstance(message, ArmCommand):
         return _arm(message)
+    if isinstance(message, Pace):
+        return struct.pack("<Bd", 10, message.speed)
     if isinstance(message, Release):
         return struct.pack("<BBi", 4, _KINDS.index(message.kind), message.index)
     if isinstance(message, Reset):
@@ -135,4 +137,6 @@ def _decode(data: bytes) -> Message:
         return ParentCommand(_KINDS[what], index, parent if parent != -1 else None)
     if kind == 9:
         return WatchContacts(bool(data[1]))
+    if kind == 10:
+        return Pace(*struct.unpack_from("<xd", data))
     raise ValueError(f"unknown kind {kind}")

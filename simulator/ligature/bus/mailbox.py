@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError, Message, decode
 from ligature.bus.newest import Newest, object_of
-from ligature.bus.pacing import Throttle
+from ligature.bus.pacing import Pace, Throttle
 from ligature.bus.ring import Ring
 from ligature.model.commands import ParentCommand, Release, check
 from ligature.model.scene import Scene
@@ -76,7 +76,8 @@ class Mailbox:
     def _check(self, message: Message) -> None:
         if isinstance(message, Throttle):
             return
-        check(message)
+        if not isinstance(message, Pace):
+            check(message)
         check_bounds(message)
         item = object_of(message)
         if item is not None and not 0 <= item[1] < self._limits.get(item[0], 0):

@@ -24,10 +24,22 @@ class Throttle:
     skip: int
 
 
+SLOWEST, FASTEST = 0.01, 100.0
+"""Bounds of simulated over wall time that may be asked for."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Simulated over wall time from now on."""
+
+    speed: float
+
+
 class Pacer:
     """Absolute deadlines of updates of ``period`` seconds of simulated time at ``speed``."""
 
     def __init__(self, period: float, speed: float = 1.0) -> None:
+        self._period = period
         self._wall_period = period / speed if speed > 0 else 0.0
         self._next: float | None = None
         self.lost = 0.0
@@ -35,6 +47,11 @@ class Pacer:
         self._clock = False
         self._skip = DEFAULT_SKIP
         self._budget = 0
+
+    def pace(self, command: Pace) -> None:
+        """Run at another speed; what was late before is forgotten."""
+        self._wall_period = self._period / command.speed
+        self._next = None
 
     def throttle(self, command: Throttle) -> None:
         """Take a world command; an edge of its clock allows ``skip`` more updates, also while others still run.

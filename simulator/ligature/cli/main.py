@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -24,6 +25,14 @@ app = typer.Typer(
 Launch = Annotated[Path, typer.Argument(help="Launch file, or one model file.")]
 Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
 Roots = Annotated[list[Path] | None, typer.Option("--root", help="Folder below which files may be opened too.")]  # noqa: UP045
+
+CockpitAddress = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--cockpit-at", "--at", metavar="ADDRESS:PORT",
+        help="Where the web page is served; beyond this machine only with a token in LIGATURE_COCKPIT_TOKEN.",
+    ),
+]  # fmt: skip
 
 
 def indices(text: str | None) -> tuple[int, ...] | None:
@@ -77,6 +86,8 @@ def run(
         Optional[Path],  # noqa: UP045
         typer.Option(help="File to write all commands to, from which 'ligature replay' simulates the run again."),
     ] = None,
+    cockpit: Annotated[bool, typer.Option("--cockpit", help="Serve the scene as a web page on this machine.")] = False,
+    cockpit_at: CockpitAddress = None,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -91,7 +102,35 @@ def run(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
         task=task, record=str(record) if record else "",
-        notes=rate_notes(rate),
+        cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
+    )  # fmt: skip
+    raise typer.Exit(Supervisor(options).run())
+
+
+def _served_at(text: str | None) -> str:
+    """The address of the page, after a look at whether it may be served there."""
+    from ligature.cockpit.address import DEFAULT, TOKEN_VARIABLE, AddressError, check_token, read_address
+
+    try:
+        check_token(read_address(text or DEFAULT), os.environ.get(TOKEN_VARIABLE, ""))
+    except AddressError as error:
+        raise typer.BadParameter(str(error)) from None
+    return text or DEFAULT
+
+
+@app.command()
+def cockpit(
+    launch: Launch,
+    models: Models = None,
+    root: Roots = None,
+    at: CockpitAddress = None,
+    rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
+    speed: Annotated[float, typer.Option("-s", help="Simulated over wall time.", min=0.001)] = 1.0,
+) -> None:
+    """Run a scene with a live web page and without ROS; see `run --cockpit` for both."""
+    options = RunOptions(
+        str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
+        cockpit=_served_at(at), ros=False, notes=rate_notes(rate),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
 

@@ -19,8 +19,9 @@ class RunOptions:
     ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
     tells whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` says
     whether pictures are published (None: of the cameras for which the scene says so), ``window`` whether
-    one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``notes`` are
-    lines to tell the user at the start.
+    one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
+    the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines to tell the user at
+    the start.
     """
 
     scene: str
@@ -40,6 +41,8 @@ class RunOptions:
     window: bool = False
     task: str = ""
     record: str = ""
+    cockpit: str = ""
+    ros: bool = True
     notes: tuple[str, ...] = ()
 
     def load(self) -> Scene:

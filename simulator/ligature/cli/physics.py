@@ -13,7 +13,7 @@ import numpy as np
 
 import ligature
 from ligature.adf import Severity
-from ligature.bus import Block, BusError, Mailbox, Pacer, Throttle
+from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Throttle
 from ligature.bus.codec import Message
 from ligature.bus.process import end_with_parent, stop_on_signal, tell
 from ligature.bus.record import Header, RecordWriter
@@ -154,6 +154,8 @@ class Loop:
         for message in messages:
             if isinstance(message, Throttle):
                 self._pacer.throttle(message)
+            elif isinstance(message, Pace):
+                self._pacer.pace(message)
             else:
                 self._note(message)
                 self._simulation.apply(message)

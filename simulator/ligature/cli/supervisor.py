@@ -34,7 +34,7 @@ _ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
 }
-_DRAWING = ("window", "render")
+_DRAWING = ("window", "render", "cockpit")
 """Processes that a run can do without; status 0 means that they have nothing to draw, or nowhere."""
 
 _BEHIND = ("nice", "-n", "10")
@@ -123,7 +123,7 @@ class Supervisor:
         self._children["physics"] = Child(
             "physics", [sys.executable, "-m", "ligature.cli.physics", text], self._events, self._env
         )
-        if self._master_ready():
+        if self._options.ros and self._master_ready():
             self._children["ros"] = Child(
                 "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
             )
@@ -134,7 +134,7 @@ class Supervisor:
 
     def _start_drawing(self, name: str, module: str) -> None:
         """Start a process that draws, behind all others; without a ROS master the run is over."""
-        if "ros" in self._children:
+        if "ros" in self._children or not self._options.ros:
             command = [*_BEHIND, sys.executable, "-m", module, self._options.to_text()]
             self._children[name] = Child(name, command, self._events, self._env)
 
@@ -164,8 +164,13 @@ class Supervisor:
             self._say(f"{process} ready: {text}")
             if process == "physics" and self._options.window:
                 self._start_drawing("window", "ligature.cli.window_process")
-            self._progress.update("connecting to ROS")
-        elif event == "cameras":
+            if process == "physics" and self._options.cockpit:
+                self._start_drawing("cockpit", "ligature.cli.cockpit_process")
+            if self._options.ros:
+                self._progress.update("connecting to ROS")
+            else:
+                self._progress.stop()
+        elif event == "cameras" and self._options.ros:
             self._start_drawing("render", "ligature.cli.render_process")
         elif event == "first-state":
             self._progress.stop()

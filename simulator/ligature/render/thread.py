@@ -20,22 +20,22 @@ class Tube:
 
     The spline is C2 and linear in its knots, the joint pivots and the two ends, whose spacing is the
     rod's rest length: points and tangents are one matrix product. Rings start at one of the elements'
-    own axes, so that a twisted thread looks twisted.
+    own axes, so that a twisted thread looks twisted. ``points`` a spline has for each element, ``sides`` a ring.
     """
 
-    def __init__(self, scene: Scene, rod: RodChain) -> None:
+    def __init__(self, scene: Scene, rod: RodChain, points: int = POINTS_PER_ELEMENT, sides: int = SIDES) -> None:
         self._radius = rod.radius
         self._bodies = list(rod.bodies)
         self._carriers, self._knots = _knots(scene, rod)
         lengths = np.asarray(rod.lengths, dtype=float)
         knots = np.concatenate([[0.0], np.cumsum(lengths)])
-        fine = np.linspace(0.0, knots[-1], POINTS_PER_ELEMENT * len(knots))
+        fine = np.linspace(0.0, knots[-1], points * len(knots))
         spline = CubicSpline(knots, np.eye(len(knots)))
         self._points, self._tangents = spline(fine), spline(fine, 1)
         self._across: int | None = None
-        angles = np.linspace(0, 2 * np.pi, SIDES + 1)
+        angles = np.linspace(0, 2 * np.pi, sides + 1)
         self._cos, self._sin = np.cos(angles)[None, :, None], np.sin(angles)[None, :, None]
-        self.faces, self._uvs = _rings(fine[[0, *range(len(fine)), -1]] / (2 * np.pi * rod.radius))
+        self.faces, self._uvs = _rings(fine[[0, *range(len(fine)), -1]] / (2 * np.pi * rod.radius), sides)
 
     def triangles(self, T_world_body: Array) -> Triangles:
         """The tube when the scene's bodies stand at ``T_world_body`` (n, 4, 4)."""
@@ -98,12 +98,12 @@ def _knots(scene: Scene, rod: RodChain) -> tuple[NDArray[np.int64], Array]:
     return np.array(carriers), np.array(places)[:, :3]
 
 
-def _rings(along: Array) -> tuple[NDArray[np.int32], Array]:
+def _rings(along: Array, sides: int) -> tuple[NDArray[np.int32], Array]:
     """Faces and texture coordinates of rings at the places ``along`` (n,), u around and v along the tube."""
-    index = np.arange(len(along) * (SIDES + 1)).reshape(len(along), SIDES + 1)
+    index = np.arange(len(along) * (sides + 1)).reshape(len(along), sides + 1)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    uvs = np.stack(np.meshgrid(np.linspace(0, 1, SIDES + 1), along), -1).reshape(-1, 2)
+    uvs = np.stack(np.meshgrid(np.linspace(0, 1, sides + 1), along), -1).reshape(-1, 2)
     return faces.astype(np.int32), uvs
 
 

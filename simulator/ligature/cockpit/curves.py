@@ -1,0 +1,122 @@
+"""Live curves: thread tension, tip forces, insertion depth, and how the task stands. Newtons, millimetres, seconds."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+import numpy as np
+from viser import GuiApi, uplot
+
+from ligature.model.scene import ArmKind, Scene
+from ligature.tasks import MissingBodies, Monitor, judge_suture
+
+SPAN = 30.0
+"""Seconds that a curve shows."""
+
+SAMPLES = 10
+"""Samples of a curve per second of simulated time."""
+
+COLOURS = ("#4dabf7", "#ffa94d", "#69db7c", "#f783ac", "#b197fc")
+
+Values = Callable[[Any], list[float]]
+
+
+class Curves:
+    """Collects values from states (one element of the record) and shows them as charts."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._charts = [chart for chart in _charts(scene) if chart[1]]
+        self._times: deque[float] = deque(maxlen=int(SPAN * SAMPLES))
+        self._rows: deque[list[float]] = deque(maxlen=int(SPAN * SAMPLES))
+        self._handles: list[Any] = []
+        self._resets = -1
+        self._monitor: Monitor | None = None
+        self._task: Any = None
+
+    def show(self, gui: GuiApi) -> None:
+        """Put the charts into the container of ``gui`` that is open."""
+        self._task = gui.add_html("")
+        empty = np.zeros(1)
+        for title, names, _ in self._charts:
+            series = (uplot.Series(label="s"), *_series(names))
+            self._handles.append(
+                gui.add_uplot(
+                    (empty, *(empty for _ in names)), series, title=title, height=150,
+                    scales={"x": uplot.Scale(time=False)},
+                )
+            )  # fmt: skip
+
+    def observe(self, state: Any) -> None:
+        """Take a state; a reset begins the task anew."""
+        if int(state["resets"]) != self._resets:
+            self._resets = int(state["resets"])
+            self._begin()
+        if self._monitor is not None:
+            self._monitor.observe(state)
+        time = float(state["sim_time"])
+        if not self._times or time - self._times[-1] >= 1.0 / SAMPLES:
+            self._times.append(time)
+            self._rows.append([value for _, _, values in self._charts for value in values(state)])
+
+    def _begin(self) -> None:
+        try:
+            self._monitor = Monitor(self._scene)
+        except MissingBodies:
+            self._monitor = None
+
+    def refresh(self, state: Any) -> None:
+        """Send the curves and the words of the task."""
+        self._task.content = self._words(state)
+        if not self._times:
+            return
+        times, rows = np.array(self._times), np.array(self._rows)
+        column = 0
+        for handle, (_, names, _) in zip(self._handles, self._charts, strict=True):
+            handle.data = (times, *(rows[:, column + i] for i in range(len(names))))
+            column += len(names)
+
+    def _words(self, state: Any) -> str:
+        if self._monitor is None:
+            return "<small>No suturing task in this scene.</small>"
+        measures = self._monitor.measures()
+        passages = [f"{'exit' if p.exit else 'entry'} {p.pair} ({1e3 * p.miss:.1f} mm)" for p in measures.passages[-6:]]
+        pairs = max(sum(p.exit for p in measures.passages), 1)
+        score = judge_suture(self._monitor.scenery, state["body_pose"], measures.passages, measures.time, pairs)
+        lines = [f"holes: {', '.join(passages) or 'none yet'}", *score.lines(), *measures.lines()]
+        return "<small>" + "<br>".join(escape(line) for line in lines) + "</small>"
+
+
+def _series(names: list[str]) -> list[uplot.Series]:
+    return [
+        uplot.Series(label=name, stroke=COLOURS[i % len(COLOURS)], width=2, points={"show": False})
+        for i, name in enumerate(names)
+    ]
+
+
+def _charts(scene: Scene) -> list[tuple[str, list[str], Values]]:
+    """Title, names of the curves and their values."""
+    threads = [(rod.name.rpartition("/")[2], list(rod.bodies)) for rod in scene.rods]
+    arms = [(i, arm.name) for i, arm in enumerate(scene.arms) if arm.kind is ArmKind.PSM]
+    needles = [needle.body for needle in scene.needles]
+
+    def tension(state: Any) -> list[float]:
+        return [float(np.abs(state["rod_tension"][bodies]).max()) for _, bodies in threads]
+
+    def forces(state: Any) -> list[float]:
+        return [float(np.linalg.norm(state["arm"][i]["spatial_measured_cf"][:3])) for i, _ in arms]
+
+    def depths(state: Any) -> list[float]:
+        count = int(state["insertion_count"])
+        depth, body = 1e3 * state["insertion_depth"][:count], state["insertion_body"][:count]
+        on_needle = np.isin(body, needles)
+        return [float(depth[chosen].max(initial=0.0)) for chosen in (on_needle, ~on_needle)]
+
+    return [
+        ("thread tension, N", [name or f"thread {i}" for i, (name, _) in enumerate(threads, 1)], tension),
+        ("tip force, N", [name for _, name in arms], forces),
+        ("depth in tissue, mm", ["needle", "thread"] if scene.holes else [], depths),
+    ]

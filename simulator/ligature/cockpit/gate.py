@@ -1,0 +1,107 @@
+"""The gate before the page: nothing is shown, and no connection made, without the token.
+
+A browser shows the token once, in the address, and is given a cookie for it. Pages of other sites are kept out also
+where there is no token: they could reach a loopback address through the browser of whoever visits them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import http
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from html import escape
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from ligature.cockpit.address import Address
+
+COOKIE = "ligature_cockpit"
+PARAMETER = "token"
+
+_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Ligature cockpit</title>
+<body style="font-family: sans-serif; background: #1a1b1e; color: #c1c2c5; text-align: center; padding-top: 20vh">
+<h2>Ligature cockpit</h2><p id="why">{why}</p>
+<form><input name="token" type="password" placeholder="token" autofocus> <button>Enter</button></form></body></html>"""
+
+
+class Gate:
+    """Decides about every request to ``address`` before anything else sees it; no ``token`` (empty) asks for none."""
+
+    def __init__(self, address: Address, token: str) -> None:
+        self._token = token
+        self._local = address.loopback and not token
+        self._pass = hmac.new(token.encode(), COOKIE.encode(), hashlib.sha256).hexdigest()
+        self.refused = 0
+
+    def answer(self, request: Request) -> Response | None:
+        """The response that ends a request here; None lets it in."""
+        found = self._answer(request)
+        if found is not None and found.status_code >= http.HTTPStatus.BAD_REQUEST:
+            self.refused += 1
+        return found
+
+    def _answer(self, request: Request) -> Response | None:
+        host = request.headers.get("Host", "")
+        if self._local and not _names_this_machine(host):
+            return _refusal(http.HTTPStatus.FORBIDDEN, f"'{host}' is not the name of this machine.")
+        origin = request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return _refusal(http.HTTPStatus.FORBIDDEN, "Pages of other sites are kept out.")
+        if not self._token or self._has_pass(request.headers):
+            return None
+        shown = parse_qs(urlsplit(request.path).query).get(PARAMETER, [""])[0]
+        if not shown:
+            return _refusal(http.HTTPStatus.UNAUTHORIZED, "This page needs the token of the cockpit.")
+        if not hmac.compare_digest(shown.encode(), self._token.encode()):
+            return _refusal(http.HTTPStatus.FORBIDDEN, "This is not the token of the cockpit.")
+        headers = Headers({"Location": "/", "Set-Cookie": f"{COOKIE}={self._pass}; HttpOnly; SameSite=Strict; Path=/"})
+        return Response(http.HTTPStatus.SEE_OTHER, "See Other", headers, b"")
+
+    def _has_pass(self, headers: Headers) -> bool:
+        try:
+            cookies = SimpleCookie("; ".join(headers.get_all("Cookie")))
+        except CookieError:
+            return False
+        return COOKIE in cookies and hmac.compare_digest(cookies[COOKIE].value.encode(), self._pass.encode())
+
+
+def _names_this_machine(host: str) -> bool:
+    name = urlsplit(f"//{host}").hostname or ""
+    return Address(name, 0).loopback
+
+
+def _refusal(status: http.HTTPStatus, why: str) -> Response:
+    body = _PAGE.format(why=escape(why)).encode()
+    headers = Headers(
+        {"Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(body)), "Cache-Control": "no-store"}
+    )
+    return Response(status, status.phrase, headers, body)
+
+
+@contextmanager
+def guarded(gate: Gate) -> Iterator[None]:
+    """Have ``gate`` stand before a websocket server that is started within: viser has no hook for that of its own."""
+    serve = websockets.asyncio.server.serve
+
+    def guarded_serve(*arguments: Any, process_request: Callable[..., Any] | None = None, **options: Any) -> Any:
+        def process(connection: ServerConnection, request: Request) -> Any:
+            refusal = gate.answer(request)
+            if refusal is not None or process_request is None:
+                return refusal
+            return process_request(connection, request)
+
+        return serve(*arguments, process_request=process, **options)
+
+    websockets.asyncio.server.serve = guarded_serve  # type: ignore[assignment,misc]
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = serve  # type: ignore[misc]

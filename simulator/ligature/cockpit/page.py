@@ -1,0 +1,75 @@
+"""The page as it is laid out for everybody: header, arms, simulation, cameras, curves. Contents come from elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import ViserServer
+from viser._messages import ShareUrlDisconnect, ShareUrlRequest
+
+from ligature.cockpit.address import Address, AddressError, check_free
+from ligature.cockpit.gate import Gate, guarded
+from ligature.cockpit.stage import VIEW_ANGLE
+
+BRAND = (28, 126, 214)
+LEFT_WIDTH, RIGHT_WIDTH = 380, 370
+"""Pixels of the panels beside the 3D view."""
+
+
+def serve(address: Address, gate: Gate) -> ViserServer:
+    """A page at ``address`` behind ``gate``; raises `AddressError` when the address cannot be had."""
+    if address.port:
+        check_free(address)
+    with guarded(gate), contextlib.redirect_stdout(io.StringIO()):
+        server = ViserServer(address.host, address.port, "Ligature", verbose=False)
+    if address.port and server.get_port() != address.port:
+        server.stop()
+        raise AddressError(f"the cockpit cannot be served at {address.host}:{address.port}: it was taken meanwhile")
+    for message in (ShareUrlRequest, ShareUrlDisconnect):  # any visitor could make the page public with these
+        server._websock_server.unregister_handler(message)
+    gui = server.gui
+    gui.configure_theme(
+        dark_mode=True, show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
+    )
+    server.scene.configure_default_lights(cast_shadow=False)
+    gui.main_panel.dock_right()
+    gui.main_panel.set_width(RIGHT_WIDTH)
+    return server
+
+
+def badge(word: str, colour: str) -> str:
+    """A word on a coloured ground, as HTML."""
+    style = f"background:{colour};color:white;border-radius:4px;padding:1px 6px;font-size:11px"
+    return f'<span style="{style}">{escape(word)}</span>'
+
+
+class Header:
+    """The line that says what is shown, how fast it runs, and who operates."""
+
+    def __init__(self, server: ViserServer, scene: str) -> None:
+        self._scene = scene
+        self._html = server.gui.add_html("", order=0)
+        self._shown = ""
+
+    def refresh(self, time: float, factor: float, running: str, operated: str, viewers: int) -> None:
+        """Show the figures."""
+        mark = badge(running, "#37b24d" if running == "running" else "#f59f00")
+        crowd = f"{operated} · {viewers} browser{'s' if viewers != 1 else ''}"
+        words = (
+            f'<div id="header" style="padding:4px 8px;font-size:13px"><b>{escape(self._scene)}</b> {mark}<br>'
+            f'{time:.1f} s · {factor:.2f} × real time<br><span style="color:#909296">{escape(crowd)}</span></div>'
+        )
+        if words != self._shown:
+            self._shown = self._html.content = words
+
+
+def look_from(server: ViserServer, eye: NDArray[np.float64], at: NDArray[np.float64], up: NDArray[np.float64]) -> None:
+    """Where browsers look from at first."""
+    camera = server.initial_camera
+    distance = float(np.linalg.norm(eye - at))
+    camera.position, camera.look_at, camera.up = eye, at, up
+    camera.fov, camera.near, camera.far = VIEW_ANGLE, max(distance / 100, 1e-3), max(100 * distance, 10.0)

@@ -1,0 +1,130 @@
+"""Goals of an arm that go where the operator points, at a hand's speed: nothing jumps, and what stops, stops at once.
+
+A slider or a gizmo may leap; the goal that is sent to the arm does not. Metres, radians, seconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ligature.model.commands import ArmCommand
+from ligature.model.frames import axis_rotation, matrix_pose7
+from ligature.robots.poses import rotation_vector
+
+Array = NDArray[np.float64]
+
+LINEAR, ANGULAR = 0.1, 1.5
+"""Fastest goals of a tip, in m/s and rad/s."""
+
+JAW = 2.0
+"""Fastest goals of a jaw or gripper in rad/s."""
+
+JOINT = {"revolute": 1.0, "prismatic": 0.1}
+"""Fastest goals of a joint in rad/s and m/s."""
+
+
+@dataclass(eq=False)
+class JointPursuit:
+    """Joint goals (n,) towards ``target``, each joint at ``speed``; ``verb`` is the command that carries them."""
+
+    goal: Array
+    target: Array
+    speed: Array
+    verb: str = "servo_jp"
+
+    def advance(self, dt: float) -> tuple[float, ...]:
+        """The goal ``dt`` seconds later."""
+        step = self.speed * dt
+        self.goal = self.goal + np.clip(self.target - self.goal, -step, step)
+        return tuple(self.goal.tolist())
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the target is reached."""
+        return bool((self.goal == self.target).all())
+
+
+@dataclass(eq=False)
+class PosePursuit:
+    """Tip poses (4, 4) towards ``target``, in the frame that ``servo_cp`` of the arm takes."""
+
+    goal: Array
+    target: Array
+    verb: str = "servo_cp"
+
+    def advance(self, dt: float) -> tuple[float, ...]:
+        """The goal ``dt`` seconds later, as a pose (7,)."""
+        way, turn = self._rest()
+        length, angle = float(np.linalg.norm(way)), float(np.linalg.norm(turn))
+        share = min(1.0, LINEAR * dt / max(length, 1e-12), ANGULAR * dt / max(angle, 1e-12))
+        if share == 1.0:
+            self.goal = self.target
+        else:
+            goal = self.goal.copy()
+            goal[:3, 3] += share * way
+            if angle > 0.0:
+                goal[:3, :3] = axis_rotation(turn / angle, share * angle) @ goal[:3, :3]
+            self.goal = goal
+        return tuple(matrix_pose7(self.goal).tolist())
+
+    def _rest(self) -> tuple[Array, Array]:
+        turn = rotation_vector(self.target[:3, :3] @ self.goal[:3, :3].T)
+        return self.target[:3, 3] - self.goal[:3, 3], turn
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the target is reached."""
+        return self.goal is self.target
+
+
+class ArmPursuits:
+    """What one arm pursues: joints or a tip pose, and beside it the jaw."""
+
+    def __init__(self, arm: int) -> None:
+        self._arm = arm
+        self._motion: JointPursuit | PosePursuit | None = None
+        self._jaw: JointPursuit | None = None
+
+    @property
+    def active(self) -> bool:
+        """Whether anything is pursued."""
+        return self._motion is not None or self._jaw is not None
+
+    def joint(self, start: ArrayLike, joint: int, target: float, speed: ArrayLike) -> None:
+        """Take one joint to ``target``, the others where they are going or stay; ``start`` are set-points (n,)."""
+        if not isinstance(self._motion, JointPursuit):
+            goal = np.array(start, dtype=float)
+            self._motion = JointPursuit(goal, goal.copy(), np.asarray(speed, dtype=float))
+        self._motion.target = self._motion.target.copy()
+        self._motion.target[joint] = target
+
+    def pose(self, start: Array, target: Array) -> None:
+        """Go to ``target`` (4, 4), from ``start`` (4, 4) unless a pose is pursued already."""
+        goal = self._motion.goal if isinstance(self._motion, PosePursuit) else np.array(start)
+        self._motion = PosePursuit(goal, np.array(target))
+
+    def jaw(self, start: float, target: float, verb: str) -> None:
+        """Open or close to ``target``."""
+        goal = np.array([start]) if self._jaw is None else self._jaw.goal
+        self._jaw = JointPursuit(goal, np.array([target]), np.array([JAW]), verb)
+
+    def advance(self, dt: float) -> list[ArmCommand]:
+        """Commands for the next ``dt`` seconds; what arrives is pursued no longer."""
+        commands = []
+        for pursuit in (self._motion, self._jaw):
+            if pursuit is not None:
+                commands.append(ArmCommand(self._arm, pursuit.verb, pursuit.advance(dt)))
+        if self._motion is not None and self._motion.arrived:
+            self._motion = None
+        if self._jaw is not None and self._jaw.arrived:
+            self._jaw = None
+        return commands
+
+    def stop(self) -> bool:
+        """Pursue nothing any more; True when something was."""
+        was = self.active
+        self._motion = self._jaw = None
+        return was

@@ -1,0 +1,97 @@
+"""The scene in 3D: looks are sent once, then only the poses of what moved, and threads as tubes. World axes, metres."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import ViserServer
+
+from ligature.cockpit.looks import body_looks, thread_colour
+from ligature.model.frames import pose7_matrix
+from ligature.model.poses import pose7_matrices
+from ligature.model.scene import ArmKind, Scene
+from ligature.render.thread import Tube
+from ligature.robots.fitting import base_pose, kinematics_of
+from ligature.robots.psm_arm import HOME
+
+Array = NDArray[np.float64]
+
+STILL, UNTURNED = 2e-5, 2e-4
+"""Metres, and differences of quaternions, below which a body counts as not moved: less than a pixel."""
+
+TUBE_POINTS, TUBE_SIDES = 2, 6
+"""Of the drawn thread: a tenth of what pictures have, since it is sent anew whenever it moves."""
+
+VIEW_ANGLE = 0.8
+"""Vertical field of view of a page in radians."""
+
+
+class Stage:
+    """What the page shows in 3D; `update` takes states."""
+
+    def __init__(self, server: ViserServer, scene: Scene) -> None:
+        self._server, self._scene = server, scene
+        self._nodes = {
+            owner: server.scene.add_glb(f"/scene/{owner}", data) for owner, data in body_looks(scene).items()
+        }
+        self._owners = np.array(sorted(self._nodes), dtype=int)
+        self._shown = np.full((len(self._owners), 7), np.inf)
+        bodies = np.array([body.T_world_body for body in scene.bodies]).reshape(-1, 4, 4)
+        self._tubes = [Tube(scene, rod, TUBE_POINTS, TUBE_SIDES) for rod in scene.rods]
+        self._threads = []
+        for rod, tube in zip(scene.rods, self._tubes, strict=True):
+            surface = tube.triangles(bodies)
+            self._threads.append(
+                server.scene.add_mesh_simple(
+                    f"/threads/{rod.name}", surface.positions.astype(np.float32), surface.faces.astype(np.uint32),
+                    color=thread_colour(scene, rod.bodies[0]), side="double", cast_shadow=False,
+                )
+            )  # fmt: skip
+        self._rod_poses = [np.full((len(rod.bodies), 7), np.inf) for rod in scene.rods]
+        self.sent = 0
+
+    def update(self, state: NDArray[np.void]) -> None:
+        """Show ``state`` (1,): sends what moved since the last time."""
+        poses = np.concatenate([state["body_pose"][0], state["ghost_world"][0]])
+        with self._server.atomic():
+            self._move(poses[self._owners])
+            self._bend(poses)
+
+    def _move(self, poses: Array) -> None:
+        moved = (np.abs(poses[:, :3] - self._shown[:, :3]).max(axis=1) > STILL) | (
+            np.abs(poses[:, 3:] - self._shown[:, 3:]).max(axis=1) > UNTURNED
+        )
+        for row in np.flatnonzero(moved):
+            x, y, z, qx, qy, qz, qw = poses[row].tolist()
+            node = self._nodes[int(self._owners[row])]
+            node.position, node.wxyz = (x, y, z), (qw, qx, qy, qz)
+            self._shown[row] = poses[row]
+            self.sent += 1
+
+    def _bend(self, poses: Array) -> None:
+        for rod, tube, node, shown in zip(self._scene.rods, self._tubes, self._threads, self._rod_poses, strict=True):
+            now = poses[list(rod.bodies)]
+            if np.abs(now[:, :3] - shown[:, :3]).max() > STILL:
+                shown[:] = now
+                T = pose7_matrices(poses[: len(self._scene.bodies)])
+                node.vertices = tube.triangles(T).positions.astype(np.float32)
+                self.sent += 1
+
+
+def first_view(scene: Scene, state: NDArray[np.void]) -> tuple[Array, Array, Array]:
+    """Where a browser looks from at first, at what, and what is up, each (3,).
+
+    As the scene's first camera looks, but from so far that threads and the tips of arms that are at home are seen.
+    """
+    loose = [*scene.rod_bodies] or [body.index for body in scene.bodies if not body.static]
+    places = [*state["body_pose"][0, loose, :3]]
+    for arm in scene.arms:
+        if arm.kind is ArmKind.PSM:
+            places.append((base_pose(scene, arm) @ kinematics_of(scene, arm).forward(HOME))[:3, 3])
+    places = places or [np.zeros(3)]
+    low, high = np.min(places, axis=0), np.max(places, axis=0)
+    target = 0.5 * (low + high)
+    distance = max(0.5 * float(np.linalg.norm(high - low)), 0.02) / np.sin(VIEW_ANGLE / 2)
+    cameras = [camera.index for camera in scene.cameras if camera.visible]
+    T = pose7_matrix(state["camera_world"][0, cameras[0]]) if cameras else np.eye(4)
+    return target + distance * T[:3, 0], target, T[:3, 2]

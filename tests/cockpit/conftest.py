@@ -1,0 +1,215 @@
+"""A simulation with its page, and a person before a browser: Debian's Chromium, headless, drawing in software."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import ligature
+import numpy as np
+import pytest
+from ligature.bus import Block
+from ligature.bus.block import FOLDER
+from ligature.cockpit.stage import VIEW_ANGLE, first_view
+from ligature.model.frames import pose7_matrix
+from ligature.model.state import new_state
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
+PATIENCE = 60.0
+FLAGS = (
+    "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader", "--window-size=1280,860", "--disable-background-networking",
+    "--disable-renderer-backgrounding", "--disable-background-timer-throttling",
+)  # fmt: skip
+
+
+def until(condition: Callable[[], Any], what: str, seconds: float = PATIENCE) -> Any:
+    """Wait for ``condition``; returns what it returned."""
+    deadline = time.monotonic() + seconds
+    while True:
+        found = condition()
+        if found:
+            return found
+        assert time.monotonic() < deadline, f"not within {seconds:g} s: {what}"
+        time.sleep(0.05)
+
+
+class Served:
+    """A simulation with a page, and its state as the physics process writes it."""
+
+    def __init__(self, *arguments: str, scene: Path = SMALL) -> None:
+        self.lines: list[str] = []
+        command = [str(Path(sys.executable).parent / "ligature"), "cockpit", str(scene), "--at", "127.0.0.1:0"]
+        self.process = subprocess.Popen(
+            [*command, "-p", "250", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env=dict(os.environ, COLUMNS="200"),
+        )  # fmt: skip
+        threading.Thread(target=self._read, daemon=True).start()
+        ready = until(lambda: next((x for x in self.lines if x.startswith("cockpit ready")), ""), "the page is served")
+        self.url = ready.partition(": ")[2].strip()
+        self.scene = ligature.load(str(scene))
+        (name,) = [path.name for path in FOLDER.glob(f"ligature-{self.process.pid}-*")]
+        self._record = new_state(self.scene)
+        self.block = Block.attach(name, self._record.dtype)
+        self.block.read(self._record)
+        self.first = self._record.copy()
+        self.names = [arm.name for arm in self.scene.arms]
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))
+
+    @property
+    def state(self) -> Any:
+        """The newest state, one element of the record."""
+        self.block.read(self._record)
+        return self._record[0]
+
+    def arm(self, name: str) -> Any:
+        """The newest state of an arm."""
+        return self.state["arm"][self.names.index(name)]
+
+    def end(self) -> None:
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+        finally:
+            self.block.close()
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    running = Served()
+    yield running
+    running.end()
+
+
+class Person:
+    """Somebody before a browser, who sees what is on the page and uses the mouse and the keyboard."""
+
+    def __init__(self) -> None:
+        from selenium import webdriver
+        from selenium.webdriver.chrome.service import Service
+
+        options = webdriver.ChromeOptions()
+        options.binary_location = str(shutil.which("chromium"))
+        for flag in FLAGS:
+            options.add_argument(flag)
+        self.driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+        self.driver.set_script_timeout(PATIENCE)
+        self.driver.set_page_load_timeout(PATIENCE)
+
+    def opens(self, url: str) -> None:
+        self.driver.get(url)
+        self.sees("Ligature")
+
+    @property
+    def text(self) -> str:
+        return str(self.driver.execute_script("return document.body.innerText"))
+
+    def sees(self, text: str) -> None:
+        until(lambda: text in self.text, f"'{text}' is on the page")
+
+    def find(self, xpath: str) -> Any:
+        """The first element that is shown."""
+        return until(
+            lambda: next((e for e in self.driver.find_elements("xpath", xpath) if e.is_displayed()), None), xpath
+        )
+
+    def clicks(self, label: str) -> None:
+        """Click what bears ``label``."""
+        self.find(f"//button[normalize-space(.)='{label}'] | //label[normalize-space(.)='{label}']").click()
+
+    def operates(self) -> None:
+        """Take the desk, unless it has it."""
+        if "Give up control" not in self.text:
+            self.clicks("Operate")
+        self.sees("Give up control")
+
+    def slider(self, label: str) -> Any:
+        """The thumb of the first slider with that label."""
+        root = self.find(f"//label[text()='{label}']").get_attribute("for")
+        return self.driver.find_element("xpath", f"//*[@id='{root}']//*[@role='slider']")
+
+    def drags(self, element: Any, right: int, down: int = 0) -> None:
+        self._chain().click_and_hold(element).move_by_offset(right, down).release().perform()
+
+    def holds_at(self, x: float, y: float, ways: list[tuple[float, float]]) -> None:
+        """Press at a place of the window, and move the pressed mouse along ``ways``."""
+        chain = self._chain()
+        chain.w3c_actions.pointer_action.move_to_location(round(x), round(y))
+        chain.pause(0.3).click_and_hold()
+        for right, down in ways:
+            chain.move_by_offset(round(right), round(down)).pause(0.05)
+        chain.perform()
+
+    def lets_go(self) -> None:
+        self._chain().release().perform()
+
+    def _chain(self) -> Any:
+        from selenium.webdriver.common.action_chains import ActionChains
+
+        return ActionChains(self.driver, duration=50)
+
+    def processes(self) -> list[int]:
+        """Process ids of the browser, its first one first."""
+        listing = subprocess.run(["ps", "-eo", "pid,ppid"], capture_output=True, text=True, check=True).stdout
+        parents = dict(tuple(map(int, line.split())) for line in listing.splitlines()[1:])  # type: ignore[misc]
+        found = [self.driver.service.process.pid]
+        for pid in found:
+            found += [child for child, parent in parents.items() if parent == pid]
+        return found[1:]
+
+    def goes(self) -> None:
+        self.driver.quit()
+
+
+def projected(served: Served, person: Person, points: np.ndarray) -> np.ndarray:
+    """Places (n, 2) in the window of world points (n, 3), from where a page looks at first.
+
+    The page is assumed to have been opened just now, and the scene's thread to lie as at the start.
+    """
+    eye, at, up = first_view(served.scene, served.first)
+    z = (eye - at) / np.linalg.norm(eye - at)
+    x = np.cross(up, z) / np.linalg.norm(np.cross(up, z))
+    local = (points - eye) @ np.array([x, np.cross(z, x), z]).T
+    box = person.driver.execute_script(
+        "const r = document.querySelector('canvas[data-engine]').getBoundingClientRect(); return [r.x, r.y, r.width, r.height]"
+    )
+    scale = 0.5 * box[3] / np.tan(VIEW_ANGLE / 2) / -local[:, 2]
+    return np.column_stack([box[0] + box[2] / 2 + scale * local[:, 0], box[1] + box[3] / 2 - scale * local[:, 1]])
+
+
+def tip(served: Served, name: str) -> np.ndarray:
+    """Set-point (4, 4) of an arm's tip in the world."""
+    index = served.names.index(name)
+    base = pose7_matrix(served.state["body_pose"][served.scene.arms[index].base])
+    return np.asarray(base @ pose7_matrix(served.arm(name)["local_setpoint_cp"]))
+
+
+@pytest.fixture(scope="module")
+def person() -> Iterator[Person]:
+    yield from somebody()
+
+
+def somebody() -> Iterator[Person]:
+    pytest.importorskip("selenium", reason="the package selenium drives the browser")
+    for program in ("chromium", "chromedriver"):
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed (debian-packages-tests.txt)")
+    found = Person()
+    yield found
+    found.goes()

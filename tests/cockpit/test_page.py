@@ -1,0 +1,120 @@
+"""The page in a real browser, used as a person uses it: what is done on it happens in the simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.cockpit.conftest import Person, Served, projected, tip, until
+
+pytestmark = pytest.mark.timeout(600)
+
+
+@pytest.fixture
+def operator(served: Served, person: Person) -> Person:
+    """Somebody who operates on a freshly loaded page, with PSM1 enabled and homed."""
+    person.opens(served.url)
+    person.sees("running")
+    person.operates()
+    if not served.arm("PSM1")["homed"]:
+        person.clicks("Enable")
+        until(lambda: served.arm("PSM1")["operating"] == 1, "PSM1 is enabled")
+        person.clicks("Home")
+    until(lambda: served.arm("PSM1")["homed"] and not served.arm("PSM1")["busy"], "PSM1 is homed")
+    until(lambda: person.slider("yaw °").get_attribute("aria-disabled") != "true", "sliders can be moved")
+    return person
+
+
+def test_the_page_shows_scene_figures_and_cameras(served: Served, person: Person) -> None:
+    person.opens(served.url)
+    for text in ("suturing_small", "running", "nobody operates", "PSM1", "PSM2", "ECM", "DISABLED", "commands"):
+        person.sees(text)
+    shown = "return [...document.querySelectorAll('img')].some(i => i.naturalWidth > 400)"
+    until(lambda: person.driver.execute_script(shown), "pictures of both eyes are shown")
+    assert person.driver.execute_script("return document.querySelectorAll('canvas').length") >= 1
+    assert not person.driver.find_elements("css selector", "[role=slider]"), "who watches has no controls"
+
+
+def test_enable_and_home_work(served: Served, operator: Person) -> None:
+    assert served.arm("PSM1")["operating"] == 1
+    assert served.arm("PSM1")["measured_js"][0, 2] == pytest.approx(0.12, abs=2e-3)
+    operator.sees("HOMED")
+
+
+def test_a_slider_moves_the_joint(served: Served, operator: Person) -> None:
+    before = served.arm("PSM1")["measured_js"][0].copy()
+    operator.drags(operator.slider("yaw °"), 25)
+    until(lambda: served.arm("PSM1")["measured_js"][0, 0] - before[0] > np.deg2rad(5.0), "the joint has moved")
+    shown = until(lambda: float(operator.slider("yaw °").get_attribute("aria-valuenow")), "the slider shows a value")
+    until(lambda: abs(np.rad2deg(served.arm("PSM1")["measured_js"][0, 0]) - shown) < 0.5, "it is where the slider is")
+    assert np.abs(served.arm("PSM1")["measured_js"][0, 1:6] - before[1:6]).max() < 2e-3, "other joints stay"
+
+
+def test_the_jaw_opens(served: Served, operator: Person) -> None:
+    operator.drags(operator.slider("jaw °"), 30)
+    until(lambda: served.arm("PSM1")["jaw_measured_js"][0] > np.deg2rad(5.0), "the jaw has opened")
+
+
+def test_pause_step_and_run(served: Served, operator: Person) -> None:
+    operator.clicks("Paused")
+    operator.sees("paused")
+    until(lambda: served.state["tick"] == served.state["tick"], "time stands")
+    before = int(served.state["update"])
+    operator.clicks("Step 10")
+    until(lambda: int(served.state["update"]) == before + 10, "ten updates were run")
+    operator.clicks("Paused")
+    until(lambda: int(served.state["update"]) > before + 20, "time goes on")
+
+
+def test_the_gizmo_moves_the_tip(served: Served, operator: Person) -> None:
+    operator.clicks("Gizmo")
+    before = tip(served, "PSM1")
+    # along that arrow of the gizmo that is seen longest
+    ends = before[:3, 3] + 0.035 * before[:3, :3].T
+    places = projected(served, operator, np.vstack([before[:3, 3], ends]))
+    arrows = places[1:] - places[0]
+    axis = int(np.argmax(np.linalg.norm(arrows, axis=1)))
+    way = 40.0 * arrows[axis] / np.linalg.norm(arrows[axis])
+    x, y = places[0] + 0.9 * arrows[axis]
+    operator.holds_at(x, y, [tuple(way / 4)] * 4)
+    operator.lets_go()
+    along = before[:3, axis]
+    until(lambda: (tip(served, "PSM1")[:3, 3] - before[:3, 3]) @ along > 0.005, "the tip has moved along the arrow")
+    moved = tip(served, "PSM1")[:3, 3] - before[:3, 3]
+    assert np.linalg.norm(moved - (moved @ along) * along) < 2e-3, "and not aside"
+
+
+def test_who_watches_cannot_command(served: Served, operator: Person) -> None:
+    driver, first = operator.driver, operator.driver.current_window_handle
+    driver.execute_script("localStorage.clear()")  # somebody else's browser has no key of the operator
+    driver.switch_to.new_window("tab")
+    try:
+        operator.opens(served.url)
+        operator.sees("operated")
+        operator.clicks("Operate")
+        operator.sees("Somebody operates already")
+        assert not driver.find_elements("css selector", "[role=slider]")
+        assert "Give up control" not in operator.text
+    finally:
+        driver.close()
+        driver.switch_to.window(first)
+    assert "Give up control" in operator.text
+
+
+def test_a_reload_keeps_state_and_operator(served: Served, operator: Person) -> None:
+    operator.clicks("Give up control")
+    operator.clicks("Operate")  # with a fresh key
+    operator.sees("Give up control")
+    before = served.arm("PSM1")["setpoint_js"][0].copy()
+    operator.driver.refresh()
+    operator.sees("Give up control")
+    shown = until(lambda: operator.slider("yaw °").get_attribute("aria-valuenow"), "the slider is shown")
+    assert float(shown) == pytest.approx(np.rad2deg(before[0]), abs=0.1)
+    assert served.arm("PSM1")["setpoint_js"][0] == pytest.approx(before, abs=1e-4)
+    assert served.arm("PSM1")["homed"]
+
+
+def test_a_reset_puts_the_scene_back(served: Served, operator: Person) -> None:
+    before = int(served.state["resets"])
+    operator.clicks("Reset the scene")
+    until(lambda: int(served.state["resets"]) == before + 1, "the scene is reset")
