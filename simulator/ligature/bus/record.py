@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ligature.bus.codec import CodecError, decode, encode
-from ligature.bus.pacing import Throttle
+from ligature.bus.pacing import Pace, Throttle
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
 
@@ -93,7 +93,7 @@ class Record:
                 command = decode(data[at : at + length])
             except CodecError as error:
                 raise RecordError(f"{path}: at byte {at}: {error}") from error
-            if isinstance(command, Throttle):
+            if isinstance(command, Throttle | Pace):
                 raise RecordError(f"{path}: at byte {at}: no command of a record")
             commands.append((update, command))
         raise RecordError(

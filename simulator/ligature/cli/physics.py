@@ -106,7 +106,7 @@ class Loop:
 
     def _note(self, message: Message) -> None:
         """Write a command to the record."""
-        if self._record is not None and not isinstance(message, Throttle):
+        if self._record is not None and not isinstance(message, Throttle | Pace):
             try:
                 self._record.write(self._updates + 1, message)
             except OSError as error:
