@@ -6,7 +6,7 @@ SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
 BPY    ?= 4.2.23 4.5.15 5.0.1
 
-.PHONY: run demo test test-slow setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
+.PHONY: run demo film test test-slow setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -44,8 +44,8 @@ $(STAMPS)/compiled: $(STAMPS)/package
 	@touch $@
 
 lint: setup
-	.venv/bin/ruff format --check simulator tests scenes blender_addon
-	.venv/bin/ruff check simulator tests scenes blender_addon
+	.venv/bin/ruff format --check simulator tests scenes examples blender_addon
+	.venv/bin/ruff check simulator tests scenes examples blender_addon
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
@@ -69,6 +69,13 @@ soak: setup
 
 demo: setup
 	.venv/bin/ligature demo
+
+# the animation of the README and the picture of docs/tasks.md
+film: setup
+	.venv/bin/ligature demo --out build/film
+	mkdir -p docs/images
+	cp build/film/suture.webp docs/images/suture.webp
+	cp build/film/suture_6.png docs/pictures/suture.png
 
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md

@@ -18,6 +18,7 @@ import numpy as np
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7
 from ligature.robots.operating_state import Refused
 from ligature.robots.poses import rotation_vector
+from ligature.robots.psm_arm import PsmArm
 from ligature.tasks import Measures, Monitor, SutureScore, judge_suture
 from PIL import Image
 
@@ -44,6 +45,9 @@ ABOVE, MEETING, BEFORE, BEYOND = 0.02, 0.03, 0.4, 0.5
 FILM_PERIOD, FILM_SIZE = 0.25, (640, 400)
 """Seconds between two pictures of the film, and their width and height."""
 
+FILM_SHOWN, FILM_QUALITY = 80, 45
+"""Milliseconds for which each is shown, and how well it is kept, of 100."""
+
 Array = np.ndarray
 
 
@@ -61,7 +65,12 @@ class Surgeon:
         self._needle = simulation.bodies[scene.bodies[self.monitor.scenery.needle].identity.topic]
         self.arc = NeedleArc.of(scene.needles[0], scene.bodies[self.monitor.scenery.needle])
         self._base = {arm.name: scene.bodies[arm.base].T_world_body for arm in scene.arms if arm.base >= 0}
-        self.arms = {name: simulation.arms[name] for name in ("PSM1", "PSM2")}
+        self.arms, self.jaws = {}, {}
+        for name in ("PSM1", "PSM2"):
+            arm = simulation.arms[name]
+            if not isinstance(arm, PsmArm) or arm.jaw is None:
+                raise Failure(f"{name} is not a PSM with a jaw")
+            self.arms[name], self.jaws[name] = arm, arm.jaw
 
     # --- time and seeing --------------------------------------------------------------------
 
@@ -106,13 +115,13 @@ class Surgeon:
                 raise Failure(str(refused)) from refused
             self.wait(STREAM)
 
-    def line(self, name: str, goal: Array, speed: float = 0.03) -> None:
+    def line(self, name: str, goal: Array, speed: float = 0.045) -> None:
         """Stream the straight way to a pose of the tool."""
         start = self.tool(name)
         way = goal[:3, 3] - start[:3, 3]
         turn = rotation_vector(start[:3, :3].T @ goal[:3, :3])
         angle = float(np.linalg.norm(turn))
-        steps = max(2, int(max(np.linalg.norm(way) / speed, angle / 1.5) / STREAM))
+        steps = max(2, int(max(float(np.linalg.norm(way)) / speed, angle / 2.0) / STREAM))
         axis = turn / angle if angle > 1e-9 else UP
         self.glide(
             name,
@@ -122,7 +131,7 @@ class Surgeon:
             ),
         )
 
-    def turn(self, name: str, throw: Throw, begin: float, end: float, speed: float = 0.8) -> None:
+    def turn(self, name: str, throw: Throw, begin: float, end: float, speed: float = 1.0) -> None:
         """Turn the needle that ``name`` holds along the throw's circle, its tip from one angle to another."""
         T_arc_tool = inverse(self.needle()) @ self.tool(name)
         steps = max(2, int(abs(end - begin) / speed / STREAM))
@@ -130,20 +139,22 @@ class Surgeon:
 
     def jaw(self, name: str, angle: float, seconds: float = 0.3) -> None:
         """Open or close the jaw."""
-        jaw = self.arms[name].jaw
+        jaw = self.jaws[name]
         start = float(jaw.setpoint_js().position[0])
         for s in np.linspace(0.0, 1.0, max(2, int(seconds / STREAM))):
             jaw.servo_jp([start + s * (angle - start)])
             self.wait(STREAM)
 
-    def take(self, name: str, T_world_tool: Array) -> None:
-        """Come from behind, close on the needle, and make sure that something is between the fingers."""
-        back = frame(np.eye(3), -0.015 * T_world_tool[:3, 2]) @ T_world_tool
+    def take(self, name: str, T_arc_tool: Array) -> None:
+        """Come from behind, close on the needle, and make sure that something is between the fingers.
+
+        Looks at the needle again on the way: a taut thread turns it in the other hand.
+        """
         self.jaw(name, OPEN)
         self.line(name, frame(np.eye(3), ABOVE * UP) @ self.tool(name))
-        self.move(name, frame(np.eye(3), ABOVE * UP) @ back)
-        self.line(name, back)
-        self.line(name, T_world_tool)
+        self.move(name, frame(np.eye(3), ABOVE * UP) @ self._behind(T_arc_tool))
+        self.line(name, self._behind(T_arc_tool))
+        self.line(name, self.needle() @ T_arc_tool)
         self.jaw(name, SHUT, 0.5)
         self.wait(0.2)
         if not self.holds(name):
@@ -152,6 +163,11 @@ class Surgeon:
     def holds(self, name: str) -> bool:
         """Whether something is between the fingers."""
         return self.simulation.grasps[name] is not None
+
+    def _behind(self, T_arc_tool: Array) -> Array:
+        """Where a tool stands before it takes the needle: drawn back along itself."""
+        T = self.needle() @ T_arc_tool
+        return frame(np.eye(3), -0.015 * T[:3, 2]) @ T
 
     def leave(self, name: str) -> None:
         """Open, and draw back along the tool."""
@@ -176,7 +192,7 @@ class Surgeon:
         """Take the needle from the pad near its tip, and hold it up before the entry."""
         waiting = frame(np.eye(3), MEETING * UP) @ throw.arc_at(-BEFORE, self.arc)
         grip = self._grip(name, PICK_DEPTHS, [waiting], self.needle(), upright=True)
-        self.take(name, self.needle() @ grip)
+        self.take(name, grip)
         T = self.tool(name)
         self.line(name, frame(np.eye(3), MEETING * UP) @ T)
         self.move(name, waiting @ inverse(self.needle()) @ self.tool(name))
@@ -202,16 +218,16 @@ class Surgeon:
         tip = throw.towards_exit + BEYOND
         rest = self.arc.end - self.arc.begin
         way = [throw.arc_at(a, self.arc) for a in np.linspace(tip, throw.towards_exit + rest + 0.3, 10)]
-        self.take(name, self.needle() @ self._grip(name, PULL_DEPTHS, way, self.needle()))
+        self.take(name, self._grip(name, PULL_DEPTHS, way, self.needle()))
         self.leave(other)
         self.turn(name, throw, tip, throw.towards_exit + rest + 0.3)
         T = self.tool(name)
-        self.line(name, frame(np.eye(3), out * UP) @ T, 0.04)
+        self.line(name, frame(np.eye(3), out * UP) @ T, 0.025)
 
     def hand_over(self, giver: str, taker: str, throw: Throw) -> None:
         """The needle goes to the arm that drives the next throw."""
         way = [throw.arc_at(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
-        self.take(taker, self.needle() @ self._grip(taker, HOLD_DEPTHS, way, self.needle()))
+        self.take(taker, self._grip(taker, HOLD_DEPTHS, way, self.needle()))
         self.leave(giver)
 
     def suture(self, pairs: tuple[int, ...], driver: str = "PSM2", puller: str = "PSM1") -> None:
@@ -236,7 +252,7 @@ def scatter(simulation: ligature.Simulation, seed: int) -> None:
     T = pose_of(handle.pose)
     turned = axis_rotation(UP, float(rng.uniform(-0.6, 0.6)))
     shift = np.append(rng.uniform(-0.008, 0.008, 2), 0.0)
-    handle.set_pose(matrix_pose7(frame(turned @ T[:3, :3], T[:3, 3] + shift)))
+    handle.set_pose(matrix_pose7(frame(turned @ T[:3, :3], T[:3, 3] + shift)).tolist())
 
 
 class Film:
@@ -255,14 +271,14 @@ class Film:
             self._frames.append(Image.fromarray(self._camera.capture(FILM_SIZE, passes=("rgb",)).rgb))
 
     def save(self) -> None:
-        """Write ``suture.gif`` and eight pictures along the way; nothing half-written stays under these names."""
+        """Write ``suture.webp`` and eight pictures along the way; nothing half-written stays under these names."""
         self._folder.mkdir(parents=True, exist_ok=True)
         for number, index in enumerate(np.linspace(0, len(self._frames) - 1, 8).round().astype(int), 1):
             self._frames[index].save(self._folder / f"suture_{number}.png")
-        part = self._folder / "suture.gif.part"
-        first, *rest = [frame.quantize(128) for frame in self._frames]
-        first.save(part, format="GIF", save_all=True, append_images=rest, duration=100, loop=0)
-        part.replace(self._folder / "suture.gif")
+        part = self._folder / "suture.webp.part"
+        first, *rest = self._frames
+        first.save(part, format="WEBP", save_all=True, append_images=rest, duration=FILM_SHOWN, quality=FILM_QUALITY)
+        part.replace(self._folder / "suture.webp")
 
 
 def operate(
@@ -284,7 +300,9 @@ def operate(
 def main() -> int:
     """Make a suture and print how well it went."""
     arguments = argparse.ArgumentParser(description="Two arms suture a pad by themselves.")
-    arguments.add_argument("--throws", type=int, choices=(1, 2, 3), default=2, help="from the first pair of holes on")
+    arguments.add_argument(
+        "--throws", type=int, choices=(1, 2, 3, 4), default=2, help="from the first pair of holes on"
+    )
     arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
     given = arguments.parse_args()

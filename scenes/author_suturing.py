@@ -1,8 +1,8 @@
 """Authors the scene `suturing`: a pad of tissue with a wound and four pairs of holes, sutured by two PSMs.
 
 Run ``python scenes/author_suturing.py`` to write the ADF files again; the results are committed and a test compares.
-Arms, needle, thread, cameras and looks are those of `suturing_small`. Names are those that clients of the suturing
-challenge look for. Lengths in metres; the pad's frame is at its middle.
+Arms, needle and thread are those of `suturing_small`, the room is that of `author_theatre`. Names are those that
+clients of the suturing challenge look for. Lengths in metres; the pad's frame is at its middle.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import author_looks as looks  # noqa: E402
 import author_suturing_small as small  # noqa: E402
+import author_theatre as theatre  # noqa: E402
 from ligature.model.frames import pose_matrix  # noqa: E402
 
 HERE = Path(__file__).resolve().parent / "suturing"
@@ -35,8 +36,14 @@ BRIDGE, BRIDGE_THICKNESS = 0.003, 0.0008
 OPENING, RING = 0.0015, 0.0004
 """Half width of a hole, and the radius of the four rods around it."""
 
-CAMERA = ((0.0307, 0.292, 0.835), (0.69813, 0.0, -3.14158))
-"""Where the cameras look from: all four pairs of holes are in the picture."""
+NEARER = 0.05
+"""How far along Y the pad lies from its place in `suturing_small`: there both arms reach all four pairs."""
+
+GRIP = {"friction": 0.15, "drag": 5.0}
+"""How the tissue holds what passes through a hole, N and N s/m: a thread runs through all eight holes in the end."""
+
+CAMERA = ((0.0307, 0.362, 0.852), (0.69813, 0.0, -3.14158))
+"""Where the endoscope is: all four pairs of holes and both instruments are in the picture."""
 
 HOLE_MASS = 0.005
 HOLE_STIFFNESS, HOLE_TURN = 400.0, 0.02
@@ -118,10 +125,13 @@ def holes() -> dict[str, np.ndarray]:
 def phantom() -> dict[str, Any]:
     """The pad, its holes, the needle with its thread, and the frame that carries the cameras."""
     document = small.phantom()
+    for name in document["bodies"]:
+        at = document[name]["location"]["position"]
+        at["y"] = small.number(at["y"] + NEARER)
     pad = document.pop("BODY Block")
     T_world_pad = pose_matrix([pad["location"]["position"][axis] for axis in "xyz"], (0, 0, 0))
     pad.update({"name": "Phantom", "mesh": "block.obj", "compound collision shape": flesh()})
-    document["BODY CameraFrame"]["location"] = small.pose(pose_matrix(*CAMERA))
+    document["BODY CameraFrame"] = theatre.camera_frame(*CAMERA)
     blocks = {"BODY Phantom": pad}
     joints = {}
     for name, T_pad_hole in holes().items():
@@ -149,25 +159,18 @@ def ghosts() -> dict[str, Any]:
             "collision groups": [],
             "visible": False,
             "passive": False,
+            "ligature tissue": GRIP,
         }
     return document
 
 
-def launch() -> dict[str, Any]:
-    """Everything together; arms and world are shared with `suturing_small`."""
-    there = "../suturing_small"
-    arms = [f"{there}/{part}" for arm in ("psm1", "psm2") for part in (f"{arm}.yaml", f"ghosts_actuators_{arm}.yaml")]
-    return {
-        "world config": f"{there}/world.yaml",
-        "color config": f"{there}/colors.yaml",
-        "input devices config": f"{there}/input_devices.yaml",
-        "multibody configs": ["phantom.yaml", "ghosts.yaml", *arms],
-    }
-
-
 def documents() -> dict[str, dict[str, Any]]:
     """Every file of the scene by name."""
-    return {"phantom.yaml": phantom(), "ghosts.yaml": ghosts(), "launch.yaml": launch()}
+    return {
+        "phantom.yaml": phantom(),
+        "ghosts.yaml": ghosts(),
+        "launch.yaml": theatre.launch("phantom.yaml", "ghosts.yaml"),
+    }
 
 
 def texts() -> dict[str, str]:

@@ -130,21 +130,17 @@ def body(name: str, T_world_body: Matrix, mass: float, shapes: list[dict[str, An
     return block
 
 
-def structure(shapes: list[dict[str, Any]], T_link_base: Matrix) -> dict[str, Any]:
-    """Looks given in the base frame, and an inertia: the mechanism above the tool touches nothing."""
-    placed = []
-    for item in shapes:
-        position = [item["offset"]["position"][axis] for axis in "xyz"]
-        T = T_link_base @ pose_matrix(position, (0, 0, 0))
-        placed.append({**item, "offset": pose(T)})
-    inertia = {"ix": 0.02, "iy": 0.02, "iz": 0.02}
-    return {"compound shape": placed, "compound collision shape": None, "inertia": inertia}
+def looks(block: dict[str, Any], mesh: str) -> None:
+    """Draw a body as a mesh of `author_instruments`; without shapes to collide with it touches nothing."""
+    block.pop("compound shape", None)
+    block["mesh"] = mesh
+    if "compound collision shape" not in block:
+        block["collision mesh"] = ""
 
 
 def psm(name: str) -> dict[str, Any]:
     """One arm: base, six joints of the instrument, two jaws and the body that names the tool."""
     T_world_base = pose_matrix(*BASE_POSES[name])
-    steel, white = colour(0.60, 0.60, 0.61, 0.8, 250), colour(0.9, 0.9, 0.92)
     table = [
         ("yaw link", dh(HALF_PI, 0, 0, HALF_PI)),
         ("pitch end link", dh(-HALF_PI, 0, 0, -HALF_PI)),
@@ -155,39 +151,38 @@ def psm(name: str) -> dict[str, Any]:
     ]
     T_6_yaw = dh(-HALF_PI, 0, 0, HALF_PI) @ pose_matrix((0, 0, 0), (-HALF_PI, 0, -HALF_PI))
     shapes = {
-        "base link": ([shape("CONE", (0, 0, 0.03), axis="Z", radius=0.008, height=0.02)], 0.0, white),
-        "yaw link": ([shape("BOX", (0, 0, 0.38), x=0.05, y=0.05, z=0.06)], 2.0, white),
-        "pitch end link": ([shape("BOX", (0, 0.05, 0.3), x=0.04, y=0.03, z=0.5)], 2.0, white),
-        "main insertion link": ([shape("BOX", (0, 0, -0.03), x=0.06, y=0.05, z=0.05)], 1.0, white),
+        "yaw link": ([], 2.0, "psm_yaw"),
+        "pitch end link": ([], 2.0, "psm_pitch"),
+        "main insertion link": ([shape("BOX", (0, 0, -0.03), x=0.06, y=0.05, z=0.05)], 1.0, "psm_insertion"),
         "tool roll link": (
             [shape("CYLINDER", (0, 0, -0.2), axis="Z", radius=0.00425, height=0.4)],
             0.3,
-            steel,
+            "psm_shaft",
         ),
         "tool pitch link": (
             [shape("CAPSULE", (0.0045, 0, 0), axis="X", radius=0.0032, height=0.0154)],
             0.1,
-            steel,
+            "psm_wrist",
         ),
-        "tool yaw link": ([shape("CYLINDER", (0, 0, 0), axis="Z", radius=0.0024, height=0.0036)], 0.1, steel),
+        "tool yaw link": ([shape("CYLINDER", (0, 0, 0), axis="Z", radius=0.0024, height=0.0036)], 0.1, "psm_hub"),
     }
+    touching_nothing = {"ix": 0.02, "iy": 0.02, "iz": 0.02}
     groups = {
         "base link": [0], "yaw link": [1], "pitch end link": [2], "main insertion link": [3],
         "tool roll link": [4], "tool pitch link": [5], "tool yaw link": [6],
     }  # fmt: skip
     published = ("base link", "tool pitch link", "tool yaw link")
-    frames_of_looks = ("yaw link", "pitch end link")
     bodies: dict[str, Any] = {}
     joints: dict[str, Any] = {}
 
-    def add_body(link: str, T: Matrix, links: list[dict[str, Any]], mass: float, look: dict[str, Any]) -> None:
-        bodies[f"BODY {link}"] = body(
-            link, T, mass, links,
-            **{"color components": look, "collision groups": groups[link], "passive": link not in published},
-        )  # fmt: skip
+    def add_body(link: str, T: Matrix, links: list[dict[str, Any]], mass: float, mesh: str) -> None:
+        block = body(link, T, mass, links, **{"collision groups": groups[link], "passive": link not in published})
+        if mass and not links:
+            block["inertia"] = touching_nothing
+        looks(block, f"{mesh}.obj")
+        bodies[f"BODY {link}"] = block
 
-    add_body("base link", T_world_base, [], 0.0, white)
-    bodies["BODY base link"].update({"compound shape": shapes["base link"][0], "collision groups": [0]})
+    add_body("base link", T_world_base, [], 0.0, "psm_base")
     kinds = ["revolute", "revolute", "prismatic", "revolute", "revolute", "revolute"]
     names = [
         "base link-yaw link", "yaw link-pitch end link", "pitch end link-main insertion link",
@@ -200,11 +195,8 @@ def psm(name: str) -> dict[str, Any]:
     for index, (link, T_link) in enumerate(table):
         T_world_link = T_world_parent @ T_link
         T_link_body = T_6_yaw if link == "tool yaw link" else np.eye(4)
-        links, mass, look = shapes[link]
-        add_body(link, T_world_link @ T_link_body, links, mass, look)
-        if link in frames_of_looks:
-            T_link_base = np.linalg.inv(T_world_link) @ T_world_base
-            bodies[f"BODY {link}"].update(structure(links, T_link_base))
+        links, mass, mesh = shapes[link]
+        add_body(link, T_world_link @ T_link_body, links, mass, mesh)
         keys: dict[str, Any] = {
             "controller output type": "VELOCITY",
             "enable feedback": True,
@@ -232,7 +224,7 @@ def psm(name: str) -> dict[str, Any]:
             shape("BOX", (-0.0006, 0.0052, 0), x=0.0011, y=0.0088, z=0.0025),
         ]
         groups[link] = [10 + number_]
-        add_body(link, T_world_yaw @ T_yaw_jaw, jaw, 0.05, steel)
+        add_body(link, T_world_yaw @ T_yaw_jaw, jaw, 0.05, "psm_jaw")
         title = f"tool yaw link-{link}"
         joints[f"JOINT {title}"] = joint(
             title, "revolute", "BODY tool yaw link", f"BODY {link}", T_yaw_axis,
@@ -245,9 +237,6 @@ def psm(name: str) -> dict[str, Any]:
                 "passive": False,
             },
         )  # fmt: skip
-    for block in bodies.values():
-        if "compound collision shape" in block and block["compound collision shape"] is None:
-            del block["compound collision shape"]
     bodies["BODY tool id"] = {
         "name": f"tool_id_{TOOL_ID}",
         "mesh": "",
@@ -258,6 +247,7 @@ def psm(name: str) -> dict[str, Any]:
     return {
         "bodies": list(bodies),
         "joints": list(joints),
+        "high resolution path": "high_res/",
         "ignore inter-collision": False,
         "gravity": vector((0, 0, 0)),
         "namespace": f"/ambf/env/{name}/",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,7 +88,8 @@ class Seed:
 def seeds() -> list[Seed]:
     """All files of one valid scene: every kind of scene file, object and mesh."""
     found = [(path.name, path.read_bytes()) for path in sorted(SCENE.glob("*.yaml"))]
-    found += [("arm.yaml", (SMALL_SCENE / "psm1.yaml").read_bytes())]
+    arm = (SMALL_SCENE / "psm1.yaml").read_bytes().replace(b"high resolution path: high_res/\n", b"")
+    found += [("arm.yaml", re.sub(rb"psm_\w+\.obj", b"part.obj", arm))]
     found += [("part.obj", OBJ.encode()), ("part.mtl", MTL.encode()), ("ascii.stl", ASCII_STL.encode())]
     found += [("binary.stl", binary_stl()), ("part.3ds", tds())]
     return [Seed(name, data, ENTRIES.get(name, name)) for name, data in found]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import ligature
@@ -19,6 +20,7 @@ def small() -> Scene:
 
 def scene_with(tmp_path: Path, arms: str, drop: str = "") -> Scene:
     """Our small scene with other files of its own: an ``arms`` key, and a joint left out of PSM1."""
+    shutil.copytree(SMALL / "high_res", tmp_path / "high_res")
     for file in SMALL.glob("*.yaml"):
         text = file.read_text()
         if drop and file.name == "psm1.yaml":

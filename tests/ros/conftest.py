@@ -188,6 +188,7 @@ def arms_scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("arms")
     for name in ("world", "environment", "colors", "input_devices", "psm1", "psm2"):
         shutil.copy(SMALL.parent / f"{name}.yaml", folder)
+    shutil.copytree(SMALL.parent / "high_res", folder / "high_res")
     (folder / "camera.yaml").write_text(CAMERA)
     launch = SMALL.read_text().partition("multibody configs")[0]
     (folder / "launch.yaml").write_text(launch + "multibody configs: [camera.yaml, psm1.yaml, psm2.yaml]\n")

@@ -9,11 +9,18 @@ from types import ModuleType
 import ligature
 import numpy as np
 import pytest
+from ligature import Simulation
 from ligature.adf import Severity
+from ligature.model.frames import axis_rotation, frame, inverse
+from ligature.render import Renderer, RenderUnavailable, view_of
 from PIL import Image
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 LAUNCHES = sorted(SCENES.glob("*/launch.yaml"))
+AUTHORS = sorted(
+    path.stem for path in SCENES.glob("author_*.py") if "\ndef texts()" in path.read_text(encoding="utf-8")
+)
+"""Scripts that write files as text; pictures are another matter."""
 
 
 @pytest.fixture(scope="module", params=LAUNCHES, ids=lambda path: path.parent.name)
@@ -43,6 +50,27 @@ def test_repeats_bit_for_bit(launch: Path) -> None:
     assert run(launch, 300).state_hash() == run(launch, 300).state_hash()
 
 
+def test_is_drawn_with_something_in_the_middle(launch: Path) -> None:
+    simulation = run(launch, 1)
+    try:
+        renderer = Renderer(simulation.scene)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0], (160, 120))
+    frame = renderer.render(simulation.state, view)
+    assert renderer.problems == []
+    assert frame.ids[40:80, 40:120].all()
+    assert frame.rgb[40:80, 40:120].std() > 3.0
+
+
+def test_arms_of_the_field_are_there(launch: Path) -> None:
+    """Names that clients look for: both PSMs with their tool, the needle or what else is handled, the camera frame."""
+    scene = ligature.load(launch)
+    assert {"PSM1", "PSM2", "ECM"} <= {arm.name for arm in scene.arms}
+    topics = {body.identity.topic for body in scene.bodies}
+    assert {"/ambf/env/psm1/toolyawlink", "/ambf/env/phantom/CameraFrame"} <= topics
+
+
 def authored_by(name: str) -> ModuleType:
     """An authoring script, imported."""
     spec = importlib.util.spec_from_file_location(name, SCENES / f"{name}.py")
@@ -52,11 +80,42 @@ def authored_by(name: str) -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("scene", ["suturing_small", "suturing"])
-def test_files_are_what_their_script_writes(scene: str) -> None:
-    module = authored_by(f"author_{scene}")
+@pytest.mark.parametrize("script", AUTHORS)
+def test_files_are_what_their_script_writes(script: str) -> None:
+    module = authored_by(script)
     for name, text in module.texts().items():
-        assert (SCENES / scene / name).read_text(encoding="utf-8") == text, name
+        assert (module.HERE / name).read_text(encoding="utf-8") == text, name
+
+
+def test_every_scene_has_its_script() -> None:
+    assert {launch.parent for launch in LAUNCHES} <= {authored_by(script).HERE for script in AUTHORS}
+
+
+def test_triangles_rest_on_the_board_around_their_posts() -> None:
+    author = authored_by("author_peg_transfer")
+    simulation = run(SCENES / "peg_transfer" / "launch.yaml", 1000)
+    place = np.array(author.theatre.PLACE)
+    for number, (x, y) in enumerate(author.posts()[:6], 1):
+        block = simulation.bodies[f"Block{number}"]
+        at = block.pose[:3] - place
+        assert np.hypot(at[0] - x, at[1] - y) < 1e-3, number
+        assert at[2] == pytest.approx(author.BOARD[2] + author.HEIGHT / 2, abs=2e-4), number
+        assert np.abs(block.twist).max() < 1e-3, number
+
+
+def test_every_post_is_within_reach_of_an_arm() -> None:
+    author = authored_by("author_peg_transfer")
+    scene = ligature.load(SCENES / "peg_transfer" / "launch.yaml")
+    arms = Simulation(scene).arms
+    down = np.diag([1.0, -1.0, -1.0])
+    for x, y in author.posts():
+        above = frame(down, np.array(author.theatre.PLACE) + [x, y, author.BOARD[2] + 0.03])
+        reached = []
+        for arm in (a for a in scene.arms if a.name in ("PSM1", "PSM2")):
+            T_base = inverse(scene.bodies[arm.base].T_world_body)
+            turns = [above @ frame(axis_rotation((0, 0, 1), t), np.zeros(3)) for t in np.linspace(-1.5, 1.5, 7)]
+            reached.append(arms[arm.name].kinematics.inverse(np.array([T_base @ T for T in turns])).ok.any())
+        assert any(reached), (x, y)
 
 
 def test_looks_are_what_their_script_writes() -> None:

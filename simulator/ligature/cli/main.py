@@ -281,7 +281,7 @@ def poses(
 
 @app.command()
 def demo(
-    throws: Annotated[int, typer.Option(help="Throws, from the first pair of holes on.", min=1, max=3)] = 2,
+    throws: Annotated[int, typer.Option(help="Throws, from the first pair of holes on.", min=1, max=4)] = 2,
     seed: Annotated[int, typer.Option(help="Where the needle lies; 0 is the scene's own place.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
     dataset: Annotated[Optional[Path], typer.Option(help="HDF5 file to write instead, to learn from.")] = None,  # noqa: UP045
