@@ -39,7 +39,7 @@ def main() -> int:
             phases = ", ".join(f"{file.attrs['phases'][k] or 'none'} {n}" for k, n in zip(labels, counts, strict=True))
             print(f"{name}: {episode.attrs['samples']} samples, success {bool(episode.attrs['success'])}; {phases}")
         picture, depth, joints, wanted = next(steps(file), (None, None, None, None))
-        if picture is not None:
+        if picture is not None and depth is not None and joints is not None:
             print(f"first step: picture {picture.shape}, nearest {depth.min():.3f} m, joints {np.round(joints, 3)}")
     return 0
 

@@ -58,7 +58,7 @@ class Failure(RuntimeError):
 class Surgeon:
     """Two arms, a needle, and how they work together."""
 
-    def __init__(self, simulation: ligature.Simulation, watch: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None) -> None:
         self.simulation, self._watch = simulation, watch
         scene = simulation.scene
         self.monitor = Monitor(scene)
