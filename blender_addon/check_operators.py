@@ -9,7 +9,7 @@ from .ligature.adf.diagnostics import Severity
 from .ligature.adf.reader import read_text
 from .ligature.adf.schema import BY_PATH
 from .ligature.authoring.lint import Finding, lint
-from .placing import rest_pose
+from .placing import SHAPED, rest_pose
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier, store, unset
 from .write_file import ExportError, has_mesh, members, text_of
@@ -33,7 +33,10 @@ def check_file(collection):
         document = read_text(text, path, kind)
     except AdfError as error:
         return [(Finding("reader", Severity.ERROR, "", str(error)), None)]
-    unsaved = {f"{obj.name}.OBJ" for obj in objects.values() if has_mesh(obj)}
+    shaped = [obj for obj in objects.values() if obj.adf.role in SHAPED and not obj.adf.mesh_print]
+    groups = [getattr(obj.adf, obj.adf.role.lower()) for obj in shaped]
+    unsaved = {name for group in groups for name in (group.mesh, group.collision_mesh)}  # the next export writes them
+    unsaved |= {f"{obj.name}.OBJ" for obj in objects.values() if has_mesh(obj)}
     inflated = {obj.adf.key for obj in objects.values() if obj.adf.inertia_factor != 1.0}
     found = lint(document, Resolver.for_file(path), frozenset(unsaved), frozenset(inflated))
     return [(finding, objects.get(finding.key)) for finding in found]

@@ -21,6 +21,7 @@ from .ligature.authoring.generate import (
 from .object_operators import active_body, target_file
 from .placing import hang, inertial_frame, place, rest_pose
 from .read_file import add_parts, find_open
+from .schema_properties import decimal
 
 THREADS = [
     ("NONE", "None", "No thread"),
@@ -43,7 +44,10 @@ class ThreadSettings:
     density: bpy.props.FloatProperty(name="Density", description="In kg/m³", default=1200.0, min=1.0)
 
     def thread(self):
-        return Thread(self.length, self.diameter, self.elements, self.youngs_modulus, density=self.density)
+        return Thread(
+            decimal(self.length), decimal(self.diameter), self.elements, decimal(self.youngs_modulus),
+            density=decimal(self.density),
+        )  # fmt: skip
 
 
 class ADF_OT_add_needle(ThreadSettings, bpy.types.Operator):
@@ -64,7 +68,7 @@ class ADF_OT_add_needle(ThreadSettings, bpy.types.Operator):
 
     def execute(self, context):
         collection = target_file(context, "BODY")
-        spec = Needle(self.radius, self.arc, self.thickness, self.taper, self.hulls)
+        spec = Needle(decimal(self.radius), self.arc, decimal(self.thickness), decimal(self.taper), self.hulls)
         T = making.cursor_pose(context.scene)
         made = add_parts(collection, needle(spec, T_world=T))
         body = made[0]
@@ -123,8 +127,8 @@ class ADF_OT_add_hole(bpy.types.Operator):
         body = active_body(context, ("BODY",))
         collection = making.file_of(body)
         parts = suture_hole(
-            self.name, making.cursor_pose(context.scene), holder_of(body), self.radius, self.wire,
-            self.stiffness, 1.0, self.travel,
+            self.name, making.cursor_pose(context.scene), holder_of(body), decimal(self.radius), decimal(self.wire),
+            decimal(self.stiffness), 1.0, decimal(self.travel),
         )  # fmt: skip
         add_parts(collection, parts)
         hang_by_text(collection)

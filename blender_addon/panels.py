@@ -334,6 +334,8 @@ class ADF_PT_launch(Sidebar, bpy.types.Panel):
             row.label(text=str(index))
             row.prop(entry, "collection", text="")
             row.prop(entry, "path", text="")
+            row.operator("adf.remove_from_launch", text="", icon="REMOVE").index = index
+        layout.operator("adf.add_to_launch", icon="ADD")
 
 
 class ADF_PT_create(Sidebar, bpy.types.Panel):

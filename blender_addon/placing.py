@@ -109,7 +109,7 @@ def shapes_of(obj: bpy.types.Object, use: str) -> list[bpy.types.Object]:
 def shape_of(obj: bpy.types.Object) -> Shape:
     """The primitive that an object stands for, its scale applied."""
     data = obj.adf.shape
-    x, y, z = (decimal(abs(s)) for s in np.diag(scaling(obj))[:3])
+    x, y, z = (float(f"{abs(s):.6g}") for s in np.diag(scaling(obj))[:3])  # the digits behind come of turning
     along = {"X": x, "Y": y, "Z": z}[data.axis]
     across = max(s for a, s in zip("XYZ", (x, y, z), strict=True) if a != data.axis)
     if data.kind == "SPHERE":

@@ -9,6 +9,7 @@ from . import (
     decompose_operators,
     file_operators,
     generator_operators,
+    launch_operators,
     object_operators,
     overlay,
     panels,
@@ -20,6 +21,7 @@ from . import (
 
 MODULES = (
     file_operators,
+    launch_operators,
     object_operators,
     generator_operators,
     check_operators,

@@ -157,6 +157,7 @@ def play(scene, identifiers, poses):
         _animate(copy, frames, poses[:, index])
         moved += 1
     scene.frame_end = max(scene.frame_end, int(frames[-1]))
+    scene.frame_set(scene.frame_current)  # else the copies stand where their last keyframe put them
     return moved
 
 

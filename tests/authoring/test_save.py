@@ -40,6 +40,16 @@ def test_what_took_its_place_goes_back_when_a_later_file_cannot(tmp_path: Path) 
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "z"]
 
 
+def test_a_file_reached_through_a_folder_that_is_not_there_yet_is_known(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"old")
+    (tmp_path / "z").mkdir()
+    around = tmp_path / "new" / ".." / "a"
+    assert save_all({around: b"old"}) == []
+    with pytest.raises(SaveError):
+        save_all({around: b"changed", tmp_path / "z": b"new"})
+    assert (tmp_path / "a").read_bytes() == b"old"
+
+
 def test_text_that_cannot_be_read_back_is_refused(tmp_path: Path) -> None:
     assert checked_text("a: 1\n", tmp_path / "m.yaml") == b"a: 1\n"
     with pytest.raises(SaveError, match="'m.yaml' would not be readable"):

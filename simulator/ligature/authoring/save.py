@@ -27,6 +27,7 @@ def save_all(files: Mapping[Path, bytes]) -> list[Path]:
     later one cannot: a full disk or a folder that cannot be written leaves everything as it was, new
     folders too. Returns the paths that were written. Raises `SaveError`.
     """
+    files = {path.parent.resolve() / path.name: data for path, data in files.items()}  # 'new/../old' is there already
     before = {path: _content(path) for path in files}
     changed = {path: data for path, data in files.items() if before[path] != data}
     folders = [folder for path in changed for folder in (path.parent, *path.parent.parents) if not folder.exists()]

@@ -199,6 +199,11 @@ def activate(name):
     layers.active_layer_collection = layers.layer_collection.children[name]
 
 
+def out_of_launch():
+    activate("scene")
+    bpy.ops.adf.remove_from_launch(index=0)
+
+
 def has_finding():
     find("BODY", "phantom").adf.body.property_unset("mass")
     bpy.ops.adf.check()
@@ -237,6 +242,8 @@ RECIPES = {
     "export_scene": [({"filepath": str(OUT / "all" / "launch.yaml")}, nothing)],
     "add_variant": [({}, lambda: activate("scene"))],
     "export_variants": [({}, has_variant)],
+    "add_to_launch": [({"path": "other.yaml"}, lambda: activate("world")), ({"path": "again.yaml"}, out_of_launch)],
+    "remove_from_launch": [({"index": 0}, nothing)],
     "new_file": [({"kind": kind, "name": "other"}, nothing) for kind in ("MODEL", "WORLD")],
     "make": [({"role": role}, on("BODY", "phantom")) for role in roles("BODY")],
     "clear_role": [({}, on("BODY", "phantom"))],

@@ -1,0 +1,35 @@
+"""The scene that is authored through the extension: its script, run in Blender, writes what is committed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+SCENES = Path(__file__).resolve().parent.parent.parent / "scenes"
+pytestmark = pytest.mark.timeout(600)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_the_script_writes_the_scene_byte_for_byte(scripts: Path, tmp_path: Path) -> None:
+    binary = shutil.which("blender")
+    if binary is None:
+        pytest.skip("Blender is not installed")
+    version = subprocess.run([binary, "--version"], capture_output=True, text=True, timeout=100, check=True).stdout
+    if "Blender 3.4" not in version:
+        pytest.skip("the scene was written by Blender 3.4; other versions round bevelled edges in another order")
+    target = tmp_path / "blender_suturing"
+    command = [binary, "-b", "--factory-startup", "--python-exit-code", "1"]
+    command += ["--python", str(SCENES / "author_blender_suturing.py"), "--", str(target)]
+    environment = {**os.environ, "BLENDER_USER_SCRIPTS": str(scripts), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=500, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert contents(target) == contents(SCENES / "blender_suturing")
+    for name, data in contents(tmp_path / "suturing_small").items():  # the arms were opened, and came back
+        assert data == (SCENES / "suturing_small" / name).read_bytes(), name
