@@ -1,7 +1,7 @@
 """A suture without hands: two arms pick up a needle and make throws through a pad, by the calls a real robot takes.
 
-The program localises from ground truth, plans with closed-form kinematics (`suture_plan`), and moves the arms by CRTK
-alone: ``move_cp``, ``servo_cp``, ``jaw/servo_jp``, ``measured_cp``. Run ``python examples/suture.py --help``.
+The program localises from ground truth, plans with closed-form kinematics (`ligature.tasks.throws`), and moves the
+arms by CRTK alone: ``move_cp``, ``servo_cp``, ``jaw/servo_jp``, ``measured_cp``. Run it with ``--help``.
 World axes, metres, radians, seconds of simulated time.
 """
 
@@ -20,10 +20,8 @@ from ligature.robots.operating_state import Refused
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks import Measures, Monitor, SutureScore, judge_suture
+from ligature.tasks.throws import UP, NeedleArc, Throw, best_grip, pose_of
 from PIL import Image
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from suture_plan import UP, NeedleArc, Throw, best_grip, pose_of  # noqa: E402
 
 SCENE = Path(__file__).resolve().parents[1] / "scenes" / "suturing" / "launch.yaml"
 STREAM = 0.005

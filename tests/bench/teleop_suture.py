@@ -24,6 +24,7 @@ from ligature.cli.master import master_answers
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.model.scene import ArmKind
 from ligature.robots.fitting import psm_kinematics
+from ligature.tasks.throws import NeedleArc
 from numpy.typing import NDArray
 
 from tests.ros.drivers import Driver, Paddle, Pen, apart, patiently, until, wait_for_listener
@@ -32,7 +33,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
 
 import suture  # noqa: E402
-from suture_plan import NeedleArc  # noqa: E402
 
 Array = NDArray[np.float64]
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from ligature.environments import SuturingEnv
+from ligature.model.frames import frame, inverse, pose7_matrix
+from ligature.robots.poses import rotation_vector
 
 IDS = sorted(name for name in gymnasium.registry if name.startswith("ligature/"))
 
@@ -72,6 +74,51 @@ def test_images_are_what_the_camera_sees() -> None:
     env.close()
 
 
+def test_turning_the_needle_along_its_arc_inserts_it() -> None:
+    """A policy that turns the hand about the middle of the throw's circle, by the actions that an agent has."""
+    env = SuturingEnv("insert")
+    observation, info = env.reset(seed=3)
+    goal, first, total, done, angle = env.goal, info["distance"], 0.0, False, -0.4
+    base = frame(env.base_rotation, env.base_position)
+    grip = inverse(pose7_matrix(observation[14:21]) @ goal.arc.T_body_arc) @ base @ pose7_matrix(env.setpoint)
+    for _ in range(150):
+        wanted = inverse(base) @ goal.throw.arc_at(angle, goal.arc) @ grip
+        now = pose7_matrix(env.setpoint)
+        action = np.zeros(7)
+        action[:3] = (wanted - now)[:3, 3] / 0.001
+        action[3:6] = rotation_vector(now[:3, :3].T @ wanted[:3, :3]) / 0.05
+        largest = np.abs(action).max()
+        action, angle = (action / largest, angle) if largest > 1.0 else (action, angle + 0.03)
+        observation, gained, done, _, info = env.step(action.astype(np.float32))
+        total += gained
+        if done:
+            break
+    env.close()
+    assert done and info["is_success"]
+    assert total == pytest.approx(1.0 + 100.0 * first, abs=1e-9)
+
+
+def test_a_needle_that_is_not_driven_is_not_in() -> None:
+    env = SuturingEnv("insert")
+    _, info = env.reset(seed=3)
+    first = info["distance"]
+    for _ in range(20):
+        *_, done, _, info = env.step(np.array([0, 0, 0, 0, 0, 0, 1], dtype=np.float32))
+        assert not done
+    env.close()
+    assert 0.0 < info["distance"] < 2.0 * first
+    assert not info["is_success"]
+
+
+def test_both_kinds_of_observation_come_together() -> None:
+    env = SuturingEnv("reach", observation="both", size=(32, 24))
+    observation, _ = env.reset(seed=1)
+    env.close()
+    assert env.observation_space.contains(observation)
+    assert observation["image"].shape == (24, 32, 3)
+    assert observation["state"].shape == (34,)
+
+
 def test_what_the_arm_refuses_is_told_and_the_episode_goes_on() -> None:
     env = SuturingEnv("reach")
     env.reset(seed=1)
@@ -86,7 +133,7 @@ def test_what_the_arm_refuses_is_told_and_the_episode_goes_on() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"task": "knit"}, "task must be one of reach, pick"),
+        ({"task": "knit"}, "task must be one of reach, pick, insert"),
         ({"action": "torque"}, "action must be one of cartesian, joint"),
         ({"arm": "MTML"}, "'MTML' is no PSM"),
         ({"arm": "PSM9"}, "no arm is called 'PSM9'"),

@@ -8,12 +8,12 @@ from pathlib import Path
 import ligature
 import numpy as np
 import pytest
+from ligature.tasks import throws
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 sys.path.insert(0, str(EXAMPLES))
 
 import suture  # noqa: E402
-import suture_plan  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -45,12 +45,12 @@ def test_the_thread_followed_the_needle_out_of_the_exit(operated: tuple) -> None
 
 def test_holes_too_far_apart_for_the_needle_are_told() -> None:
     with pytest.raises(ValueError, match=r"holes 25\.0 mm apart are too far for a needle of radius 10\.0 mm"):
-        suture_plan.Throw.through(np.zeros(3), np.array([0.025, 0, 0]), 0.01, suture_plan.UP)
+        throws.Throw.through(np.zeros(3), np.array([0.025, 0, 0]), 0.01, throws.UP)
 
 
 def test_the_circle_of_a_throw_goes_through_both_holes() -> None:
     entry, exit = np.array([0.01, 0.02, 0.03]), np.array([0.022, 0.02, 0.03])
-    throw = suture_plan.Throw.through(entry, exit, 0.0097, suture_plan.UP)
+    throw = throws.Throw.through(entry, exit, 0.0097, throws.UP)
     at = [throw.centre + 0.0097 * throw.axes @ [np.cos(a), np.sin(a), 0.0] for a in (0.0, throw.towards_exit)]
     assert at[0] == pytest.approx(entry)
     assert at[1] == pytest.approx(exit)

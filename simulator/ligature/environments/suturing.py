@@ -1,4 +1,4 @@
-"""An environment over the simulation in process: one arm learns to reach and to pick up a needle.
+"""An environment over the simulation in process: one arm learns to reach, to pick up a needle and to drive it.
 
 Metres, radians, world axes.
 """
@@ -29,13 +29,10 @@ CONTROL = 0.02
 STEP_LENGTH, STEP_ANGLE, STEP_JAW = 0.001, 0.05, 0.1
 """Metres, radians and radians of jaw that an action of 1 means."""
 
-DEFAULT_SCENE = Path(__file__).resolve().parents[3] / "scenes" / "suturing_small" / "launch.yaml"
-"""Our small scene, in the repository that this package is installed from."""
+SCENES = Path(__file__).resolve().parents[3] / "scenes"
+"""Our scenes, in the repository that this package is installed from."""
 
 STEP_JOINTS = np.array([0.01, 0.01, 0.001, 0.08, 0.06, 0.06])
-START = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-"""Joint values with which an episode begins."""
-
 SUCCESS_REWARD = 1.0
 
 
@@ -63,7 +60,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 30 to 32 | the target | m |
     | 33 | how far there is to go | m |
 
-    With ``observation="image"`` they are pictures of ``camera``, `Box(0, 255, (height, width, 3), uint8)`.
+    With ``observation="image"`` they are pictures of ``camera``, `Box(0, 255, (height, width, 3), uint8)`; with
+    ``"both"``, a `Dict` of ``image`` and ``state``.
 
     **Reward** ``"dense"``: metres gained in an action, times 100, and 1 at the end; ``"sparse"``: 1 at the end, else 0.
 
@@ -73,11 +71,11 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     Parameters
     ----------
     task
-        ``reach`` or ``pick``.
+        ``reach``, ``pick`` or ``insert`` (`ligature.environments.goals`).
     scene
-        A launch file with a PSM and a needle; our small scene by default.
+        A launch file with a PSM and a needle, and holes for ``insert``; the task's scene of ours by default.
     arm
-        Name of the arm.
+        Name of the arm; by default the one that does the task.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012 (as the base class)
@@ -86,7 +84,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self,
         task: str = "reach",
         scene: str | Path | None = None,
-        arm: str = "PSM1",
+        arm: str | None = None,
         action: str = "cartesian",
         observation: str = "state",
         reward: str = "dense",
@@ -97,12 +95,13 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     ) -> None:
         for name, value, allowed in (
             ("task", task, tuple(GOALS)), ("action", action, ("cartesian", "joint")),
-            ("observation", observation, ("state", "image")), ("reward", reward, ("dense", "sparse")),
+            ("observation", observation, ("state", "image", "both")), ("reward", reward, ("dense", "sparse")),
         ):  # fmt: skip
             if value not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
         self._goal: Goal = GOALS[task]()
-        self._simulation = Simulation(load(scene or DEFAULT_SCENE))
+        self._simulation = Simulation(load(scene or SCENES / self._goal.scene / "launch.yaml"))
+        arm = arm or self._goal.arm
         found = self._simulation.arms[arm]
         if not isinstance(found, PsmArm):
             raise ValueError(f"'{arm}' is no PSM")
@@ -112,22 +111,36 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._camera, self._size, self._most = camera, size, max_steps
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
-        if observation == "image":
-            self.observation_space: spaces.Space[Any] = spaces.Box(0, 255, (size[1], size[0], 3), np.uint8)
-        else:
-            self.observation_space = spaces.Box(-np.inf, np.inf, (34,), np.float64)
+        image = spaces.Box(0, 255, (size[1], size[0], 3), np.uint8)
+        state = spaces.Box(-np.inf, np.inf, (34,), np.float64)
+        both = spaces.Dict({"image": image, "state": state})
+        self.observation_space: spaces.Space[Any] = {"image": image, "state": state, "both": both}[observation]
         self._ticks = round(CONTROL / self._simulation.dt)
-        self._arm.place_jp(START)
-        self._arm.adopt()
-        self._simulation.step(200)
+        self._goal.prepare(self._simulation, self._scenery, self._arm)
         self._settled = self._simulation.snapshot()
         self._count, self._before, self._closed = 0, 0.0, False
+
+    @property
+    def goal(self) -> Goal:
+        """What is to be done."""
+        return self._goal
 
     @property
     def base_rotation(self) -> Array:
         """Rotation (3, 3) of the arm's base in the world: actions are along the base's axes, targets in the world's."""
         base = next(arm.base for arm in self._simulation.scene.arms if arm.name == self._arm.name)
         return pose7_matrix(self._simulation.state["body_pose"][0, base])[:3, :3]
+
+    @property
+    def base_position(self) -> Array:
+        """Where the arm's base is (3,), world axes."""
+        base = next(arm.base for arm in self._simulation.scene.arms if arm.name == self._arm.name)
+        return np.array(self._simulation.state["body_pose"][0, base, :3])
+
+    @property
+    def setpoint(self) -> Array:
+        """Pose (7,) of the tip in the arm's base that is asked for; Cartesian actions are added to it."""
+        return self._arm.local_setpoint_cp()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; ``options`` has no keys."""
@@ -166,8 +179,12 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return ""
 
     def _observe(self) -> Any:
-        if self._observation == "image":
-            return self._picture(self._size)
+        if self._observation == "both":
+            return {"image": self._picture(self._size), "state": self._numbers()}
+        return self._numbers() if self._observation == "state" else self._picture(self._size)
+
+    def _numbers(self) -> Array:
+        """The state, as the table of the class has it."""
         state, arm = self._simulation.state, self._arm
         jaw = np.zeros(1) if arm.jaw is None else arm.jaw.measured_js().position
         needle = self._scenery.needle

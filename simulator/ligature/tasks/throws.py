@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
 from ligature.model.frames import axis_rotation, frame, inverse, pose7_matrix
 from ligature.model.piercing import Needle
 from ligature.model.scene import Body

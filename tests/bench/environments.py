@@ -1,0 +1,59 @@
+"""How fast the learning environments are: ``python -m tests.bench.environments [SECONDS]``.
+
+Steps a second for state observations and random actions, resets included, in one process and in two, and how many
+times real time that is; a step is 20 ms of simulated time.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+import gymnasium
+import ligature.environments
+import numpy as np
+from ligature.environments.suturing import CONTROL
+
+SECONDS = 10.0
+MAX_STEPS = 100
+
+
+def made(name: str) -> gymnasium.Env:
+    assert ligature.environments is not None
+    return gymnasium.make(name, max_steps=MAX_STEPS)
+
+
+def rate(name: str, processes: int, seconds: float) -> float:
+    """Steps a second of all processes together."""
+    envs = gymnasium.vector.AsyncVectorEnv([lambda: made(name)] * processes)
+    rng = np.random.default_rng(0)
+    envs.reset(seed=0)
+    for _ in range(20):
+        envs.step(rng.uniform(-1, 1, (processes, 7)).astype(np.float32))
+    steps, begin = 0, time.perf_counter()
+    while time.perf_counter() - begin < seconds:
+        envs.step(rng.uniform(-1, 1, (processes, 7)).astype(np.float32))
+        steps += processes
+    found = steps / (time.perf_counter() - begin)
+    envs.close()
+    return found
+
+
+def main() -> int:
+    """Entry point."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
+    load = os.getloadavg()[0]
+    for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
+        one, two = rate(name, 1, seconds), rate(name, 2, seconds)
+        sys.stdout.write(
+            f"{name}: {one:.0f} steps/s in one process, {one * CONTROL:.2f} times real time; "
+            f"{two:.0f} in two, {two * CONTROL:.2f} times\n"
+        )
+        sys.stdout.flush()
+    sys.stdout.write(f"load of the machine at the start: {load:.1f}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
