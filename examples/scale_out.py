@@ -72,7 +72,7 @@ def main() -> int:
         ray.init(address=given.address)
     else:
         ray.init(num_cpus=given.workers, include_dashboard=False, object_store_memory=100_000_000)
-    workers = [Worker.remote("reach", given.steps) for _ in range(given.workers)]
+    workers = [Worker.remote("reach", given.steps) for _ in range(given.workers)]  # type: ignore[attr-defined]
     policy = search(workers, given.generations, given.population, seed=0)
     reward, done, steps = ray.get(workers[0].evaluate.remote(policy, 1000))
     print(f"the policy found: reward {reward:.2f} in {steps} steps, {'reached' if done else 'not reached'}")
