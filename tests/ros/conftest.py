@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -134,8 +135,9 @@ def start(ros_env: dict[str, str]) -> Iterator[Callable[..., Program]]:
         return programs[-1]
 
     yield run
-    for program in programs:
-        program.end(30.0)
+    with ExitStack() as ending:  # all of them, also when one has to be killed
+        for program in programs:
+            ending.callback(program.end, 30.0)
 
 
 class Listener:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +58,8 @@ def arms(simulator: Any, node: Any) -> Iterator[dict[str, Any]]:
 
     clients = {name: kind(node, name) for name, kind in (("PSM1", crtk.Psm), ("PSM2", crtk.Psm), ("ECM", crtk.Arm))}
     for client in clients.values():
-        assert client.enable(30.0)
-        assert client.home(30.0)
+        assert patiently(partial(client.enable, 30.0))
+        assert patiently(partial(client.home, 30.0))
         client.check_connections(30.0)
     yield clients
     for client in clients.values():

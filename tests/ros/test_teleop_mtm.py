@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +44,8 @@ def arms(simulator: Any, node: Any) -> Iterator[dict[str, Any]]:
 
     clients = {n: kind(node, n) for n, kind in (("PSM1", crtk.Psm), ("MTMR", crtk.Mtm), ("ECM", crtk.Arm))}
     for client in (clients["MTMR"], clients["ECM"]):
-        assert client.enable(30.0)
-        assert client.home(30.0)
+        assert patiently(partial(client.enable, 30.0))
+        assert patiently(partial(client.home, 30.0))
     yield clients
     for client in clients.values():
         client.close()
@@ -91,10 +92,14 @@ def test_an_arm_that_is_off_is_made_ready_and_the_master_turns_to_it(
 def test_the_instrument_follows_the_master_by_the_dvrk_s_scale(
     component: Any, arms: dict[str, Any], node: Any, listen: Callable[..., Any]
 ) -> None:
+    from geometry_msgs.msg import TwistStamped
+
     T_base_camera = camera_of(arms, "PSM1", listen)
     settled(arms, "MTMR")
     hand, tip = measured(arms, "MTMR")[:3, 3], settled(arms, "PSM1")
+    speeds = listen("/MTMR_PSM1/MTM/measured_cv", TwistStamped)
     drive(arms["MTMR"], (0.03, 0.02, -0.02))
+    until(lambda: any(m.twist.linear.x < -0.01 for m in speeds.messages), "the hand's speed is not told")
     moved = settled(arms, "MTMR")[:3, 3] - hand
     assert np.linalg.norm(moved) > 0.03
     ideal = tip[:3, 3] + 0.2 * T_base_camera[:3, :3] @ VIEW_CONSOLE @ moved

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import rospy
 from crtk_msgs.msg import StringStamped
-from geometry_msgs.msg import PoseStamped, QuaternionStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, QuaternionStamped, TwistStamped, WrenchStamped
 from numpy.typing import NDArray
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool, Float64, String
 
 from ligature.model.frames import matrix_pose7, matrix_quaternion
+from ligature.robots.poses import rotation_vector
 
 Array = NDArray[np.float64]
 Tell = Callable[[str, Any], None]
@@ -62,6 +63,8 @@ class PairTopics(Topics):
         self._offset = rospy.Publisher(f"{root}/alignment_offset", QuaternionStamped, queue_size=1)
         self._leader = rospy.Publisher(f"{root}/MTM/measured_cp", PoseStamped, queue_size=1)
         self._follower = rospy.Publisher(f"{root}/PSM/setpoint_cp", PoseStamped, queue_size=1)
+        self._speed = rospy.Publisher(f"{root}/MTM/measured_cv", TwistStamped, queue_size=1)
+        self._last: tuple[Any, Array] | None = None
         for name, value in {
             "desired_state": DISABLED, "current_state": DISABLED, "following": False, "scale": scale,
             "align_mtm": align, "rotation_locked": False, "translation_locked": False,
@@ -80,7 +83,7 @@ class PairTopics(Topics):
         self.haptic = values if np.isfinite(values).all() else np.zeros(3)
 
     def read(self, offset: Array, T_view_hand: Array | None, T_camera_tip: Array | None) -> None:
-        """Publish the readings: rotation (3, 3) of the tip in the hand, and both poses (4, 4)."""
+        """Publish the readings: rotation (3, 3) of the tip in the hand, both poses (4, 4), the hand's velocity."""
         stamp = rospy.Time.now()
         if self._offset.get_num_connections():
             message = QuaternionStamped()
@@ -91,6 +94,22 @@ class PairTopics(Topics):
         for publisher, T in ((self._leader, T_view_hand), (self._follower, T_camera_tip)):
             if publisher.get_num_connections() and T is not None and np.isfinite(T).all():
                 publisher.publish(posed(T, stamp))
+        self._tell_speed(stamp, T_view_hand)
+
+    def _tell_speed(self, stamp: Any, T: Array | None) -> None:
+        """Publish how the hand (4, 4) moved since the last reading: m/s and rad/s in axes of the view."""
+        last, self._last = self._last, None if T is None or not np.isfinite(T).all() else (stamp, T)
+        if last is None or self._last is None or T is None or not self._speed.get_num_connections():
+            return
+        dt = (stamp - last[0]).to_sec()
+        if dt <= 0.0:
+            return
+        message = TwistStamped()
+        message.header.stamp = stamp
+        v, w = message.twist.linear, message.twist.angular
+        v.x, v.y, v.z = ((T[:3, 3] - last[1][:3, 3]) / dt).tolist()
+        w.x, w.y, w.z = (rotation_vector(T[:3, :3] @ last[1][:3, :3].T) / dt).tolist()
+        self._speed.publish(message)
 
 
 class CameraTopics(Topics):
