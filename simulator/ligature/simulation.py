@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic
 from ligature.arms import ArmSet
-from ligature.grasping import Grasps, Holder
+from ligature.grasping import Clamps, Grasps, Holder
 from ligature.model.commands import (
     ActuatorCommand,
     ArmCommand,
@@ -214,8 +214,9 @@ class Simulation:
         self._contacts = Contacts(scene, self._world)
         self.arms = ArmSet(scene, self._world)
         self.problems += self.arms.problems
-        self._actuators = Actuators(scene, Holder(scene, self._world, self._rods), self._rays)
-        self.grasps = Grasps(scene, self._world, self._rods, lambda: self._actuators.held)
+        clamps = Clamps(scene, self._world)
+        self._actuators = Actuators(scene, Holder(scene, self._world, self._rods, clamps), self._rays)
+        self.grasps = Grasps(scene, self._world, self._rods, clamps, lambda: self._actuators.held)
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._write_state()

@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.grasping import pinches
+from ligature.grasping.clamps import Clamps
 from ligature.grasping.fingers import LEAST_LEVER, TOUCH, Facing, Fingers
+from ligature.grasping.grips import Exchange, Grip, begin
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.scene import Jaw, Scene
 from ligature.model.state import StateRecord
 from ligature.physics import World
 from ligature.suture import Rods
-from ligature.suture.grasp import Grasp, Patch, hold_together, warm_up
-from ligature.suture.motion import Motion
+from ligature.suture.grasp import Patch, warm_up
 from ligature.suture.rod import Pads
 
 Array = NDArray[np.float64]
@@ -58,17 +59,14 @@ class Held:
 
 
 @dataclass
-class _Grip:
-    """A grasp and what it needs of its jaw: levers of the pads, joint positions at which the fingers stop.
+class _Grip(Grip):
+    """A grip and what it needs of its jaw: levers of the pads, joint positions at which the fingers stop.
 
-    ``pace`` (6,) is the holder's velocity at the body's centre in the last tick, ``holder_at`` (3,) where it was.
+    ``holder_at`` (3,) is where the holder was in the last tick.
     """
 
-    body: int
-    grasp: Grasp
     levers: tuple[float, float]
     positions: tuple[float, float]
-    pace: Array
     holder_at: Array
     checked: float = 0.0
 
@@ -77,25 +75,23 @@ class _Grip:
         before, self.holder_at = self.holder_at, holder_at
         return bool(np.abs(holder_at - before).max() > JUMP)
 
-    def carry(self, holder: Motion, body: Motion) -> Array:
-        """By how much (6,) the holder's velocity at the body's centre has changed since the last call."""
-        pace = holder.velocity_at(body.pose[:3])
-        change, self.pace = pace - self.pace, pace
-        return change
-
 
 class Grasps(Mapping[str, Held | None]):
     """What the jaws of a scene hold, by the jaw's name; None for nothing.
 
     Parameters
     ----------
+    clamps
+        What actuators that yield hold; it is solved together with what jaws hold.
     actuated
         Gives the body that each actuator of the scene holds, -1 for none: what a tool's own actuator holds
         rigidly, its jaw does not hold by friction.
     """
 
-    def __init__(self, scene: Scene, world: World, rods: Rods, actuated: Callable[[], list[int]]) -> None:
-        self._scene, self._world, self._rods, self._actuated = scene, world, rods, actuated
+    def __init__(
+        self, scene: Scene, world: World, rods: Rods, clamps: Clamps, actuated: Callable[[], list[int]]
+    ) -> None:
+        self._scene, self._world, self._rods, self._clamps, self._actuated = scene, world, rods, clamps, actuated
         self._fingers = [Fingers(jaw, world) for jaw in scene.jaws]
         tree_of = {link.body: tree for tree in scene.articulations for link in tree.links}
         self._own = [{link.body for link in tree_of[jaw.holder].links} for jaw in scene.jaws]
@@ -105,6 +101,7 @@ class Grasps(Mapping[str, Held | None]):
         self._pads: list[Pads | None] = [None for _ in scene.jaws]
         self._passing: list[list[int]] = [[] for _ in scene.jaws]
         self._near = [False for _ in scene.jaws]
+        self._exchange = Exchange(world)
         if scene.jaws:
             warm_up()
 
@@ -187,14 +184,13 @@ class Grasps(Mapping[str, Held | None]):
 
     def _grasp(self, index: int, body: int, faces: tuple[Facing, Facing]) -> None:
         fingers, jaw = self._fingers[index], self._scene.jaws[index]
-        holder = Motion(*self._world.motion(jaw.holder), 0.0, np.zeros(3))
-        T_world_holder, T_world_body = pose7_matrix(holder.pose), pose7_matrix(self._world.motion(body)[0])
-        T_holder_patch = inverse(T_world_holder) @ _patch_pose(fingers, faces)
+        holder = self._world.motion(jaw.holder)[0]
+        T_holder_patch = inverse(pose7_matrix(holder)) @ _patch_pose(fingers, faces)
         friction = self._friction(jaw, self._scene.bodies[body].friction)
-        grasp = Grasp(Patch(T_holder_patch, jaw.half_width, friction), inverse(T_world_holder) @ T_world_body)
-        grasp.begin(holder)
-        levers, pace = (faces[0].lever, faces[1].lever), holder.velocity_at(T_world_body[:3, 3])
-        self._grips[index] = grip = _Grip(body, grasp, levers, fingers.positions(), pace, holder.pose[:3])
+        grasp, ride = begin(self._world, jaw.holder, body, Patch(T_holder_patch, jaw.half_width, friction))
+        levers = faces[0].lever, faces[1].lever
+        grip = _Grip(body, jaw.holder, grasp, ride, levers, fingers.positions(), holder[:3])
+        self._grips[index] = grip
         self._take(index, grip)
         self._world.hold_up(body, True, gripped=True)
         self._rods.weigh(self._world)
@@ -293,40 +289,18 @@ class Grasps(Mapping[str, Held | None]):
 
     def _hold(self) -> None:
         """Exchange impulses between held bodies and what holds them."""
-        by_body: dict[int, list[int]] = {}
+        by_body: dict[int, list[Grip]] = {}
+        if self._clamps.lose(slipped=True):
+            self._rods.weigh(self._world)
+        for clamp in self._clamps.grips:
+            by_body.setdefault(clamp.body, []).append(clamp)
         for index, grip in enumerate(self._grips):
             if grip is not None:
-                by_body.setdefault(grip.body, []).append(index)
-        for body, all_holding in by_body.items():
-            actuated = self._actuated()
-            holding = [i for i in all_holding if body not in [actuated[a] for a in self._actuators[i]]]
-            if holding:
-                self._exchange(body, holding)
-
-    def _exchange(self, body: int, holding: list[int]) -> None:
-        """Let the jaws ``holding`` act on one body for the coming tick."""
-        world = self._world
-        grips = [grip for grip in (self._grips[i] for i in holding) if grip is not None]
-        holders = [Motion(*world.motion(self._scene.jaws[i].holder), 0.0, np.zeros(3)) for i in holding]
-        motion = self._free_motion(body)
-        carried = np.mean([grip.carry(holder, motion) for grip, holder in zip(grips, holders, strict=True)], axis=0)
-        world.carry(body, carried)
-        motion.twist[:] += (1.0 - self._scene.bodies[body].mass * motion.inverse_mass) * carried
-        impulses = hold_together([grip.grasp for grip in grips], holders, motion, world.dt)
-        world.apply_impulse(body, impulses[0, :3], impulses[0, 3:])
-        for index, impulse in zip(holding, impulses[1:], strict=True):
-            world.apply_impulse(self._scene.jaws[index].holder, impulse[:3], impulse[3:])
-
-    def _free_motion(self, body: int) -> Motion:
-        """How a body would move after the tick were it let go now, but for what is added to its mass."""
-        pose, twist = self._world.motion(body)
-        mass, inertia = self._world.mass_of(body)
-        pending, dt = self._world.pending(body), self._world.dt
-        described = self._scene.bodies[body]
-        R = pose7_matrix(pose)[:3, :3]
-        twist[:3] += pending[:3] / mass + dt * described.mass / mass * described.gravity
-        twist[3:] += R @ ((R.T @ pending[3:]) / inertia)
-        return Motion(pose, twist, 1.0 / mass, 1.0 / inertia)
+                actuated = self._actuated()
+                if grip.body not in [actuated[a] for a in self._actuators[index]]:
+                    by_body.setdefault(grip.body, []).append(grip)
+        for grips in by_body.values():
+            self._exchange.between(grips)
 
     # --- state ------------------------------------------------------------------------------
 
@@ -338,6 +312,8 @@ class Grasps(Mapping[str, Held | None]):
             pinch = self._pinches[index]
             if pinch is not None and body is None:
                 self._end_thread(index, pinch)
+        if self._clamps.lose(body):
+            self._rods.weigh(self._world)
 
     def write_state(self, state: StateRecord) -> None:
         """Write what every jaw holds into a state record."""
@@ -356,6 +332,7 @@ class Grasps(Mapping[str, Held | None]):
             "pads": list(self._pads),
             "passing": [list(p) for p in self._passing],
             "near": list(self._near),
+            "clamps": self._clamps.memory(),
         }
 
     def recall(self, memory: dict[str, Any]) -> None:
@@ -380,6 +357,7 @@ class Grasps(Mapping[str, Held | None]):
         for index, grip in enumerate(self._grips):
             if grip is not None:
                 self._take(index, grip)
+        self._clamps.recall(memory["clamps"])
         self._rods.weigh(self._world)
 
 

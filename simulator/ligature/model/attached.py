@@ -16,7 +16,7 @@ from ligature.model.frames import Array, axis_rotation, pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
 from ligature.model.parts import camera_frame, light_frame
 from ligature.model.piercing import Tissue
-from ligature.model.scene import Attachment, Camera, Ghost, Identity, Light
+from ligature.model.scene import Attachment, Camera, Ghost, Identity, Light, Slip
 
 STATIC_CUTOFF = np.pi / 2
 """Largest half angle of a light; larger ones are clamped (§19)."""
@@ -40,6 +40,14 @@ def ghost(element: Element, index: int, identity: Identity, context: FileContext
         element.value("ligature hole"),
         _tissue(element),
     )
+
+
+def slip(element: Element) -> Slip | None:
+    """How an actuator yields; None for one that holds rigidly."""
+    if not element.has("ligature slip"):
+        return None
+    names = ("normal force", "friction", "half width", "reach")
+    return Slip(*(element.number(f"ligature slip.{name}") for name in names))
 
 
 def _tissue(element: Element) -> Tissue:

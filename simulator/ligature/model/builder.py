@@ -290,7 +290,7 @@ class SceneBuilder:
             self.actuators.append(
                 Actuator(
                     len(self.actuators), identity, parent, T_body_actuator,
-                    element.flag("visible"), element.number("visible size"),
+                    element.flag("visible"), element.number("visible size"), attached.slip(element),
                 )
             )  # fmt: skip
 

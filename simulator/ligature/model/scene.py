@@ -366,9 +366,24 @@ class Sensor:
     visible_size: float = 0.02
 
 
+@dataclass(frozen=True)
+class Slip:
+    """Two pads of an actuator that hold by friction: ``normal_force`` (N) between them, ``friction`` of a pad, to be
+    multiplied by the body's, ``half_width`` (m), and the way (m) that a body may slip until it is let go.
+    """
+
+    normal_force: float
+    friction: float
+    half_width: float
+    reach: float
+
+
 @dataclass(frozen=True, eq=False)
 class Actuator:
-    """A constraint actuator (§17.5); ``T_body_actuator`` (4, 4) in the parent's body frame."""
+    """A constraint actuator (§17.5); ``T_body_actuator`` (4, 4) in the parent's body frame.
+
+    It holds rigidly, or with ``slip`` between pads that are normal to its z axis.
+    """
 
     index: int
     identity: Identity
@@ -376,6 +391,7 @@ class Actuator:
     T_body_actuator: Array
     visible: bool = False
     visible_size: float = 0.02
+    slip: Slip | None = None
 
 
 @dataclass(frozen=True, eq=False)

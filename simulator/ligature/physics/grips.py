@@ -12,7 +12,6 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, inertia_of, is_alone
 from ligature.physics.bodies import Placement
@@ -162,17 +161,10 @@ class BulletGrips:
         """Whether something holds a body."""
         return body in self._held_up
 
-    def carry(self, body: int, change: Array) -> None:
-        """Move the added mass of a body along with its holders, whose velocity there changed by ``change`` (6,)."""
+    def carry(self, body: int, wrench: Array) -> None:
+        """Move the added mass of a body along with its holders, which takes ``wrench`` (6,) in the coming tick."""
         if body in self._burdens:
-            place, _ = self._burdens[body]
-            pose, twist = np.empty(7), np.empty(6)
-            place.read_inertial(pose, twist)
-            mass, inertia = self.mass_of(body)
-            share = 1.0 - place.body.mass / mass
-            R = pose7_matrix(pose)[:3, :3]
-            moment = R @ (inertia * (R.T @ change[3:]))
-            place.load((share / self.dt * np.concatenate([mass * change[:3], moment])).tolist())
+            self._burdens[body][0].load(wrench.tolist())
 
     def _carry_burdens(self) -> None:
         """Take the weight of added mass off again, for the coming tick."""

@@ -186,6 +186,10 @@ class World(BulletQueries, BulletGrips):
         self.place_of[body].read_inertial(pose, twist)
         return pose, twist
 
+    def read_motion(self, body: int, pose: Array, twist: Array) -> None:
+        """Fill ``pose`` (7,) of a body's inertial frame I, and its ``twist`` (6,)."""
+        self.place_of[body].read_inertial(pose, twist)
+
     def set_pose(self, body: int, pose: Array) -> None:
         """Put the root body of a tree at ``pose`` (7,) at rest; raises ValueError for a link of an arm."""
         place = self.place_of[body]

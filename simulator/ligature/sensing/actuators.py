@@ -1,4 +1,4 @@
-"""Constraint actuators: hold a body rigidly, by name, by sensor or with an offset, and let it go.
+"""Constraint actuators: hold a body, rigidly or until it slips, by name, by sensor or with an offset, and let it go.
 
 Semantics of the reference (interface reference §3.4, ADF specification §17.5): the body is held
 wherever it is, without tolerance; a request while something is held changes nothing.
@@ -45,14 +45,14 @@ class Actuators:
     @property
     def held(self) -> list[int]:
         """Body held by each actuator, -1 for none."""
-        return [-1 if hold is None else hold.body for hold in self._holds]
+        return [-1 if hold is None or not self._holder.holds(hold.handle) else hold.body for hold in self._holds]
 
     def apply(self, command: ActuatorCommand, body_pose: Array) -> Diagnostic | None:
         """Carry out ``command`` with bodies at ``body_pose`` (bodies, 7); what it could not do is returned."""
         if not command.actuate:
             self.release(command.actuator)
             return None
-        if self._holds[command.actuator] is not None:
+        if self.held[command.actuator] >= 0:
             return None
         try:
             body = self._body_of(command)
@@ -115,5 +115,8 @@ class Actuators:
             T_child_frame = np.linalg.inv(pose7_matrix(body_pose[body])) @ T_world_frame
         else:
             T_child_frame = self._scene.bodies[body].T_body_inertial @ pose7_matrix(np.array(command.offset))
-        handle = self._holder.add_fixed(actuator.parent, body, T_parent_frame, T_child_frame)
+        if actuator.slip is None:
+            handle = self._holder.add_fixed(actuator.parent, body, T_parent_frame, T_child_frame)
+        else:
+            handle = self._holder.add_yielding(actuator.slip, actuator.parent, body, T_parent_frame, T_child_frame)
         self._holds[command.actuator] = _Hold(body, handle)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.hits import Contact, RayHits
-from ligature.model.scene import Collider
+from ligature.model.scene import Collider, Slip
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,12 @@ class Holds(Protocol):
 
     def add_fixed(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
         """Hold two frames together, given in the body frames of parent and child; returns a handle."""
+
+    def add_yielding(self, slip: Slip, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
+        """The same by friction between pads, beyond which the child slips; returns a handle."""
+
+    def holds(self, handle: Any) -> bool:
+        """Whether it has not slipped out."""
 
     def remove_fixed(self, handle: Any) -> None:
         """Let go what `add_fixed` holds."""

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.suture.motion import Motion
-from ligature.suture.pads import Pads, hold, scratch
+from ligature.suture.pads import hold, let_free, motions, pads, scratch
+from ligature.suture.tables import table_of
 
 Array = NDArray[np.float64]
 
@@ -61,6 +62,8 @@ class Grasp:
 
     Attributes
     ----------
+    patch_pose
+        (7,) pose of the patch in the inertial frame of the jaw's holder.
     normal_force
         Force between the fingers in newtons; the owner keeps it up to date.
     load
@@ -71,7 +74,7 @@ class Grasp:
 
     def __init__(self, patch: Patch, T_holder_body: Array) -> None:
         self.patch = patch
-        self._patch = matrix_pose7(patch.T_holder_patch)
+        self.patch_pose = matrix_pose7(patch.T_holder_patch)
         self.held = matrix_pose7(inverse(patch.T_holder_patch) @ T_holder_body)
         self.normal_force = 0.0
         self.load = np.zeros(6)
@@ -93,7 +96,7 @@ class Grasp:
         """Let the pads touch elsewhere, with nothing else changed."""
         T_holder_body = self.patch.T_holder_patch @ pose7_matrix(self.held)
         self.patch = replace(self.patch, T_holder_patch=T_holder_patch)
-        self._patch = matrix_pose7(T_holder_patch)
+        self.patch_pose = matrix_pose7(T_holder_patch)
         self.held = matrix_pose7(inverse(T_holder_patch) @ T_holder_body)
 
     def share(self) -> float:
@@ -101,31 +104,52 @@ class Grasp:
         return share_of_limit(self.load[:2], float(self.load[5]), self.patch.limits(self.normal_force))
 
 
-def hold_together(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Motion, dt: float) -> Array:
-    """Impulses (1 + g, 6) of one tick on a body and on the holders of its grasps, each about its centre of mass.
+class Hands:
+    """The arrays in which ``count`` grasps of one body meet; reused from tick to tick.
 
-    ``body.twist`` is as it would be after the tick were the body let go. Holders are taken to move as they
-    do; an arm of kilograms is not moved within a tick by what springs on a needle carry.
+    Attributes
+    ----------
+    motions
+        The caller fills in how the body and the holders move.
     """
-    pads = Pads(
-        np.array([g._patch for g in grasps]),
-        np.array([g.held for g in grasps]),
-        np.array([(*g.patch.limits(g.normal_force), max(g.normal_force, LEAST_FORCE)) for g in grasps]),
-        np.zeros((len(grasps), 6)),
-        np.array([g.slipped for g in grasps]),
-        np.array([g.pace for g in grasps]),
-        np.array([g.lag for g in grasps]),
-        np.zeros((len(grasps), 2), dtype=np.bool_),
-    )
-    impulses = np.zeros((1 + len(grasps), 6))
-    hold(
-        body.pose, body.twist, body.inverse_mass, body.inverse_inertia, np.array([h.pose for h in holders]),
-        np.array([h.twist for h in holders]), pads, scratch(len(grasps)), impulses, dt,
-    )  # fmt: skip
-    for g, grasp in enumerate(grasps):
-        grasp.held, grasp.load, grasp.slipped, grasp.slides = pads.held[g], pads.load[g], pads.slid[g], pads.slides[g]
-        grasp.pace, grasp.lag = pads.pace[g], pads.lag[g]
-    return impulses
+
+    def __init__(self, count: int) -> None:
+        self.motions, self._pads, self._scratch = motions(count), pads(count), scratch(count)
+        self._tables = table_of(self.motions), table_of(self._pads), table_of(self._scratch)
+
+    def let_free(self, own_mass: float, gravity: Array, dt: float) -> Array:
+        """See `ligature.suture.pads.let_free`; returns `Motions.burden`."""
+        let_free(self._tables[0], self._tables[2], own_mass, gravity, dt)
+        return self.motions.burden
+
+    def hold(self, grasps: Sequence[Grasp], dt: float) -> Array:
+        """Impulses (1 + g, 6) of one tick on the body and on the holders, each about its centre of mass.
+
+        `Motions.body_twist` is as it would be after the tick were the body let go. Holders are taken to move as
+        they do; an arm of kilograms is not moved within a tick by what springs on a needle carry.
+        """
+        held = self._pads
+        for g, grasp in enumerate(grasps):
+            held.patch[g], held.held[g], held.slid[g] = grasp.patch_pose, grasp.held, grasp.slipped
+            held.pace[g], held.lag[g] = grasp.pace, grasp.lag
+            held.limits[g, :2] = grasp.patch.limits(grasp.normal_force)
+            held.limits[g, 2] = max(grasp.normal_force, LEAST_FORCE)
+        hold(*self._tables, dt)
+        for g, grasp in enumerate(grasps):
+            grasp.held[:], grasp.load[:], grasp.slipped[:] = held.held[g], held.load[g], held.slid[g]
+            grasp.pace[:], grasp.lag[:], grasp.slides[:] = held.pace[g], held.lag[g], held.slides[g]
+        return self.motions.impulse
+
+
+def hold_together(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Motion, dt: float) -> Array:
+    """`Hands.hold` for once, of a body and holders that move as given."""
+    hands = Hands(len(grasps))
+    at = hands.motions
+    at.body_pose[:], at.body_twist[:] = body.pose, body.twist
+    at.inverse[0], at.inverse[1:] = body.inverse_mass, body.inverse_inertia
+    for g, holder in enumerate(holders):
+        at.holder_pose[g], at.holder_twist[g] = holder.pose, holder.twist
+    return hands.hold(grasps, dt)
 
 
 def warm_up() -> None:
@@ -133,3 +157,4 @@ def warm_up() -> None:
     origin = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     still = Motion(origin, np.zeros(6), 1.0, np.ones(3))
     hold_together([Grasp(Patch(np.eye(4), 1e-3, 0.5), np.eye(4))], [still], still, 1e-3)
+    Hands(1).let_free(1.0, np.zeros(3), 1e-3)

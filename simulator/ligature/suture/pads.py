@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ligature.suture.chain import invert_spd6
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.rotations import cross, matrix_of, multiply, rotate, rotate_back, rotation_vector
+from ligature.suture.tables import opener
 
 Array = NDArray[np.float64]
 
@@ -54,8 +55,22 @@ class Pads(NamedTuple):
     slides: NDArray[np.bool_]  # (g, 2) whether it slides along the pads, and pries them apart
 
 
+class Motions(NamedTuple):
+    """The body and the holders of its g jaws at the start of a tick, inertial frames, world axes."""
+
+    body_pose: Array  # (7,)
+    body_twist: Array  # (6,) as it would be after the tick were the body let go
+    inverse: Array  # (4,) of the body's mass, and of its principal moments
+    holder_pose: Array  # (g, 7)
+    holder_twist: Array  # (g, 6)
+    ride: Array  # (g, 6) velocity of the holders at the body's centre in the last tick
+    pending: Array  # (6,) impulse and moment that the body was given already
+    burden: Array  # (6,) force and moment that move along what was added to the body's mass
+    impulse: Array  # (1 + g, 6) what jaws give to the body, and to their holders
+
+
 class Scratch(NamedTuple):
-    """Room for one tick of g jaws."""
+    """What one tick of g jaws works with; nothing in it outlives one."""
 
     at: Array  # (g, 3) patches in the world
     R: Array  # (g, 3, 3)
@@ -73,11 +88,26 @@ class Scratch(NamedTuple):
     y3: Array
 
 
-def scratch(g: int) -> Scratch:
+def motions(g: int) -> Motions:
+    """Room for the motion of a body and ``g`` holders."""
+    z = np.zeros
+    return Motions(z(7), z(6), z(4), z((g, 7)), z((g, 6)), z((g, 6)), z(6), z(6), z((1 + g, 6)))
+
+
+def pads(g: int) -> Pads:
     """Room for ``g`` jaws."""
+    z = np.zeros
+    return Pads(z((g, 7)), z((g, 7)), z((g, 3)), z((g, 6)), z((g, 2)), z((g, 6)), z((g, 6)), np.zeros((g, 2), np.bool_))
+
+
+def scratch(g: int) -> Scratch:
+    """Scratch for ``g`` jaws."""
     z = np.zeros
     return Scratch(z((g, 3)), z((g, 3, 3)), z((g, 6)), z((g, 6)), z((g, 6, 6)), z(6), z((3, 3)), z((3, 3)), z((6, 6)),
                    z(6), z(6), z(3), z(3), z(3))  # fmt: skip
+
+
+open_motions, open_pads, open_scratch = opener(motions(1)), opener(pads(1)), opener(scratch(1))
 
 
 @inlined
@@ -248,15 +278,53 @@ def _sweep(g, body_pose, inverse_mass, pads, room, dt):
 
 
 @kernel
-def hold(body_pose, body_twist, inverse_mass, inverse_inertia, holder_pose, holder_twist, pads, room, impulse, dt):
-    """Impulses of one tick: ``impulse[0]`` (6,) on the body, ``impulse[1 + g]`` on the holder of jaw g.
+def let_free(motion_table, room_table, own_mass, gravity, dt):
+    """Bring `Motions.body_twist`, given at the start of a tick, to its end, were all jaws to let the body go.
 
-    All are about the centres of mass, in world axes. ``body_twist`` (6,) is as it would be after the tick were
-    the body let go. Holders move as they do; that they gain or lose speed within the tick shows in the next
-    one as a lag of the body, which is made up in time without force. ``pads`` are brought up to date.
+    What was added to its ``own_mass``, and to its inertia with it, moves along with the holders, by the mean change
+    of `Motions.ride`, which is brought up to date. ``gravity`` (3,) pulls at the own mass.
     """
+    moves, room = open_motions(motion_table), open_scratch(room_table)
+    pose, twist, inverse = moves.body_pose, moves.body_twist, moves.inverse
+    burden, pending = moves.burden, moves.pending
+    n, own = moves.ride.shape[0], own_mass * inverse[0]
+    for k in range(6):
+        burden[k], room.step[k] = 0.0, 0.0
+    for g in range(n):
+        h, t, now, ride = moves.holder_pose[g], moves.holder_twist[g], room.ask, moves.ride[g]
+        vx, vy, vz = cross(t[3], t[4], t[5], pose[0] - h[0], pose[1] - h[1], pose[2] - h[2])
+        now[0], now[1], now[2], now[3], now[4], now[5] = t[0] + vx, t[1] + vy, t[2] + vz, t[3], t[4], t[5]
+        for k in range(6):
+            burden[k] += (now[k] - ride[k]) / n
+            ride[k] = now[k]
+    for k in range(6):
+        twist[k] += (1.0 - own) * burden[k]
+    matrix_of(pose[3], pose[4], pose[5], pose[6], room.S)
+    ax, ay, az = rotate_back(room.S, burden[3], burden[4], burden[5])
+    burden[3], burden[4], burden[5] = rotate(room.S, ax / inverse[1], ay / inverse[2], az / inverse[3])
+    wx, wy, wz = rotate_back(room.S, pending[3], pending[4], pending[5])
+    wx, wy, wz = rotate(room.S, wx * inverse[1], wy * inverse[2], wz * inverse[3])
+    twist[3], twist[4], twist[5] = twist[3] + wx, twist[4] + wy, twist[5] + wz
+    for k in range(3):
+        twist[k] += pending[k] * inverse[0] + dt * own * gravity[k]
+        burden[k] /= inverse[0]
+    for k in range(6):
+        burden[k] *= (1.0 - own) / dt
+
+
+@kernel
+def hold(motion_table, pads_table, room_table, dt):
+    """Fill `Motions.impulse` for one tick: row 0 acts on the body, row 1 + g on the holder of jaw g.
+
+    All are about the centres of mass, in world axes. Holders move as they do; that they gain or lose speed within
+    the tick shows in the next one as a lag of the body, which is made up in time without force. The pads are
+    brought up to date.
+    """
+    moves, pads, room = open_motions(motion_table), open_pads(pads_table), open_scratch(room_table)
+    body_pose, body_twist, impulse = moves.body_pose, moves.body_twist, moves.impulse
+    holder_pose, holder_twist, inverse_mass = moves.holder_pose, moves.holder_twist, moves.inverse[0]
     n = pads.patch.shape[0]
-    _inverse_inertia(body_pose, inverse_inertia, room.S, room.W)
+    _inverse_inertia(body_pose, moves.inverse[1:], room.S, room.W)
     for k in range(6):
         room.twist[k] = body_twist[k]
     for g in range(n):

@@ -47,6 +47,11 @@ ACTUATOR = (
     Key("location", POSE, POSE_ZERO, "m, rad", "actuator frame on the parent"),
     Key("visible", F, False, doc="draw the actuator"),
     Key("visible size", N, 0.02, "m", "radius of the marker"),
+    Key("ligature slip", MAP, doc="hold by friction between pads normal to z, not rigidly", status=Status.OURS),
+    Key("ligature slip.normal force", N, unit="N", doc="of the pads", required=True, status=Status.OURS, least=0.0),
+    Key("ligature slip.friction", N, 0.5, doc="of a pad; times the body's", status=Status.OURS, least=0.0),
+    Key("ligature slip.half width", N, 0.00125, "m", "of the pads", status=Status.OURS, least=1e-6),
+    Key("ligature slip.reach", N, 0.01, "m", "way that a body slips until it is lost", status=Status.OURS, least=0.0),
     *ignored(("max impulse", "tau"), "of AMBF 1.0; the constraint is rigid"),
 )
 
