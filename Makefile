@@ -70,12 +70,16 @@ soak: setup
 demo: setup
 	.venv/bin/ligature demo
 
-# the animation of the README and the picture of docs/tasks.md
+# the animation of the README and the pictures of docs/demonstration.md
 film: setup
 	.venv/bin/ligature demo --out build/film
+	.venv/bin/ligature render scenes/peg_transfer/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/peg_transfer
+	.venv/bin/ligature render scenes/needle_pick/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/needle_pick
 	mkdir -p docs/images
 	cp build/film/suture.webp docs/images/suture.webp
-	cp build/film/suture_6.png docs/pictures/suture.png
+	cp build/film/suture_6.png docs/images/suturing.png
+	cp build/film/peg_transfer/cameraL.png docs/images/peg_transfer.png
+	cp build/film/needle_pick/cameraL.png docs/images/needle_pick.png
 
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md

@@ -303,8 +303,9 @@ def main() -> int:
     )
     arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
+    arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file; launch_400006.yaml has other tools")
     given = arguments.parse_args()
-    simulation = ligature.Simulation(ligature.load(SCENE))
+    simulation = ligature.Simulation(ligature.load(given.scene))
     scatter(simulation, given.seed)
     film = Film(simulation, given.out) if given.out else None
     started = time.perf_counter()

@@ -170,6 +170,7 @@ def documents() -> dict[str, dict[str, Any]]:
         "phantom.yaml": phantom(),
         "ghosts.yaml": ghosts(),
         "launch.yaml": theatre.launch("phantom.yaml", "ghosts.yaml"),
+        "launch_400006.yaml": theatre.launch("phantom.yaml", "ghosts.yaml", tool="_400006"),
     }
 
 

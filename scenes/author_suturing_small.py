@@ -19,7 +19,10 @@ HERE = Path(__file__).resolve().parent / "suturing_small"
 HALF_PI = np.pi / 2
 
 TOOL_ID = 420006
-INSERTION_OFFSET, SHAFT_LENGTH, PITCH_TO_YAW = -0.4318, 0.4826, 0.009
+TOOLS = {420006: (-0.4318, 0.4826), 400006: (-0.4389, 0.416)}
+"""Insertion offset and length of the shaft with each large needle driver."""
+
+PITCH_TO_YAW = 0.009
 BASE_POSES = {
     "psm1": ((0.1313066, 0.3967149, 0.8777097), (0.69743, -0.51874, -3.13917)),
     "psm2": ((-0.0713554, 0.396989, 0.876246), (0.714168, 0.508757, -3.08779)),
@@ -138,14 +141,19 @@ def looks(block: dict[str, Any], mesh: str) -> None:
         block["collision mesh"] = ""
 
 
-def psm(name: str) -> dict[str, Any]:
-    """One arm: base, six joints of the instrument, two jaws and the body that names the tool."""
-    T_world_base = pose_matrix(*BASE_POSES[name])
+def psm(name: str, tool: int = TOOL_ID) -> dict[str, Any]:
+    """One arm: base, six joints of the instrument, two jaws and the body that names the tool.
+
+    With a tool that is shorter below the remote centre, the arm stands nearer by as much.
+    """
+    insertion_offset, shaft_length = TOOLS[tool]
+    nearer = sum(TOOLS[TOOL_ID]) - (insertion_offset + shaft_length)
+    T_world_base = pose_matrix(*BASE_POSES[name]) @ pose_matrix((0, 0, -nearer), (0, 0, 0))
     table = [
         ("yaw link", dh(HALF_PI, 0, 0, HALF_PI)),
         ("pitch end link", dh(-HALF_PI, 0, 0, -HALF_PI)),
-        ("main insertion link", dh(HALF_PI, 0, INSERTION_OFFSET, 0)),
-        ("tool roll link", dh(0, 0, SHAFT_LENGTH, 0)),
+        ("main insertion link", dh(HALF_PI, 0, insertion_offset, 0)),
+        ("tool roll link", dh(0, 0, shaft_length, 0)),
         ("tool pitch link", dh(-HALF_PI, 0, 0, -HALF_PI)),
         ("tool yaw link", dh(-HALF_PI, PITCH_TO_YAW, 0, -HALF_PI)),
     ]
@@ -238,7 +246,7 @@ def psm(name: str) -> dict[str, Any]:
             },
         )  # fmt: skip
     bodies["BODY tool id"] = {
-        "name": f"tool_id_{TOOL_ID}",
+        "name": f"tool_id_{tool}",
         "mesh": "",
         "mass": 0.0,
         "location": pose(T_world_yaw),
@@ -435,6 +443,8 @@ def documents() -> dict[str, dict[str, Any]]:
         "phantom.yaml": phantom(),
         "psm1.yaml": psm("psm1"),
         "psm2.yaml": psm("psm2"),
+        "psm1_400006.yaml": psm("psm1", 400006),
+        "psm2_400006.yaml": psm("psm2", 400006),
         "ghosts_actuators_psm1.yaml": ghosts_and_actuator("psm1"),
         "ghosts_actuators_psm2.yaml": ghosts_and_actuator("psm2"),
     }  # fmt: skip

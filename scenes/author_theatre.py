@@ -25,6 +25,9 @@ PLACE = (0.03, 0.23, 0.685)
 CAMERA = ((0.0307, 0.342, 0.835), (0.69813, 0.0, -3.14158))
 """Where the endoscope is: it sees the whole of a pad."""
 
+VIEW = 0.98
+"""Vertical field of view of both cameras."""
+
 TABLE, TABLE_SIZE = (0.0, 0.2, 0.6), (1.2, 1.0, 0.05)
 STAND_SIZE = (0.12, 0.22)
 CLOTH, FALL, FOLD = (64, 56), 0.22, 0.0035
@@ -96,8 +99,10 @@ def environment() -> dict[str, Any]:
 
 
 def world() -> dict[str, Any]:
-    """The world of `suturing_small`, its light at the end of the endoscope."""
+    """The world of `suturing_small`, its light at the end of the endoscope, which sees less at the sides."""
     document = small.world()
+    for camera in document["cameras"]:
+        document[camera]["field view angle"] = VIEW
     document["light2"]["location"] = small.vector((0.0, 0.0, -0.0505))
     return document
 
@@ -127,15 +132,15 @@ def document(bodies: dict[str, dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def launch(*own: str) -> dict[str, Any]:
-    """A launch file in a folder beside `theatre`: files of its own, and both arms."""
+def launch(*own: str, tool: str = "") -> dict[str, Any]:
+    """A launch file in a folder beside `theatre`: files of its own, and both arms; ``tool`` ends their file names."""
     there = "../suturing_small"
-    arms = [f"{there}/{part}" for arm in ("psm1", "psm2") for part in (f"{arm}.yaml", f"ghosts_actuators_{arm}.yaml")]
+    arms = [part for arm in ("psm1", "psm2") for part in (f"{arm}{tool}.yaml", f"ghosts_actuators_{arm}.yaml")]
     return {
         "world config": "../theatre/world.yaml",
         "color config": f"{there}/colors.yaml",
         "input devices config": f"{there}/input_devices.yaml",
-        "multibody configs": [*own, *arms],
+        "multibody configs": [*own, *(f"{there}/{arm}" for arm in arms)],
     }
 
 

@@ -56,3 +56,31 @@ def test_the_circle_of_a_throw_goes_through_both_holes() -> None:
     assert at[1] == pytest.approx(exit)
     middle = throw.centre + 0.0097 * throw.axes @ [np.cos(throw.towards_exit / 2), np.sin(throw.towards_exit / 2), 0]
     assert middle[2] < entry[2]
+
+
+def test_both_arms_reach_every_pair_of_holes() -> None:
+    surgeon = suture.Surgeon(ligature.Simulation(ligature.load(suture.SCENE)))
+    arc = surgeon.arc
+    for pair in (1, 2, 3, 4):
+        throw = surgeon.throw(pair)
+        tip, rest = throw.towards_exit + suture.BEYOND, arc.end - arc.begin
+        ways = {
+            "PSM2": (suture.HOLD_DEPTHS, np.linspace(-suture.BEFORE, tip, 6)),
+            "PSM1": (suture.PULL_DEPTHS, np.linspace(tip, throw.towards_exit + rest + 0.3, 6)),
+        }
+        for name, (depths, turns) in ways.items():
+            way = [throw.arc_at(a, arc) for a in turns]
+            kinematics, base = surgeon.arms[name].kinematics, surgeon._base[name]
+            above = surgeon.hole("Entry", pair)
+            assert throws.best_grip(arc, depths, kinematics, base, way, way[0], above), (pair, name)
+
+
+@pytest.mark.slow
+def test_all_four_throws_are_made_from_another_place() -> None:
+    simulation = ligature.Simulation(ligature.load(suture.SCENE))
+    suture.scatter(simulation, 1)
+    score, measures, stopped = suture.operate(simulation, throws=4)
+    assert stopped == ""
+    assert score.success, score.lines()
+    assert max(score.misses) < 1e-3
+    assert measures.drops == 0

@@ -16,14 +16,14 @@ from ligature.render import Renderer, RenderUnavailable, view_of
 from PIL import Image
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
-LAUNCHES = sorted(SCENES.glob("*/launch.yaml"))
+LAUNCHES = sorted(SCENES.glob("*/launch*.yaml"))
 AUTHORS = sorted(
     path.stem for path in SCENES.glob("author_*.py") if "\ndef texts()" in path.read_text(encoding="utf-8")
 )
 """Scripts that write files as text; pictures are another matter."""
 
 
-@pytest.fixture(scope="module", params=LAUNCHES, ids=lambda path: path.parent.name)
+@pytest.fixture(scope="module", params=LAUNCHES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def launch(request: pytest.FixtureRequest) -> Path:
     return request.param
 
