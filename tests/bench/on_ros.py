@@ -31,14 +31,17 @@ class Listener:
         import rospy
         from diagnostic_msgs.msg import DiagnosticArray
 
-        rospy.init_node("on_ros", anonymous=True, disable_signals=True)
         self.received = 0
         self.seconds: list[dict[str, str]] = []
         topics = [(name, kind) for name, kind in rospy.get_published_topics() if name.endswith("/State")]
         self.topics = len(topics)
-        for name, _ in topics:
-            rospy.Subscriber(name, rospy.AnyMsg, self._count, queue_size=1)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, self._note)
+        self._subscribers = [rospy.Subscriber(name, rospy.AnyMsg, self._count, queue_size=1) for name, _ in topics]
+        self._subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, self._note))
+
+    def close(self) -> None:
+        """Listen no more."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
 
     def _count(self, message: object) -> None:
         self.received += 1
@@ -75,6 +78,9 @@ def main() -> int:
         while not master_answers(os.environ["ROS_MASTER_URI"]):
             time.sleep(0.1)
         time.sleep(5.0)
+        import rospy
+
+        rospy.init_node("on_ros", anonymous=True, disable_signals=True)
         listener = Listener()
         time.sleep(SETTLING)
         before, received, begin = processor_seconds(run.pid), listener.received, time.monotonic()

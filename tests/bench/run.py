@@ -7,7 +7,7 @@ import sys
 
 BENCHMARKS = (
     "scenes", "on_ros", "latency", "arm_latency", "teleop_latency", "teleop_suture", "kinematics", "cameras", "render",
-    "environments",
+    "environments", "suturing_on_ros",
 )  # fmt: skip
 
 

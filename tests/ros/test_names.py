@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import ligature
@@ -56,6 +57,41 @@ def test_the_stock_names_are_ambiguous_for_those_scripts(scene: ligature.Scene) 
 def test_no_two_objects_share_a_name(scene: ligature.Scene, policy: str) -> None:
     topics = advertised(scene, policy)
     assert len(topics) == len(set(topics))
+
+
+OURS = Path(__file__).resolve().parents[2] / "scenes" / "suturing" / "launch.yaml"
+SCENERY = re.compile(r"/(Table|BlackGround1?|Barrier)\Z|/psm[12]/toolpitchlink\Z")
+"""What no client asks for: decor, and a link that an instrument has when its wrist is drawn."""
+
+INSTRUMENT = re.compile(r"(?<=link)simple\Z|[/_]4[02]0006\Z")
+"""What names of links say of the instrument; clients look for what stands before it."""
+
+
+def asked_for(scene: ligature.Scene, policy: str) -> dict[str, str]:
+    """Names of objects that clients use, whatever the instrument, and the types of their messages."""
+    templates = conversion.templates(scene)
+    topics = names.topics([(t.kind, t.identity) for t in templates], policy, scene.world.topic)
+    return {
+        INSTRUMENT.sub("", topic): type(template.message).__name__
+        for template, topic in zip(templates, topics, strict=True)
+        if topic is not None and not SCENERY.search(topic)
+    }
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize("policy", names.POLICIES)
+def test_our_scene_and_the_labs_agree_on_all_names_that_clients_use(scene: ligature.Scene, policy: str) -> None:
+    ours = ligature.load(OURS)
+    assert asked_for(ours, policy) == asked_for(scene, policy)
+    assert len(asked_for(ours, policy)) > 15
+    assert [(arm.name, arm.kind, len(arm.joints)) for arm in ours.arms] == [
+        (arm.name, arm.kind, len(arm.joints)) for arm in scene.arms
+    ]
+
+
+def test_every_look_up_finds_exactly_one_object_in_our_scene() -> None:
+    topics = advertised(ligature.load(OURS), "src")
+    assert {part: len([topic for topic in topics if part in topic]) for part in LOOK_UPS} == dict.fromkeys(LOOK_UPS, 1)
 
 
 def test_the_prefix_of_all_namespaces_is_kept() -> None:
