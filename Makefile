@@ -77,7 +77,7 @@ film: setup
 	.venv/bin/ligature render scenes/needle_pick/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/needle_pick
 	mkdir -p docs/images
 	cp build/film/suture.webp docs/images/suture.webp
-	cp build/film/suture_6.png docs/images/suturing.png
+	cp build/film/suture_7.png docs/images/suturing.png
 	cp build/film/peg_transfer/cameraL.png docs/images/peg_transfer.png
 	cp build/film/needle_pick/cameraL.png docs/images/needle_pick.png
 
