@@ -79,6 +79,14 @@ def begin_holds(p, owner):
 
 
 @inlined
+def begin_again(p, owner):
+    """Springs of the passages of a rod as they were, after a step that did not settle."""
+    for c in range(p.filled[0]):
+        if p.owner[c] == owner:
+            begin_hold(p, c)
+
+
+@inlined
 def add_holds(p, owner, nodes, work, elapsed, h):
     """Add what the passages of a rod do to the matrices and loads of its nodes."""
     for c in range(p.filled[0]):

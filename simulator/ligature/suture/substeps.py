@@ -11,7 +11,7 @@ from ligature.suture import layout
 from ligature.suture.bonds import place_bonds
 from ligature.suture.compiled import inlined, kernel
 from ligature.suture.contacts import detect
-from ligature.suture.holding import add_hold_impulses, begin_holds
+from ligature.suture.holding import add_hold_impulses, begin_again, begin_holds
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
@@ -26,6 +26,9 @@ open_work = opener(layout.work(2, 2, 1, 1))
 
 REFINEMENT, MAX_PARTS = 4, 16
 """How many steps take the place of one that did not settle, and the most in a tick."""
+
+MAX_STEPS = 16
+"""Newton steps of a tick after which no more time is spent on settling: steps count as they are."""
 
 
 @inlined
@@ -90,12 +93,12 @@ def _scale_loads(joints, factor):
 @inlined
 def _one_step(
     first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, tension, counts, self_skip,
-    stiffness, h, part,
+    stiffness, h, begins, elapsed,
 ):  # fmt: skip
     new.count[0] = 0
     place_bonds(nodes, work, old, new, grips, points)
     detect(first, work.segment.shape[0], nodes, shapes, old, new, work, tension, counts, self_skip, h)
-    return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, part == 0, (part + 1) * h)
+    return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, begins, elapsed)
 
 
 @kernel
@@ -114,38 +117,41 @@ def run_tick(
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
     _copy2(shapes.pose, shape_poses)
-    parts, steps, settled, in_c = 1, 0, False, False
-    while True:
-        for i in range(total):
-            for k in range(6):
-                impulse[i, k] = 0.0
-        h = dt / parts
-        _scale_loads(joints, 1.0 / (parts * parts))
-        begin_holds(passages, owner)
-        steps, settled = 0, True
-        old, new = a, b
-        for part in range(parts):
-            more, fine = _one_step(
-                first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, tension,
-                counts, self_skip, stiffness, h, part,
-            )  # fmt: skip
-            steps += more
-            settled = settled and fine
-            if not settled and parts < MAX_PARTS:
-                break
-            add_reactions(n, joints, new, work, impulse, h)
-            add_hold_impulses(passages, owner, impulse, h)
-            if parts > 1:
-                _move_shapes(nodes, shapes, h)
-            in_c = part % 2 == 1
-            old = new
-            new = b if in_c else c
-        if settled or parts == MAX_PARTS:
+    begin_holds(passages, owner)
+    for i in range(total):
+        for k in range(6):
+            impulse[i, k] = 0.0
+    old, new, in_c = a, b, False
+    # In units of the smallest step: what of the tick is done, the next step, that of the loads, and of those kept.
+    done, size, scale, kept = 0, MAX_PARTS, MAX_PARTS, MAX_PARTS
+    steps = 0
+    while done < MAX_PARTS:
+        h = dt * size / MAX_PARTS
+        _scale_loads(joints, (size / scale) ** 2)
+        scale = size
+        more, settled = _one_step(
+            first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, tension,
+            counts, self_skip, stiffness, h, done == 0, dt * (done + size) / MAX_PARTS,
+        )  # fmt: skip
+        steps += more
+        if not settled and size > 1 and steps < MAX_STEPS:
+            _take_back(nodes, joints, work)
+            begin_again(passages, owner)
+            size, scale = size // REFINEMENT, kept
+            continue
+        add_reactions(n, joints, new, work, impulse, h)
+        add_hold_impulses(passages, owner, impulse, h)
+        done += size
+        if done == MAX_PARTS:
             break
-        _take_back(nodes, joints, work)
-        _copy2(shape_poses, shapes.pose)
-        parts *= REFINEMENT
+        _move_shapes(nodes, shapes, h)
+        _keep(nodes, joints, work)
+        kept = size
+        old, in_c = new, not in_c
+        new = c if in_c else b
+        while done % (REFINEMENT * size) == 0:
+            size *= REFINEMENT
     _copy2(shape_poses, shapes.pose)
-    _scale_loads(joints, float(parts * parts))
+    _scale_loads(joints, (MAX_PARTS / scale) ** 2)
     find_tension(first, n, joints, work, tension, dt)
     counts[2], counts[3] = steps, 1 if in_c else 0

@@ -15,7 +15,7 @@ from ligature.suture.rotations import cross, rotate
 
 MAX_CG = 40
 
-CG_TOLERANCE = 1e-9
+CG_TOLERANCE = 1e-6
 """Residual energy, relative to the first, at which the coupling is solved."""
 
 
