@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +25,13 @@ from ligature.model.state import new_state
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
-PATIENCE = 60.0
+PATIENCE = 100.0
+COARSE = 0.25
+"""Pixels drawn of the 3D view for each of the window: nobody looks at it here, and software draws."""
+
 FLAGS = (
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader", "--window-size=1280,860", "--disable-background-networking",
+    "--enable-unsafe-swiftshader", "--window-size=1180,700", "--disable-background-networking",
     "--disable-renderer-backgrounding", "--disable-background-timer-throttling",
 )  # fmt: skip
 
@@ -54,6 +58,13 @@ class Served:
             env=dict(os.environ, COLUMNS="200"),
         )  # fmt: skip
         threading.Thread(target=self._read, daemon=True).start()
+        try:
+            self._attach(scene)
+        except BaseException:
+            self.process.kill()
+            raise
+
+    def _attach(self, scene: Path) -> None:
         ready = until(lambda: next((x for x in self.lines if x.startswith("cockpit ready")), ""), "the page is served")
         self.url = ready.partition(": ")[2].strip()
         self.scene = ligature.load(str(scene))
@@ -113,8 +124,11 @@ class Person:
         self.driver.set_page_load_timeout(PATIENCE)
 
     def opens(self, url: str) -> None:
-        self.driver.get(url)
+        self.driver.get(f"{url}/?fixedDpr={COARSE}")
         self.sees("Ligature")
+        self.driver.execute_script(
+            "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+        )
 
     @property
     def text(self) -> str:
@@ -139,6 +153,19 @@ class Person:
             self.clicks("Operate")
         self.sees("Give up control")
 
+    def operates_arm(self, served: Served, name: str) -> None:
+        """Operate on a freshly loaded page, with the arm enabled and homed."""
+        self.opens(served.url)
+        self.sees("running")
+        until(lambda: "operator away" not in self.text or "Give up control" in self.text, "the desk is free")
+        self.operates()
+        if not served.arm(name)["homed"]:
+            self.clicks("Enable")
+            until(lambda: served.arm(name)["operating"] == 1, f"{name} is enabled")
+            self.clicks("Home")
+        until(lambda: served.arm(name)["homed"] and not served.arm(name)["busy"], f"{name} is homed")
+        until(lambda: self.slider("yaw °").get_attribute("aria-disabled") != "true", "sliders can be moved")
+
     def slider(self, label: str) -> Any:
         """The thumb of the first slider with that label."""
         root = self.find(f"//label[text()='{label}']").get_attribute("for")
@@ -155,6 +182,10 @@ class Person:
         for right, down in ways:
             chain.move_by_offset(round(right), round(down)).pause(0.05)
         chain.perform()
+
+    def presses(self, element: Any, right: int) -> None:
+        """Press on an element and drag it, and keep it pressed."""
+        self._chain().click_and_hold(element).move_by_offset(right, 0).perform()
 
     def lets_go(self) -> None:
         self._chain().release().perform()
@@ -174,7 +205,8 @@ class Person:
         return found[1:]
 
     def goes(self) -> None:
-        self.driver.quit()
+        with suppress(Exception):  # a browser that was killed cannot be told to end
+            self.driver.quit()
 
 
 def projected(served: Served, person: Person, points: np.ndarray) -> np.ndarray:
@@ -202,14 +234,18 @@ def tip(served: Served, name: str) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def person() -> Iterator[Person]:
-    yield from somebody()
+    with somebody() as found:
+        yield found
 
 
+@contextmanager
 def somebody() -> Iterator[Person]:
     pytest.importorskip("selenium", reason="the package selenium drives the browser")
     for program in ("chromium", "chromedriver"):
         if shutil.which(program) is None:
             pytest.skip(f"{program} is not installed (debian-packages-tests.txt)")
     found = Person()
-    yield found
-    found.goes()
+    try:
+        yield found
+    finally:
+        found.goes()

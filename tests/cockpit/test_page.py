@@ -12,16 +12,8 @@ pytestmark = pytest.mark.timeout(600)
 
 @pytest.fixture
 def operator(served: Served, person: Person) -> Person:
-    """Somebody who operates on a freshly loaded page, with PSM1 enabled and homed."""
-    person.opens(served.url)
-    person.sees("running")
-    person.operates()
-    if not served.arm("PSM1")["homed"]:
-        person.clicks("Enable")
-        until(lambda: served.arm("PSM1")["operating"] == 1, "PSM1 is enabled")
-        person.clicks("Home")
-    until(lambda: served.arm("PSM1")["homed"] and not served.arm("PSM1")["busy"], "PSM1 is homed")
-    until(lambda: person.slider("yaw °").get_attribute("aria-disabled") != "true", "sliders can be moved")
+    """Somebody who operates PSM1 on a freshly loaded page."""
+    person.operates_arm(served, "PSM1")
     return person
 
 
@@ -85,8 +77,9 @@ def test_the_gizmo_moves_the_tip(served: Served, operator: Person) -> None:
 
 
 def test_who_watches_cannot_command(served: Served, operator: Person) -> None:
+    """Somebody else's browser, which does not have the operator's key; here it is another tab without it."""
     driver, first = operator.driver, operator.driver.current_window_handle
-    driver.execute_script("localStorage.clear()")  # somebody else's browser has no key of the operator
+    key = driver.execute_script("const kept = {...localStorage}; localStorage.clear(); return kept")
     driver.switch_to.new_window("tab")
     try:
         operator.opens(served.url)
@@ -96,6 +89,7 @@ def test_who_watches_cannot_command(served: Served, operator: Person) -> None:
         assert not driver.find_elements("css selector", "[role=slider]")
         assert "Give up control" not in operator.text
     finally:
+        driver.execute_script("Object.assign(localStorage, arguments[0])", key)
         driver.close()
         driver.switch_to.window(first)
     assert "Give up control" in operator.text

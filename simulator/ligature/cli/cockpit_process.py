@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from typing import TYPE_CHECKING
 
 import ligature
 from ligature.bus import Block, BusError
@@ -12,6 +13,10 @@ from ligature.cli.options import RunOptions
 from ligature.cockpit.address import TOKEN_VARIABLE, AddressError, read_address
 from ligature.cockpit.pictures import Pictures
 from ligature.model.state import state_dtype
+
+if TYPE_CHECKING:
+    from ligature.ros.health import TopicHealth
+    from ligature.teleop.remote import TeleopRemote
 
 PHYSICS_SILENCE = 5.0
 """Seconds without a sign of life of the physics process after which this one ends."""
@@ -36,8 +41,9 @@ def main() -> None:
     try:
         address = read_address(options.cockpit)
         cockpit = Cockpit(
-            scene, block, pictures, address, os.environ.get(TOKEN_VARIABLE, ""), lambda text: tell("warning", text)
-        )
+            scene, block, pictures, address, os.environ.get(TOKEN_VARIABLE, ""), lambda text: tell("warning", text),
+            _on_ros(options.prefix) if options.ros else None,
+        )  # fmt: skip
     except AddressError as error:
         tell("fatal", str(error))
         stop.wait()
@@ -46,6 +52,18 @@ def main() -> None:
     while not stop.is_set() and block.age < PHYSICS_SILENCE:
         cockpit.turn()
     cockpit.close()
+
+
+def _on_ros(prefix: str) -> tuple[TopicHealth, TeleopRemote]:
+    """What the page shows of ROS."""
+    from ligature.ros.health import TopicHealth, begin_node
+    from ligature.teleop.remote import TeleopRemote
+
+    begin_node()
+    remote = TeleopRemote("/" + "".join(f"{part}/" for part in prefix.split("/") if part))
+    health = TopicHealth(remote.look)
+    health.start()
+    return health, remote
 
 
 if __name__ == "__main__":

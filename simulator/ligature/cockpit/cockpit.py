@@ -6,12 +6,9 @@ made on one thread. Metres, radians, seconds.
 
 from __future__ import annotations
 
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +19,15 @@ from ligature.bus import Block, Outbox
 from ligature.cockpit.address import Address
 from ligature.cockpit.arm_facts import ArmFacts
 from ligature.cockpit.arm_panel import ArmControls, ArmStatus
+from ligature.cockpit.audience import Audience
+from ligature.cockpit.camera_panel import NO_PICTURES, CameraControls
 from ligature.cockpit.curves import Curves
 from ligature.cockpit.deadman import PATIENCE, DeadMan
-from ligature.cockpit.desk import Desk
 from ligature.cockpit.gate import Gate
-from ligature.cockpit.page import LEFT_WIDTH, Header, look_from, serve
+from ligature.cockpit.page import CAMERA_HEIGHT, LEFT_WIDTH, Header, look_from, serve
 from ligature.cockpit.pictures import Pictures, sights
 from ligature.cockpit.pursuit import ArmPursuits
+from ligature.cockpit.ros_panel import Health, Remote, RosPanel, TeleopControls, obey_teleop
 from ligature.cockpit.simulation_panel import Clockwork, SimulationControls, SimulationPanel
 from ligature.cockpit.stage import Stage, first_view
 from ligature.cockpit.statelog import StateLog
@@ -40,19 +39,22 @@ PERIOD = 0.01
 STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD = 0.05, 0.2, 0.4
 """Seconds between turns of the loop, poses, words and controls, and curves."""
 
-KEY = "ligature_operator"
-KEY_PATIENCE = 10.0
 TOLD = ("warning", "error")
 """Events of an arm that are shown beside it."""
-
-NO_PICTURES = "off"
 
 
 class Cockpit:
     """The page of one running simulation; `turn` does everything that is due."""
 
     def __init__(
-        self, scene: Scene, block: Block, pictures: Pictures, address: Address, token: str, warn: Callable[[str], None]
+        self,
+        scene: Scene,
+        block: Block,
+        pictures: Pictures,
+        address: Address,
+        token: str,
+        warn: Callable[[str], None],
+        ros: tuple[Health, Remote] | None = None,
     ) -> None:
         self._scene, self._block, self._pictures, self._warn = scene, block, pictures, warn
         self._ring, self._outbox = block.rings["cockpit"], Outbox(block.rings["cockpit"])
@@ -61,57 +63,53 @@ class Cockpit:
         block.events.skip()
         self._address = address
         self.server = serve(address, Gate(address, token))
-        self._desk, self._deadman = Desk(), DeadMan(self.server)
+        self._deadman = DeadMan(self.server)
         self._inbox: deque[tuple[str, int, Any]] = deque()
-        self._clients: dict[int, ClientHandle] = {}
-        self._seats: dict[int, list[Any]] = {}
         self._clockwork = Clockwork(self._outbox.push)
         self._speed = "1"
         self._log: StateLog | None = None
         self._logged = ""
         facts = [ArmFacts.of(scene, index) for index in range(len(scene.arms))]
         self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
-        self._lay_out(facts)
+        self._lay_out(facts, ros)
         self._controls: list[ArmControls] = []
         self._run_controls: SimulationControls | None = None
+        self._camera_controls: CameraControls | None = None
+        self._teleop_controls: TeleopControls | None = None
         self._due = {self._show_stage: 0.0, self._show_words: 0.0, self._show_curves: 0.0}
         self._last = time.monotonic()
         self._moved_at, self._tick = self._last, -1
-        self.server.on_client_connect(self._on_connect)
-        self.server.on_client_disconnect(self._on_disconnect)
+        self._audience = Audience(
+            self.server, lambda *what: self._inbox.append(what), self._begin_operating, self._end_operating
+        )
 
-    def _lay_out(self, facts: list[ArmFacts]) -> None:
+    def _lay_out(self, facts: list[ArmFacts], ros: tuple[Health, Remote] | None) -> None:
         server, scene = self.server, self._scene
         look_from(server, *first_view(scene, self._state))
         self._header = Header(server, _title(scene))
         self._panel = SimulationPanel(server)
         first = next((f.index for f in facts if f.description.kind is ArmKind.PSM), 0)
         self._arms = [ArmStatus(server, f, f.index == first) for f in facts]
-        left = server.gui.add_panel()
+        self._ros = None if ros is None else RosPanel(server, *ros)
+        panels = []
         self._sights = {sight.name: sight for sight in sights(scene)}
         self._sight = next(iter(self._sights), NO_PICTURES)
         if self._sights:
-            with left.add_tab("Cameras"):
+            panels.append(server.gui.add_panel())
+            with panels[-1].add_tab("Cameras"):
                 self._camera_folder = server.gui.add_folder("View")
                 self._picture = server.gui.add_image(np.zeros((2, 2, 3), np.uint8), format="jpeg", jpeg_quality=80)
                 self._camera_words = server.gui.add_html("")
         self._curves = Curves(scene)
-        with left.add_tab("Curves"):
+        panels.append(server.gui.add_panel())
+        with panels[-1].add_tab("Curves"):
             self._curves.show(server.gui)
-        left.dock_left()
-        left.set_width(LEFT_WIDTH)
+        panels[0].dock_left()
+        panels[0].set_width(LEFT_WIDTH)
+        if len(panels) > 1:
+            panels[1].dock_below(panels[0])
+            panels[0].set_height(CAMERA_HEIGHT)
         self._stage = Stage(server, scene)
-
-    # --- browsers, on the network's thread -----------------------------------------------------
-
-    async def _on_connect(self, client: ClientHandle) -> None:
-        self._put("connect", client.client_id, client)
-
-    async def _on_disconnect(self, client: ClientHandle) -> None:
-        self._put("disconnect", client.client_id, None)
-
-    def _put(self, word: str, client: int, value: Any) -> None:
-        self._inbox.append((word, client, value))
 
     @property
     def url(self) -> str:
@@ -126,7 +124,9 @@ class Cockpit:
         self._ring.beat()
         self._block.read(self._state)
         while self._inbox:
-            self._hear(*self._inbox.popleft(), now)
+            word, client, value = self._inbox.popleft()
+            if not self._audience.hear(word, client, value, now):
+                self._obey(word, value)
         self._follow(now, now - self._last)
         self._last = now
         self._curves.observe(self._state[0])
@@ -144,113 +144,34 @@ class Cockpit:
         self._pictures.close()
         self.server.stop()
 
-    # --- what browsers do ----------------------------------------------------------------------
+    # --- who operates --------------------------------------------------------------------------
 
-    def _hear(self, word: str, client: int, value: Any, now: float) -> None:
-        if word == "connect":
-            self._clients[client] = value
-            threading.Thread(target=self._ask_key, args=(value,), daemon=True).start()
-            self._seat(client)
-        elif word == "disconnect":
-            self._clients.pop(client, None)
-            self._seats.pop(client, None)
-            if self._desk.leaves(client, now):
-                self._stop_all("the operator's browser is gone")
-                self._forget_controls()
-        elif client not in self._clients:
-            return
-        elif word == "key":
-            if self._desk.comes_back(client, value, now):
-                self._begin_operating(client)
-        elif word == "claim":
-            self._claim(client, value, now)
-        elif word == "release" and self._desk.releases(client):
-            self._stop_all("the operator gave up control")
-            self._end_operating(client)
-        elif client == self._desk.operator:
-            self._obey(word, value)
+    def _begin_operating(self, client: ClientHandle) -> None:
+        state, own = self._state[0], client.client_id
 
-    def _ask_key(self, client: ClientHandle) -> None:
-        """Ask the browser for the key that it was given as operator, on a thread of its own: it may take a while."""
-        with suppress(RuntimeError, TimeoutError):
-            key = client.local_storage.get_item(KEY, timeout=KEY_PATIENCE)
-            if key:
-                self._put("key", client.client_id, key)
+        def act(word: str, value: Any) -> None:
+            self._inbox.append((word, own, value))
 
-    def _claim(self, client: int, key: str, now: float) -> None:
-        before = self._desk.operator
-        new = self._desk.claim(client, now, key)
-        if new is None:
-            kept = self._desk.kept(now)
-            why = f"The desk is kept for its operator for {kept:.0f} s." if kept else "Somebody operates already."
-            self._clients[client].add_notification("Watching only", why, auto_close_seconds=5.0, color="yellow")
-            return
-        if before is not None and before != client:
-            self._stop_all("the operator went to another page")
-            self._end_operating(before)
-        self._clients[client].local_storage.set_item(KEY, new)
-        self._begin_operating(client)
-
-    def _seat(self, client: int) -> None:
-        """Tell a browser what it may do, and let it ask for more."""
-        handle = self._clients[client]
-        for shown in self._seats.pop(client, []):
-            shown.remove()
-        operates = client == self._desk.operator
-        if operates:
-            button = handle.gui.add_button("Give up control", color="gray", order=1)
-            button.on_click(partial(self._on_release, client))
-        else:
-            button = handle.gui.add_button("Operate", color="green", order=1, hint="One browser operates, others watch")
-            button.on_click(partial(self._on_claim, client))
-        self._seats[client] = [button]
-
-    async def _on_release(self, client: int, _: Any) -> None:
-        self._put("release", client, None)
-
-    async def _on_claim(self, client: int, _: Any) -> None:
-        threading.Thread(target=self._claim_with_key, args=(client,), daemon=True).start()
-
-    def _claim_with_key(self, client: int) -> None:
-        handle, key = self._clients.get(client), ""
-        if handle is not None:
-            with suppress(RuntimeError, TimeoutError):
-                key = handle.local_storage.get_item(KEY, timeout=1.0) or ""
-        self._put("claim", client, key)
-
-    def _begin_operating(self, client: int) -> None:
-        handle, state = self._clients[client], self._state[0]
-        self._forget_controls()
-        self._seat(client)
         self._controls = [
-            ArmControls(handle, status, state, lambda word, arm, value: self._put(word, client, (arm, value)))
+            ArmControls(client, status, state, lambda word, arm, value: act(word, (arm, value)))
             for status in self._arms
         ]
         self._run_controls = SimulationControls(
-            handle, self._panel, self._clockwork.paused, self._speed, self._log is not None,
-            lambda word, value: self._put(word, client, value),
-        )  # fmt: skip
+            client, self._panel, self._clockwork.paused, self._speed, self._log is not None, act
+        )
         if self._sights:
-            with self._camera_folder:
-                choice = handle.gui.add_dropdown("Camera", (*self._sights, NO_PICTURES), initial_value=self._sight)
-            choice.on_update(partial(self._on_sight, client))
-            self._seats[client].append(choice)
+            self._camera_controls = CameraControls(client, self._camera_folder, tuple(self._sights), self._sight, act)
+        if self._ros is not None:
+            self._teleop_controls = TeleopControls(client, self._ros, act)
 
-    async def _on_sight(self, client: int, event: Any) -> None:
-        self._put("sight", client, event.target.value)
-
-    def _end_operating(self, client: int) -> None:
-        for controls in self._controls:
-            controls.remove()
-        if self._run_controls is not None:
-            self._run_controls.remove()
-        self._forget_controls()
-        if client in self._clients:
-            self._seat(client)
-
-    def _forget_controls(self) -> None:
-        """The controls went with their browser."""
-        self._controls, self._run_controls = [], None
+    def _end_operating(self, why: str, there: bool) -> None:
+        """Nobody operates any more; ``there`` tells whether the browser still shows the controls."""
+        self._stop_all(why)
+        if there:
+            for controls in (*self._controls, self._run_controls, self._camera_controls, self._teleop_controls):
+                if controls is not None:
+                    controls.remove()
+        self._controls, self._run_controls, self._camera_controls, self._teleop_controls = [], None, None, None
 
     # --- what the operator does ----------------------------------------------------------------
 
@@ -273,6 +194,8 @@ class Cockpit:
             self._switch_log(bool(value))
         elif word == "sight":
             self._sight = value
+        elif self._ros is not None:
+            obey_teleop(self._ros.remote, word, value)
 
     def _obey_arm(self, word: str, arm: int, value: Any) -> None:
         state, facts, pursuits = self._state[0], self._arms[arm].facts, self._pursuits[arm]
@@ -300,7 +223,7 @@ class Cockpit:
         """Send the next goals of what is pursued, as long as the operator's browser answers."""
         led = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
         dragged = any(controls.dragging for controls in self._controls)
-        self._deadman.watch(self._desk.operator if led or dragged else None)
+        self._deadman.watch(self._audience.desk.operator if led or dragged else None)
         if self._deadman.silence > PATIENCE:
             silent = 1e3 * self._deadman.silence
             self._stop_all(f"the operator's browser has not answered for {silent:.0f} ms")
@@ -343,7 +266,7 @@ class Cockpit:
     # --- what is shown -------------------------------------------------------------------------
 
     def _show_stage(self, now: float) -> float:
-        if self._clients:
+        if self._audience.clients:
             self._stage.update(self._state)
             for arm, controls in enumerate(self._controls):
                 if not self._pursuits[arm].active:
@@ -359,7 +282,7 @@ class Cockpit:
                     self._pursuits[event.arm].stop()
         if self._tick != int(state["tick"]):
             self._tick, self._moved_at = int(state["tick"]), now
-        if self._clients:
+        if self._audience.clients:
             self._show_header(now)
             self._panel.refresh(self._run_words())
             for arm in self._arms:
@@ -367,21 +290,24 @@ class Cockpit:
             for controls, pursuits in zip(self._controls, self._pursuits, strict=False):
                 controls.refresh(state, not pursuits.active)
             self._show_picture()
-        self._pictures.want(self._sights.get(self._sight) if self._clients else None)
+            self._show_ros()
+        self._pictures.want(self._sights.get(self._sight) if self._audience.clients else None)
         return WORDS_PERIOD
+
+    def _show_ros(self) -> None:
+        if self._ros is None:
+            return
+        self._ros.refresh()
+        old = self._teleop_controls
+        if old is not None and old.outdated(self._ros):
+            old.remove()
+            self._teleop_controls = TeleopControls(old.client, self._ros, old.act)
 
     def _show_header(self, now: float) -> None:
         factor = float(self._block.figures["real_time_factor"][0])
         running = "paused" if self._clockwork.paused else "running" if now - self._moved_at < 1.0 else "standing still"
-        kept = self._desk.kept(now)
-        operated = (
-            "operated"
-            if self._desk.operator is not None
-            else f"operator away, desk kept {kept:.0f} s"
-            if kept
-            else "nobody operates"
-        )
-        self._header.refresh(float(self._state["sim_time"][0]), factor, running, operated, len(self._clients))
+        operated = self._audience.words(now)
+        self._header.refresh(float(self._state["sim_time"][0]), factor, running, operated, len(self._audience.clients))
 
     def _run_words(self) -> list[str]:
         figures = self._block.figures
@@ -404,7 +330,7 @@ class Cockpit:
             self._camera_words.content = "<small>no pictures</small>"
 
     def _show_curves(self, now: float) -> float:
-        if self._clients:
+        if self._audience.clients:
             self._curves.refresh(self._state[0])
         return CURVES_PERIOD
 

@@ -34,6 +34,7 @@ class Curves:
         self._rows: deque[list[float]] = deque(maxlen=int(SPAN * SAMPLES))
         self._handles: list[Any] = []
         self._resets = -1
+        self._sent = float("-inf")
         self._monitor: Monitor | None = None
         self._task: Any = None
 
@@ -70,9 +71,12 @@ class Curves:
 
     def refresh(self, state: Any) -> None:
         """Send the curves and the words of the task."""
-        self._task.content = self._words(state)
-        if not self._times:
+        words = self._words(state)
+        if words != self._task.content:
+            self._task.content = words
+        if not self._times or self._times[-1] == self._sent:
             return
+        self._sent = self._times[-1]
         times, rows = np.array(self._times), np.array(self._rows)
         column = 0
         for handle, (_, names, _) in zip(self._handles, self._charts, strict=True):

@@ -16,8 +16,8 @@ from ligature.cockpit.gate import Gate, guarded
 from ligature.cockpit.stage import VIEW_ANGLE
 
 BRAND = (28, 126, 214)
-LEFT_WIDTH, RIGHT_WIDTH = 380, 370
-"""Pixels of the panels beside the 3D view."""
+LEFT_WIDTH, RIGHT_WIDTH, CAMERA_HEIGHT = 380, 370, 260
+"""Pixels of the panels beside the 3D view, and of the camera's pictures above the curves."""
 
 
 def serve(address: Address, gate: Gate) -> ViserServer:

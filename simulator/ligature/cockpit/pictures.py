@@ -112,6 +112,8 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
     while True:
         while pipe.poll(None if sight is None else 0):
             sight = pipe.recv()
+            if easel is not None:
+                easel.forget()
         if sight is None:
             continue
         try:
@@ -120,10 +122,11 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
             pipe.send(str(error))
             return
         begin = time.monotonic()
-        picture = easel.picture(sight)
-        if picture is None:
+        if easel.ended:
             return
-        pipe.send(picture)
+        picture = easel.picture(sight)
+        if picture is not None:
+            pipe.send(picture)
         spent = time.monotonic() - begin
         time.sleep(max(PERIOD - spent, REST * spent))
 
@@ -135,18 +138,30 @@ class _Easel:
         self._scene = scene
         self._renderer = Renderer(scene)
         self._state = new_state(scene)
+        self._drawn = -1
         try:
             self._block = Block.attach(bus, state_dtype(scene))
         except BusError as error:
             raise RuntimeError(str(error)) from error
 
+    @property
+    def ended(self) -> bool:
+        """Whether the simulation is over."""
+        return self._block.age > PHYSICS_SILENCE
+
+    def forget(self) -> None:
+        """Draw the same moment again when asked."""
+        self._drawn = -1
+
     def picture(self, sight: Sight) -> NDArray[np.uint8] | None:
-        """All eyes of ``sight`` side by side, (h, w, 3); None when the simulation has ended."""
+        """All eyes of ``sight`` side by side, (h, w, 3); None when nothing has happened since the last one."""
         from ligature.render import view_of
 
-        if self._block.age > PHYSICS_SILENCE:
-            return None
         self._block.read(self._state)
+        moment = int(self._state["tick"][0])
+        if moment == self._drawn:
+            return None
+        self._drawn = moment
         shown = []
         for index, eye in sight.eyes:
             camera = self._scene.cameras[index]

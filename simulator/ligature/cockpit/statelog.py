@@ -23,6 +23,10 @@ INTERVAL = 0.02
 """Simulated seconds between rows."""
 
 
+ROUNDING = 1e-6
+"""Seconds by which simulated time may seem to be early: it is a sum of ticks."""
+
+
 class StateLog:
     """Writes ``FOLDER/SCENE-DATE.npy`` and ``.json``; until `close` the array is called ``.part``."""
 
@@ -51,7 +55,7 @@ class StateLog:
         now = float(state["sim_time"][0])
         if now < self._next:
             return
-        self._next = now + INTERVAL
+        self._next = now + INTERVAL - ROUNDING
         for name in FIELDS:
             self._row[name] = state[name]
         self._file.write(self._row.tobytes())

@@ -1,0 +1,30 @@
+"""Which camera the page shows: the operator's choice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from viser import ClientHandle
+
+NO_PICTURES = "off"
+
+
+class CameraControls:
+    """The operator's; ``act`` takes a word and a value, on the network's thread."""
+
+    def __init__(
+        self, client: ClientHandle, folder: Any, names: tuple[str, ...], chosen: str, act: Callable[[str, Any], None]
+    ) -> None:
+        with folder:
+            self._choice = client.gui.add_dropdown("Camera", (*names, NO_PICTURES), initial_value=chosen)
+        self._act = act
+        self._choice.on_update(self._on_choice)
+
+    async def _on_choice(self, event: Any) -> None:
+        if event.client_id is not None:
+            self._act("sight", event.target.value)
+
+    def remove(self) -> None:
+        """Take the choice off the page."""
+        self._choice.remove()
