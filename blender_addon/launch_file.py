@@ -45,7 +45,23 @@ def import_launch(path: Path, scene: bpy.types.Scene, indices: tuple[int, ...] |
         reference = getattr(launch, name)
         made = _opened(reference, scene, done) if reference is not None else None
         setattr(stored, name, made.collection if made else None)
+    stored.environment = _environment(stored.world, resolver, scene, done)
     return done
+
+
+def _environment(
+    world: bpy.types.Collection | None, resolver: Resolver, scene: bpy.types.Scene, done: list[Import]
+) -> bpy.types.Collection | None:
+    """The model that the world names as its surroundings, brought in."""
+    if world is None or not world.adf.world.environment:
+        return None
+    try:
+        path = resolver.resolve(world.adf.world.environment, Path(world.adf.filepath).parent)
+        done.append(import_file(path, scene))
+    except (AdfError, OSError) as error:
+        done.append(Import(scene.collection, problems=[str(error)]))
+        return None
+    return done[-1].collection
 
 
 def _opened(reference, scene: bpy.types.Scene, done: list[Import]) -> Import | None:
@@ -70,6 +86,8 @@ def export_scene(scene: bpy.types.Scene, path: Path, remember: bool = True) -> l
     folder = path.parent
     targets = [(entry.collection, entry.path) for entry in stored.models]
     targets += [(getattr(stored, name), getattr(stored, f"{name}_path")) for name in ("world", "devices", "colours")]
+    if stored.environment is not None and stored.world is not None:
+        targets.append((stored.environment, Path(stored.world_path).parent / stored.world.adf.world.environment))
     files: dict[Path, bytes] = {}
     texts: list[tuple[bpy.types.Collection, Path, str]] = []
     for collection, name in targets:

@@ -19,6 +19,10 @@ class ADF_OT_add_to_launch(bpy.types.Operator):
         name="Path", description="Path from the launch file's folder; the file's own when empty"
     )
 
+    environment: bpy.props.BoolProperty(
+        name="As Environment", description="Make the model the surroundings that the world file names"
+    )
+
     @classmethod
     def poll(cls, context):
         collection = chosen_collection(context)
@@ -35,11 +39,21 @@ class ADF_OT_add_to_launch(bpy.types.Operator):
             setattr(stored, name, collection)
             setattr(stored, f"{name}_path", path)
             return {"FINISHED"}
+        if self.environment:
+            return self._surround(stored, collection, path)
         if any(entry.collection is collection for entry in stored.models):
             self.report({"ERROR"}, f"'{collection.name}' is listed already")
             return {"CANCELLED"}
         entry = stored.models.add()
         entry.collection, entry.path = collection, path
+        return {"FINISHED"}
+
+    def _surround(self, stored, collection, path):
+        if stored.world is None or collection.adf.kind != "MODEL":
+            self.report({"ERROR"}, f"'{collection.name}': surroundings are a model, and need a world; make one first")
+            return {"CANCELLED"}
+        stored.environment = collection
+        stored.world.adf.world.environment = path
         return {"FINISHED"}
 
 

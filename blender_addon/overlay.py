@@ -25,6 +25,9 @@ COLOURS = {
 SIZE = 0.03
 """Length in metres of what has no size of its own."""
 
+SIZE_OF_HANDLE_GAP = 0.08 * SIZE
+"""How far the handle of a limit stands off its place, so that those of a locked axis are two."""
+
 _state: dict = {"handle": None, "dirty": True, "batches": []}
 
 
@@ -168,58 +171,19 @@ def _draw() -> None:
 
 
 @bpy.app.handlers.persistent
-def _changed(*arguments) -> None:
+def redraw(*arguments) -> None:
+    """Work the lines out again when they are drawn next."""
     _state["dirty"] = True
 
 
-class ADF_GGT_limits(bpy.types.GizmoGroup):
-    """Handles on the limits of the active joint."""
-
-    bl_label = "Joint Limits"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "WINDOW"
-    bl_options = {"3D", "PERSISTENT"}
-
-    @classmethod
-    def poll(cls, context):
-        obj = context.object
-        return (
-            obj is not None
-            and obj.adf.role == "JOINT"
-            and obj.adf.joint.type in ("revolute", "prismatic", "torsion spring", "linear spring")
-            and obj.adf.joint.is_property_set("joint_limits_low")
-        )
-
-    def setup(self, context):
-        self.handles = []
-        for name in ("joint_limits_low", "joint_limits_high"):
-            gizmo = self.gizmos.new("GIZMO_GT_arrow_3d")
-            gizmo.draw_style = "BOX"
-            gizmo.color, gizmo.color_highlight = COLOURS["limit"][:3], (1.0, 1.0, 1.0)
-            gizmo.alpha, gizmo.scale_basis = 0.9, 0.3
-            self.handles.append((gizmo, name))
-        self.refresh(context)
-
-    def refresh(self, context):
-        from mathutils import Matrix
-
-        obj = context.object
-        slides = obj.adf.joint.type in ("prismatic", "linear spring")
-        turn = Matrix.Rotation(pi / 2, 4, "Y") if obj.adf.joint.type == "prismatic" else Matrix.Identity(4)
-        for gizmo, name in self.handles:
-            gizmo.target_set_prop("offset", obj.adf.joint, name)
-            base = Matrix(rest_pose(obj).tolist()) @ turn
-            gizmo.matrix_basis = base if slides else base @ Matrix.Translation((0.0, 0.0, 0.5 * SIZE))
-
-
-CLASSES = (ADF_GGT_limits,)
+CLASSES = ()
 
 
 def attach() -> None:
     """Start drawing, unless there is no window."""
-    bpy.app.handlers.depsgraph_update_post.append(_changed)
-    bpy.app.handlers.load_post.append(_changed)
-    bpy.app.handlers.undo_post.append(_changed)
+    bpy.app.handlers.depsgraph_update_post.append(redraw)
+    bpy.app.handlers.load_post.append(redraw)
+    bpy.app.handlers.undo_post.append(redraw)
     if not bpy.app.background:
         _state["handle"] = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
 
@@ -227,7 +191,7 @@ def attach() -> None:
 def detach() -> None:
     """Stop drawing."""
     for handlers in (bpy.app.handlers.depsgraph_update_post, bpy.app.handlers.load_post, bpy.app.handlers.undo_post):
-        handlers.remove(_changed)
+        handlers.remove(redraw)
     if _state["handle"] is not None:
         bpy.types.SpaceView3D.draw_handler_remove(_state["handle"], "WINDOW")
     _state.update(handle=None, dirty=True, batches=[])

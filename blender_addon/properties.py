@@ -137,6 +137,9 @@ class ADF_PG_scene(bpy.types.PropertyGroup):
     source: bpy.props.StringProperty(options={"HIDDEN"})
     byte_order_mark: bpy.props.BoolProperty(options={"HIDDEN"})
     world: bpy.props.PointerProperty(type=bpy.types.Collection, name="World")
+    environment: bpy.props.PointerProperty(
+        type=bpy.types.Collection, name="Environment", description="Model that the world names as its surroundings"
+    )
     devices: bpy.props.PointerProperty(type=bpy.types.Collection, name="Input Devices")
     colours: bpy.props.PointerProperty(type=bpy.types.Collection, name="Colours")
     world_path: bpy.props.StringProperty(name="World File", default="world.yaml")

@@ -9,13 +9,16 @@ from . import (
     decompose_operators,
     file_operators,
     generator_operators,
+    gizmos,
+    key_panels,
     launch_operators,
+    menus,
     object_operators,
     overlay,
-    panels,
     preview_operators,
     properties,
     schema_properties,
+    sidebar,
     simulate_operators,
 )
 
@@ -28,8 +31,11 @@ MODULES = (
     decompose_operators,
     preview_operators,
     simulate_operators,
-    panels,
+    key_panels,
+    sidebar,
+    menus,
     overlay,
+    gizmos,
 )
 
 

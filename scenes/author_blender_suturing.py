@@ -63,12 +63,12 @@ def paint(obj: bpy.types.Object, name: str, colour: tuple[float, float, float], 
 
 def woven(folder: Path) -> bpy.types.Image:
     """A small picture of woven cloth, as a file."""
-    image = bpy.data.images.new("drape", 64, 64)
+    image = bpy.data.images.new("drape", 256, 256)
     pixels = []
-    for row in range(64):
-        for column in range(64):
+    for row in range(256):
+        for column in range(256):
             light = 0.75 + 0.25 * ((row // 4 + column // 4) % 2)
-            pixels += [0.16 * light, 0.42 * light, 0.46 * light, 1.0]
+            pixels += [0.10 * light, 0.30 * light, 0.33 * light, 1.0]
     image.pixels = pixels
     image.filepath_raw, image.file_format = str(folder / "drape.png"), "PNG"
     image.save()
@@ -131,8 +131,7 @@ def view(folder: Path) -> None:
     bpy.ops.adf.make(role="BODY")
     frame.adf.body.mass = 0.0
     bpy.ops.adf.new_file(kind="WORLD", name="world", namespace="/ambf/env/")
-    world = bpy.context.scene.adf.world.adf.world
-    world.gravity, world.environment = (0.0, 0.0, -9.81), "../suturing_small/environment.yaml"
+    bpy.context.scene.adf.world.adf.world.gravity = (0.0, 0.0, -9.81)
     bpy.ops.adf.add_endoscope(parent="BODY CameraFrame", separation=0.004, field_of_view=1.2)
     tilt = 0.35
     cursor(at(0.05, 0.1 * sin(tilt), 0.12 * cos(tilt)), (-tilt, tilt, 0.0))
@@ -140,12 +139,12 @@ def view(folder: Path) -> None:
 
 
 def arms(folder: Path) -> None:
-    """The two arms with what lets them grasp, from files that are there, listed in the launch file."""
-    for name in ("psm1", "ghosts_actuators_psm1", "psm2", "ghosts_actuators_psm2"):
+    """The room, and the two arms with what lets them grasp: files that are there, listed in the launch file."""
+    for name in ("environment", "psm1", "ghosts_actuators_psm1", "psm2", "ghosts_actuators_psm2"):
         bpy.ops.adf.import_file(filepath=str(SCENES / "suturing_small" / f"{name}.yaml"))
         layers = bpy.context.view_layer
         layers.active_layer_collection = layers.layer_collection.children[name]
-        bpy.ops.adf.add_to_launch(path=f"../suturing_small/{name}.yaml")
+        bpy.ops.adf.add_to_launch(path=f"../suturing_small/{name}.yaml", environment=name == "environment")
 
 
 STEPS = (drape, flaps, holes, needle, view, arms)
@@ -154,7 +153,7 @@ STEPS = (drape, flaps, holes, needle, view, arms)
 def write(folder: Path) -> None:
     """Check the scene, and write the launch file with all that it names."""
     bpy.ops.adf.check()
-    errors = [item.message for item in bpy.context.scene.adf.findings if item.severity != "INFO"]
+    errors = [item.message for item in bpy.context.scene.adf.findings if item.severity == "ERROR"]
     if errors:
         raise SystemExit("\n".join(errors))
     bpy.ops.adf.export_scene(filepath=str(folder / "launch.yaml"))

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import sysconfig
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -45,8 +45,12 @@ def display() -> Iterator[str]:
 
 
 @pytest.fixture
-def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Path]:
-    """What the session found, its output, and the folder of its pictures."""
+def session(display: str, scripts: Path, tmp_path: Path) -> Callable[[str], tuple[dict, str]]:
+    """Runs a script of `gui`: what it found, and its output; its pictures lie in ``tmp_path``."""
+    return lambda script: run_session(script, display, scripts, tmp_path)
+
+
+def run_session(script: str, display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str]:
     binary = shutil.which("blender")
     if binary is None:
         pytest.skip("Blender is not installed")
@@ -55,7 +59,7 @@ def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Pat
         "BLENDER_USER_CONFIG": str(tmp_path / "config"), "PYTHONDONTWRITEBYTECODE": "1",
         "LIGATURE_TEST_PACKAGES": sysconfig.get_paths()["purelib"],
         "LIGATURE_COMMAND": str(Path(sys.executable).parent / "ligature"),
-        "PYTHONPATH": str(ROOT / "simulator"),
+        "PYTHONPATH": str(ROOT / "simulator"), "LIGATURE_ROOT": str(ROOT),
     }  # fmt: skip
     environment.pop("WAYLAND_DISPLAY", None)
     blank = tmp_path / "blank.blend"  # with a file to open, Blender shows no splash
@@ -63,7 +67,8 @@ def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Pat
     subprocess.run(
         [binary, "-b", "--factory-startup", "--python-expr", save], capture_output=True, timeout=100, check=True
     )
-    startup = f"import sys; sys.path.append({sysconfig.get_paths()['purelib']!r})"
+    folders = [sysconfig.get_paths()["purelib"], str(HERE / "gui")]
+    startup = f"import sys; sys.path += {folders!r}"
     command = [
         binary,
         "--factory-startup",
@@ -77,7 +82,7 @@ def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Pat
         "--python-expr",
         startup,
     ]
-    command += ["--python", str(HERE / "gui" / "session.py"), "--", str(tmp_path)]
+    command += ["--python", str(HERE / "gui" / script), "--", str(tmp_path)]
     start = time.monotonic()
     log = tmp_path / "log"
     with log.open("w") as stream:
@@ -90,13 +95,18 @@ def session(display: str, scripts: Path, tmp_path: Path) -> tuple[dict, str, Pat
     output = f"{log.read_text(errors='replace')}\nafter {time.monotonic() - start:.0f} s, status {process.returncode}"
     told = [line for line in output.splitlines() if line.startswith("RESULT ")]
     assert told, output[-5000:]
-    return json.loads(told[-1].removeprefix("RESULT ")), output, tmp_path
-
-
-def test_panels_draw_operators_are_undone_and_nothing_is_left(session: tuple[dict, str, Path]) -> None:
-    found, output, folder = session
+    found = json.loads(told[-1].removeprefix("RESULT "))
     assert found["errors"] == [], "\n".join(found["errors"])
     assert "Traceback" not in output and "Error: Python" not in output, output[-5000:]
+    for name in found["pictures"]:
+        assert (tmp_path / f"{name}.png").stat().st_size > 20_000
+        if target := os.environ.get("LIGATURE_PICTURES"):
+            shutil.copy(tmp_path / f"{name}.png", Path(target) / f"{name}.png")
+    return found, output
+
+
+def test_panels_draw_operators_are_undone_and_nothing_is_left(session: Callable[[str], tuple[dict, str]]) -> None:
+    found, _ = session("session.py")
     assert set(found["drawn"]) >= {
         "BODY",
         "JOINT",
@@ -114,9 +124,15 @@ def test_panels_draw_operators_are_undone_and_nothing_is_left(session: tuple[dic
     wrong = {label: how for label, how in found["undone"].items() if how != expected[label.split()[0]]}
     assert wrong == {}
     assert found["left"] == []
-    for name in found["pictures"]:
-        assert (folder / f"{name}.png").stat().st_size > 20_000
-    target = os.environ.get("LIGATURE_PICTURES")
-    if target:
-        for name in found["pictures"]:
-            shutil.copy(folder / f"{name}.png", Path(target) / f"{name}.png")
+    assert len(found["dragged"]) == 3
+    for label, told in found["dragged"].items():
+        assert abs(told["after"] - told["before"]) > 1e-3, label
+        assert told["undone"] == pytest.approx(told["before"], abs=1e-7), label
+
+
+def test_the_tutorial_leads_to_a_scene_that_moves(session: Callable[[str], tuple[dict, str]], tmp_path: Path) -> None:
+    found, output = session("tutorial.py")
+    assert len(found["pictures"]) == 5
+    assert "bodies over" in output  # Simulate Here played the motion back
+    scene = tmp_path / "scenes" / "blender_suturing"
+    assert (scene / "pad.yaml").read_bytes() == (ROOT / "scenes" / "blender_suturing" / "pad.yaml").read_bytes()

@@ -1,54 +1,18 @@
-"""One session of Blender with a window: every panel is drawn, every operator is undone, pictures are taken.
-
-Started with the folder for pictures after ``--``; prints one line ``RESULT {…}`` and quits.
-"""
+"""A session of Blender with a window: every panel is drawn, every operator is undone, pictures are taken."""
 
 import json
 import os
 import sys
-import time
-import traceback
 from pathlib import Path
 
 import addon_utils
 import bpy
+import window
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from window import OUT, RESULT, STEPS, find, picture, redraw, select, step, view
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "inside"))
-OUT = Path(sys.argv[sys.argv.index("--") + 1])
-RESULT = {"undone": {}, "drawn": [], "pictures": [], "errors": []}
-STEPS = []
-START = time.monotonic()
-
-
-def step(function):
-    """Enter a function that runs with a window, one after the other."""
-    STEPS.append(function)
-    return function
-
-
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def view():
-    area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
-    return {
-        "window": window(),
-        "area": area,
-        "region": next(r for r in area.regions if r.type == "WINDOW"),
-        "space_data": area.spaces[0],
-    }
-
-
-def redraw():
-    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-
-
-def picture(name):
-    for _ in range(3):  # panels slide into place
-        redraw()
-    bpy.ops.screen.screenshot(filepath=str(OUT / f"{name}.png"))
-    RESULT["pictures"].append(name)
+step(window.enable)
 
 
 def plain(value):
@@ -80,26 +44,6 @@ def scene_print():
     return json.dumps(told)
 
 
-def select(*objects):
-    for obj in bpy.context.view_layer.objects:
-        obj.select_set(obj in objects)
-    bpy.context.view_layer.objects.active = objects[-1]
-
-
-def find(role, name=""):
-    return next(o for o in bpy.data.objects if o.adf.role == role and name in o.name)
-
-
-@step
-def enable():
-    assert addon_utils.enable("adf_studio", default_set=True) is not None
-    bpy.context.preferences.view.show_splash = False
-    bpy.context.preferences.view.ui_scale = 1.0
-    bpy.context.preferences.system.viewport_aa = "OFF"  # a software renderer draws these windows
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-
-
 @step
 def author():
     from test_from_empty import author as make
@@ -110,46 +54,16 @@ def author():
 
 @step
 def look():
-    area = view()["area"]
-    space = area.spaces[0]
-    space.show_region_ui = True
-    space.shading.type, space.shading.color_type, space.shading.show_xray = "SOLID", "OBJECT", False
-    space.overlay.show_floor = False
-    space.clip_start = 0.001
-    from mathutils import Euler, Vector
-
-    space.region_3d.view_location = Vector((0.12, 0.0, 0.2))
-    space.region_3d.view_rotation = Euler((1.15, 0.0, 0.5)).to_quaternion()
-    space.region_3d.view_distance = 1.1
-    properties = next(a for a in window().screen.areas if a.type == "PROPERTIES")
-    properties.spaces[0].context = "PHYSICS" if bpy.context.object else "SCENE"
+    window.look((0.12, 0.0, 0.2), (1.15, 0.0, 0.5), 1.1)
 
 
-def simulate(kind, value):
-    """An event of the mouse over the sidebar's ADF tab."""
-    area = view()["area"]
-    window().event_simulate(type=kind, value=value, x=area.x + area.width - 14, y=area.y + area.height - 212)
-
-
-@step
-def point_at_the_tab():
-    redraw()
-    simulate("MOUSEMOVE", "NOTHING")
-
-
-@step
-def press_the_tab():
-    simulate("LEFTMOUSE", "PRESS")
-
-
-@step
-def release_the_tab():
-    simulate("LEFTMOUSE", "RELEASE")
+for function in window.OPEN_TAB:
+    step(function)
 
 
 @step
 def draw_every_role():
-    properties = next(a for a in window().screen.areas if a.type == "PROPERTIES")
+    properties = next(a for a in window.main().screen.areas if a.type == "PROPERTIES")
     roles = sorted({o.adf.role for o in bpy.data.objects if o.adf.role != "NONE"})
     for role in roles:
         select(find(role))
@@ -242,7 +156,11 @@ RECIPES = {
     "export_scene": [({"filepath": str(OUT / "all" / "launch.yaml")}, nothing)],
     "add_variant": [({}, lambda: activate("scene"))],
     "export_variants": [({}, has_variant)],
-    "add_to_launch": [({"path": "other.yaml"}, lambda: activate("world")), ({"path": "again.yaml"}, out_of_launch)],
+    "add_to_launch": [
+        ({"path": "other.yaml"}, lambda: activate("world")),
+        ({"path": "again.yaml"}, out_of_launch),
+        ({"path": "room.yaml", "environment": True}, nothing),
+    ],
     "remove_from_launch": [({"index": 0}, nothing)],
     "new_file": [({"kind": kind, "name": "other"}, nothing) for kind in ("MODEL", "WORLD")],
     "make": [({"role": role}, on("BODY", "phantom")) for role in roles("BODY")],
@@ -262,7 +180,7 @@ RECIPES = {
     "add_hole": [({}, on("BODY", "phantom"))],
     "add_grasp": [({}, nothing)],
     "add_endoscope": [({}, nothing)],
-    "check": [({}, nothing)],
+    "check": [({}, lambda: bpy.context.scene.adf.findings.clear())],
     "fix": [({"everything": True}, has_finding)],
     "select_finding": [({"index": 0}, has_finding)],
     "copy_findings": [({}, has_finding)],
@@ -334,6 +252,64 @@ def undo_every_operator():
     STEPS[:0] = [try_operator(name) for name in RECIPES]
 
 
+def drag(name, limit, pixels):
+    """Steps that drag the handle of a limit of a joint over the screen, and take it back."""
+
+    def handle():
+        from adf_studio import gizmos
+
+        obj = find("JOINT", name)
+        place = gizmos.place_of(obj, next(each for each in gizmos.limits_of(obj) if each.name == limit))
+        region = view()["region"]
+        x, y = location_3d_to_region_2d(region, view()["space_data"].region_3d, place)
+        return int(region.x + x), int(region.y + y)
+
+    def event(kind, value, along=0.0):
+        x, y = STATE["handle"]
+        window.main().event_simulate(type=kind, value=value, x=int(x + along * pixels[0]), y=int(y + along * pixels[1]))
+
+    def begin():
+        select(find("JOINT", name))
+        bpy.ops.ed.undo_push(message="selected")
+        STATE["limit"] = getattr(bpy.context.object.adf.joint, limit)
+        redraw()
+
+    def point():
+        STATE["handle"] = handle()
+        event("MOUSEMOVE", "NOTHING")
+
+    def end():
+        found = {"before": STATE["limit"], "after": getattr(bpy.context.object.adf.joint, limit)}
+        if limit == "joint_limits_linear_high_x":
+            picture("blender_six_dof")
+        bpy.ops.ed.undo()
+        found["undone"] = getattr(find("JOINT", name).adf.joint, limit)
+        RESULT.setdefault("dragged", {})[f"{name} {limit}"] = found
+
+    moves = [lambda part=part: event("MOUSEMOVE", "NOTHING", part) for part in (0.1, 0.5, 1.0)]
+    press, release = (lambda: event("LEFTMOUSE", "PRESS")), (lambda: event("LEFTMOUSE", "RELEASE", 1.0))
+    return [begin, point, point, press, *moves, release, end]
+
+
+@step
+def drag_limits():
+    window.look((0.2, 0.0, 0.2), (0.6, 0.0, 0.3), 0.25)
+    STEPS[:0] = drag("link1", "joint_limits_high", (-40, 30)) + [over_the_phantom]
+
+
+def over_the_phantom():
+    joint = find("JOINT", "phantom").adf.joint
+    for axis in "xyz":
+        setattr(joint, f"joint_limits_linear_low_{axis}", -0.01)
+        setattr(joint, f"joint_limits_linear_high_{axis}", 0.01)
+        setattr(joint, f"joint_limits_angular_low_{axis}", -0.6)
+        setattr(joint, f"joint_limits_angular_high_{axis}", 0.6)
+    window.look((0.0, 0.0, 0.02), (0.9, 0.0, 0.5), 0.2)
+    STEPS[:0] = drag("phantom", "joint_limits_linear_high_x", (60, 20)) + drag(
+        "phantom", "joint_limits_angular_low_z", (30, -10)
+    )
+
+
 @step
 def disable():
     addon_utils.disable("adf_studio", default_set=True)
@@ -341,29 +317,4 @@ def disable():
     RESULT["left"] = [n for n in dir(bpy.types) if "ADF_" in n]
 
 
-def run():
-    """The next step; a failure ends the session with its traceback told."""
-    if not STEPS:
-        finish()
-        return None
-    function = STEPS.pop(0)
-    sys.stderr.write(f"{time.monotonic() - START:.1f} s: {function.__name__}\n")
-    sys.stderr.flush()
-    try:
-        with bpy.context.temp_override(**view()):
-            function()
-    except Exception:
-        RESULT["errors"].append(f"{function.__name__}: {traceback.format_exc()}")
-        finish()
-        return None
-    return 0.3
-
-
-def finish():
-    sys.stdout.write(f"RESULT {json.dumps(RESULT)}\n")
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)
-
-
-bpy.app.timers.register(run, first_interval=1.0, persistent=True)
+window.start()

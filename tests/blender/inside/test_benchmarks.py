@@ -16,6 +16,7 @@ from adf_studio.ligature.mesh import load_mesh
 from adf_studio.mesh_data import points_of
 from adf_studio.object_operators import solid_of
 from adf_studio.placing import rest_pose
+from adf_studio.read_file import import_file
 from adf_studio.write_file import export_file
 
 from .scene import body, model, scene_print, select
@@ -160,6 +161,38 @@ def test_b9_textures_are_copied_and_the_material_file_is_in_the_readers_dialect(
         assert (high / name).read_bytes() == (tmp_path / name).read_bytes()
     mesh = load_mesh(high / "part.OBJ", Resolver([tmp_path]))
     assert mesh.parts[0].material.normal_map == high / "bumps.png" and mesh.parts[0].uvs is not None
+
+
+SECTIONS = {
+    "BODY": "bodies", "JOINT": "joints", "GHOST_OBJECT": "ghost objects", "SENSOR": "sensors", "ACTUATOR": "actuators",
+    "CAMERA": "cameras", "LIGHT": "lights", "SOFT_BODY": "soft bodies", "VOLUME": "volumes", "SUTURE": "sutures",
+}  # fmt: skip
+
+
+def test_b11_every_section_is_authored_and_read_back(tmp_path):
+    collection = model()
+    parent, child = body("parent"), body("child", location=(2, 0, 0))
+    select(child, parent)
+    bpy.ops.adf.connect(type="revolute")
+    for role in SECTIONS:
+        if role not in ("BODY", "JOINT"):
+            select(parent)
+            bpy.ops.adf.add(role=role, name=f"a {role.lower()}")
+    soft = next(o for o in collection.objects if o.adf.role == "SOFT_BODY")
+    soft.adf.soft_body.mesh, soft.adf.soft_body.mass = "soft.OBJ", 1.0
+    volume = next(o for o in collection.objects if o.adf.role == "VOLUME").adf.volume
+    volume.images_path, volume.images_prefix, volume.images_format, volume.images_count = "./scan/", "slice", "png", 8
+    assert bpy.ops.adf.export_file(filepath=str(tmp_path / "m.yaml"), collection=collection.name) == {"FINISHED"}
+    document = read_any(tmp_path / "m.yaml", Resolver([tmp_path]))
+    assert {name: len(document.elements(name)) for name in SECTIONS.values() if document.elements(name)} == {
+        name: 2 if name == "bodies" else 1 for name in SECTIONS.values()
+    }
+    text = (tmp_path / "m.yaml").read_bytes()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    again = import_file(tmp_path / "m.yaml", bpy.context.scene).collection
+    assert {o.adf.role for o in again.objects} >= set(SECTIONS)
+    export_file(again, tmp_path / "m.yaml")
+    assert (tmp_path / "m.yaml").read_bytes() == text
 
 
 def test_b12_nothing_unreferenced_and_nothing_empty_is_written(tmp_path):

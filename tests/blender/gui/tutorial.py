@@ -1,0 +1,77 @@
+"""The tutorial of docs/blender.md in a Blender with a window: each step as its script does it, and a picture of it."""
+
+import importlib.util
+import os
+from pathlib import Path
+
+import bpy
+import window
+from window import OUT, STEPS, find, main, picture, select, step, view
+
+spec = importlib.util.spec_from_file_location("author", Path(os.environ["LIGATURE_ROOT"], "scenes", "author_blender_suturing.py"))  # fmt: skip
+author = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(author)
+
+STATE = {"turn": (0.95, 0.0, 0.45), "place": author.at(z=-0.004), "distance": 0.19}
+step(window.enable)
+
+
+def shown(name, distance, *objects):
+    """A picture of what a step made, with one of its objects active."""
+
+    def show():
+        if objects:
+            select(*[bpy.data.objects[each] for each in objects])
+        window.look(author.at(z=-0.004), (0.95, 0.0, 0.45), distance)
+        view()["space_data"].shading.color_type = "TEXTURE" if name.endswith("drape") else "MATERIAL"
+        picture(name)
+
+    show.__name__ = name
+    return show
+
+
+def made(function):
+    """A step of the script."""
+
+    def make():
+        function(OUT)
+
+    make.__name__ = function.__name__
+    return make
+
+
+def simulate():
+    bpy.context.preferences.addons["adf_studio"].preferences.simulator = os.environ["LIGATURE_COMMAND"]
+    author.write(OUT / "scenes" / "blender_suturing")
+    assert bpy.ops.adf.simulate(seconds=0.8) == {"FINISHED"}
+    bpy.context.scene.frame_set(bpy.context.scene.frame_end)
+
+
+def finding_list():
+    bpy.ops.adf.check()
+    area = view()["area"]
+    for region in area.regions:
+        if region.type == "UI":
+            with bpy.context.temp_override(window=main(), area=area, region=region):
+                for _ in range(12):
+                    bpy.ops.view2d.scroll_down(deltay=60)
+
+
+STEPS += [
+    made(author.drape),
+    *window.OPEN_TAB,
+    shown("blender_1_drape", 0.3, "Drape"),
+    made(author.flaps),
+    shown("blender_2_flaps", 0.19, "Pad"),
+    made(author.holes),
+    made(author.needle),
+    lambda: select(find("JOINT", "Entry2")),
+    shown("blender_3_needle", 0.13),
+    made(author.view),
+    made(author.arms),
+    finding_list,
+    shown("blender_4_arms", 0.7, "CameraFrame"),
+    simulate,
+    shown("blender_5_motion", 0.3),
+]
+window.start()
