@@ -57,6 +57,7 @@ def paint(obj: bpy.types.Object, name: str, colour: tuple[float, float, float], 
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = (*colour, 1.0)
     shader.inputs["Roughness"].default_value = roughness
+    material.diffuse_color = (*colour, 1.0)  # what the viewport shows
     obj.data.materials.append(material)
     return shader
 

@@ -12,7 +12,6 @@ spec = importlib.util.spec_from_file_location("author", Path(os.environ["LIGATUR
 author = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(author)
 
-STATE = {"turn": (0.95, 0.0, 0.45), "place": author.at(z=-0.004), "distance": 0.19}
 step(window.enable)
 
 
@@ -23,7 +22,7 @@ def shown(name, distance, *objects):
         if objects:
             select(*[bpy.data.objects[each] for each in objects])
         window.look(author.at(z=-0.004), (0.95, 0.0, 0.45), distance)
-        view()["space_data"].shading.color_type = "TEXTURE" if name.endswith("drape") else "MATERIAL"
+        view()["space_data"].shading.color_type = "TEXTURE"
         picture(name)
 
     show.__name__ = name
@@ -44,7 +43,11 @@ def simulate():
     bpy.context.preferences.addons["adf_studio"].preferences.simulator = os.environ["LIGATURE_COMMAND"]
     author.write(OUT / "scenes" / "blender_suturing")
     assert bpy.ops.adf.simulate(seconds=0.8) == {"FINISHED"}
-    bpy.context.scene.frame_set(bpy.context.scene.frame_end)
+    bpy.context.scene.frame_set(19)
+    bpy.context.scene.adf.show_overlay = False
+    view()["space_data"].overlay.show_extras = False
+    for collection in bpy.data.collections:
+        collection.hide_viewport = "Shapes" in collection.name
 
 
 def finding_list():
@@ -59,6 +62,7 @@ def finding_list():
 
 STEPS += [
     made(author.drape),
+    lambda: window.look(author.at(), (0.95, 0.0, 0.45), 0.3),
     *window.OPEN_TAB,
     shown("blender_1_drape", 0.3, "Drape"),
     made(author.flaps),
@@ -72,6 +76,6 @@ STEPS += [
     finding_list,
     shown("blender_4_arms", 0.7, "CameraFrame"),
     simulate,
-    shown("blender_5_motion", 0.3),
+    shown("blender_5_motion", 0.16, "Needle motion"),
 ]
 window.start()
