@@ -1,7 +1,8 @@
 """How fast the learning environments are: ``python -m tests.bench.environments [SECONDS]``.
 
 Steps a second for state observations and random actions, resets included, in one process and in two, and how many
-times real time that is; a step is 20 ms of simulated time.
+times real time that is; a step is 20 ms of simulated time. Steps for each second of processor time say the same of a
+machine that has other work.
 """
 
 from __future__ import annotations
@@ -40,15 +41,30 @@ def rate(name: str, processes: int, seconds: float) -> float:
     return found
 
 
+def rate_alone(name: str, seconds: float) -> tuple[float, float]:
+    """Steps for each second of the wall, and of the processor, of an environment in this process."""
+    env, rng = made(name), np.random.default_rng(0)
+    env.reset(seed=0)
+    steps, begin, spent = 0, time.perf_counter(), time.process_time()
+    while time.perf_counter() - begin < seconds:
+        *_, done, cut, _ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+        steps += 1
+        if done or cut:
+            env.reset()
+    wall, spent = time.perf_counter() - begin, time.process_time() - spent
+    env.close()
+    return steps / wall, steps / spent
+
+
 def main() -> int:
     """Entry point."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     load = os.getloadavg()[0]
     for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
-        one, two = rate(name, 1, seconds), rate(name, 2, seconds)
+        (one, spent), two = rate_alone(name, seconds), rate(name, 2, seconds)
         sys.stdout.write(
-            f"{name}: {one:.0f} steps/s in one process, {one * CONTROL:.2f} times real time; "
-            f"{two:.0f} in two, {two * CONTROL:.2f} times\n"
+            f"{name}: {one:.0f} steps/s in one process, {one * CONTROL:.2f} times real time, "
+            f"{spent:.0f} for a second of processor time; {two:.0f} in two, {two * CONTROL:.2f} times\n"
         )
         sys.stdout.flush()
     sys.stdout.write(f"load of the machine at the start: {load:.1f}\n")

@@ -44,9 +44,11 @@ def record(out: Path, exclude: str, seconds: float, keep_free: float, console: C
     lines, status = _run(command, seconds)
     reason = _reason(lines)
     if reason or status != 0 or not part.is_file():
-        console.print(
-            f"the recording failed: {reason or f'the recorder ended with {status}'}", style="red", markup=False
+        free = shutil.disk_usage(out.parent).free / 1e9
+        said = (
+            f"the recording failed: {reason or f'the recorder ended with {status}'}; {free:.3g} GB of the disk are free"
         )
+        console.print(said, style="red", markup=False)
         _tell_rest(part, console)
         return 1
     part.replace(out)
