@@ -103,8 +103,8 @@ def test_the_phantom_opens_in_a_second_and_is_written_in_another(corpus, tmp_pat
     export_file(done.collection, tmp_path / "phantom.yaml")
     written = time.process_time() - start
     assert (tmp_path / "phantom.yaml").read_bytes() == file.read_bytes()
-    # processor seconds, which other work on the machine lengthens little
-    assert opened < 1.3 and written < 1.3, (opened, written)
+    # processor seconds, far above the found ones (docs/blender.md) since a busy machine lengthens them
+    assert opened < 3.0 and written < 3.0, (opened, written)
 
 
 def test_references_to_other_files_are_kept_and_resolved_when_those_are_open(corpus):
