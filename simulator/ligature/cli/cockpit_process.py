@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import ligature
@@ -43,6 +44,7 @@ def main() -> None:
         cockpit = Cockpit(
             scene, block, pictures, address, os.environ.get(TOKEN_VARIABLE, ""), lambda text: tell("warning", text),
             _on_ros(options.prefix) if options.ros else None,
+            f"{Path(options.scene).resolve().parent.name}/{scene.name}",
         )  # fmt: skip
     except AddressError as error:
         tell("fatal", str(error))

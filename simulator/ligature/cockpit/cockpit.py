@@ -55,6 +55,7 @@ class Cockpit:
         token: str,
         warn: Callable[[str], None],
         ros: tuple[Health, Remote] | None = None,
+        title: str = "",
     ) -> None:
         self._scene, self._block, self._pictures, self._warn = scene, block, pictures, warn
         self._ring, self._outbox = block.rings["cockpit"], Outbox(block.rings["cockpit"])
@@ -71,7 +72,7 @@ class Cockpit:
         self._logged = ""
         facts = [ArmFacts.of(scene, index) for index in range(len(scene.arms))]
         self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
-        self._lay_out(facts, ros)
+        self._lay_out(facts, ros, title)
         self._controls: list[ArmControls] = []
         self._run_controls: SimulationControls | None = None
         self._camera_controls: CameraControls | None = None
@@ -83,10 +84,10 @@ class Cockpit:
             self.server, lambda *what: self._inbox.append(what), self._begin_operating, self._end_operating
         )
 
-    def _lay_out(self, facts: list[ArmFacts], ros: tuple[Health, Remote] | None) -> None:
+    def _lay_out(self, facts: list[ArmFacts], ros: tuple[Health, Remote] | None, title: str) -> None:
         server, scene = self.server, self._scene
         look_from(server, *first_view(scene, self._state))
-        self._header = Header(server, _title(scene))
+        self._header = Header(server, title)
         self._panel = SimulationPanel(server)
         first = next((f.index for f in facts if f.description.kind is ArmKind.PSM), 0)
         self._arms = [ArmStatus(server, f, f.index == first) for f in facts]
@@ -333,9 +334,3 @@ class Cockpit:
         if self._audience.clients:
             self._curves.refresh(self._state[0])
         return CURVES_PERIOD
-
-
-def _title(scene: Scene) -> str:
-    """What a person calls the scene: launch files are mostly named alike, their folders are not."""
-    folder = scene.models[0].path.parent.name if scene.models else ""
-    return f"{folder}/{scene.name}" if folder else scene.name

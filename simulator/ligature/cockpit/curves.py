@@ -85,13 +85,13 @@ class Curves:
 
     def _words(self, state: Any) -> str:
         if self._monitor is None:
-            return "<small>No suturing task in this scene.</small>"
+            return '<div style="font-size:12px;padding:2px 8px">No suturing task in this scene.</div>'
         measures = self._monitor.measures()
         passages = [f"{'exit' if p.exit else 'entry'} {p.pair} ({1e3 * p.miss:.1f} mm)" for p in measures.passages[-6:]]
         pairs = max(sum(p.exit for p in measures.passages), 1)
         score = judge_suture(self._monitor.scenery, state["body_pose"], measures.passages, measures.time, pairs)
         lines = [f"holes: {', '.join(passages) or 'none yet'}", *score.lines(), *measures.lines()]
-        return "<small>" + "<br>".join(escape(line) for line in lines) + "</small>"
+        return '<div style="font-size:12px;padding:2px 8px">' + "<br>".join(escape(line) for line in lines) + "</div>"
 
 
 def _series(names: list[str]) -> list[uplot.Series]:

@@ -26,6 +26,10 @@ VIEW_ANGLE = 0.8
 """Vertical field of view of a page in radians."""
 
 
+ROOM = 1.25
+"""How much farther the first viewpoint stands than what is looked at needs."""
+
+
 class Stage:
     """What the page shows in 3D; `update` takes states."""
 
@@ -91,7 +95,7 @@ def first_view(scene: Scene, state: NDArray[np.void]) -> tuple[Array, Array, Arr
     places = places or [np.zeros(3)]
     low, high = np.min(places, axis=0), np.max(places, axis=0)
     target = 0.5 * (low + high)
-    distance = max(0.5 * float(np.linalg.norm(high - low)), 0.02) / np.sin(VIEW_ANGLE / 2)
+    distance = ROOM * max(0.5 * float(np.linalg.norm(high - low)), 0.02) / np.sin(VIEW_ANGLE / 2)
     cameras = [camera.index for camera in scene.cameras if camera.visible]
     T = pose7_matrix(state["camera_world"][0, cameras[0]]) if cameras else np.eye(4)
     return target + distance * T[:3, 0], target, T[:3, 2]

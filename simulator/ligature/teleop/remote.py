@@ -11,7 +11,9 @@ import rospy
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool, Float64, String
 
-_PAIR = re.compile(r"/(?P<leader>[A-Za-z]\w*?)_(?P<follower>[A-Za-z][A-Za-z0-9]*)/current_state\Z")
+_PAIR = re.compile(r"/(?P<leader>[A-Za-z]\w*?)_(?P<follower>[A-Za-z][A-Za-z0-9]*)/align_mtm\Z")
+"""What a pair has and the leading of a camera has not."""
+
 PEDALS = ("clutch", "camera")
 
 
@@ -62,7 +64,7 @@ class TeleopRemote:
     def look(self) -> None:
         """Ask the master for pairs that were not there before; raises `rosgraph.MasterException`, OSError."""
         for topic, type_ in rosgraph.Master(rospy.get_name()).getTopicTypes():
-            match = _PAIR.match("/" + topic.removeprefix(self._prefix)) if type_ == "std_msgs/String" else None
+            match = _PAIR.match("/" + topic.removeprefix(self._prefix)) if type_ == "std_msgs/Bool" else None
             if match is None:
                 continue
             pair = PairTold(match["leader"], match["follower"])
