@@ -75,15 +75,13 @@ film: setup
 	.venv/bin/ligature demo --out build/film
 	.venv/bin/ligature render scenes/peg_transfer/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/peg_transfer
 	.venv/bin/ligature render scenes/needle_pick/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/needle_pick
-	mkdir -p docs/images
-	cp build/film/suture.webp docs/images/suture.webp
-	cp build/film/suture_7.png docs/images/suturing.png
-	cp build/film/peg_transfer/cameraL.png docs/images/peg_transfer.png
-	cp build/film/needle_pick/cameraL.png docs/images/needle_pick.png
+	cp build/film/suture.webp docs/pictures/suture.webp
+	cp build/film/suture_7.png docs/pictures/suturing.png
+	cp build/film/peg_transfer/cameraL.png docs/pictures/peg_transfer.png
+	cp build/film/needle_pick/cameraL.png docs/pictures/needle_pick.png
 
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md
-	$(PYTHON) -m docs.pictures
 
 addon: setup
 	$(PYTHON) blender_addon/pack.py dist
