@@ -19,33 +19,13 @@ import numpy as np
 import viser
 from ligature.bus import Outbox, Pace
 from ligature.model.commands import ArmCommand
-from websockets.sync.client import connect
-from websockets.typing import Subprotocol
 
-from tests.cockpit.conftest import ROOT, SMALL, Served
+from tests.cockpit.conftest import SMALL, Served
 
+VIEWERS = Path(__file__).with_name("cockpit_viewers.py")
 SECONDS = 6.0
 SETTLING = 2.0
 SWAY = 0.2
-
-
-def viewer(url: str, seconds: float) -> None:
-    """Take all that a page sends for a while; one process of these is one browser that only looks on."""
-    import msgspec.msgpack
-
-    os.nice(10)
-    protocol = Subprotocol(f"viser-v{viser.__version__}")
-    camera = {
-        "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.0, 0.0, 1.0), "fov": 0.8,
-        "image_height": 800, "image_width": 1200, "near": 0.01, "far": 10.0, "look_at": (0.0, 0.0, 0.0),
-        "up_direction": (0.0, 0.0, 1.0),
-    }  # fmt: skip
-    received, end = 0, time.monotonic() + seconds
-    with connect(url.replace("http", "ws"), subprotocols=[protocol], max_size=None, compression=None) as connection:
-        connection.send(msgspec.msgpack.encode(camera))
-        while time.monotonic() < end:
-            received += len(connection.recv(timeout=30))
-    sys.stdout.write(f"{received}\n")
 
 
 def sway(served: Served, outbox: Outbox, seconds: float) -> float:
@@ -73,46 +53,39 @@ def ready(served: Served, outbox: Outbox) -> None:
             time.sleep(0.05)
 
 
-def compare(viewers: int, rounds: int, speed: float, scene: Path) -> tuple[float, float, float]:
-    """Median real-time factors without and with viewers, and megabytes per second and viewer."""
+def compare(viewers: int, rounds: int, speed: float, scene: Path) -> tuple[float, float]:
+    """Median real-time factors without and with viewers."""
     served = Served(scene=scene)
     outbox = Outbox(served.block.rings["spare"])
     try:
         ready(served, outbox)
         outbox.push(Pace(speed))
-        alone, watched, sent = [], [], []
+        alone, watched = [], []
+        command = [sys.executable, str(VIEWERS), served.url, viser.__version__, str(viewers)]
         for _ in range(rounds):
             sway(served, outbox, SETTLING)
             alone.append(sway(served, outbox, SECONDS))
-            command = [
-                sys.executable,
-                "-m",
-                "tests.bench.cockpit",
-                "--view",
-                served.url,
-                str(SECONDS + 2 * SETTLING + 4),
-            ]
-            crowd = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) for _ in range(viewers)]
-            sway(served, outbox, SETTLING + 4)
-            watched.append(sway(served, outbox, SECONDS))
-            sent += [int(process.communicate()[0]) / (SECONDS + 2 * SETTLING + 4) for process in crowd]
-        return float(np.median(alone)), float(np.median(watched)), float(np.mean(sent)) / 1e6
+            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as crowd:
+                assert crowd.stdout is not None and crowd.stdin is not None
+                for _ in range(viewers):
+                    assert crowd.stdout.readline() == "connected\n"
+                sway(served, outbox, SETTLING)
+                watched.append(sway(served, outbox, SECONDS))
+                crowd.stdin.close()
+        return float(np.median(alone)), float(np.median(watched))
     finally:
         served.end()
 
 
 def main() -> None:
     """Print the figures."""
-    if sys.argv[1:2] == ["--view"]:
-        viewer(sys.argv[2], float(sys.argv[3]))
-        return
     viewers, rounds = (int(sys.argv[i]) if len(sys.argv) > i else default for i, default in ((1, 10), (2, 5)))
     for name, speed in (("paced at 1", 1.0), ("as fast as it can", 100.0)):
-        alone, watched, sent = compare(viewers, rounds, speed, SMALL)
+        alone, watched = compare(viewers, rounds, speed, SMALL)
         change = 100.0 * (watched / alone - 1.0)
         sys.stdout.write(
-            f"{name}: real-time factor {alone:.3f} alone, {watched:.3f} with {viewers} viewers ({change:+.1f} %), "
-            f"{sent:.2f} MB/s each; load {os.getloadavg()[0]:.1f}\n"
+            f"{name}: real-time factor {alone:.3f} alone, {watched:.3f} with {viewers} viewers ({change:+.1f} %); "
+            f"load {os.getloadavg()[0]:.1f}\n"
         )
 
 

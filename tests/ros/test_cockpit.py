@@ -100,7 +100,7 @@ def test_the_page_shows_ros_and_selects_a_pair(simulator: Any, remote: Any) -> N
         label = f"//*[normalize-space(text())='pen → {wanted}']"
         person.find(f"({label}/following::button[normalize-space(.)='Select'])[1]").click()
         until(lambda: remote.pairs[f"pen_{wanted}"].selected, "the pair is selected")
-        person.clicks("ROS topics")
+        person.find("//*[normalize-space(text())='ROS topics']").click()
         person.sees("topics are published")
         person.sees("/PSM1/operating_state")
     time.sleep(0.1)
