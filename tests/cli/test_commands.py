@@ -121,9 +121,9 @@ def test_demo_needs_the_repository(
     from rich.console import Console
 
     monkeypatch.setattr(demo, "EXAMPLE", tmp_path / "suture.py")
-    assert demo.demo(2, 0, tmp_path, Console(soft_wrap=True)) == 2
+    assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 2
     assert "comes with the repository" in capsys.readouterr().out
     (tmp_path / "suture.py").write_text(
         "import sys; sys.exit(0 if sys.argv[1:4] == ['--throws', '2', '--seed'] else 3)"
     )
-    assert demo.demo(2, 0, tmp_path, Console(soft_wrap=True)) == 0
+    assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 0
