@@ -196,8 +196,9 @@ class Ghosts:
     def _ask_about_bodies(self, ghost_world: Array, bodies: Array) -> None:
         for ghost in np.flatnonzero(self._ask.any(axis=1)):
             asked = np.flatnonzero(self._ask[ghost])
-            found = self._queries.probe_overlaps(self._probes[ghost], ghost_world[ghost], self._solid[asked].tolist())
-            self._known[ghost, asked] = np.isin(self._solid[asked], found)
+            candidates = self._solid[asked].tolist()
+            found = set(self._queries.probe_overlaps(self._probes[ghost], ghost_world[ghost], candidates))
+            self._known[ghost, asked] = [body in found for body in candidates]
             self._seen_ghost[ghost, asked] = ghost_world[ghost]
             self._seen_body[ghost, asked] = bodies[asked]
 
