@@ -23,6 +23,7 @@ from ligature.model.optics import EYES, R_CAMERA_OPTICAL, Calibration, eye_offse
 from ligature.model.scene import Camera, Scene
 from ligature.ros import pictures
 from ligature.ros.master import node_name, require_free
+from ligature.ros.start import start_node
 
 WORLD = "world"
 """The frame that world poses are in."""
@@ -127,7 +128,7 @@ class CameraNode:
     def __init__(self, scene: Scene, shown: Sequence[Camera], everything: bool) -> None:
         name = f"{node_name(scene.world.topic)}_cameras"
         require_free(f"/{name}")
-        rospy.init_node(name, disable_signals=True)
+        start_node(name)
         frames = frame_names(scene.cameras)
         names = pictures.id_names(scene)
         self.topics = [

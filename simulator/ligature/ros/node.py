@@ -27,6 +27,7 @@ from ligature.ros.parameters import Parameters
 from ligature.ros.publisher import Publisher
 from ligature.ros.reception import Reception
 from ligature.ros.schedule import Key, Outlet, Schedule
+from ligature.ros.start import start_node
 
 DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
 HOUSEKEEPING = 0.02
@@ -49,7 +50,7 @@ class Node:
         self._woken = threading.Event()
         name = node_name(scene.world.topic)
         require_free(f"/{name}")
-        rospy.init_node(name, disable_signals=True)
+        start_node(name)
         prefix, self._outbox = scene.world.topic.rpartition("/ambf/")[0] + "/", Outbox(self._ring)
         self._reception = Reception(scene, self._outbox, self._wake)
         self._world = conversion.WorldTemplate()

@@ -24,6 +24,7 @@ from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from ligature.ros.bags import REPORTS, reported_pose
 from ligature.ros.master import NO_ANSWER, MasterWatch, node_name, require_free
+from ligature.ros.start import start_node
 from ligature.tasks.attempt import TASKS, Attempt
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ class TaskNode:
         self._lock = threading.Lock()
         name = f"{node_name(scene.world.topic)}_tasks"
         require_free(f"/{name}")
-        rospy.init_node(name, disable_signals=True)
+        start_node(name)
         root = f"{scene.world.topic.rpartition('/ambf/')[0]}/ligature/tasks/{task}"
         self._score = rospy.Publisher(f"{root}/score", DiagnosticStatus, queue_size=QUEUE, latch=True)
         self._measures = rospy.Publisher(f"{root}/measures", DiagnosticStatus, queue_size=QUEUE)

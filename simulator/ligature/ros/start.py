@@ -1,0 +1,22 @@
+"""Starts a node that many clients connect to at the same moment.
+
+rospy lets five connections wait to be taken. A recorder of everything, or a surgeon's console, opens a hundred at once;
+those beyond the five are dropped by the kernel and tried again after 1, 3, 7, 15 seconds: topics seem silent so long.
+"""
+
+from __future__ import annotations
+
+import rospy
+import rospy.impl.tcpros_base as tcpros
+from rosgraph.xmlrpc import ThreadingXMLRPCServer
+
+WAITING = 512
+"""Connections that may wait; the kernel's own limit is in /proc/sys/net/core/somaxconn."""
+
+
+def start_node(name: str) -> None:
+    """Make this process the node ``name``, which takes `WAITING` connections at once; signals stay the caller's."""
+    ThreadingXMLRPCServer.request_queue_size = WAITING
+    rospy.init_node(name, disable_signals=True)
+    tcpros.start_tcpros_server()
+    tcpros._tcpros_server.tcp_ros_server.server_sock.listen(WAITING)
