@@ -54,7 +54,15 @@ def test_the_gizmo_moves_the_tip(served: Served, operator: Person) -> None:
     assert np.linalg.norm(moved - (moved @ along) * along) < 2e-3, "and not aside"
 
 
+def rests(served: Served) -> bool:
+    """Whether the joints of PSM1 stand still."""
+    before = served.arm("PSM1")["measured_js"][0].copy()
+    time.sleep(0.3)
+    return bool(np.abs(served.arm("PSM1")["measured_js"][0] - before).max() < 1e-4)
+
+
 def test_a_slider_moves_the_joint(served: Served, operator: Person) -> None:
+    until(lambda: rests(served), "the arm has come to rest")
     before = served.arm("PSM1")["measured_js"][0].copy()
 
     def moved() -> bool:

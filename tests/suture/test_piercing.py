@@ -103,18 +103,19 @@ def test_released_needle_stays_half_through_a_hole(threadless, hole):
     assert insertion.force == pytest.approx([0.0, 0.0, 9.8 * 0.5], rel=0.02, abs=0.1)
 
 
-def test_released_needle_with_its_thread_stays_in_its_hole(threaded):
+@pytest.mark.parametrize("hole", range(8))
+def test_released_needle_with_its_thread_stays_in_its_hole(threaded, hole):
     """1.2 kg of thread swing onto needle and hole, which hangs on a spring of 100 N/m and gives way by millimetres.
 
-    In the hole the needle is shaken by tenths of a millimetre; then nothing moves any more.
+    In the hole the needle is shaken by tenths of a millimetre and swings back; then nothing moves any more.
     """
-    pierced = Pierced(threaded, 0, 0.35)
-    released = pierced.marks_in_hole(0)
+    pierced = Pierced(threaded, hole, 0.35)
+    released = pierced.marks_in_hole(hole)
     pierced.sim.step(2000)
     settled = pierced.handle.pose
-    pierced.sim.step(8000)
+    pierced.sim.step(8000 if hole == 0 else 1000)
     assert pierced.drift(settled) < 0.02e-3
-    assert np.linalg.norm(pierced.marks_in_hole(0) - released, axis=1).max() < 0.4e-3
+    assert np.linalg.norm(pierced.marks_in_hole(hole) - released, axis=1).max() < 0.1e-3
     assert [i.body for i in pierced.sim.insertions] == [pierced.body.index]
 
 

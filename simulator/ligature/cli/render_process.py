@@ -14,6 +14,7 @@ import numpy as np
 import ligature
 from ligature.bus import Block, BusError
 from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.cli.joining import SCENE_PATIENCE
 from ligature.cli.options import RunOptions
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Camera, Scene
@@ -24,9 +25,6 @@ from ligature.render.shutter import Shutter
 from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
 from ligature.ros.master import MasterWatch, NameTaken
 from ligature.ros.parameters import Follower
-
-SCENE_PATIENCE = 10.0
-"""Seconds to wait for the end of the run, for which the physics process gives the reasons."""
 
 PHYSICS_SILENCE = 5.0
 """Seconds without a sign of life of the physics process after which this one ends."""
