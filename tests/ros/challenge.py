@@ -147,6 +147,10 @@ class Psm:
         self.servo_jp(q)
 
 
+TURNED = 0.05
+"""Angle in radians to its goal within which a body that is led has arrived."""
+
+
 def lead(stage: Stage, handle: Any, target: Callable[[], np.ndarray], step: float, arrived: float) -> None:
     """Command poses on the way to ``target()``, ``step`` metres ahead at most, until it is ``arrived`` metres near."""
     for _ in range(1000):
@@ -156,7 +160,7 @@ def lead(stage: Stage, handle: Any, target: Callable[[], np.ndarray], step: floa
         if left > step:
             ahead[:3, 3] = here[:3, 3] + (goal - here)[:3, 3] * step / left
         handle.set_pose(message(ahead))
-        if left < arrived:
+        if left < arrived and angle(goal, here) < TURNED:
             return
         stage.sleep(0.01)
     raise AssertionError(f"{left * 1e3:.2f} mm are left")
@@ -203,5 +207,5 @@ def stitch_path(entry: np.ndarray, exit_: np.ndarray) -> list[np.ndarray]:
     centre = at(*(entry[:3, 3] + exit_[:3, 3]) / 2) @ at(0, 0, math.sqrt(radius**2 - half**2))
     first, last = math.radians(150), math.radians(20)
     return [
-        centre @ turned(0, -math.pi / 2) @ turned(2, where - own) for where in np.linspace(first, last, 45).tolist()
+        centre @ turned(0, -math.pi / 2) @ turned(2, where - own) for where in np.linspace(first, last, 30).tolist()
     ]

@@ -27,7 +27,7 @@ from tests.ros.challenge import (
     turned,
     within,
 )
-from tests.ros.conftest import BIN, ROOT, SMALL, Listener, Program
+from tests.ros.conftest import BIN, ROOT, Listener, Program
 
 pytestmark = pytest.mark.ros
 FLAGS = [
@@ -47,12 +47,12 @@ FLAGS = [
 HOLES = [f"{hole}{n}" for hole in ("Entry", "Exit") for n in (1, 2, 3, 4)]
 
 
-@pytest.fixture(scope="module", params=["small", pytest.param("lab", marks=pytest.mark.corpus)])
+@pytest.fixture(scope="module", params=["ours", pytest.param("lab", marks=pytest.mark.corpus)])
 def stage(request: Any, ros_env: dict[str, str], node: Any) -> Iterator[Stage]:
     """A simulator started as the challenge starts its own, and a connected client."""
     from ligature.client import Client
 
-    launch, models = SMALL, "0,1,2,3,4"
+    launch, models = ROOT / "scenes" / "suturing" / "launch.yaml", "0,1,2,3,4,5"
     if request.param == "lab":
         launch, models = request.getfixturevalue("corpus") / "suturing_scene" / "launch.yaml", "10,11,6,7,8,9"
     program = Program([str(BIN / "ambf_simulator"), "--launch_file", str(launch), "-l", models, *FLAGS], ros_env)
@@ -64,6 +64,12 @@ def stage(request: Any, ros_env: dict[str, str], node: Any) -> Iterator[Stage]:
         client.clean_up()
     finally:
         program.end()
+
+
+@pytest.fixture
+def lab(request: Any) -> bool:
+    """Whether the scene is the lab's."""
+    return bool(request.node.callspec.params["stage"] == "lab")
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +89,6 @@ def needle(stage: Stage) -> Any:
 
 @pytest.fixture(scope="module")
 def holes(stage: Stage) -> dict[str, Any]:
-    if "/ambf/env/phantom/Entry1" not in stage.client.get_obj_names():
-        pytest.skip("this scene has no holes")
     return {name: stage.client.get_obj_handle(name) for name in HOLES}
 
 
@@ -220,22 +224,23 @@ def test_the_evaluation_reads_needle_and_camera_from_their_literal_topics(
     assert abs(stage.client.get_time() - time.time()) < 1.0
 
 
-@pytest.mark.slow  # it samples a moving needle in real time: other work on the machine makes it miss a crossing
 def test_a_needle_led_through_entry_and_exit_is_two_insertions_in_order(
-    stage: Stage, needle: Any, holes: dict[str, Any]
+    stage: Stage, needle: Any, holes: dict[str, Any], lab: bool
 ) -> None:
+    if not lab:
+        pytest.skip("a pose command pushes with the needle's own mass: a tenth of a gram does not part the tissue")
     stage.world.reset_bodies()
     stage.sleep(0.2)
     path = stitch_path(measured(holes["Entry1"]), measured(holes["Exit1"]))
     above = path[0].copy()
     above[2, 3] += 0.03
-    lead(stage, needle, lambda: above, NEEDLE_STEP, 0.001)
+    for pose in (above, path[0]):
+        lead(stage, needle, lambda pose=pose: pose, NEEDLE_STEP, 0.0005)
     insertions = Insertions(needle, holes)
     for pose in path:
-        needle.set_pose(message(pose))
-        for _ in range(2):
-            stage.sleep(0.01)
-            insertions.sample()
+        # step by step: a needle that lags behind would cut the corner, and a busy machine miss a crossing
+        lead(stage, needle, lambda pose=pose: pose, NEEDLE_STEP, 0.0005)
+        insertions.sample()
     assert insertions.events == ["Exit1", "Entry1"]
     needle.set_force(0.0, 0.0, 0.0)
     needle.set_torque(0.0, 0.0, 0.0)
