@@ -5,8 +5,9 @@ STAMPS := build/stamps
 SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
 BPY    ?= 4.2.23 4.5.15 5.0.1
+NEWEST_BPY := $(lastword $(BPY))
 
-.PHONY: run demo film test test-slow setup lint types check-imports unit fuzz bench soak docs addon test-blender clean
+.PHONY: run demo film test test-slow setup lint types check-imports unit fuzz bench soak docs addon test-blender blender-module clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -49,8 +50,12 @@ lint: setup
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
-unit: setup
-	$(PYTHON) -m pytest -m "not slow" tests
+unit: setup blender-module
+	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python $(PYTHON) -m pytest -m "not slow" tests
+
+# the newest Blender as a Python module, beside the binary; without network the rest is tested without it
+blender-module: setup
+	@sh .ci/fetch_blender_module.sh $(NEWEST_BPY) build/bpy-$(NEWEST_BPY) 240
 
 # what takes long, or watches real time so closely that other work on the machine disturbs it
 test-slow: setup

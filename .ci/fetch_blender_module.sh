@@ -1,9 +1,26 @@
 #!/bin/sh
-# Blender of version $1 as a Python module in an environment of its own at $2; what is there is kept.
+# Blender of version $1 as a Python module in an environment of its own at $2, within $3 seconds; what is there is kept.
+# One that cannot be had is no failure: the reason is told here and stands in $2.why, and its tests are skipped.
 set -u
-if "$2/bin/python" -c "import bpy, pytest, yaml" 2>/dev/null; then exit 0; fi
-echo "fetching bpy $1 (some 350 MB) into $2"
-rm -rf "$2"
-/usr/bin/python3 -m venv "$2" &&
-    "$2/bin/pip" install --quiet --disable-pip-version-check "bpy==$1" -r requirements-bpy.txt && exit 0
-echo "bpy $1 could not be had from the package index: its tests are skipped" >&2
+version=$1 folder=$2 seconds=${3:-600}
+if "$folder/bin/python" -c "import bpy, pytest, yaml" 2>/dev/null; then
+    rm -f "$folder.why"
+    exit 0
+fi
+python=
+for candidate in /usr/bin/python3 python3.11; do # the wheels of Blender 4.2 to 5.0 are for Python 3.11 alone
+    "$candidate" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && python=$candidate && break
+done
+mkdir -p "$(dirname "$folder")"
+if [ -z "$python" ]; then
+    why="bpy $version needs Python 3.11, and this machine has $(/usr/bin/python3 -V 2>&1)"
+else
+    echo "fetching bpy $version (some 350 MB) into $folder, for at most $seconds s"
+    rm -rf "$folder"
+    "$python" -m venv "$folder" &&
+        timeout -k 10 "$seconds" "$folder/bin/pip" install --quiet --disable-pip-version-check --timeout 15 --retries 1 \
+            "bpy==$version" -r requirements-bpy.txt && rm -f "$folder.why" && exit 0
+    why="bpy $version could not be had from the package index within $seconds s"
+fi
+echo "$why: its tests are skipped" >&2
+echo "$why" >"$folder.why"

@@ -60,3 +60,20 @@ def line_shader():
     import gpu
 
     return gpu.shader.from_builtin("UNIFORM_COLOR")
+
+
+def colour_shader():
+    """Shader for triangles with a colour at each corner."""
+    import gpu
+
+    return gpu.shader.from_builtin("SMOOTH_COLOR")
+
+
+def text_size(font: int, size: float) -> None:
+    """Set the height in pixels of text drawn over the view."""
+    import blf
+
+    if VERSION < (4, 0, 0):
+        blf.size(font, round(size), 72)  # whole points of 72 to the inch
+    else:
+        blf.size(font, size)

@@ -8,19 +8,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
-from mathutils.bvhtree import BVHTree
 
 from . import compat, making
 from .ligature.mesh.cache import write_atomically
-from .ligature.mesh.inertia import mass_properties
 from .mesh_data import points_of
 from .object_operators import NeedsBody, active_body
 from .placing import children_with
+from .quality import measure
 
 WORKER = Path(__file__).with_name("decompose_worker.py")
 
@@ -89,48 +88,6 @@ def _packages():
     """Folders in which the worker finds CoACD."""
     found = importlib.util.find_spec("coacd")
     return [str(Path(found.origin).parent.parent)] if found else []
-
-
-def quality(vertices, faces, hulls, samples=2000):
-    """How well hulls stand for a mesh: volume error (None for an open mesh) and the greatest distance in metres.
-
-    The distance is from points of the hulls' outside to the mesh, and from points of the mesh to the
-    hulls, over ``samples`` evenly spread points on each.
-    """
-    surfaces = [making.hull_of(hull) for hull in hulls]
-    try:
-        volume = mass_properties(vertices, faces).volume
-        error = abs(sum(mass_properties(v, np.array(f)).volume for v, f in surfaces) - volume) / volume
-    except ValueError:
-        error = None
-    mesh = BVHTree.FromPolygons(vertices.tolist(), faces.tolist())
-    trees = [BVHTree.FromPolygons(v.tolist(), f) for v, f in surfaces]
-    rng = np.random.default_rng(0)
-    worst = 0.0
-    for v, f in surfaces:
-        for point in _samples(v, np.array(f), samples // len(surfaces) + 1, rng):
-            if not any(_inside(tree, point) for tree in trees):
-                worst = max(worst, mesh.find_nearest(point)[3])
-    for point in _samples(vertices, faces, samples, rng):
-        if not any(_inside(tree, point) for tree in trees):
-            worst = max(worst, min(tree.find_nearest(point)[3] for tree in trees))
-    return error, worst
-
-
-def _inside(tree, point):
-    """Whether a point lies inside a convex surface by more than a thousandth of a millimetre."""
-    place, normal, _, _ = tree.find_nearest(point)
-    return (place - Vector(point)).dot(normal) > 1e-6
-
-
-def _samples(vertices, faces, count, rng):
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    chosen = rng.choice(len(faces), count, p=area / area.sum())
-    u, v = rng.random((2, count, 1))
-    over = u + v > 1.0
-    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
-    return a[chosen] + u * (b[chosen] - a[chosen]) + v * (c[chosen] - a[chosen])
 
 
 class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
@@ -213,17 +170,14 @@ class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
             return {"CANCELLED"}
         for old in children_with(body, "HULL"):
             bpy.data.objects.remove(old)
-        kept = []
         for piece in pieces:
-            try:
+            with suppress(ValueError):  # CoACD's flat slivers collide with nothing
                 making.add_hull(body, piece)
-                kept.append(piece)
-            except ValueError:
-                continue  # CoACD's flat slivers collide with nothing
         body.adf.body.collision_mesh_type = "CONVEX_HULL"
-        volume, distance = quality(self._vertices, self._faces, kept)
-        share = "volume unknown, the mesh is open" if volume is None else f"volume error {100 * volume:.1f} %"
-        self.report({"INFO"}, f"{len(kept)} convex pieces, {share}, distance {1e3 * distance:.2f} mm")
+        try:
+            self.report({"INFO"}, f"'{body.name}': {measure(body)}")
+        except ValueError as error:
+            self.report({"WARNING"}, f"'{body.name}': {error}")
         return {"FINISHED"}
 
 

@@ -28,7 +28,7 @@ SIZE = 0.03
 SIZE_OF_HANDLE_GAP = 0.08 * SIZE
 """How far the handle of a limit stands off its place, so that those of a locked axis are two."""
 
-_state: dict = {"handle": None, "dirty": True, "batches": []}
+_state: dict = {"handle": None, "dirty": True, "batches": [], "changes": 0}
 
 
 def lines_of(scene: bpy.types.Scene) -> dict[str, list[Array]]:
@@ -174,6 +174,12 @@ def _draw() -> None:
 def redraw(*arguments) -> None:
     """Work the lines out again when they are drawn next."""
     _state["dirty"] = True
+    _state["changes"] += 1
+
+
+def changes() -> int:
+    """A number that grows with every change of the scene."""
+    return _state["changes"]
 
 
 CLASSES = ()

@@ -56,6 +56,16 @@ class ADF_PG_shape(bpy.types.PropertyGroup):
     order: bpy.props.IntProperty(options={"HIDDEN"})
 
 
+class ADF_PG_quality(bpy.types.PropertyGroup):
+    """How well collision shapes stand for a mesh, as it was measured."""
+
+    pieces: bpy.props.IntProperty()
+    volume: bpy.props.FloatProperty()
+    closed: bpy.props.BoolProperty()
+    distance: bpy.props.FloatProperty()
+    measured: bpy.props.StringProperty()
+
+
 class ADF_PG_object(bpy.types.PropertyGroup):
     """What an object is in the file."""
 
@@ -82,6 +92,7 @@ class ADF_PG_object(bpy.types.PropertyGroup):
         min=0.0,
     )
     shape: bpy.props.PointerProperty(type=ADF_PG_shape)
+    quality: bpy.props.PointerProperty(type=ADF_PG_quality)
 
 
 class ADF_PG_file(bpy.types.PropertyGroup):
@@ -154,6 +165,11 @@ class ADF_PG_scene(bpy.types.PropertyGroup):
     show_overlay: bpy.props.BoolProperty(
         name="Overlay", description="Draw joints, limits, inertia, rays over the scene", default=True
     )
+    show_quality: bpy.props.BoolProperty(
+        name="Collision Quality",
+        description="Draw volume error, Hausdorff distance and deviation over the meshes that were measured",
+        default=True,
+    )
 
 
 for _kind in OBJECT_KINDS:
@@ -164,7 +180,8 @@ ADF_PG_file.__annotations__["variants"] = bpy.props.CollectionProperty(type=ADF_
 ADF_PG_scene.__annotations__["launch"] = bpy.props.PointerProperty(type=group_class("launch"))
 
 CLASSES = (
-    ADF_PG_shape, ADF_PG_object, ADF_PG_variant, ADF_PG_file, ADF_PG_launch_entry, ADF_PG_finding, ADF_PG_scene,
+    ADF_PG_shape, ADF_PG_quality, ADF_PG_object, ADF_PG_variant, ADF_PG_file, ADF_PG_launch_entry, ADF_PG_finding,
+    ADF_PG_scene,
 )  # fmt: skip
 
 

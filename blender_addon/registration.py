@@ -17,6 +17,8 @@ from . import (
     overlay,
     preview_operators,
     properties,
+    quality,
+    quality_overlay,
     schema_properties,
     sidebar,
     simulate_operators,
@@ -29,12 +31,14 @@ MODULES = (
     generator_operators,
     check_operators,
     decompose_operators,
+    quality,
     preview_operators,
     simulate_operators,
     key_panels,
     sidebar,
     menus,
     overlay,
+    quality_overlay,
     gizmos,
 )
 

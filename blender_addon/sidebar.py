@@ -145,6 +145,9 @@ class ADF_PT_collision(Sidebar, bpy.types.Panel):
         layout.operator_menu_enum("adf.fit_shape", "kind", text="Fit Primitive", icon="MOD_SHRINKWRAP")
         layout.operator("adf.add_hull", icon="MESH_ICOSPHERE")
         layout.operator("adf.decompose", icon="MOD_EXPLODE")
+        row = layout.row(align=True)
+        row.operator("adf.measure_collision", icon="DRIVER_DISTANCE")
+        row.prop(context.scene.adf, "show_quality", text="", icon="OVERLAY")
         layout.operator_menu_enum("adf.set_inertia", "source", text="Set Inertia From", icon="PHYSICS")
 
 

@@ -1,10 +1,14 @@
-"""The tests of `inside` in Blender as a Python module; ``make test-blender`` names its Pythons in BLENDER_MODULES."""
+"""The tests of `inside` in Blender as a Python module, whose Pythons BLENDER_MODULES names.
+
+``make test`` names the newest Blender, ``make test-blender`` all that are supported.
+"""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -22,15 +26,23 @@ def named(python: str) -> str:
     return Path(python).parent.parent.name
 
 
+@cache
+def missing(path: Path) -> str:
+    """Why a Python has no Blender; empty when it has one."""
+    if path.is_file() and not subprocess.run([path, "-c", "import bpy"], capture_output=True, check=False).returncode:
+        return ""
+    why = path.parent.parent.with_name(f"{path.parent.parent.name}.why")
+    return why.read_text().strip() if why.is_file() else f"{path} has no bpy"
+
+
 @pytest.fixture(params=PYTHONS or [""], ids=named)
 def python(request: pytest.FixtureRequest) -> str:
     """A Python that has Blender as a module."""
     if not request.param:
         pytest.skip("name Pythons that have bpy in BLENDER_MODULES, or run `make test-blender`")
-    path = ROOT / request.param
-    if not path.is_file() or subprocess.run([path, "-c", "import bpy"], capture_output=True, check=False).returncode:
-        pytest.skip(f"{request.param} has no bpy: its wheel could not be had when `make test-blender` fetched it")
-    return str(path)
+    if reason := missing(ROOT / request.param):
+        pytest.skip(reason)
+    return str(ROOT / request.param)
 
 
 @pytest.mark.parametrize("file", sorted(p.name for p in INSIDE.glob("test_*.py")))

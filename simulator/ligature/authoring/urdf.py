@@ -7,7 +7,6 @@ child's frame. What ADF cannot express is told, never dropped in silence. Metres
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 from ligature.adf import AdfError, Resolver
 from ligature.adf.frames import Array, frame, inverse, matrix_quaternion, minimal_rotation, quaternion_matrix
 from ligature.adf.update import Item
+from ligature.authoring.conversion import Converted, shape_keys
 from ligature.authoring.generate import Parts, mass_keys
 from ligature.authoring.placement import joint_keys, matrix_of, pose_of
 from ligature.authoring.shapes import Shape
@@ -24,14 +24,6 @@ from ligature.mesh.load import load_mesh
 from ligature.mesh.mesh import Mesh, MeshPart
 
 _KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
-
-
-@dataclass
-class Converted:
-    """A converted robot, and what could not be expressed."""
-
-    parts: Parts
-    notes: list[str] = field(default_factory=list)
 
 
 def from_urdf(robot: Any, folder: Path) -> Converted:
@@ -94,29 +86,16 @@ def _shapes(
     link: str, given: Any, prefix: str, folder: Path, meshes: dict[str, Mesh], notes: list[str]
 ) -> Iterator[tuple[str, Any]]:
     """Keys of a link's visuals or collisions: primitives as a compound, meshes joined into one file."""
-    primitives, parts = [], []
+    primitives: list[tuple[Shape, Array]] = []
+    parts: list[MeshPart] = []
     for index, item in enumerate(given or ()):
         T = _matrix(item.origin)
         shape = _primitive(item.geometry)
         if shape is not None:
-            geometry = {f"geometry.{key}": value for key, value in shape.geometry().items()}
-            primitives.append({"shape": shape.kind, **geometry, "offset": pose_of(T)})
+            primitives.append((shape, T))
         elif item.geometry is not None and item.geometry.mesh is not None:
             parts += _mesh_parts(link, item.geometry.mesh, T, index, folder, notes)
-    if primitives and parts:
-        notes.append(
-            f"link '{link}' mixes meshes and primitives as {prefix or 'visual '}shapes; the meshes are left out"
-        )
-    if primitives:
-        yield f"compound {prefix}shape", tuple(primitives)
-    elif parts:
-        name = f"{link}{'_collision' if prefix else ''}.OBJ"
-        meshes[name] = Mesh(Path(name), tuple(parts))
-        yield f"{prefix}mesh", name
-        if prefix:
-            yield "collision mesh type", "CONVEX_HULL"
-    elif prefix:
-        yield "collision mesh", ""  # otherwise the visual mesh would collide
+    yield from shape_keys(link, prefix, primitives, parts, meshes)
 
 
 def _primitive(geometry: Any) -> Shape | None:

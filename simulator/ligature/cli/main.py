@@ -256,11 +256,11 @@ def inertia(
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(help="A URDF file.")],
+    source: Annotated[Path, typer.Argument(help="A URDF or MJCF file.")],
     out: Annotated[Path, typer.Option("-o", help="The model file to write.")],
     namespace: Annotated[str, typer.Option(help="Namespace of the model.")] = "/ambf/env/",
 ) -> None:
-    """Turn a URDF robot into an ADF model with its meshes; tells what ADF cannot express."""
+    """Turn a URDF or MJCF robot into an ADF model with its meshes; tells what ADF cannot express."""
     from ligature.cli.convert import convert as run_convert
 
     raise typer.Exit(run_convert(source, out, namespace, Console(highlight=False, soft_wrap=True)))

@@ -185,6 +185,7 @@ RECIPES = {
     "select_finding": [({"index": 0}, has_finding)],
     "copy_findings": [({}, has_finding)],
     "decompose": [({"threshold": 0.5, "max_hulls": 2}, on("BODY", "link1"))],
+    "measure_collision": [({}, on("BODY", "link1"))],
     "move_joint": [({"part": 0.9}, on("JOINT", "link1"))],
     "rest_pose": [({}, is_moved)],
     "simulate": [({"seconds": 0.1}, nothing)],
@@ -308,6 +309,26 @@ def over_the_phantom():
     STEPS[:0] = drag("phantom", "joint_limits_linear_high_x", (60, 20)) + drag(
         "phantom", "joint_limits_angular_low_z", (30, -10)
     )
+
+
+@step
+def quality():
+    """Five convex pieces are few for a ring: numbers tell it, and colours where."""
+    bpy.ops.mesh.primitive_torus_add(major_radius=0.05, minor_radius=0.015, location=(1.0, 1.0, 0.1))
+    bpy.context.object.name = "Ring"
+    select(bpy.context.object)
+    bpy.ops.adf.make(role="BODY")
+    assert bpy.ops.adf.decompose(threshold=0.3, max_hulls=5) == {"FINISHED"}
+    view()["space_data"].overlay.show_extras = False
+    window.look((1.0, 1.0, 0.1), (0.8, 0.0, 0.5), 0.22)
+    window.scroll_sidebar(8)
+
+
+@step
+def quality_is_drawn():
+    picture("blender_quality")
+    find("HULL", "Ring").location.x += 0.01  # drawn once more, as figures of something else
+    redraw()
 
 
 @step

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 import window
-from window import OUT, STEPS, find, main, picture, select, step, view
+from window import OUT, STEPS, find, picture, select, step, view
 
 spec = importlib.util.spec_from_file_location("author", Path(os.environ["LIGATURE_ROOT"], "scenes", "author_blender_suturing.py"))  # fmt: skip
 author = importlib.util.module_from_spec(spec)
@@ -52,12 +52,7 @@ def simulate():
 
 def finding_list():
     bpy.ops.adf.check()
-    area = view()["area"]
-    for region in area.regions:
-        if region.type == "UI":
-            with bpy.context.temp_override(window=main(), area=area, region=region):
-                for _ in range(12):
-                    bpy.ops.view2d.scroll_down(deltay=60)
+    window.scroll_sidebar(12)
 
 
 STEPS += [

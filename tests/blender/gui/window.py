@@ -115,6 +115,15 @@ OPEN_TAB = (point_at_the_tab, press_the_tab, release_the_tab)
 """Steps that open the add-on's tab in the sidebar."""
 
 
+def scroll_sidebar(times):
+    """Scroll the sidebar down."""
+    area = view()["area"]
+    region = next(region for region in area.regions if region.type == "UI")
+    with bpy.context.temp_override(window=main(), area=area, region=region):
+        for _ in range(times):
+            bpy.ops.view2d.scroll_down(deltay=60)
+
+
 def run():
     """The next step; a failure ends the session with its traceback told."""
     if not STEPS:
