@@ -6,7 +6,9 @@ import io
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import ligature
+import numpy as np
 import pytest
 from ligature.bus.record import Header, Record, RecordWriter
 from ligature.cli.options import RunOptions
@@ -47,6 +49,17 @@ def test_a_record_ends_in_the_same_bits(recorded: Path) -> None:
     status, text = said(recorded)
     assert status == 0, text
     assert f"the same bits: {Record.read(recorded).end}" in text
+
+
+def test_a_record_becomes_a_dataset_of_the_run(recorded: Path, tmp_path: Path) -> None:
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    assert replay(recorded, None, "", 1.0, console, tmp_path / "run.h5") == 0, console.file.getvalue()  # type: ignore[attr-defined]
+    with h5py.File(tmp_path / "run.h5") as file:
+        episode = file["episode_0000"]
+        assert episode["time"][:] == pytest.approx([0.002, 0.102])
+        placed = [[0.0] * 6, [0.1, 0.1, 0.12, 0.0, 0.0, 0.0]]
+        assert episode["arms/PSM2/measured_js"][:, 0] == pytest.approx(np.array(placed), abs=1e-4)
+        assert episode["cameras/cameraL/rgb"][:].std() > 1.0
 
 
 def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def record(out: Path, exclude: str, seconds: float, keep_free: float, console: C
         console.print(problem, style="red", markup=False)
         return 1
     part = out.with_name(f"{out.stem}.part.bag")
-    command = [str(recorder()), "-a", "-O", str(part), f"--min-space={max(1, round(1e6 * keep_free))}k"]
+    command = [str(recorder()), "-a", "-O", str(part), f"--min-space={max(1, round(1e6 * keep_free))}k", *_commanded()]
     if exclude:
         command += ["-x", exclude]
     console.print(f"recording to '{out}'; Ctrl-C ends it", markup=False)
@@ -70,6 +70,16 @@ def _obstacle(out: Path) -> str:
     if not master_answers(uri):
         return f"no ROS master answers at {uri}; start the simulator with 'ligature run' first"
     return ""
+
+
+def _commanded() -> list[str]:
+    """Topics of commands: the recorder listens from the start, not a second or more after a client came up."""
+    from ligature.ros.master import NO_ANSWER, commanded_topics
+
+    try:
+        return sorted(commanded_topics())
+    except NO_ANSWER:
+        return []
 
 
 def _run(command: list[str], seconds: float) -> tuple[list[str], int]:

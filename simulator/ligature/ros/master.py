@@ -31,6 +31,16 @@ def node_name(world: str) -> str:
     return "ligature" if world == DEFAULT_WORLD else "ligature" + re.sub(r"\W+", "_", world.rpartition("/")[0])
 
 
+_SIMULATORS = re.compile(r"/(ligature|ambf)(?!.*_\d+_\d+\Z)")
+"""Nodes of simulators, ours and AMBF's; those of programs beside them have names that end in process and time."""
+
+
+def commanded_topics() -> set[str]:
+    """Topics that a simulator on this master listens to; raises one of `NO_ANSWER`."""
+    _, subscribers, _ = rosgraph.Master("/ligature_look").getSystemState()
+    return {topic for topic, nodes in subscribers if any(_SIMULATORS.match(node) for node in nodes)}
+
+
 class NameTaken(RuntimeError):
     """Another simulator of the same world runs on this master; the message says what to do."""
 

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import rosbag
-import rosgraph
 import rospy
 from crtk_msgs.msg import OperatingState, StringStamped
 from sensor_msgs.msg import JointState
 
 from ligature.ros.bags import BagError, messages, opened
+from ligature.ros.master import commanded_topics
 
 PATIENCE = 20.0
 """Seconds to wait for the simulator to be connected, and for an arm to get ready."""
@@ -38,7 +38,7 @@ def play(path: Path, joints: str, speed: float, say: Callable[[str], None]) -> i
     `PlaybackError`.
     """
     rospy.init_node("ligature_replay", anonymous=True, disable_signals=True)
-    taken = _subscribed()
+    taken = commanded_topics()
     with opened(path) as bag:
         found = sorted(bag.get_type_and_topic_info().topics)
         routes = _joint_routes(found, joints, taken) if joints else {topic: topic for topic in found if topic in taken}
@@ -61,13 +61,6 @@ def play(path: Path, joints: str, speed: float, say: Callable[[str], None]) -> i
             for topic, message in types.items():
                 _begin(routes[topic], message)
         return _stream(bag, publishers, bool(joints), speed)
-
-
-def _subscribed() -> set[str]:
-    """Topics that a simulator of ours, or AMBF's, listens to."""
-    _, subscribers, _ = rosgraph.Master(rospy.get_name()).getSystemState()
-    found = {topic for topic, nodes in subscribers if any(re.match(r"/(ligature|ambf)", node) for node in nodes)}
-    return {topic for topic in found if not topic.startswith("/rosout")}
 
 
 def _joint_routes(found: list[str], kind: str, taken: set[str]) -> dict[str, str]:
