@@ -28,6 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PASSES = ("rgb", "depth", "ids")
 SIZE = (640, 480)
 SECONDS = 3.0
+LOOKS = {None: "as the device is given", 4: "4 samples", 0: "hard edges"}
 CHUNK = 2500
 """Triangles that PyBullet takes at a time."""
 
@@ -133,7 +134,7 @@ def main() -> int:
         say = sys.stdout.write
         tiny = Tiny(scene, simulation)
         reference, effort = frames_per_second(lambda tiny=tiny, view=view: tiny.draw(view), SECONDS)
-        for samples in (4, 0):
+        for samples in (None, 4, 0):
             renderer = Renderer(scene, samples)
 
             def draw(renderer: Renderer = renderer, view: CameraView = view, state: Any = simulation.state) -> None:
@@ -142,7 +143,7 @@ def main() -> int:
             alone, own = frames_per_second(draw, SECONDS)
             loaded, factor = beside_physics(launch, models, draw)
             say(
-                f"{name}, {SIZE[0]}x{SIZE[1]} {'+'.join(PASSES)}, {renderer.triangles} triangles, {samples} samples, "
+                f"{name}, {SIZE[0]}x{SIZE[1]} {'+'.join(PASSES)}, {renderer.triangles} triangles, {LOOKS[samples]}, "
                 f"{renderer.device}: {alone:.1f} frames/s alone ({alone / reference:.1f} times PyBullet's {reference:.1f}), "
                 f"{own:.0f} ms of processor time a frame (PyBullet's {effort:.0f}), "
                 f"{loaded:.1f} beside physics at real-time factor {factor:.2f}\n"

@@ -78,7 +78,7 @@ class Stage:
         path.write_text(head + folders + "".join(lines) + CAMERA + f"L: {{{self.lamp}}}\n" + self.more)
         return path
 
-    def renderer(self, samples: int = 4) -> tuple[Renderer, Simulation]:
+    def renderer(self, samples: int | None = None) -> tuple[Renderer, Simulation]:
         """The scene, loaded, and what draws it; skips where there is no OpenGL."""
         simulation = Simulation(ligature.load(self.write()))
         try:
@@ -86,7 +86,7 @@ class Stage:
         except RenderUnavailable as error:
             pytest.skip(str(error))
 
-    def draw(self, samples: int = 4) -> Frame:
+    def draw(self, samples: int | None = None) -> Frame:
         """Its picture."""
         renderer, simulation = self.renderer(samples)
         assert renderer.problems == []

@@ -18,3 +18,12 @@ def create_context() -> moderngl.Context:
             f"no OpenGL 3.3 context through EGL ({error}); install libegl1 and libgl1-mesa-dri "
             "for the software rasteriser, or a GPU driver; the simulator runs on without cameras"
         ) from error
+
+
+SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")
+"""What drivers that draw on the processor call themselves."""
+
+
+def draws_on_processor(context: moderngl.Context) -> bool:
+    """Whether a software rasteriser draws, to which several samples a pixel cost as much as the picture itself."""
+    return any(name in context.info["GL_RENDERER"].lower() for name in SOFTWARE)

@@ -103,7 +103,9 @@ class Lights:
             size = settings.shadow_size
             if not size or len(self._shadows) == MAX_SHADOWS:
                 continue
-            shadow = self._maps.setdefault((index, size), _ShadowMap(self._context, size))
+            shadow = self._maps.get((index, size))
+            if shadow is None:
+                shadow = self._maps[index, size] = _ShadowMap(self._context, size)
             light, projection = light_camera(settings, self._T_world_light[index], centre, radius)
             shadow.use()
             draw(light, projection, size)

@@ -87,6 +87,11 @@ class Painter:
         own = self._brushes.own
         return any(not b.surface.opaque or own(shaders) or own(b.shaders) for b, _ in self._calls)
 
+    @property
+    def has_own_shaders(self) -> bool:
+        """Whether programs of scene files draw something."""
+        return any(self._brushes.own(batch.shaders) for batch, _ in self._calls)
+
     def paint(self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None) -> None:
         """Draw ``passes``: the opaque from near to far, then the transparent from far to near."""
         context, seen = self._context, self._seen

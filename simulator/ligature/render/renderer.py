@@ -17,9 +17,10 @@ from ligature.model.poses import pose7_matrices
 from ligature.model.scene import Scene, ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
-from ligature.render.context import create_context
+from ligature.render.context import create_context, draws_on_processor
 from ligature.render.lights import Lights
 from ligature.render.movement import Movement
+from ligature.render.outlines import smoothed
 from ligature.render.painter import Brushes, Painter
 from ligature.render.points import computed_points
 from ligature.render.programs import Programs
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 
 BACKGROUND = (0.02, 0.02, 0.03, 1.0)
 SAMPLES = 4
-"""Samples a pixel of the colour picture: what Mesa's software rasteriser offers."""
+"""Samples a pixel of the colour picture on a GPU."""
 
 COARSE_BELOW = 24.0
 """Radius in pixels below which the low-resolution mesh of an object is drawn."""
@@ -55,14 +56,17 @@ class Renderer:
         What to draw.
     samples
         Samples a pixel of the colour picture; 0 draws colour without anti-aliasing, in one pass with the rest.
+        When not given, 4 on a GPU; on a software rasteriser colour is drawn as with 0 and its edges smoothed after.
     context
         The OpenGL context of a window; one without a display when not given.
     """
 
-    def __init__(self, scene: Scene, samples: int = SAMPLES, context: moderngl.Context | None = None) -> None:
+    def __init__(self, scene: Scene, samples: int | None = None, context: moderngl.Context | None = None) -> None:
         self._scene = scene
         self._context = context or create_context()
-        self._samples = min(samples, self._context.max_samples)
+        self._smoothed = samples is None and draws_on_processor(self._context)
+        wanted = SAMPLES if samples is None else samples
+        self._samples = 0 if self._smoothed else min(wanted, self._context.max_samples)
         self._programs = Programs(self._context)
         self._textures = Textures(self._context)
         self._targets: dict[tuple[int, int, tuple[str, ...], int], Target] = {}
@@ -127,16 +131,21 @@ class Renderer:
         before = self._movement.before(self._instances, view) if "flow" in target.passes else None
         painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
         self.drawn_triangles = painter.triangles
-        if self._samples or self._sky is not None or painter.needs_colour_apart(shaders):
-            if target.colour is not None:
-                painter.paint(target.colour, ["rgb"], shaders)
-                if self._sky is not None and shaders is None:
-                    self._sky.draw(target.colour, view)
+        sky = self._sky if shaders is None else None
+        if target.colour is not None and (self._samples or painter.needs_colour_apart(shaders)):
+            painter.paint(target.colour, ["rgb"], shaders)
+            if sky is not None:
+                sky.draw(target.colour, view)
             if target.geometry is not None:
                 painter.paint(target.geometry, [name for name in target.passes if name != "rgb"])
         else:
             painter.paint(target.whole, target.passes)
-        return target.read()
+            if sky is not None and target.behind is not None:
+                sky.draw(target.behind, view)
+        if not self._smoothed or shaders:
+            return target.read()
+        keyed = not painter.has_own_shaders
+        return target.read(lambda rgba: smoothed(rgba, keyed))
 
     def points(self, depth: NDArray[np.float32], view: CameraView, shaders: ShaderFiles) -> NDArray[np.float32] | None:
         """What ``depth compute shaders`` make of linear ``depth`` (h, w): the x, y, z (h, w, 3) that they write.

@@ -58,6 +58,7 @@ class Surface:
             "METALLIC_MAP": look and look.metallic_map,
             "ROUGHNESS_MAP": look and look.roughness_map,
             "COAT": look and (look.coat or None),
+            "CLEAR": None if self.opaque else self.colour,
         }
         return frozenset(name for name, value in present.items() if value is not None)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,7 +46,7 @@ class Frame:
 class Target:
     """One texture for each pass; colour with ``samples`` a pixel when above 0, resolved before it is read.
 
-    ``colour`` and ``geometry`` are drawn one after the other, or ``whole`` at once.
+    ``colour`` and ``geometry`` are drawn one after the other, or ``whole`` at once, and what lies ``behind`` it.
     """
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], passes: Sequence[str], samples: int) -> None:
@@ -60,7 +60,9 @@ class Target:
         self.whole = context.framebuffer(list(self._textures.values()), depth)
         self._resolved: moderngl.Framebuffer | None = None
         self.colour: moderngl.Framebuffer | None = None
+        self.behind: moderngl.Framebuffer | None = None
         if "rgb" in self.passes:
+            self.behind = context.framebuffer([self._textures["rgb"]], depth)
             self.colour = context.framebuffer([self._textures["rgb"]], context.depth_renderbuffer(size))
             if samples:
                 self._resolved = self.colour
@@ -79,15 +81,18 @@ class Target:
         for name, data in self._empty.items():  # what OpenGL's clear colour cannot express
             self._textures[name].write(data)
 
-    def read(self) -> Frame:
-        """Copy the picture out, top row first."""
+    def read(self, finish: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda rgba: rgba[..., :3]) -> Frame:
+        """Copy the picture out, top row first; ``finish`` makes (h, w, 3) of the colours and alpha (h, w, 4)."""
         if self._resolved is not None and self.colour is not None:
             self._context.copy_framebuffer(self._resolved, self.colour)
-        return Frame(**{name: self._array(name) for name in self.passes})
+        arrays = {name: self._array(name) for name in self.passes}
+        if "rgb" in arrays:
+            arrays["rgb"] = finish(arrays["rgb"])
+        return Frame(**{name: np.ascontiguousarray(array) for name, array in arrays.items()})
 
     def _array(self, name: str) -> NDArray[Any]:
         width, height = self.size
         channels, dtype = PASSES[name]
         data = np.frombuffer(self._textures[name].read(), dtype="u1" if dtype == "f1" else dtype)
         rows = data.reshape(height, width, channels)[::-1]
-        return np.ascontiguousarray(rows[..., 0] if channels == 1 else rows[..., :3])
+        return rows[..., 0] if channels == 1 else rows[..., : 3 if name == "normals" else channels]

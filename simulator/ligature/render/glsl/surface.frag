@@ -102,9 +102,15 @@ void main() {
     vec4 texel = vec4(1.0);
 #endif
 #ifdef PHYSICAL
-    fColour = vec4(physical(uDiffuse * texel.rgb, eye, shadedNormal(normal), toEye), uAlpha * texel.a);
+    fColour.rgb = physical(uDiffuse * texel.rgb, eye, shadedNormal(normal), toEye);
 #else
-    fColour = vec4(phong(texel.rgb, eye, shadedNormal(normal), toEye), uAlpha * texel.a);
+    fColour.rgb = phong(texel.rgb, eye, shadedNormal(normal), toEye);
+#endif
+#ifdef CLEAR
+    fColour.a = uAlpha * texel.a;
+#else
+    // not needed for blending, so it tells surfaces and their directions apart for the smoothing of outlines
+    fColour.a = fract(0.381966 * float(vIds.y) + dot(normal, vec3(0.13, 0.17, 0.2)));
 #endif
 #endif
 #ifdef PASS_DEPTH
