@@ -1,7 +1,8 @@
-"""What rigid bodies and the legacy objects share: joint lists by name or index, in radians or metres, and vectors."""
+"""What rigid bodies and the legacy objects share: wrenches, and joint lists by name or index, in radians or metres."""
 
 from __future__ import annotations
 
+import copy
 import math
 import operator
 import time
@@ -9,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import rospy
-from geometry_msgs.msg import Vector3
+from geometry_msgs.msg import Point, Vector3, Wrench
 
 from ligature.client.base_object import BaseObject
 
@@ -26,6 +27,34 @@ class JointedObject(BaseObject):
     """
 
     _asked = -math.inf
+
+    def get_inertia(self) -> Point:
+        """Principal moments of inertia, kg·m²."""
+        return self._state.pInertia
+
+    def set_force(self, fx: float, fy: float, fz: float) -> None:
+        """Command a force on the centre of mass, world axes; the torque stays the commanded one."""
+        self.set_wrench(Wrench(vector(fx, fy, fz), self._cmd.wrench.torque))
+
+    def set_torque(self, nx: float, ny: float, nz: float) -> None:
+        """Command a torque, world axes; the force stays the commanded one."""
+        self.set_wrench(Wrench(self._cmd.wrench.force, vector(nx, ny, nz)))
+
+    def set_wrench(self, wrench: Wrench) -> None:
+        """Command force and torque, world axes."""
+        if not self._takes(*components(wrench.force), *components(wrench.torque)):
+            return
+        with self._lock:
+            self._cmd.wrench = copy.deepcopy(wrench)
+            self._wrench_commanded()
+
+    def wrench_command(self, fx: float, fy: float, fz: float, nx: float, ny: float, nz: float) -> None:
+        """Command force and torque by their components."""
+        self.set_wrench(Wrench(vector(fx, fy, fz), vector(nx, ny, nz)))
+
+    def _wrench_commanded(self) -> None:
+        """Have the command say that its wrench is meant."""
+        raise NotImplementedError
 
     def get_children_names(self) -> list[str]:
         """Names of all bodies below this one."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import copy
-
 from ambf_msgs.msg import ObjectCmd, ObjectState
-from geometry_msgs.msg import Point, Pose, Quaternion, Wrench
+from geometry_msgs.msg import Point, Pose, Quaternion
 
 from ligature.client.euler import quaternion_from_euler
-from ligature.client.joints import JointedObject, components, grown, vector
+from ligature.client.joints import JointedObject, grown
 
 
 class Object(JointedObject):
@@ -16,30 +14,6 @@ class Object(JointedObject):
 
     State = ObjectState
     Command = ObjectCmd
-
-    def get_inertia(self) -> Point:
-        """Principal moments of inertia, kg·m²."""
-        return self._state.pInertia
-
-    def set_force(self, fx: float, fy: float, fz: float) -> None:
-        """Command a force, world axes; the torque stays."""
-        self.set_wrench(Wrench(vector(fx, fy, fz), self._cmd.wrench.torque))
-
-    def set_torque(self, nx: float, ny: float, nz: float) -> None:
-        """Command a torque, world axes; the force stays."""
-        self.set_wrench(Wrench(self._cmd.wrench.force, vector(nx, ny, nz)))
-
-    def set_wrench(self, wrench: Wrench) -> None:
-        """Command force and torque, world axes."""
-        if not self._takes(*components(wrench.force), *components(wrench.torque)):
-            return
-        with self._lock:
-            self._cmd.wrench = copy.deepcopy(wrench)
-            self._cmd.enable_position_controller = False
-
-    def wrench_command(self, fx: float, fy: float, fz: float, nx: float, ny: float, nz: float) -> None:
-        """Command force and torque by their components."""
-        self.set_wrench(Wrench(vector(fx, fy, fz), vector(nx, ny, nz)))
 
     def pose_command(
         self, px: float, py: float, pz: float, roll: float, pitch: float, yaw: float, *joints: float
@@ -61,6 +35,9 @@ class Object(JointedObject):
 
     def _pose_commanded(self) -> None:
         self._cmd.enable_position_controller = True
+
+    def _wrench_commanded(self) -> None:
+        self._cmd.enable_position_controller = False
 
     def _command_joint(self, joint: str | int, value: float, position: bool) -> None:
         value, index = float(value), self._index(joint)

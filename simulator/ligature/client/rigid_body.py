@@ -9,7 +9,7 @@ import copy
 from collections.abc import Sequence
 
 from ambf_msgs.msg import RigidBodyCmd, RigidBodyState
-from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 
 from ligature.client.euler import quaternion_from_euler
 from ligature.client.joints import JointedObject, components, grown, vector
@@ -23,10 +23,6 @@ class RigidBody(JointedObject):
     State = RigidBodyState
     Command = RigidBodyCmd
 
-    def get_inertia(self) -> Point:
-        """Principal moments of inertia, kg·m²."""
-        return self._state.pInertia
-
     def get_linear_vel(self) -> Vector3:
         """Velocity of the centre of mass."""
         return self._state.twist.linear
@@ -34,26 +30,6 @@ class RigidBody(JointedObject):
     def get_angular_vel(self) -> Vector3:
         """Angular velocity."""
         return self._state.twist.angular
-
-    def set_force(self, fx: float, fy: float, fz: float) -> None:
-        """Command a force on the centre of mass; the torque stays the commanded one."""
-        self.set_wrench(Wrench(vector(fx, fy, fz), self._cmd.wrench.torque))
-
-    def set_torque(self, nx: float, ny: float, nz: float) -> None:
-        """Command a torque; the force stays the commanded one."""
-        self.set_wrench(Wrench(self._cmd.wrench.force, vector(nx, ny, nz)))
-
-    def set_wrench(self, wrench: Wrench) -> None:
-        """Command force and torque."""
-        if not self._takes(*components(wrench.force), *components(wrench.torque)):
-            return
-        with self._lock:
-            self._cmd.wrench = copy.deepcopy(wrench)
-            self._cmd.cartesian_cmd_type = FORCE
-
-    def wrench_command(self, fx: float, fy: float, fz: float, nx: float, ny: float, nz: float) -> None:
-        """Command force and torque by their components."""
-        self.set_wrench(Wrench(vector(fx, fy, fz), vector(nx, ny, nz)))
 
     def set_linear_vel(self, vx: float, vy: float, vz: float) -> None:
         """Command a velocity; the angular one stays the commanded one."""
@@ -132,6 +108,9 @@ class RigidBody(JointedObject):
 
     def _pose_commanded(self) -> None:
         self._cmd.cartesian_cmd_type = POSITION
+
+    def _wrench_commanded(self) -> None:
+        self._cmd.cartesian_cmd_type = FORCE
 
     def _command_joints(self, values: Sequence[float], joints: Sequence[int], kind: int) -> None:
         if len(values) != len(joints):
