@@ -64,6 +64,16 @@ BOUNDS = {
 TOUCH = 0.02
 """Newtons on a tip from which on it counts as touching something."""
 
+PUSH = 0.05
+"""Newtons or newton metres of a drive from which on an arm that stands pushes something, if only with its shaft: no
+gravity acts on the arms, so that the drives of one that is free have nothing to do."""
+
+FREE_RESTS = 10
+"""Rests in the air that a run must have at least, for its figures to mean something."""
+
+REST = 0.5
+"""Simulated seconds after which an arm that has its last set-point stands."""
+
 SLOW = 0.04
 """Metres per second of a tip on its way."""
 
@@ -83,6 +93,7 @@ class Arm:
         }
         self._jaw = Latest(rospy, f"/{name}/jaw/setpoint_js", JointState)
         self._force = Latest(rospy, f"/{name}/body/measured_cf", WrenchStamped)
+        self._joints = Latest(rospy, f"/{name}/measured_js", JointState)
         self.setpoints: list[tuple[float, Array]] | None = None
         rospy.Subscriber(f"/{name}/setpoint_cp", PoseStamped, self._keep, queue_size=100, tcp_nodelay=True)
 
@@ -109,6 +120,10 @@ class Arm:
         """What the tip touches pushes it with, in N."""
         f = patiently(self._force.fresh).wrench.force
         return float(np.linalg.norm([f.x, f.y, f.z]))
+
+    def effort(self) -> float:
+        """What the drive does that pushes hardest, in N or N m."""
+        return float(np.abs(patiently(self._joints.fresh).effort).max())
 
 
 class Hand:
@@ -252,26 +267,29 @@ class Operator(suture.Surgeon):
         self.line(name, T_world_tool, SLOW)
 
     def judge(self, name: str) -> None:
-        """Note how far the arm is from the ideal mapping once it has come to rest; one that touches something may lean."""
+        """Note how far the arm is from the ideal mapping once it has come to rest.
+
+        One that touches something may lean on it: with its tip, which its force tells, or with its shaft on the other
+        arm's, which its drives tell.
+        """
         hand, arm = self.hands[name], self.psms[name]
-        ideal, asked, best = hand.ideal(), (np.inf, np.inf), (np.inf, np.inf)
+        ideal, asked = hand.ideal(), (np.inf, np.inf)
         end = time.monotonic() + PATIENCE
         while max(asked) > 1e-3 and time.monotonic() < end:
             asked = apart(arm.setpoint(), ideal)
             time.sleep(0.01)
-        end_simulated = self.now() + 0.5
-        while self.now() < end_simulated and max(best) > 0.01:
-            best = min(best, apart(arm.measured(), ideal), key=max)
-            time.sleep(0.01)
+        self.wait(REST)
+        there, force, effort = apart(arm.measured(), ideal), arm.force(), arm.effort()
         self.note("set-point from the ideal mapping, mm", asked[0])
         self.note("set-point from the ideal mapping, °", asked[1])
-        force = arm.force()
-        if force < TOUCH:
+        if force < TOUCH and effort < PUSH:
             self.free += 1
-            self.note("free follower from the ideal mapping, mm", best[0])
-            self.note("free follower from the ideal mapping, °", best[1])
+            self.note("free follower from the ideal mapping, mm", there[0])
+            self.note("free follower from the ideal mapping, °", there[1])
         else:
-            self.leaning.append(f"{name} {best[0]:.2f} mm and {best[1]:.2f}° at {force:.1f} N")
+            self.leaning.append(
+                f"{name} {there[0]:.2f} mm and {there[1]:.2f}° with {force:.1f} N on the tip, drives at {effort:.1f}"
+            )
 
     def jaw(self, name: str, angle: float, seconds: float = 0.3) -> None:
         closed = angle < 0.0
@@ -474,6 +492,7 @@ def operate() -> dict[str, float]:
     sys.stdout.write(
         f"{operator.free} rests in the air; leaning on something: {', '.join(operator.leaning) or 'none'}\n"
     )
+    assert operator.free >= FREE_RESTS, f"only {operator.free} rests in the air, where {FREE_RESTS} should be judged"
     return operator.figures
 
 

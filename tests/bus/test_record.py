@@ -6,7 +6,7 @@ import struct
 from pathlib import Path
 
 import pytest
-from ligature.bus.record import Header, Record, RecordError, RecordWriter, is_record
+from ligature.bus.record import Excerpt, Header, Moment, Record, RecordError, RecordWriter, is_record
 from ligature.model.commands import ArmCommand, BodyCommand, Command, CommandType, Reset
 
 HEADER = Header('{"scene": "a.yaml"}', "ab" * 32)
@@ -40,6 +40,56 @@ def test_commands_are_replayed_between_the_updates_they_came_between(whole: Path
     Record.read(whole).replay(lambda: seen.append("update"), seen.append)
     first, second, third = (command for _, command in COMMANDS)
     assert seen == [first, second, *["update"] * 6, third, *["update"] * 2]
+
+
+def test_a_part_of_a_run_holds_what_was_before_it_and_says_where_it_begins(tmp_path: Path) -> None:
+    """The part begins between two commands of one update; what comes after its end is not in it."""
+    (_, first), (_, second), (_, third) = COMMANDS
+    writer = RecordWriter(tmp_path / "run.record", HEADER)
+    writer.write(1, first)
+    writer.write(4, second)
+    part = Excerpt(tmp_path / "part.record", writer, writer.moment(4, "ef" * 32))
+    writer.write(4, third)
+    end = writer.moment(6, "01" * 32)
+    writer.write(6, first)
+    part.finish(end)
+    writer.finish(9, "cd" * 32)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["part.record", "run.record"]
+    record = Record.read(part.path)
+    assert record == Record(HEADER, ((1, first), (4, second), (4, third)), 6, "01" * 32, 4, 2, "ef" * 32)
+    seen: list[object] = []
+    record.replay(lambda: seen.append("update"), seen.append, lambda: seen.append("begins"))
+    assert seen == [first, *["update"] * 3, second, "begins", third, *["update"] * 2]
+    assert Record.read(tmp_path / "run.record").begun == ""
+
+
+def test_a_part_without_commands_begins_and_ends_after_the_right_updates(tmp_path: Path) -> None:
+    writer = RecordWriter(tmp_path / "run.record", HEADER)
+    Excerpt(tmp_path / "part.record", writer, writer.moment(3, "ef" * 32)).finish(writer.moment(5, "01" * 32))
+    seen: list[object] = []
+    Record.read(tmp_path / "part.record").replay(
+        lambda: seen.append("update"), seen.append, lambda: seen.append("begins")
+    )
+    assert seen == [*["update"] * 2, "begins", *["update"] * 2]
+
+
+def test_a_part_that_the_disk_does_not_take_leaves_nothing(tmp_path: Path) -> None:
+    """/dev/full is a disk without room."""
+    writer = RecordWriter(tmp_path / "run.record", HEADER)
+    (tmp_path / "part.record.active").symlink_to("/dev/full")
+    part = Excerpt(tmp_path / "part.record", writer, writer.moment(1, "ef" * 32))
+    with pytest.raises(OSError, match="No space left"):
+        part.finish(writer.moment(2, "01" * 32))
+    writer.finish(2, "cd" * 32)
+    assert [path.name for path in tmp_path.iterdir()] == ["run.record"]
+
+
+def test_a_journal_that_is_too_short_is_told(tmp_path: Path) -> None:
+    writer = RecordWriter(tmp_path / "run.record", HEADER)
+    part = Excerpt(tmp_path / "part.record", writer, writer.moment(1, "ef" * 32))
+    with pytest.raises(OSError, match="shorter than it was"):
+        part.finish(Moment(2, "01" * 32, 100_000))
+    assert not list(tmp_path.glob("part*"))
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.99])

@@ -50,12 +50,12 @@ def until(condition: Callable[[], Any], what: str, seconds: float = PATIENCE) ->
 class Served:
     """A simulation with a page, and its state as the physics process writes it."""
 
-    def __init__(self, *arguments: str, scene: Path = SMALL) -> None:
+    def __init__(self, *arguments: str, scene: Path = SMALL, folder: Path | None = None) -> None:
         self.lines: list[str] = []
         command = [str(Path(sys.executable).parent / "ligature"), "cockpit", str(scene), "--at", "127.0.0.1:0"]
         self.process = subprocess.Popen(
             [*command, "-p", "250", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env=dict(os.environ, COLUMNS="200"),
+            env=dict(os.environ, COLUMNS="200"), cwd=folder,
         )  # fmt: skip
         threading.Thread(target=self._read, daemon=True).start()
         try:
@@ -102,8 +102,14 @@ class Served:
 
 
 @pytest.fixture(scope="module")
-def served() -> Iterator[Served]:
-    running = Served()
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the simulator is started."""
+    return tmp_path_factory.mktemp("started")
+
+
+@pytest.fixture(scope="module")
+def served(folder: Path) -> Iterator[Served]:
+    running = Served(folder=folder)
     yield running
     running.end()
 
@@ -147,6 +153,10 @@ class Person:
         """Click what bears ``label``."""
         self.find(f"//button[normalize-space(.)='{label}'] | //label[normalize-space(.)='{label}']").click()
 
+    def ticked(self, label: str) -> bool:
+        """Whether the box with that label is ticked."""
+        return bool(self.find(f"//input[@id=//label[text()='{label}']/@for]").is_selected())
+
     def operates(self) -> None:
         """Take the desk, unless it has it."""
 
@@ -171,6 +181,14 @@ class Person:
             self.clicks("Home")
         until(lambda: served.arm(name)["homed"] and not served.arm(name)["busy"], f"{name} is homed")
         until(lambda: self.slider("yaw °").get_attribute("aria-disabled") != "true", "sliders can be moved")
+
+    def writes(self, label: str, text: str) -> None:
+        """Write ``text`` into the field with that label, and leave it."""
+        from selenium.webdriver.common.keys import Keys
+
+        field = self.find(f"(//label[text()='{label}']/following::input)[1]")
+        field.send_keys(Keys.CONTROL, "a")
+        field.send_keys(text, Keys.TAB)
 
     def slider(self, label: str) -> Any:
         """The thumb of the first slider with that label."""

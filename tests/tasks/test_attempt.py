@@ -98,6 +98,15 @@ def test_a_suture_names_the_misses_of_all_holes(scene: Scene) -> None:
     assert {"success", "completion_time", "axial", "entry1_lateral", "exit1_lateral"} == set(report)
 
 
+def test_progress_is_the_share_of_holes_passed_in_their_order(scene: Scene) -> None:
+    for pair, task, pairs, share in ((1, "suture", 4, 0.25), (2, "suture", 4, 0.0), (1, "suture", 1, 1.0),
+                                     (2, "insertion", 4, 1.0)):  # fmt: skip
+        attempt = Attempt(scene, task, pairs)
+        assert attempt.progress == 0.0
+        led_through(attempt, scene, pair)
+        assert attempt.progress == share, (pair, task, pairs)
+
+
 def test_nothing_is_judged_before_the_first_state(scene: Scene) -> None:
     with pytest.raises(ValueError, match="before its first state"):
         Attempt(scene, "suture").judge()

@@ -11,6 +11,7 @@ from ligature.bus.block import Block, BusError
 from ligature.bus.mailbox import Mailbox
 from ligature.bus.outbox import Outbox
 from ligature.bus.pacing import Pace, Pacer, Throttle
+from ligature.bus.recording import Recording
 from ligature.bus.watchdog import Watchdog
 
-__all__ = ["Block", "BusError", "Mailbox", "Outbox", "Pace", "Pacer", "Throttle", "Watchdog"]
+__all__ = ["Block", "BusError", "Mailbox", "Outbox", "Pace", "Pacer", "Recording", "Throttle", "Watchdog"]

@@ -50,11 +50,13 @@ FIGURES = np.dtype(
         ("frames", "u8"),
         ("frames_dropped", "u8"),
         ("frame_seconds", "f8"),
+        ("recording", "u8"),
     ]
 )
 """Figures of the running loop; times in seconds, ``physics_beat`` on the monotonic clock.
 
-``frames`` are pictures drawn for clients, ``frame_seconds`` is how long the last round of them took.
+``frames`` are pictures drawn for clients, ``frame_seconds`` is how long the last round of them took. ``recording`` is 1
+while a recording goes on that was asked for during the run.
 """
 
 _STATE_AT = 4096

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 
 from ligature.bus.pacing import Pace, Throttle
+from ligature.bus.recording import Recording
 from ligature.model.commands import (
     VERBS,
     ActuatorCommand,
@@ -24,7 +25,10 @@ MAX_TEXT = 200
 _TYPES = tuple(sorted(CommandType))
 _KINDS = ("body", "camera", "light", "actuator", "sensor", "ghost", "world", "arm")
 
-Message = Command | Throttle | Pace
+LoopCommand = Throttle | Pace | Recording
+"""What the loop obeys itself, of which the simulation knows nothing."""
+
+Message = Command | LoopCommand
 
 
 class CodecError(ValueError):
@@ -58,6 +62,8 @@ def encode(message: Message) -> bytes:
         return _arm(message)
     if isinstance(message, Pace):
         return struct.pack("<Bd", 10, message.speed)
+    if isinstance(message, Recording):
+        return struct.pack("<B", 11) + _texts(message.name)
     if isinstance(message, Release):
         return struct.pack("<BBi", 4, _KINDS.index(message.kind), message.index)
     if isinstance(message, Reset):
@@ -139,4 +145,6 @@ def _decode(data: bytes) -> Message:
         return WatchContacts(bool(data[1]))
     if kind == 10:
         return Pace(*struct.unpack_from("<xd", data))
+    if kind == 11:
+        return Recording(data[2 : 2 + data[1]].decode("utf-8"))
     raise ValueError(f"unknown kind {kind}")

@@ -17,13 +17,16 @@ from numpy.typing import NDArray
 SLOT_BYTES = 512
 MOST_BYTES = SLOT_BYTES - 16
 SLOTS = 1024
+RUN = -1
+"""Number of an event that is about the run and no arm."""
+
 _HEADER = 64
 LOG_BYTES = _HEADER + SLOTS * SLOT_BYTES
 
 
 @dataclass(frozen=True)
 class BusEvent:
-    """Something that happened to the arm with number ``arm``; ``name`` is the topic that tells it."""
+    """Something that happened to the arm with number ``arm``, or to the `RUN`; ``name`` is the topic that tells it."""
 
     arm: int
     name: str

@@ -13,6 +13,7 @@ from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError, Message, decode
 from ligature.bus.newest import Newest, object_of
 from ligature.bus.pacing import Pace, Throttle
+from ligature.bus.recording import Recording, file_name
 from ligature.bus.ring import Ring
 from ligature.model.commands import ParentCommand, Release, check
 from ligature.model.scene import Scene
@@ -75,6 +76,9 @@ class Mailbox:
 
     def _check(self, message: Message) -> None:
         if isinstance(message, Throttle):
+            return
+        if isinstance(message, Recording):
+            file_name(message.name)
             return
         if not isinstance(message, Pace):
             check(message)

@@ -2,27 +2,30 @@
 
 The same scene and commands give the same bits, so that a record is all that a run was. A file has one line of JSON,
 then frames: update (u8), length (u4), a command as `ligature.bus.codec` packs it; the last has the length `END` and
-says the hash of the final state. Until the run ends the file is called ``NAME.active``.
+says the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too, and
+a frame of the length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
-from ligature.bus.codec import CodecError, decode, encode
-from ligature.bus.pacing import Pace, Throttle
+from ligature.bus.codec import CodecError, LoopCommand, decode, encode
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
 
 FORMAT = "ligature record 1"
-END = 0xFFFFFFFF
+END, BEGIN = 0xFFFFFFFF, 0xFFFFFFFE
 _HEAD = struct.Struct("<QI")
 _HASH_BYTES = 32
+_CHUNK = 1 << 20
 
 
 class RecordError(ValueError):
@@ -37,14 +40,20 @@ class Header:
     begin: str
 
 
-class RecordWriter:
-    """Writes the record ``path``, which must not exist; raises OSError where that cannot be done."""
+@dataclass(frozen=True)
+class Moment:
+    """After ``update`` updates the state had the hash ``state``; the journal was ``size`` bytes long."""
 
-    def __init__(self, path: Path, header: Header) -> None:
-        if path.exists():
-            raise FileExistsError(f"'{path}' exists already; records replace nothing")
-        self._path, self._part = path, path.with_name(f"{path.name}.active")
-        self._file = self._part.open("wb")
+    update: int
+    state: str
+    size: int
+
+
+class Journal:
+    """All commands of a run in an open ``file``, from which records are made; raises OSError where it cannot."""
+
+    def __init__(self, file: BinaryIO, header: Header) -> None:
+        self._file = file
         head = {"format": FORMAT, "options": header.options, "begin": header.begin}
         self._file.write(json.dumps(head).encode() + b"\n")
         self._file.flush()
@@ -58,6 +67,33 @@ class RecordWriter:
         """Hand what was written to the disk."""
         self._file.flush()
 
+    def moment(self, update: int, state_hash: str) -> Moment:
+        """Where the run is now."""
+        self._file.flush()
+        return Moment(update, state_hash, self._file.tell())
+
+    def copy(self, into: BinaryIO, begin: int, end: int) -> None:
+        """Copy bytes from ``begin`` to ``end``; may run beside `write` on another thread."""
+        while begin < end:
+            data = os.pread(self._file.fileno(), min(_CHUNK, end - begin), begin)
+            if not data:
+                raise OSError(0, "the journal of the run is shorter than it was")
+            into.write(data)
+            begin += len(data)
+
+    def close(self) -> None:
+        """Close the file."""
+        with suppress(OSError):
+            self._file.close()
+
+
+class RecordWriter(Journal):
+    """Writes the record ``path``, which must not exist; raises OSError where that cannot be done."""
+
+    def __init__(self, path: Path, header: Header) -> None:
+        self._path, self._part = path, part_of(path)
+        super().__init__(self._part.open("w+b"), header)
+
     def finish(self, update: int, state_hash: str) -> None:
         """End with the hash of the state after ``update`` updates; now the file gets its name."""
         self._file.write(_HEAD.pack(update, END) + bytes.fromhex(state_hash))
@@ -66,19 +102,64 @@ class RecordWriter:
 
     def abandon(self) -> Path:
         """Stop writing; returns where what was written stays."""
+        self.close()
+        return self._part
+
+
+class Excerpt:
+    """The record ``path`` of a run whose ``journal`` is kept, from the moment ``begin`` on.
+
+    Raises OSError where it cannot be written, at once rather than at its end.
+    """
+
+    def __init__(self, path: Path, journal: Journal, begin: Moment) -> None:
+        self.path, self.begin = path, begin
+        self._journal, self._part = journal, part_of(path)
+        self._file = self._part.open("wb")
+
+    def finish(self, end: Moment) -> None:
+        """Write all of it, and give the file its name; takes as long as the disk does, on any thread."""
+        begin, file, journal = self.begin, self._file, self._journal
+        try:
+            journal.copy(file, 0, begin.size)
+            file.write(_HEAD.pack(begin.update, BEGIN) + bytes.fromhex(begin.state))
+            journal.copy(file, begin.size, end.size)
+            file.write(_HEAD.pack(end.update, END) + bytes.fromhex(end.state))
+            file.close()
+            self._part.replace(self.path)
+        except OSError:
+            self.drop()
+            raise
+
+    def drop(self) -> None:
+        """Write nothing."""
         with suppress(OSError):
             self._file.close()
-        return self._part
+        self._part.unlink(missing_ok=True)
+
+
+def part_of(path: Path) -> Path:
+    """What the record ``path`` is called until it is whole; raises FileExistsError when there is one."""
+    if path.exists():
+        raise FileExistsError(f"'{path}' exists already; records replace nothing")
+    return path.with_name(f"{path.name}.active")
 
 
 @dataclass(frozen=True)
 class Record:
-    """A whole record: pairs of update and command, and the run's length in updates and final hash."""
+    """A whole record: pairs of update and command, and the run's length in updates and final hash.
+
+    What was asked for begins after ``start`` updates and the first ``before`` commands, with the hash ``begun``; that
+    is empty for a record of a run from its beginning.
+    """
 
     header: Header
     commands: tuple[tuple[int, Command], ...]
     updates: int
     end: str
+    start: int = 1
+    before: int = 0
+    begun: str = ""
 
     @classmethod
     def read(cls, path: Path) -> Record:
@@ -86,30 +167,43 @@ class Record:
         data = path.read_bytes()
         header, begin = _header(data, path)
         commands: list[tuple[int, Command]] = []
+        asked = (1, 0, "")
         for update, length, at in _frames(data, begin, path):
             if length == END:
-                return cls(header, tuple(commands), update, data[at : at + _HASH_BYTES].hex())
+                return cls(header, tuple(commands), update, data[at : at + _HASH_BYTES].hex(), *asked)
+            if length == BEGIN:
+                asked = (update, len(commands), data[at : at + _HASH_BYTES].hex())
+                continue
             try:
                 command = decode(data[at : at + length])
             except CodecError as error:
                 raise RecordError(f"{path}: at byte {at}: {error}") from error
-            if isinstance(command, Throttle | Pace):
+            if isinstance(command, LoopCommand):
                 raise RecordError(f"{path}: at byte {at}: no command of a record")
             commands.append((update, command))
         raise RecordError(
             f"{path}: cut off after {len(commands)} commands: the run that wrote it did not come to its end"
         )
 
-    def replay(self, updated: Callable[[], None], take: Callable[[Command], None]) -> None:
-        """Call ``updated`` and ``take`` in the order of the run, from after the first update to the last."""
+    def replay(
+        self, updated: Callable[[], None], take: Callable[[Command], None], started: Callable[[], None] = lambda: None
+    ) -> None:
+        """Call ``updated`` and ``take`` in the order of the run, from after the first update to the last.
+
+        ``started`` is called where what was asked for begins.
+        """
         done = 1
-        for update, command in self.commands:
+        for index, (update, command) in enumerate((*self.commands, (self.updates, None))):
+            if index == self.before:
+                for _ in range(self.start - done):
+                    updated()
+                done = max(done, self.start)
+                started()
             for _ in range(update - done):
                 updated()
             done = max(done, update)
-            take(command)
-        for _ in range(self.updates - done):
-            updated()
+            if command is not None:
+                take(command)
 
 
 def is_record(path: Path) -> bool:
@@ -136,7 +230,7 @@ def _frames(data: bytes, at: int, path: Path) -> Iterator[tuple[int, int, int]]:
     while at + _HEAD.size <= len(data):
         update, length = _HEAD.unpack_from(data, at)
         at += _HEAD.size
-        size = _HASH_BYTES if length == END else length
+        size = _HASH_BYTES if length in (BEGIN, END) else length
         if size > MOST_BYTES or update < before:
             raise RecordError(f"{path}: at byte {at}: no frame of a record")
         if at + size > len(data):

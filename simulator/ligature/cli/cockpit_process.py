@@ -44,7 +44,7 @@ def main() -> None:
         cockpit = Cockpit(
             scene, block, pictures, address, os.environ.get(TOKEN_VARIABLE, ""), lambda text: tell("warning", text),
             _on_ros(options.prefix) if options.ros else None,
-            f"{Path(options.scene).resolve().parent.name}/{scene.name}",
+            f"{Path(options.scene).resolve().parent.name}/{scene.name}", options.task,
         )  # fmt: skip
     except AddressError as error:
         tell("fatal", str(error))

@@ -7,17 +7,16 @@ import math
 import sys
 import time
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 
 import ligature
 from ligature.adf import Severity
-from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Throttle
+from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Recording, Throttle
 from ligature.bus.codec import Message
 from ligature.bus.process import end_with_parent, stop_on_signal, tell
-from ligature.bus.record import Header, RecordWriter
 from ligature.cli.options import RunOptions
+from ligature.cli.recorder import Recorder
 from ligature.simulation import Simulation
 
 TICK = 1e-3
@@ -54,11 +53,9 @@ def main() -> None:
         tell("error", str(error))
         sys.exit(1)
     try:
-        loop = Loop(simulation, block, options)
         simulation.step(simulation.ticks_per_update)
+        loop = Loop(simulation, block, options)
         loop.publish()
-        if options.record:
-            loop.record(Path(options.record))
         if options.shown_cameras(scene):
             tell("cameras")
         gc.collect()
@@ -76,8 +73,8 @@ class Loop:
     """One turn takes commands, waits for its time, and advances one update."""
 
     def __init__(self, simulation: Simulation, block: Block, options: RunOptions) -> None:
-        self._simulation, self._block, self._options = simulation, block, options
-        self._record: RecordWriter | None = None
+        self._simulation, self._block = simulation, block
+        self._recorder = Recorder(options, simulation, block)
         self._ticks = simulation.ticks_per_update
         self._period = self._ticks * TICK
         self._mailbox = Mailbox(simulation.scene, block.rings)
@@ -88,36 +85,9 @@ class Loop:
         self._mark_updates = 0
         self._warned = 0
 
-    def record(self, path: Path) -> None:
-        """Write all commands from now on to ``path``; without a file there is no run."""
-        try:
-            self._record = RecordWriter(path, Header(self._options.to_text(), self._simulation.state_hash()))
-        except OSError as error:
-            tell("error", f"the run cannot be recorded: {error.strerror or error}: '{path}'")
-            sys.exit(1)
-
     def end(self) -> None:
-        """Give the record its end and its name."""
-        if self._record is not None:
-            try:
-                self._record.finish(self._updates + 1, self._simulation.state_hash())
-            except OSError as error:
-                self._give_up_record(error)
-
-    def _note(self, message: Message) -> None:
-        """Write a command to the record."""
-        if self._record is not None and not isinstance(message, Throttle | Pace):
-            try:
-                self._record.write(self._updates + 1, message)
-            except OSError as error:
-                self._give_up_record(error)
-
-    def _give_up_record(self, error: OSError) -> None:
-        """Go on without a record, and say so: a run matters more than its record."""
-        assert self._record is not None
-        part = self._record.abandon()
-        self._record = None
-        tell("error", f"the run is not recorded any more: {error.strerror}; '{part}' ends before the run does")
+        """The run is over."""
+        self._recorder.end(self._updates + 1)
 
     def turn(self) -> None:
         """Sleep, take commands, and run an update when it is due; the commands may say that it is not."""
@@ -156,8 +126,10 @@ class Loop:
                 self._pacer.throttle(message)
             elif isinstance(message, Pace):
                 self._pacer.pace(message)
+            elif isinstance(message, Recording):
+                self._recorder.obey(self._updates + 1, message)
             else:
-                self._note(message)
+                self._recorder.note(self._updates + 1, message)
                 self._simulation.apply(message)
 
     def _figures(self) -> None:
@@ -177,11 +149,7 @@ class Loop:
         for name in ("received", "coalesced", "rejected"):
             figures[name] = getattr(self._mailbox, name)
         self._mark, self._mark_updates = now, self._updates
-        if self._record is not None:
-            try:
-                self._record.flush()
-            except OSError as error:
-                self._give_up_record(error)
+        self._recorder.flush()
         if self._mailbox.rejected > self._warned:
             tell(
                 "warning",

@@ -28,8 +28,9 @@ def resimulate(
 ) -> ligature.Simulation:
     """Simulate a recorded run again; ``scene`` replaces the launch file that the record names.
 
-    ``watch`` sees the simulation after each update. Raises `ligature.SceneError`, and `Differs` when the scene does
-    not begin as the recorded one did.
+    ``watch`` sees the simulation where what was asked to be recorded begins, and after each update from there on.
+    Raises `ligature.SceneError`, and `Differs` when the scene does not begin as the recorded one did, or goes on
+    otherwise.
     """
     options = RunOptions.from_text(record.header.options)
     if scene is not None:
@@ -43,12 +44,22 @@ def resimulate(
             f"'{options.scene}' begins otherwise than when the run was recorded: the scene or the version changed"
         )
 
+    watched = False
+
     def update() -> None:
         simulation.step(ticks)
+        if watched:
+            watch(simulation)
+
+    def started() -> None:
+        nonlocal watched
+        watched = True
+        if record.begun not in ("", simulation.state_hash()):
+            simulation.close()
+            raise Differs("the run goes otherwise before the recording begins: the version changed")
         watch(simulation)
 
-    watch(simulation)
-    record.replay(update, simulation.apply)
+    record.replay(update, simulation.apply, started)
     return simulation
 
 
@@ -73,11 +84,14 @@ def replay(
 
 
 def _again(record: Record, scene: Path | None, dataset: Path | None, console: Console) -> int:
-    begin = time.perf_counter()
+    clock = time.perf_counter()
     with ExitStack() as files:
         simulation = resimulate(record, scene, _sampling(dataset, files) if dataset else lambda _: None)
-    took, found = time.perf_counter() - begin, simulation.state_hash()
+    took, found = time.perf_counter() - clock, simulation.state_hash()
     console.print(f"{len(record.commands)} commands, {simulation.time:.3f} s simulated in {took:.1f} s", markup=False)
+    if record.begun:
+        begin = record.start * simulation.ticks_per_update * TICK
+        console.print(f"recorded were the last {simulation.time - begin:.3f} s", markup=False)
     simulation.close()
     if found != record.end:
         console.print(f"the run ended otherwise: {found}, not {record.end}", style="red", markup=False)

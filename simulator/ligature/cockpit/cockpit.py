@@ -9,13 +9,13 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from viser import ClientHandle
 
 from ligature.bus import Block, Outbox
+from ligature.bus.events import RUN
 from ligature.cockpit.address import Address
 from ligature.cockpit.arm_facts import ArmFacts
 from ligature.cockpit.arm_panel import ArmControls, ArmStatus
@@ -30,7 +30,6 @@ from ligature.cockpit.pursuit import ArmPursuits
 from ligature.cockpit.ros_panel import Health, Remote, RosPanel, TeleopControls, obey_teleop
 from ligature.cockpit.simulation_panel import Clockwork, SimulationControls, SimulationPanel
 from ligature.cockpit.stage import Stage, first_view
-from ligature.cockpit.statelog import StateLog
 from ligature.model.commands import ArmCommand
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import new_state
@@ -56,6 +55,7 @@ class Cockpit:
         warn: Callable[[str], None],
         ros: tuple[Health, Remote] | None = None,
         title: str = "",
+        task: str = "",
     ) -> None:
         self._scene, self._block, self._pictures, self._warn = scene, block, pictures, warn
         self._ring, self._outbox = block.rings["cockpit"], Outbox(block.rings["cockpit"])
@@ -68,10 +68,10 @@ class Cockpit:
         self._inbox: deque[tuple[str, int, Any]] = deque()
         self._clockwork = Clockwork(self._outbox.push)
         self._speed = "1"
-        self._log: StateLog | None = None
-        self._logged = ""
+        self._record_as, self._recorded = "", ""
         facts = [ArmFacts.of(scene, index) for index in range(len(scene.arms))]
         self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
+        self._curves = Curves(scene, task)
         self._lay_out(facts, ros, title)
         self._controls: list[ArmControls] = []
         self._run_controls: SimulationControls | None = None
@@ -101,7 +101,6 @@ class Cockpit:
                 self._camera_folder = server.gui.add_folder("View")
                 self._picture = server.gui.add_image(np.zeros((2, 2, 3), np.uint8), format="jpeg", jpeg_quality=80)
                 self._camera_words = server.gui.add_html("")
-        self._curves = Curves(scene)
         panels.append(server.gui.add_panel())
         with panels[-1].add_tab("Curves"):
             self._curves.show(server.gui)
@@ -131,7 +130,6 @@ class Cockpit:
         self._follow(now, now - self._last)
         self._last = now
         self._curves.observe(self._state[0])
-        self._record()
         for show, due in self._due.items():
             if now >= due:
                 self._due[show] = now + show(now)
@@ -139,9 +137,7 @@ class Cockpit:
         time.sleep(max(PERIOD - (time.monotonic() - now), 0.0))
 
     def close(self) -> None:
-        """End the page, and finish what is recorded."""
-        if self._log is not None:
-            self._log.close()
+        """End the page."""
         self._pictures.close()
         self.server.stop()
 
@@ -158,7 +154,7 @@ class Cockpit:
             for status in self._arms
         ]
         self._run_controls = SimulationControls(
-            client, self._panel, self._clockwork.paused, self._speed, self._log is not None, act
+            client, self._panel, self._clockwork.paused, self._speed, self._recording, self._record_as, act
         )
         if self._sights:
             self._camera_controls = CameraControls(client, self._camera_folder, tuple(self._sights), self._sight, act)
@@ -191,8 +187,10 @@ class Cockpit:
         elif word == "reset":
             self._stop_all("")
             self._clockwork.reset()
+        elif word == "record as":
+            self._record_as = str(value)
         elif word == "record":
-            self._switch_log(bool(value))
+            self._record(bool(value))
         elif word == "sight":
             self._sight = value
         elif self._ros is not None:
@@ -244,25 +242,19 @@ class Cockpit:
                     self._warn(f"{status.facts.name} holds: {why}")
         self._deadman.watch(None)
 
-    # --- recording -----------------------------------------------------------------------------
+    @property
+    def _recording(self) -> bool:
+        """Whether the simulation records."""
+        return bool(self._block.figures["recording"][0])
 
-    def _switch_log(self, on: bool) -> None:
-        if on and self._log is None:
-            try:
-                self._log = StateLog(self._scene, self._state.dtype, Path("recordings"))
-            except OSError as error:
-                self._logged = f"recording failed: {error}"
-        elif not on and self._log is not None:
-            path, self._log = self._log.close(), None
-            self._logged = f"recorded to {path}"
-
-    def _record(self) -> None:
-        if self._log is None:
-            return
+    def _record(self, on: bool) -> None:
         try:
-            self._log.observe(self._state)
-        except OSError as error:
-            self._log, self._logged = None, f"recording failed: {error}"
+            if on:
+                self._clockwork.record(self._record_as)
+            else:
+                self._clockwork.end_record()
+        except ValueError as error:
+            self._recorded = f"nothing is recorded: {error}"
 
     # --- what is shown -------------------------------------------------------------------------
 
@@ -277,7 +269,9 @@ class Cockpit:
     def _show_words(self, now: float) -> float:
         state = self._state[0]
         for event in self._block.events.read():
-            if event.name in TOLD:
+            if event.arm == RUN:
+                self._recorded = str(event.value)
+            elif event.name in TOLD:
                 self._arms[event.arm].note = str(event.value)
                 if "servo" in str(event.value):
                     self._pursuits[event.arm].stop()
@@ -290,6 +284,8 @@ class Cockpit:
                 arm.refresh(state)
             for controls, pursuits in zip(self._controls, self._pursuits, strict=False):
                 controls.refresh(state, not pursuits.active)
+            if self._run_controls is not None:
+                self._run_controls.show_recording(self._recording)
             self._show_picture()
             self._show_ros()
         self._pictures.want(self._sights.get(self._sight) if self._audience.clients else None)
@@ -315,10 +311,8 @@ class Cockpit:
         p50, p99 = 1e3 * float(figures["tick_p50"][0]), 1e3 * float(figures["tick_p99"][0])
         lines = [f"update {p50:.2f} ms, p99 {p99:.2f} ms · {float(figures['behind'][0]):.1f} s behind"]
         lines.append(f"commands {int(figures['received'][0])}, rejected {int(figures['rejected'][0])}")
-        if self._log is not None:
-            lines.append(f"recording to {self._log.path.name}: {self._log.rows} rows")
-        elif self._logged:
-            lines.append(self._logged)
+        if self._recorded or self._recording:
+            lines.append(self._recorded or "recording")
         return lines
 
     def _show_picture(self) -> None:

@@ -1,4 +1,7 @@
-"""Live curves: thread tension, tip forces, insertion depth, and how the task stands. Newtons, millimetres, seconds."""
+"""Live curves: thread tension, tip forces, insertion depth, task score, and how the task stands in words.
+
+Newtons, millimetres, percent, seconds.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,8 @@ import numpy as np
 from viser import GuiApi, uplot
 
 from ligature.model.scene import ArmKind, Scene
-from ligature.tasks import MissingBodies, Monitor, judge_suture
+from ligature.tasks import Attempt, MissingBodies, Scenery, judge_suture
+from ligature.tasks.scores import SUTURE_PAIRS
 
 SPAN = 30.0
 """Seconds that a curve shows."""
@@ -21,21 +25,27 @@ SAMPLES = 10
 
 COLOURS = ("#4dabf7", "#ffa94d", "#69db7c", "#f783ac", "#b197fc")
 
+SCORE = "task score, % of holes"
+
+RANGES = {SCORE: (0.0, 100.0)}
+"""Of charts whose values have bounds."""
+
 Values = Callable[[Any], list[float]]
 
 
 class Curves:
-    """Collects values from states (one element of the record) and shows them as charts."""
+    """Collects values from states (one element of the record) and shows them as charts.
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._charts = [chart for chart in _charts(scene) if chart[1]]
+    ``task`` is what the run is judged by; without one it is a suture through all pairs of holes that the scene has.
+    """
+
+    def __init__(self, scene: Scene, task: str = "") -> None:
+        self._attempt = _attempt(scene, task)
+        self._charts = [chart for chart in (*_charts(scene), *_score(self._attempt)) if chart[1]]
         self._times: deque[float] = deque(maxlen=int(SPAN * SAMPLES))
         self._rows: deque[list[float]] = deque(maxlen=int(SPAN * SAMPLES))
         self._handles: list[Any] = []
-        self._resets = -1
         self._sent = float("-inf")
-        self._monitor: Monitor | None = None
         self._task: Any = None
 
     def show(self, gui: GuiApi) -> None:
@@ -44,30 +54,23 @@ class Curves:
         empty = np.zeros(1)
         for title, names, _ in self._charts:
             series = (uplot.Series(label="s"), *_series(names))
+            scales = {"x": uplot.Scale(time=False)}
+            if title in RANGES:
+                scales["y"] = uplot.Scale(range=RANGES[title])
             self._handles.append(
                 gui.add_uplot(
-                    (empty, *(empty for _ in names)), series, title=title, height=150,
-                    scales={"x": uplot.Scale(time=False)},
+                    (empty, *(empty for _ in names)), series, title=title, height=150, scales=scales
                 )
             )  # fmt: skip
 
     def observe(self, state: Any) -> None:
         """Take a state; a reset begins the task anew."""
-        if int(state["resets"]) != self._resets:
-            self._resets = int(state["resets"])
-            self._begin()
-        if self._monitor is not None:
-            self._monitor.observe(state)
+        if self._attempt is not None:
+            self._attempt.observe(state)
         time = float(state["sim_time"])
         if not self._times or time - self._times[-1] >= 1.0 / SAMPLES:
             self._times.append(time)
             self._rows.append([value for _, _, values in self._charts for value in values(state)])
-
-    def _begin(self) -> None:
-        try:
-            self._monitor = Monitor(self._scene)
-        except MissingBodies:
-            self._monitor = None
 
     def refresh(self, state: Any) -> None:
         """Send the curves and the words of the task."""
@@ -84,14 +87,34 @@ class Curves:
             column += len(names)
 
     def _words(self, state: Any) -> str:
-        if self._monitor is None:
+        attempt = self._attempt
+        if attempt is None:
             return '<div style="font-size:12px;padding:2px 8px">No suturing task in this scene.</div>'
-        measures = self._monitor.measures()
+        measures = attempt.monitor.measures()
         passages = [f"{'exit' if p.exit else 'entry'} {p.pair} ({1e3 * p.miss:.1f} mm)" for p in measures.passages[-6:]]
-        pairs = max(sum(p.exit for p in measures.passages), 1)
-        score = judge_suture(self._monitor.scenery, state["body_pose"], measures.passages, measures.time, pairs)
-        lines = [f"holes: {', '.join(passages) or 'none yet'}", *score.lines(), *measures.lines()]
+        lines = [f"holes: {', '.join(passages) or 'none yet'}"]
+        if attempt.task == "insertion":
+            lines += attempt.judge().lines()
+        elif attempt.task == "suture":
+            pairs = max(sum(p.exit for p in measures.passages), 1)
+            poses = state["body_pose"]
+            lines += judge_suture(attempt.monitor.scenery, poses, measures.passages, measures.time, pairs).lines()
+        lines += measures.lines()
         return '<div style="font-size:12px;padding:2px 8px">' + "<br>".join(escape(line) for line in lines) + "</div>"
+
+
+def _attempt(scene: Scene, task: str) -> Attempt | None:
+    try:
+        return Attempt(scene, task or "suture", min(len(Scenery.of(scene).entries), SUTURE_PAIRS))
+    except MissingBodies:
+        return None
+
+
+def _score(attempt: Attempt | None) -> list[tuple[str, list[str], Values]]:
+    """The share of the task's holes passed in their order; a pose estimation is judged by a report alone."""
+    if attempt is None or attempt.task == "pose_estimation":
+        return []
+    return [(SCORE, [attempt.task], lambda _: [100.0 * attempt.progress])]
 
 
 def _series(names: list[str]) -> list[uplot.Series]:

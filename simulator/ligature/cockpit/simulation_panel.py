@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from html import escape
 from typing import Any
 
 from viser import ClientHandle, GuiEvent, ViserServer
 
-from ligature.bus import Pace, Throttle
+from ligature.bus import Pace, Recording, Throttle
 from ligature.bus.codec import Message
+from ligature.bus.recording import SUFFIX, file_name
 from ligature.model.commands import Reset
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 STEPS = ("Step 1", "Step 10", "Step 100")
+
+ANSWERED = 1.0
+"""Seconds that the simulation is given to begin or end a recording, before the page shows what it does."""
 
 
 class Clockwork:
@@ -44,6 +49,14 @@ class Clockwork:
         """Simulated over wall time."""
         self._send(Pace(speed))
 
+    def record(self, name: str) -> None:
+        """Record to the file ``name``, or to one with the date; raises ValueError for what is no name."""
+        self._send(Recording(file_name(name) or time.strftime(f"%Y-%m-%d-%H%M%S{SUFFIX}")))
+
+    def end_record(self) -> None:
+        """Record no longer."""
+        self._send(Recording(""))
+
 
 class SimulationPanel:
     """What everybody sees; the folder takes the operator's controls."""
@@ -67,7 +80,7 @@ class SimulationControls:
 
     def __init__(
         self, client: ClientHandle, panel: SimulationPanel, paused: bool, speed: str, recording: bool,
-        act: Callable[[str, Any], None],
+        record_as: str, act: Callable[[str, Any], None],
     ) -> None:  # fmt: skip
         self._act = act
         gui = client.gui
@@ -78,20 +91,34 @@ class SimulationControls:
                 "Speed", SPEEDS, initial_value=speed if speed in SPEEDS else "1", hint="Simulated over wall time"
             )
             reset = gui.add_button("Reset the scene", color="red")
-            recorded = gui.add_checkbox("Record states", recording)
+            name = gui.add_text(
+                "Record as", record_as, hint="Name of a file in the folder of recordings; empty: the date"
+            )
+            self._recorded: Any = gui.add_checkbox(
+                "Record", recording, hint="To be simulated again bit for bit by 'ligature replay'"
+            )
         self._paused.on_update(self._of("pause"))
         steps.on_click(self._of("step"))
         self._speed.on_update(self._of("speed"))
         reset.on_click(self._of("reset"))
-        recorded.on_update(self._of("record"))
-        self._handles: list[Any] = [self._paused, steps, self._speed, reset, recorded]
+        name.on_update(self._of("record as"))
+        self._recorded.on_update(self._of("record"))
+        self._asked = 0.0
+        self._handles: list[Any] = [self._paused, steps, self._speed, reset, name, self._recorded]
 
     def _of(self, word: str) -> Any:
         async def take(event: GuiEvent[Any]) -> None:
             if event.client_id is not None:
+                if word == "record":
+                    self._asked = time.monotonic()
                 self._act(word, event.target.value)
 
         return take
+
+    def show_recording(self, recording: bool) -> None:
+        """Whether the simulation records, once it has had time to do what was asked for."""
+        if time.monotonic() - self._asked > ANSWERED and self._recorded.value != recording:
+            self._recorded.value = recording
 
     def show_paused(self, paused: bool) -> None:
         """The simulation rests, or runs."""

@@ -19,9 +19,11 @@ from ligature.tasks.scores import (
     EstimationScore,
     InsertionScore,
     SutureScore,
+    holes_of,
     judge_estimate,
     judge_insertion,
     judge_suture,
+    passed_in_order,
 )
 
 Array = NDArray[np.float64]
@@ -70,6 +72,15 @@ class Attempt:
     def time(self) -> float:
         """Simulated seconds since the attempt began."""
         return self._now - self._begin
+
+    @property
+    def progress(self) -> float:
+        """Share of the task's holes that the tip has passed in their order, 0 to 1; a pose estimation has none."""
+        if self.task == "pose_estimation":
+            return 0.0
+        pairs, passages = list(range(1, len(self._scenery.entries) + 1)), self.monitor.passages
+        throws = [[pair] for pair in pairs] if self.task == "insertion" else [pairs[: self._pairs]]
+        return max(passed_in_order(passages, wanted) / len(wanted) for wanted in map(holes_of, throws))
 
     def observe(self, state: Any) -> None:
         """Take a state record (`ligature.model.state`), one element of it; 100 Hz and more will do."""

@@ -166,12 +166,23 @@ class SutureScore:
         ]
 
 
+def passed_in_order(passages: Sequence[Passage], wanted: Sequence[tuple[int, bool]]) -> int:
+    """How many of the ``wanted`` holes (pair, is an exit) the tip has passed, one after the other, last of all."""
+    got = [(passage.pair, passage.exit) for passage in passages]
+    return next(n for n in range(len(wanted), -1, -1) if n <= len(got) and got[len(got) - n :] == list(wanted[:n]))
+
+
+def holes_of(pairs: Sequence[int]) -> list[tuple[int, bool]]:
+    """Holes of throws through ``pairs`` in their order: pair, and whether it is the exit."""
+    return [(pair, is_exit) for pair in pairs for is_exit in (False, True)]
+
+
 def judge_suture(
     scenery: Scenery, body_pose: Array, passages: Sequence[Passage], time: float, pairs: int = SUTURE_PAIRS
 ) -> SutureScore:
     """Judge a suture of ``pairs`` throws, from pair 1 on, entry before exit."""
     _, _, axial = _closest(scenery, body_pose)
-    wanted = [(pair, is_exit) for pair in range(1, pairs + 1) for is_exit in (False, True)]
+    wanted = holes_of(range(1, pairs + 1))
     newest = list(passages[-len(wanted) :])
     got = [(passage.pair, passage.exit) for passage in newest]
     if got != wanted:

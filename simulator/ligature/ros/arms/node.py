@@ -17,6 +17,7 @@ from tf2_msgs.msg import TFMessage
 from ligature.bus import Block, Outbox
 from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError
+from ligature.bus.events import RUN
 from ligature.model.commands import ArmCommand, Command, check
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
@@ -98,7 +99,7 @@ class ArmsNode:
         """
         self._due = max(self._due + PERIOD, now + PERIOD / 5)
         self._count += 1
-        events = self._block.events.read()
+        events = [event for event in self._block.events.read() if event.arm != RUN]
         if events:
             refresh()
         settled = {event.arm for event in events if event.name == "operating_state"}

@@ -1,0 +1,26 @@
+"""The word that begins and ends a recording while a run goes on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SUFFIX = ".record"
+MOST_BYTES = 150
+"""Of a name: with what is put after it, file systems take it."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Record what happens from now on as the file ``name`` in the folder of recordings; an empty name ends it."""
+
+    name: str
+
+
+def file_name(text: str) -> str:
+    """The file that a person means by ``text``, a name without folders; raises ValueError that says what is allowed."""
+    name = text.strip()
+    if "/" in name or name.startswith(".") or not name.isprintable():
+        raise ValueError(f"'{text[:40]}' is no name of a recording; write letters and digits, without folders")
+    if len(name.encode()) > MOST_BYTES:
+        raise ValueError(f"the name of a recording has {MOST_BYTES} bytes at most, not {len(name.encode())}")
+    return name if not name or name.endswith(SUFFIX) else name + SUFFIX

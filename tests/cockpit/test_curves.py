@@ -1,0 +1,69 @@
+"""Curves of the page: what they show of a task goes with what the needle does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import ligature
+import numpy as np
+import pytest
+from ligature.cockpit.curves import Curves
+from ligature.model.scene import Scene
+from ligature.model.state import new_state
+from viser import ViserServer
+
+from tests.tasks.test_attempt import led_through
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return ligature.load(SCENES / "suturing" / "launch.yaml")
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[ViserServer]:
+    made = ViserServer("127.0.0.1", 0, verbose=False)
+    yield made
+    made.stop()
+
+
+def score_of(curves: Curves) -> Any:
+    """The chart of the task's score."""
+    return next(handle for handle in curves._handles if handle.title.startswith("task score"))
+
+
+@pytest.mark.parametrize(("task", "share"), [("suture", 25.0), ("insertion", 100.0), ("", 25.0)])
+def test_the_score_rises_with_each_hole_and_falls_with_a_reset(
+    scene: Scene, server: ViserServer, task: str, share: float
+) -> None:
+    curves = Curves(scene, task)
+    curves.show(server.gui)
+    assert curves._attempt is not None
+    state = led_through(SimpleNamespace(monitor=curves._attempt.monitor, observe=curves.observe), scene, 1)
+    curves.refresh(state)
+    times, score = score_of(curves).data
+    assert np.all(np.diff(times) > 0)
+    assert set(score) == {0.0, share / 2, share}
+    assert np.all(np.diff(score) >= 0)
+    assert "exit 1" in curves._task.content
+    state["resets"] += 1
+    state["sim_time"] = 9.0
+    curves.observe(state)
+    curves.refresh(state)
+    assert score_of(curves).data[1][-1] == 0.0
+    assert "none yet" in curves._task.content
+
+
+def test_a_scene_without_a_task_has_no_score(server: ViserServer) -> None:
+    small = ligature.load(SCENES / "suturing_small" / "launch.yaml")
+    curves = Curves(small)
+    curves.show(server.gui)
+    curves.observe(new_state(small)[0])
+    curves.refresh(new_state(small)[0])
+    assert not any(handle.title.startswith("task score") for handle in curves._handles)
+    assert "No suturing task" in curves._task.content
