@@ -18,6 +18,7 @@ from ligature.render.camera import perspective
 from ligature.render.programs import Program
 
 Array = NDArray[np.float64]
+Sphere = tuple[Array, float]
 
 MAX_LIGHTS, MAX_SHADOWS = 8, 2
 SHADOW_SIZES = (0, 256, 512, 1024, 2048, 4096)
@@ -93,10 +94,14 @@ class Lights:
             self._T_world_light, self._used = (np.linalg.inv(view) @ T_eye_light)[None], [HEADLIGHT]
         self._T_eye_light = view @ self._T_world_light
 
-    def cast(self, draw: Callable[[Array, Array, int], None], centre: Array, radius: float, view: Array) -> None:
+    def cast(
+        self, draw: Callable[[Array, Array, int], None], scene: Sphere, seen: Sphere, view: Array, moment: bytes
+    ) -> None:
         """Draw the shadow maps: ``draw(view, projection, size)`` draws every caster.
 
-        Casters and what is seen of their shadows lie within ``radius`` of ``centre`` (3,), in world axes.
+        Spheres are given by centre (3,) and radius, in world axes: casters and what is ``seen`` of their shadows lie
+        within the second. A spot's map reaches for the whole ``scene`` and so is the same for both eyes: it is drawn
+        once for each ``moment``, which is all that moves.
         """
         self._shadows = []
         for index, settings in enumerate(self._used):
@@ -106,32 +111,35 @@ class Lights:
             shadow = self._maps.get((index, size))
             if shadow is None:
                 shadow = self._maps[index, size] = _ShadowMap(self._context, size)
-            light, projection = light_camera(settings, self._T_world_light[index], centre, radius)
-            shadow.use()
-            draw(light, projection, size)
+            sphere = scene if settings.kind is LightKind.SPOT else seen
+            light, projection = light_camera(settings, self._T_world_light[index], *sphere)
+            content = (moment, light.tobytes(), projection.tobytes())
+            if shadow.content != content:
+                shadow.use()
+                draw(light, projection, size)
+                shadow.content = content
             self._shadows.append((index, shadow, TO_TEXTURE @ projection @ light @ np.linalg.inv(view)))
             shadow.spread = 2.0 / (abs(projection[0, 0]) * size)
 
     def bind(self, program: Program) -> None:
-        """Fill the lights' uniforms of a built-in program."""
-        for i, (settings, T) in enumerate(zip(self._used, self._T_eye_light, strict=True)):
-            name = f"uLights[{i}]"
-            program.set(f"{name}.position", tuple(T[:3, 3]))
+        """Fill the lights' uniforms of a built-in program; those that cast shadows come first."""
+        casting = [index for index, _, _ in self._shadows]
+        order = casting + [index for index in range(len(self._used)) if index not in casting]
+        for place, index in enumerate(order):
+            settings, T = self._used[index], self._T_eye_light[index]
+            name, spot = f"uLights[{place}]", settings.kind is LightKind.SPOT
+            directional = settings.kind is LightKind.DIRECTIONAL
+            program.set(f"{name}.position", (*-T[:3, 0], 0.0) if directional else (*T[:3, 3], 1.0))
             program.set(f"{name}.direction", tuple(T[:3, 0]))
-            program.set(f"{name}.attenuation", settings.attenuation)
-            program.set(
-                f"{name}.cosCutoff", float(np.cos(settings.cutoff)) if settings.kind is LightKind.SPOT else -1.0
-            )
-            program.set(f"{name}.exponent", settings.exponent)
-            program.set(f"{name}.directional", int(settings.kind is LightKind.DIRECTIONAL))
-        if not self._shadows:
-            return
+            program.set(f"{name}.attenuation", (1.0, 0.0, 0.0) if directional else settings.attenuation)
+            program.set(f"{name}.cosCutoff", float(np.cos(settings.cutoff)) if spot else -2.0)
+            program.set(f"{name}.exponent", settings.exponent if spot else 0.0)
         for unit, (_, shadow, _) in enumerate(self._shadows, SHADOW_UNIT):
             shadow.texture.use(unit)
             program.set(f"uShadowMap{unit - SHADOW_UNIT}", unit)
-        program.set("uShadowOf", [index for index, _, _ in self._shadows])
-        program.write("uShadowFromEye", np.array([matrix for _, _, matrix in self._shadows]))
-        program.set("uShadowTexel", [(1.0 / shadow.size, shadow.spread) for _, shadow, _ in self._shadows])
+        if self._shadows:
+            program.write("uShadowFromEye", np.array([matrix for _, _, matrix in self._shadows]))
+            program.set("uShadowTexel", [(1.0 / shadow.size, shadow.spread) for _, shadow, _ in self._shadows])
 
     def eye_space(self) -> list[tuple[LightSettings, Array]]:
         """Settings and eye-space frame (4, 4) of every light."""
@@ -171,6 +179,8 @@ class _ShadowMap:
     def __init__(self, context: moderngl.Context, size: int) -> None:
         self.size = size
         self.spread = 0.0
+        self.content: tuple[bytes, ...] = ()
+        """What it was last drawn of."""
         self.texture = context.depth_texture((size, size))
         self.texture.compare_func = "<="
         self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)

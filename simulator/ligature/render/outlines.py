@@ -7,8 +7,6 @@ at the run's two ends suggest, and each pixel mixed with its neighbour by the ar
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,37 +32,41 @@ def smoothed(rgba: NDArray[np.uint8], keyed: bool = True) -> NDArray[np.uint8]:
     edges are only where it jumps: outlines and creases, but not what is painted on a surface.
     """
     rgba = np.ascontiguousarray(rgba)
-    below, right = np.zeros(rgba.shape[:2], dtype=np.uint8), np.zeros(rgba.shape[:2], dtype=np.uint8)
-    _differ(rgba, below, right, KEY_STEP if keyed else 0)
+    keys, step = np.ascontiguousarray(rgba[..., 3]), KEY_STEP if keyed else 0
+    below, right = np.zeros(keys.shape, dtype=np.uint8), np.zeros(keys.shape, dtype=np.uint8)
+    _differ(rgba, below, np.flatnonzero(_jumps(keys[:-1], keys[1:], step)), 1, 0)
+    _differ(rgba, right, np.flatnonzero(_jumps(keys[:, :-1], keys[:, 1:], step)), 0, 1)
     lying, standing = _edges(below, right)
-    rgb = np.ascontiguousarray(rgba[..., :3])
+    rgb = np.empty((*keys.shape, 3), dtype=np.uint8)
+    _copy_colours(rgba, rgb)
     _mix(rgba, rgb, lying, standing, False)
     _mix(rgba, rgb, np.ascontiguousarray(standing.T), np.ascontiguousarray(lying.T), True)
     return rgb
 
 
+def _jumps(a: NDArray[np.uint8], b: NDArray[np.uint8], step: int) -> NDArray[np.bool_]:
+    """Where two keys are at least ``step`` apart, counted around: bytes wrap as keys do."""
+    return (a - b + np.uint8(step - 1)) > 2 * step - 2 if step else np.ones(a.shape, dtype=np.bool_)
+
+
 @compiled  # type: ignore[untyped-decorator]
-def _differ(rgba: NDArray[np.uint8], below: NDArray[np.uint8], right: NDArray[np.uint8], step: int) -> None:
-    """The largest difference of a channel to the pixel below, and to the one on the right; 0 without a step of keys."""
-    height, width = below.shape
+def _copy_colours(rgba: NDArray[np.uint8], rgb: NDArray[np.uint8]) -> None:
+    height, width = rgba.shape[:2]
     for y in range(height):
         for x in range(width):
-            if x + 1 < width:
-                key = np.uint8(rgba[y, x, 3] - rgba[y, x + 1, 3])
-                if min(key, 256 - key) >= step:
-                    right[y, x] = _contrast(rgba, y, x, y, x + 1)
-            if y + 1 < height:
-                key = np.uint8(rgba[y, x, 3] - rgba[y + 1, x, 3])
-                if min(key, 256 - key) >= step:
-                    below[y, x] = _contrast(rgba, y, x, y + 1, x)
+            rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = rgba[y, x, 0], rgba[y, x, 1], rgba[y, x, 2]
 
 
 @compiled  # type: ignore[untyped-decorator]
-def _contrast(rgba: NDArray[np.uint8], y: int, x: int, v: int, u: int) -> Any:
-    most = np.int32(0)
-    for c in range(3):
-        most = max(most, abs(np.int32(rgba[y, x, c]) - np.int32(rgba[v, u, c])))
-    return most
+def _differ(rgba: NDArray[np.uint8], out: NDArray[np.uint8], places: NDArray[np.int64], down: int, along: int) -> None:
+    """Write the largest difference of a channel to the pixel ``down`` and ``along``; ``places`` count such pairs."""
+    width = out.shape[1] - along
+    for place in places:
+        y, x = place // width, place % width
+        most = np.int32(0)
+        for c in range(3):
+            most = max(most, abs(np.int32(rgba[y, x, c]) - np.int32(rgba[y + down, x + along, c])))
+        out[y, x] = most
 
 
 @compiled  # type: ignore[untyped-decorator]

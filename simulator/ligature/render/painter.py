@@ -121,6 +121,7 @@ class Painter:
             program.set("uShape", batch.primitive[1:])
         if "rgb" in passes:
             self._brushes.lights.bind(program)
+            program.set("uClosed", int(batch.closed))
             program.write("uWorldFromEye", view.view[:3, :3].T)
             bind_surface(program, batch.surface, self._brushes.textures)
         program.set("uHalfSize", (view.width / 2, view.height / 2))

@@ -43,6 +43,9 @@ COARSE_BELOW = 24.0
 THREAD = Physical(roughness=0.45)
 """Reflectance of a thread whose material does not ask for another: the sheen of silk or a coated filament."""
 
+PLACES = ("body_pose", "ghost_world", "light_world")
+"""What of a state moves things and their shadows, wherever it is looked at from."""
+
 LARGE = 2.0
 """Radius in metres above which a piece is ground or wall and does not set the extent of shadow maps."""
 
@@ -126,7 +129,7 @@ class Renderer:
         target = self._target(view, passes, 0 if shaders else self._samples)
         seen = self._instances.seen(view.view, view.projection, view.height, COARSE_BELOW)
         if "rgb" in target.passes:
-            self._cast_shadows(seen, view)
+            self._cast_shadows(seen, view, b"".join(state[name].tobytes() for name in PLACES))
         target.clear(BACKGROUND)
         before = self._movement.before(self._instances, view) if "flow" in target.passes else None
         painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
@@ -202,7 +205,7 @@ class Renderer:
 
     def _place(self, state: NDArray[np.void], view: Array) -> None:
         """Move everything to where ``state`` has it."""
-        T = pose7_matrices(np.concatenate([state["body_pose"][0], state["ghost_world"][0]]))
+        T = pose7_matrices(np.concatenate([state[name][0] for name in PLACES[:2]]))
         tubes = [tube.triangles(T) for tube in self._tubes]
         for rod in self._scene.rods:
             T[rod.bodies[0]] = np.eye(4)  # tubes stand in world axes
@@ -212,20 +215,17 @@ class Renderer:
             self._instances.reach(batch.rows.start, batch.triangles)
         self._lights.place(pose7_matrices(state["light_world"][0]), view)
 
-    def _cast_shadows(self, seen: Seen, view: CameraView) -> None:
-        """Draw the shadow maps of what may throw shadows into the picture."""
-        if "SHADOWS" not in self._lights.defines:
+    def _cast_shadows(self, seen: Seen, view: CameraView, moment: bytes) -> None:
+        """Draw the shadow maps of what may throw shadows into the picture of the state at ``moment``."""
+        if "SHADOWS" not in self._lights.defines or not seen.mask.any():
             return
-        small = seen.mask & (self._instances.radii < LARGE)
-        if not small.any():
-            small = seen.mask
-        if not small.any():
-            return
-        centre, radius = self._instances.around(small)
+        small = self._instances.radii < LARGE
+        near = seen.mask & small if (seen.mask & small).any() else seen.mask
+        scene = self._instances.around(small if small.any() else near)
         context = self._context
         context.enable_only(moderngl.DEPTH_TEST)
         context.polygon_offset = (1.5, 2.0)
-        self._lights.cast(self._draw_shadow, centre, radius, view.view)
+        self._lights.cast(self._draw_shadow, scene, self._instances.around(near), view.view, moment)
         context.polygon_offset = (0.0, 0.0)
 
     def _draw_shadow(self, view: Array, projection: Array, size: int) -> None:

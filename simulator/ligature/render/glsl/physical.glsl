@@ -97,7 +97,7 @@ vec3 physical(vec3 shown, vec3 eye, vec3 n, vec3 v) {
 #endif
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 l;
-        float strength = lightAt(i, eye, n, l);
+        float strength = lightAt(i, eye, l);
         float nl = max(dot(n, l), 0.0);
         vec3 h = normalize(l + v);
         float nh = max(dot(n, h), 0.0), fresnel = schlick(max(dot(v, h), 0.0));

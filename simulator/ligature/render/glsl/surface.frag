@@ -71,7 +71,7 @@ vec3 phong(vec3 texel, vec3 eye, vec3 n, vec3 toEye) {
     vec3 colour = (uEmission + AMBIENT_LIGHT * uAmbient) * texel;
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 toLight;
-        float strength = lightAt(i, eye, n, toLight);
+        float strength = lightAt(i, eye, toLight);
         float facing = max(dot(n, toLight), 0.0);
         float shine = facing > 0.0 ? pow(max(dot(n, normalize(toLight + toEye)), 0.0), uShininess) : 0.0;
         colour += strength * (facing * base + shine * uSpecular);

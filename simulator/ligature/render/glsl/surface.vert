@@ -33,6 +33,19 @@ out vec4 vNow;
 out vec4 vBefore;
 #endif
 
+#ifdef SHADOWS
+uniform mat4 uShadowFromEye[SHADOWS];  // to texture coordinates and depth of the shadow map
+uniform vec2 uShadowTexel[SHADOWS];    // edge of a texel: as in lights.glsl
+uniform int uClosed;                   // 1: back faces are never seen
+out vec4 vShadow[SHADOWS];
+
+// Where `eye` is looked up in a shadow map: off the surface by a texel and a half.
+vec4 inShadowMap(mat4 fromEye, float texel, vec3 eye, vec3 n) {
+    float away = abs(dot(vec4(fromEye[0].w, fromEye[1].w, fromEye[2].w, fromEye[3].w), vec4(eye, 1.0)));
+    return fromEye * vec4(eye + n * (1.5 * texel * away), 1.0);
+}
+#endif
+
 void main() {
 #ifdef ANALYTIC
     vec3 place = aPosition * COVER;
@@ -51,6 +64,11 @@ void main() {
     vTangent = vec4(turn * aTangent.xyz, aTangent.w);
 #endif
     gl_Position = uProjection * eye;
+#ifdef SHADOWS
+    vec3 n = vNormal / max(length(vNormal), 1e-9);
+    if (uClosed == 0 && dot(n, eye.xyz) > 0.0) n = -n;
+    for (int i = 0; i < SHADOWS; ++i) vShadow[i] = inShadowMap(uShadowFromEye[i], uShadowTexel[i].y, eye.xyz, n);
+#endif
 #ifdef PASS_FLOW
     vNow = gl_Position;
     vBefore = iBefore * vec4(place, 1.0);
