@@ -4,6 +4,7 @@ import hashlib
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -47,6 +48,16 @@ class Job:
     def finished(self):
         """Whether the pieces are there, or the process has ended without."""
         return self.process is None or self.process.poll() is not None
+
+    @property
+    def progress(self):
+        """Parts that the mesh is cut into so far, and the share of them, 0 to 1, that this round has looked at."""
+        if self.process is None:
+            return 1, 1.0
+        words = Path(self.log.name).read_text("utf-8", "replace")
+        pool = re.findall(r"waiting pool: (\d+)", words)
+        done = re.findall(r"Processing \[([\d.]+)%\]", words.rpartition("waiting pool")[2])
+        return int(pool[-1]) if pool else 1, max((float(share) / 100.0 for share in done), default=0.0)
 
     def pieces(self):
         """Vertices (n, 3) of each piece; raises ValueError with the process's last words."""
@@ -122,6 +133,7 @@ class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
             return {"CANCELLED"}
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.1, window=context.window)
+        manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -134,7 +146,11 @@ class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         seconds = time.monotonic() - self._job.started
-        context.workspace.status_text_set(f"Decomposing '{self._body}' for {seconds:.0f} s. Esc ends it")
+        parts, share = self._job.progress
+        context.window_manager.progress_update(100.0 * share)
+        context.workspace.status_text_set(
+            f"Decomposing '{self._body}': {share:.0%} of {parts} parts, {seconds:.0f} s. Esc ends it"
+        )
         if not self._job.finished:
             return {"PASS_THROUGH"}
         self._end(context)
@@ -156,6 +172,7 @@ class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
 
     def _end(self, context):
         context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
         context.workspace.status_text_set(None)
 
     def _take(self, context):

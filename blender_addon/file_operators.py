@@ -1,5 +1,6 @@
 """Import and export of model, world and launch files, with entries in the File menu."""
 
+import re
 from pathlib import Path
 
 import bpy
@@ -13,7 +14,7 @@ from .write_file import ExportError, after_export, export_file, export_variants
 
 
 class ADF_OT_import(bpy.types.Operator):
-    """Open model, world or input-devices files; each becomes a collection"""
+    """Open model, world, input-devices or launch files; each becomes a collection, a launch file with all it names"""
 
     bl_idname = "adf.import_file"
     bl_label = "Import ADF"
@@ -38,18 +39,18 @@ class ADF_OT_import(bpy.types.Operator):
     def execute(self, context):
         paths = [Path(self.directory, item.name) for item in self.files if item.name] or [Path(self.filepath)]
         opened = 0
-        for path in paths:
+        roots = (Path(self.root),) if self.root else ()
+        for path in [Path(bpy.path.abspath(str(path))) for path in paths]:
             try:
-                done = import_file(
-                    Path(bpy.path.abspath(str(path))), context.scene, (Path(self.root),) if self.root else ()
-                )
+                launch = _is_launch(path)
+                done = import_launch(path, context.scene) if launch else [import_file(path, context.scene, roots)]
             except (AdfError, OSError) as error:
                 self.report({"ERROR"}, str(error))
                 continue
             opened += 1
-            for problem in done.problems[:20]:
+            for problem in [problem for one in done for problem in one.problems][:20]:
                 self.report({"WARNING"}, problem)
-            self.report({"INFO"}, f"{path.name}: {len(done.collection.all_objects)} objects")
+            self.report({"INFO"}, f"{path.name}: {sum(len(one.collection.all_objects) for one in done)} objects")
         return {"FINISHED"} if opened else {"CANCELLED"}
 
 
@@ -224,6 +225,14 @@ class ADF_OT_export_scene(bpy.types.Operator):
             return {"CANCELLED"}
         self.report({"INFO"}, f"{len(written)} files written")
         return {"FINISHED"}
+
+
+def _is_launch(path):
+    """Whether a file is a launch file, by the keys of one."""
+    try:
+        return re.search(rb"^(multibody configs|world config)\s*:", path.read_bytes(), re.MULTILINE) is not None
+    except OSError:
+        return False  # the reader tells it better
 
 
 def chosen_collection(context, name=""):

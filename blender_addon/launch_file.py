@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from .ligature.adf import AdfError, Resolver, read_launch
+from .ligature.adf import AdfError, Resolver, read_any, read_launch, read_world
 from .ligature.adf.patch import PatchError
 from .ligature.adf.update import given_values, new_text, updated
 from .ligature.authoring.save import SaveError, checked_text, save_all
@@ -15,8 +15,10 @@ from .read_file import Import, import_file
 from .schema_properties import fetch, store
 from .write_file import ExportError, after_export, prepared, unheld_top
 
+WORLD_TEXT = "namespace: /ambf/env/\ngravity: {x: 0.0, y: 0.0, z: -9.8}\nmax iterations: 10\n"
 DEVICES_TEXT = "input devices: []\n"
 COLOURS_TEXT = "white: {r: 255, g: 255, b: 255, a: 255}\n"
+"""What a launch file must name and the scene does not have."""
 
 
 def import_launch(path: Path, scene: bpy.types.Scene, indices: tuple[int, ...] | None = None) -> list[Import]:
@@ -43,7 +45,7 @@ def import_launch(path: Path, scene: bpy.types.Scene, indices: tuple[int, ...] |
             entry.collection = made.collection if made else None
     for name in ("world", "devices", "colours"):
         reference = getattr(launch, name)
-        made = _opened(reference, scene, done) if reference is not None else None
+        made = _opened(reference, scene, done, name) if reference is not None else None
         setattr(stored, name, made.collection if made else None)
     stored.environment = _environment(stored.world, resolver, scene, done)
     return done
@@ -64,12 +66,13 @@ def _environment(
     return done[-1].collection
 
 
-def _opened(reference, scene: bpy.types.Scene, done: list[Import]) -> Import | None:
+def _opened(reference, scene: bpy.types.Scene, done: list[Import], name: str = "") -> Import | None:
     if reference.path is None:
         done.append(Import(scene.collection, problems=[str(reference.diagnostic)]))
         return None
     try:
-        made = import_file(reference.path, scene)
+        # a world with nothing but lights and cameras looks like a model by itself
+        made = import_file(reference.path, scene, reader=read_world if name == "world" else read_any)
     except AdfError as error:
         done.append(Import(scene.collection, problems=[str(error)]))
         return None
@@ -99,7 +102,9 @@ def export_scene(scene: bpy.types.Scene, path: Path, remember: bool = True) -> l
             raise ExportError(f"{collection.name}: {error}") from error
         files.update(own)
         texts.append((collection, folder / name, done.text))
-    for name, content in ((stored.devices_path, DEVICES_TEXT), (stored.colours_path, COLOURS_TEXT)):
+    for name, content in (
+        (stored.world_path, WORLD_TEXT), (stored.devices_path, DEVICES_TEXT), (stored.colours_path, COLOURS_TEXT),
+    ):  # fmt: skip
         if name and folder / name not in files and not (folder / name).exists():
             files[folder / name] = content.encode()
     try:

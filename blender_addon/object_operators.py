@@ -1,8 +1,7 @@
-"""Operators that make objects part of a file: roles, joints, shapes, hulls, inertia."""
+"""Operators that make objects part of a file: roles, joints, inertia."""
 
 from math import pi
 
-import bmesh
 import bpy
 import numpy as np
 
@@ -10,11 +9,11 @@ from . import making
 from .file_operators import chosen_collection
 from .ligature.adf.frames import axis_rotation, frame, pose_matrix
 from .ligature.authoring.generate import mass_keys
-from .ligature.authoring.shapes import Shape, fitted, oriented, shapes_properties
+from .ligature.authoring.shapes import Shape, shapes_properties
 from .ligature.mesh.inertia import combined, mass_properties
 from .mesh_data import points_of
 from .placing import children_with, relative_pose, rest_pose, shape_of, shapes_of
-from .properties import ROLES, SHAPE_KINDS, USES
+from .properties import ROLES
 
 JOINT_KINDS = [
     (kind, kind.title(), f"A {kind} joint")
@@ -90,12 +89,11 @@ class ADF_OT_make(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        collection = target_file(context, self.role)
         for obj in context.selected_objects:
             if obj.adf.role in ("SHAPE", "HULL", "INERTIAL"):
                 self.report({"WARNING"}, f"'{obj.name}' is part of a body and stays so")
                 continue
-            making.give_role(obj, self.role, collection)
+            making.give_role(obj, self.role, making.file_of(obj) or target_file(context, self.role))
         return {"FINISHED"}
 
 
@@ -156,7 +154,7 @@ class ADF_OT_connect(bpy.types.Operator):
 
     bl_idname = "adf.connect"
     bl_label = "Connect by Joint"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     type: bpy.props.EnumProperty(name="Type", items=JOINT_KINDS)
     pivot: bpy.props.EnumProperty(
@@ -196,104 +194,12 @@ class ADF_OT_connect(bpy.types.Operator):
         return frame(R, origin)
 
 
-class ADF_OT_add_shape(NeedsBody, bpy.types.Operator):
-    """Add a primitive to the active body"""
-
-    bl_idname = "adf.add_shape"
-    bl_label = "Add Primitive"
-    bl_options = {"REGISTER", "UNDO"}
-
-    kind: bpy.props.EnumProperty(name="Shape", items=SHAPE_KINDS)
-    use: bpy.props.EnumProperty(name="Use", items=USES)
-    size: bpy.props.FloatVectorProperty(name="Size", size=3, default=(0.1, 0.1, 0.1), min=1e-6, subtype="XYZ_LENGTH")
-    radius: bpy.props.FloatProperty(name="Radius", default=0.05, min=1e-6, subtype="DISTANCE", precision=5)
-    height: bpy.props.FloatProperty(name="Height", default=0.2, min=1e-6, subtype="DISTANCE", precision=5)
-    axis: bpy.props.EnumProperty(name="Axis", items=[(a, a, f"Along {a}") for a in "XYZ"], default="Z")
-    position: bpy.props.FloatVectorProperty(name="Position", size=3, subtype="TRANSLATION")
-    rotation: bpy.props.FloatVectorProperty(name="Rotation", size=3, subtype="EULER")
-
-    def execute(self, context):
-        shape = Shape(self.kind, tuple(self.size), self.radius, self.height, self.axis)
-        making.add_shape(active_body(context), shape, self.use, pose_matrix(self.position, self.rotation))
-        return {"FINISHED"}
-
-
-class ADF_OT_redraw_shape(bpy.types.Operator):
-    """Draw the primitive again after its numbers were changed"""
-
-    bl_idname = "adf.redraw_shape"
-    bl_label = "Update Primitive"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        if context.object is None or context.object.adf.role != "SHAPE":
-            cls.poll_message_set("Make a primitive active")
-            return False
-        return True
-
-    def execute(self, context):
-        making.redraw_shape(context.object)
-        return {"FINISHED"}
-
-
-class ADF_OT_fit(NeedsBody, bpy.types.Operator):
-    """Fit the smallest primitive around the active body's mesh, or around its selected faces in edit mode"""
-
-    bl_idname = "adf.fit_shape"
-    bl_label = "Fit Primitive"
-    bl_options = {"REGISTER", "UNDO"}
-
-    kind: bpy.props.EnumProperty(name="Shape", items=SHAPE_KINDS[:5])
-    along: bpy.props.EnumProperty(
-        name="Axes",
-        items=[
-            ("BODY", "Body", "Along the body's own axes"),
-            ("PRINCIPAL", "Principal", "Along the principal axes of the points"),
-        ],
-    )
-    use: bpy.props.EnumProperty(name="Use", items=USES)
-
-    def execute(self, context):
-        body = active_body(context)
-        points = _chosen_points(context, body)
-        if len(points) < 2:
-            self.report({"ERROR"}, f"'{body.name}' has no mesh to fit a shape to")
-            return {"CANCELLED"}
-        T_axes = oriented(points) if self.along == "PRINCIPAL" else np.eye(4)
-        local = (points - T_axes[:3, 3]) @ T_axes[:3, :3]
-        try:
-            shape, T = fitted(self.kind, local)
-        except ValueError as error:
-            self.report({"ERROR"}, f"'{body.name}': {error}")
-            return {"CANCELLED"}
-        making.add_shape(body, shape, self.use, T_axes @ T)
-        return {"FINISHED"}
-
-
-class ADF_OT_add_hull(NeedsBody, bpy.types.Operator):
-    """Add the convex hull of the body's mesh, or of its selected faces in edit mode, as a collision piece"""
-
-    bl_idname = "adf.add_hull"
-    bl_label = "Add Convex Hull"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def execute(self, context):
-        body = active_body(context)
-        try:
-            making.add_hull(body, _chosen_points(context, body))
-        except ValueError as error:
-            self.report({"ERROR"}, f"'{body.name}': {error}")
-            return {"CANCELLED"}
-        return {"FINISHED"}
-
-
 class ADF_OT_inertia(bpy.types.Operator):
     """Set mass, principal moments and centre of mass of the selected bodies from their geometry"""
 
     bl_idname = "adf.set_inertia"
     bl_label = "Set Inertia"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     source: bpy.props.EnumProperty(
         name="From",
@@ -377,23 +283,7 @@ def target_file(context, role):
     return collection
 
 
-def _chosen_points(context, body):
-    """Points of the body's mesh in its frame: of the selected faces in edit mode, else of all."""
-    obj = context.object if context.object is not None and context.object.type == "MESH" else body
-    if obj.type != "MESH":
-        return np.zeros((0, 3))
-    if context.mode == "EDIT_MESH":
-        work = bmesh.from_edit_mesh(obj.data)
-        chosen = [v.co for face in work.faces if face.select for v in face.verts]
-        if chosen:
-            return np.array(chosen, dtype=float)
-    return points_of(body)[0] if body.type == "MESH" else np.zeros((0, 3))
-
-
-CLASSES = (
-    ADF_OT_new_file, ADF_OT_make, ADF_OT_clear, ADF_OT_add, ADF_OT_connect, ADF_OT_add_shape, ADF_OT_redraw_shape,
-    ADF_OT_fit, ADF_OT_add_hull, ADF_OT_inertia,
-)  # fmt: skip
+CLASSES = (ADF_OT_new_file, ADF_OT_make, ADF_OT_clear, ADF_OT_add, ADF_OT_connect, ADF_OT_inertia)
 
 
 def attach() -> None:

@@ -10,7 +10,10 @@ import numpy as np
 
 from . import making
 from .ligature.adf.frames import axis_rotation, frame
-from .placing import is_prismatic, place, rest_pose
+from .placing import place, rest_pose
+
+WITHOUT_LIMITS = {"T": (-0.05, 0.05), "R": (-np.pi, np.pi)}
+"""Metres along and radians about an axis that has no limits, which are shown of it."""
 
 _TRANSFORM = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
@@ -34,17 +37,11 @@ def behind(joint):
     return found
 
 
-def move_joint(scene, joint, position):
-    """Show a joint at a position: an angle, or metres of a prismatic joint; from rest."""
+def move_joint(scene, joint, motion):
+    """Show a joint with its frame moved by ``motion`` (4, 4) in itself; from rest."""
     bring_back(scene)
     bodies = behind(joint)
     T = rest_pose(joint)
-    axis = (1.0, 0.0, 0.0) if is_prismatic(joint) else (0.0, 0.0, 1.0)
-    motion = (
-        frame(np.eye(3), np.multiply(axis, position))
-        if is_prismatic(joint)
-        else frame(axis_rotation(axis, position), (0, 0, 0))
-    )
     moved = T @ motion @ np.linalg.inv(T)
     rest, targets = {}, []
     for body in bodies:
@@ -82,6 +79,13 @@ class ADF_OT_move_joint(bpy.types.Operator):
     bl_label = "Preview Joint"
     bl_options = {"REGISTER", "UNDO"}
 
+    axis: bpy.props.EnumProperty(
+        name="Axis",
+        description="Which way a joint of several axes moves",
+        items=[("FREE", "First Free", "The first axis that is not locked")]
+        + [(f"T{a}", f"Along {a}", f"Along {a} of the joint") for a in "XYZ"]
+        + [(f"R{a}", f"About {a}", f"About {a} of the joint") for a in "XYZ"],
+    )
     part: bpy.props.FloatProperty(
         name="Position",
         description="Part of the way from the lower to the upper limit",
@@ -100,19 +104,45 @@ class ADF_OT_move_joint(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        low, high = limits_of(context.object)
-        move_joint(context.scene, context.object, low + self.part * (high - low))
+        joint = context.object
+        ranges = ranges_of(joint)
+        name = next(iter(ranges), "") if self.axis == "FREE" else self.axis
+        if name not in ranges:
+            self.report({"ERROR"}, f"'{joint.name}' is locked there; it moves {', '.join(ranges) or 'nowhere'}")
+            return {"CANCELLED"}
+        low, high = ranges[name]
+        move_joint(context.scene, joint, motion_along(name, low + self.part * (high - low)))
         return {"FINISHED"}
 
 
-def limits_of(joint):
-    """The range that a joint is shown in: its limits, or half a turn each way, or five centimetres."""
-    group = joint.adf.joint
+def motion_along(name, position):
+    """Motion (4, 4) of a joint frame by metres along, or radians about, one of its axes: TX to RZ."""
+    axis = np.eye(3)["XYZ".index(name[1])]
+    if name[0] == "T":
+        return frame(np.eye(3), position * axis)
+    return frame(axis_rotation(axis, position), (0.0, 0.0, 0.0))
+
+
+def ranges_of(joint):
+    """The free axes of a joint, TX to RZ, and the range that each is shown in: its limits where it has any."""
+    group, kind = joint.adf.joint, joint.adf.joint.type
+    if kind.startswith("six dof"):
+        found = {}
+        for letter, half in (("T", "linear"), ("R", "angular")):
+            for a in "xyz":
+                low, high = (getattr(group, f"joint_limits_{half}_{end}_{a}") for end in ("low", "high"))
+                if low != high:
+                    found[letter + a.upper()] = (low, high) if low < high else WITHOUT_LIMITS[letter]
+        return found
+    if kind == "cone twist":
+        widths = {f"R{a.upper()}": getattr(group, f"joint_limits_{a}") for a in "xyz"}
+        return {name: (-width, width) for name, width in widths.items() if width > 0.0}
+    if kind in ("fixed", "p2p"):
+        return {} if kind == "fixed" else {f"R{a}": WITHOUT_LIMITS["R"] for a in "XYZ"}
+    name = {"prismatic": "TX", "linear spring": "TZ"}.get(kind, "RZ")
     if group.is_property_set("joint_limits_low") and group.is_property_set("joint_limits_high"):
-        return group.joint_limits_low, group.joint_limits_high
-    if group.type.startswith("six dof"):
-        return group.joint_limits_angular_low_z, group.joint_limits_angular_high_z
-    return (-0.05, 0.05) if is_prismatic(joint) else (-np.pi, np.pi)
+        return {name: (group.joint_limits_low, group.joint_limits_high)}
+    return {name: WITHOUT_LIMITS[name[0]]}
 
 
 class ADF_OT_rest(bpy.types.Operator):

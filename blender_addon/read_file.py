@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 from codecs import BOM_UTF8
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -40,10 +41,18 @@ class Import:
     problems: list[str] = field(default_factory=list)
 
 
-def import_file(path: Path, scene: bpy.types.Scene, roots: tuple[Path, ...] = ()) -> Import:
-    """Bring one world, model, input-devices or colours file in; raises `AdfError` when it cannot be read at all."""
+def import_file(
+    path: Path,
+    scene: bpy.types.Scene,
+    roots: tuple[Path, ...] = (),
+    reader: Callable[[Path, Resolver], Document] = read_any,
+) -> Import:
+    """Bring one world, model, input-devices or colours file in; raises `AdfError` when it cannot be read at all.
+
+    ``reader`` is for a file whose kind is known; by itself it is told by its keys.
+    """
     resolver = Resolver.for_file(path, roots)
-    document = read_any(path, resolver)
+    document = reader(path, resolver)
     collection = bpy.data.collections.new(path.stem)
     scene.collection.children.link(collection)
     stored = collection.adf

@@ -6,6 +6,7 @@ import bpy
 
 from . import (
     check_operators,
+    collision_operators,
     decompose_operators,
     file_operators,
     generator_operators,
@@ -28,6 +29,7 @@ MODULES = (
     file_operators,
     launch_operators,
     object_operators,
+    collision_operators,
     generator_operators,
     check_operators,
     decompose_operators,

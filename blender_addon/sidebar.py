@@ -143,7 +143,8 @@ class ADF_PT_collision(Sidebar, bpy.types.Panel):
         layout = self.layout
         layout.operator_menu_enum("adf.add_shape", "kind", text="Add Primitive", icon="MESH_CUBE")
         layout.operator_menu_enum("adf.fit_shape", "kind", text="Fit Primitive", icon="MOD_SHRINKWRAP")
-        layout.operator("adf.add_hull", icon="MESH_ICOSPHERE")
+        layout.operator_menu_enum("adf.add_hull", "around", text="Add Convex Hull", icon="MESH_ICOSPHERE")
+        layout.operator("adf.add_ring", icon="MESH_CIRCLE")
         layout.operator("adf.decompose", icon="MOD_EXPLODE")
         row = layout.row(align=True)
         row.operator("adf.measure_collision", icon="DRIVER_DISTANCE")

@@ -37,7 +37,7 @@ class ADF_OT_simulate(bpy.types.Operator):
 
     bl_idname = "adf.simulate"
     bl_label = "Simulate Here"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     seconds: bpy.props.FloatProperty(name="Seconds", default=2.0, min=0.05, max=120.0)
 

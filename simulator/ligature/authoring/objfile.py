@@ -67,32 +67,43 @@ def _surface_lines(surface: Surface, counts: list[int], name: str, material: str
     if not np.isfinite(vertices).all():
         raise MeshWriteError(f"'{name}' has a vertex that is not finite; check its modifiers and its transform")
     distinct, index = _distinct(vertices[surface.triangles].reshape(-1, 3))
-    lines = [f"v {row}" for row in distinct]
+    lines = [_table("v", distinct)]
     corners = [index + counts[0]]
     counts[0] += len(distinct)
     for values, letter, place in ((surface.uvs, "vt", 1), (surface.normals, "vn", 2)):
         if values is None:
             continue
         distinct, index = _distinct(np.asarray(values, dtype=float).reshape(len(surface.triangles) * 3, -1))
-        lines += [f"{letter} {row}" for row in distinct]
+        lines.append(_table(letter, distinct))
         corners.append(index + counts[place])
         counts[place] += len(distinct)
     lines.append(f"usemtl {material}")
     separator = "//" if surface.uvs is None and surface.normals is not None else "/"
-    words = [separator.join(map(str, corner)) for corner in zip(*(c.tolist() for c in corners), strict=True)]
-    return lines + [f"f {words[i]} {words[i + 1]} {words[i + 2]}" for i in range(0, len(words), 3)]
+    corner = separator.join(["%d"] * len(corners))
+    line = f"f {corner} {corner} {corner}\n"
+    numbers = np.column_stack(corners).ravel().tolist()
+    return [*lines, (line * len(surface.triangles) % tuple(numbers))[:-1]]
 
 
-def _distinct(rows: Array) -> tuple[list[str], NDArray[np.int64]]:
-    """Texts of the different rows in order of first use, and the row of each."""
+def _table(letter: str, rows: Array) -> str:
+    """Lines of a letter and the row's numbers; one format for all, since there are tens of thousands."""
+    line = " ".join([letter] + [f"%.{DIGITS}g"] * rows.shape[1]) + "\n"
+    return (line * len(rows) % tuple(rows.ravel().tolist()))[:-1]
+
+
+def _distinct(rows: Array) -> tuple[Array, NDArray[np.int64]]:
+    """The different rows, as single precision has them, in order of first use, and the row of each."""
     with np.errstate(under="ignore"):
         single = np.ascontiguousarray(rows.astype(np.float32)) + np.float32(0.0)
-    _, first, inverse = np.unique(single, axis=0, return_index=True, return_inverse=True)
+    code = np.zeros(len(single), dtype=np.int64)
+    for column in single.view(np.int32).T:  # equal numbers have equal bits, now that no zero is negative
+        values, place = np.unique(column, return_inverse=True)
+        _, code = np.unique(code * len(values) + place, return_inverse=True)
+    _, first, inverse = np.unique(code, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    texts = [" ".join(f"{v:.{DIGITS}g}" for v in row) for row in single[first[order]].tolist()]
-    return texts, rank[inverse.reshape(-1)]
+    return single[first[order]].astype(float), rank[inverse.reshape(-1)]
 
 
 def _paint_lines(paint: Paint, material: str) -> str:

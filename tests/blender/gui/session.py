@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import addon_utils
+import bmesh
 import bpy
 import window
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -35,7 +36,7 @@ def scene_print():
         told.append([obj.parent.name if obj.parent else "", obj.data.name if obj.data else "", list(obj.color)])
         told.append([len(obj.modifiers), obj.hide_render, obj.display_type, obj.select_get(), obj.empty_display_type])
         if obj.type == "MESH":
-            told.append([len(obj.data.vertices), [slot.name for slot in obj.material_slots]])
+            told.append([len(obj.data.vertices), len(obj.data.polygons), [slot.name for slot in obj.material_slots]])
     for collection in sorted(bpy.data.collections, key=lambda c: c.name):
         told.append([collection.name, sorted(o.name for o in collection.objects), plain(collection.get("adf"))])
     scene = bpy.context.scene
@@ -118,6 +119,17 @@ def out_of_launch():
     bpy.ops.adf.remove_from_launch(index=0)
 
 
+def has_opening():
+    data = find("BODY", "base").data
+    work = bmesh.new()
+    work.from_mesh(data)
+    bmesh.ops.delete(work, geom=[list(work.faces)[0]], context="FACES_ONLY")
+    work.to_mesh(data)
+    work.free()
+    data.update()
+    select(find("BODY", "base"))
+
+
 def has_finding():
     find("BODY", "phantom").adf.body.property_unset("mass")
     bpy.ops.adf.check()
@@ -170,7 +182,8 @@ RECIPES = {
     "add_shape": [({"kind": kind}, on("BODY", "phantom")) for kind in ("BOX", "SPHERE", "CAPSULE", "PLANE")],
     "redraw_shape": [({}, on("SHAPE"))],
     "fit_shape": [({"kind": kind}, on("BODY", "link1")) for kind in ("BOX", "SPHERE", "CYLINDER", "CAPSULE", "CONE")],
-    "add_hull": [({}, on("BODY", "link1"))],
+    "add_hull": [({}, on("BODY", "link1")), ({"around": "MATERIAL"}, on("BODY", "ground"))],
+    "add_ring": [({"radius": 0.002}, has_opening)],
     "set_inertia": [
         ({"source": "SHAPES"}, on("BODY", "link1")),
         ({"source": "MESH", "given": "DENSITY"}, on("BODY", "link1")),

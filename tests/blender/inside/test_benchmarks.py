@@ -233,8 +233,12 @@ def test_b13_a_decomposition_can_be_cancelled_at_once_and_is_kept(monkeypatch, t
     job.cancel()
     assert time.monotonic() - start < 0.5 and job.finished
     job = Job(vertices, faces, settings)
+    told = set()
     while not job.finished:
+        told.add(job.progress)
         time.sleep(0.05)
+    told.add(job.progress)
+    assert len(told) > 2 and all(parts >= 1 and 0.0 <= share <= 1.0 for parts, share in told)  # it is seen to go on
     pieces = job.pieces()
     start = time.monotonic()
     again = Job(vertices, faces, settings)

@@ -1,0 +1,195 @@
+"""What single operators make: pieces by material, rings, previews of every joint type, dropped launch files."""
+
+import os
+from pathlib import Path
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+from adf_studio.ligature.adf import Resolver, read_any, read_launch
+from adf_studio.mesh_data import shape_data
+from adf_studio.placing import relative_pose, rest_pose, shape_of
+
+from .scene import body, model, scene_print, select
+
+
+def test_faces_of_each_material_get_a_hull_of_their_own():
+    model()
+    part = body("two blocks")
+    corners = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [*sides, *(tuple(i + 8 for i in side) for side in sides)]
+    part.data = shape_data(np.vstack([corners, corners + [3.0, 0.0, 0.0]]), faces, "blocks")
+    for name in ("red", "blue"):
+        part.data.materials.append(bpy.data.materials.new(name))
+    for polygon in part.data.polygons:
+        polygon.material_index = int(polygon.index >= 6)
+    select(part)
+    assert bpy.ops.adf.add_hull(around="MATERIAL") == {"FINISHED"}
+    extents = sorted(
+        (min(v.co.x for v in hull.data.vertices), max(v.co.x for v in hull.data.vertices)) for hull in part.children
+    )
+    assert extents == [(0.0, 1.0), (3.0, 4.0)]
+    assert part.adf.body.collision_mesh_type == "CONVEX_HULL"
+
+
+def test_a_ring_follows_the_open_boundary_of_a_mesh_and_its_scale():
+    model()
+    bpy.ops.mesh.primitive_circle_add(vertices=64, radius=0.01, fill_type="NOTHING")
+    sheet = bpy.context.object
+    work = bmesh.new()
+    bmesh.ops.create_circle(work, segments=64, radius=0.01)
+    inner = list(work.edges)
+    made = bmesh.ops.extrude_edge_only(work, edges=inner)
+    for vertex in (item for item in made["geom"] if isinstance(item, bmesh.types.BMVert)):
+        vertex.co *= 3.0
+    work.to_mesh(sheet.data)
+    work.free()
+    sheet.scale = (2.0, 2.0, 2.0)
+    select(sheet)
+    bpy.ops.adf.make(role="BODY")
+    assert bpy.ops.adf.add_ring(sides=8, radius=0.0005) == {"FINISHED"}
+    assert len(sheet.children) == 16
+    distances = sorted(np.linalg.norm(relative_pose(sheet, child)[:3, 3]) for child in sheet.children)
+    np.testing.assert_allclose(distances[:8], 0.02 * np.cos(np.pi / 8), rtol=2e-3)
+    np.testing.assert_allclose(distances[8:], 0.06 * np.cos(np.pi / 8), rtol=2e-3)
+    assert {shape_of(child).kind for child in sheet.children} == {"CAPSULE"}
+    closed = body("closed")
+    with pytest.raises(RuntimeError, match="'closed': its mesh has no open boundary"):
+        bpy.ops.adf.add_ring()
+    assert not closed.children
+
+
+MOVES = [
+    ("revolute", "FREE", "RZ", np.pi / 2),
+    ("prismatic", "FREE", "TX", 0.05),
+    ("linear spring", "FREE", "TZ", 0.05),
+    ("torsion spring", "FREE", "RZ", 1.0),
+    ("cone twist", "RY", "RY", 0.7),
+    ("p2p", "RX", "RX", np.pi),
+    ("six dof", "TY", "TY", 0.02),
+    ("six dof spring", "FREE", "TY", 0.02),
+]
+
+
+@pytest.mark.parametrize(("kind", "axis", "moved", "most"), MOVES, ids=[move[0] for move in MOVES])
+def test_a_preview_moves_every_type_of_joint_along_its_own_axis(kind, axis, moved, most):
+    model()
+    parent, child = body("parent"), body("child", location=(0.3, 0.2, 0.1))
+    select(child, parent)
+    bpy.ops.adf.connect(type=kind)
+    joint = next(o for o in bpy.data.objects if o.adf.role == "JOINT")
+    if kind.startswith("six dof"):
+        joint.adf.joint.joint_limits_linear_low_y, joint.adf.joint.joint_limits_linear_high_y = -0.02, 0.02
+    before = scene_print()
+    T_joint, T_child = rest_pose(joint), rest_pose(child)
+    bpy.context.view_layer.objects.active = joint
+    assert bpy.ops.adf.move_joint(axis=axis, part=1.0) == {"FINISHED"}
+    motion = np.linalg.inv(T_joint) @ rest_pose(child) @ np.linalg.inv(T_child) @ T_joint
+    index = "XYZ".index(moved[1])
+    if moved[0] == "T":
+        np.testing.assert_allclose(motion[:3, 3], most * np.eye(3)[index], atol=1e-6)
+        np.testing.assert_allclose(motion[:3, :3], np.eye(3), atol=1e-6)
+    else:
+        a, b = (index + 1) % 3, (index + 2) % 3
+        np.testing.assert_allclose([motion[a, a], motion[b, a]], [np.cos(most), np.sin(most)], atol=1e-6)
+    bpy.ops.adf.rest_pose()
+    assert scene_print() == before
+
+
+def test_a_locked_axis_is_told_with_those_that_move():
+    model()
+    parent, child = body("parent"), body("child", location=(1, 0, 0))
+    select(child, parent)
+    bpy.ops.adf.connect(type="fixed")
+    bpy.context.view_layer.objects.active = next(o for o in bpy.data.objects if o.adf.role == "JOINT")
+    with pytest.raises(RuntimeError, match="is locked there; it moves nowhere"):
+        bpy.ops.adf.move_joint()
+    bpy.context.object.adf.joint.type = "revolute"
+    with pytest.raises(RuntimeError, match="is locked there; it moves RZ"):
+        bpy.ops.adf.move_joint(axis="TX")
+
+
+OPERATORS = [
+    ("make", {"role": "GHOST_OBJECT"}), ("add_shape", {}), ("fit_shape", {"kind": "CAPSULE"}), ("add_hull", {}),
+    ("measure_collision", {}), ("set_inertia", {}), ("add", {"role": "SENSOR"}), ("add_needle", {}), ("add_suture", {"form": "CHAIN"}),
+    ("add_hole", {}), ("add_grasp", {}), ("add_endoscope", {}), ("check", {}), ("fix", {"everything": True}),
+    ("new_file", {"kind": "WORLD", "name": "w"}), ("add_to_launch", {"path": "w.yaml"}),
+]  # fmt: skip
+
+
+def users(objects):
+    """What a user has arranged of objects, as a text each."""
+    layer = bpy.context.view_layer
+    return [
+        f"{o.name} {o.data.name} {np.array(o.matrix_world).tolist()} {o.parent} {o.hide_get()} {o.hide_render} {o.hide_viewport} "
+        f"{o.select_get()} {layer.objects.active is o} {o.display_type} {len(o.modifiers)} {[c.name for c in o.users_collection]}"
+        for o in objects
+    ]
+
+
+def test_no_operator_selects_renames_moves_or_hides_what_the_user_has(tmp_path):
+    model()
+    part = body("part")
+    part.adf.body.collision_margin = 0.9  # which has a fix
+    bpy.ops.mesh.primitive_cube_add(location=(0.3, 0.2, 0.1), rotation=(0.1, 0.2, 0.3))
+    other = bpy.context.object
+    hidden = other.copy()
+    bpy.context.scene.collection.objects.link(hidden)
+    hidden.hide_set(True)
+    select(part)
+    bpy.context.view_layer.update()
+    before = users([part, other, hidden])
+    export = ("export_scene", {"filepath": str(tmp_path / "launch.yaml")})
+    for name, arguments in [*OPERATORS[1:], export, ("import_launch", export[1]), OPERATORS[0]]:
+        assert getattr(bpy.ops.adf, name)(**arguments) == {"FINISHED"}, name
+        bpy.context.view_layer.update()
+        assert users([part, other, hidden]) == before, name
+
+
+def test_a_launch_file_among_dropped_files_is_opened_with_all_that_it_names():
+    folder = Path(os.environ["LIGATURE_ROOT"]) / "scenes" / "suturing_small"
+    bpy.ops.adf.import_file(directory=str(folder), files=[{"name": "launch.yaml"}])
+    stored = bpy.context.scene.adf
+    assert len(stored.models) >= 1 and all(entry.collection for entry in stored.models) and stored.world is not None
+    assert Path(stored.filepath) == folder / "launch.yaml"
+
+
+def test_a_scene_without_a_world_is_written_with_all_files_that_a_launch_file_must_name(tmp_path):
+    model()
+    body()
+    target = tmp_path / "scene" / "launch.yaml"
+    assert bpy.ops.adf.export_scene(filepath=str(target)) == {"FINISHED"}
+    launch = read_launch(target, Resolver.for_file(target))
+    named = [launch.world, launch.devices, launch.colours, *launch.models]
+    assert len(named) == 4 and all(reference.path.is_file() for reference in named)
+    world = read_any(launch.world.path, Resolver([tmp_path]))
+    assert world.kind == "world"
+    assert [d.message for d in world.diagnostics] == ["world 'world.yaml' names no environment"]  # that is so
+
+
+def test_a_world_without_surroundings_comes_back_as_a_world(tmp_path):
+    model()
+    body()
+    bpy.ops.adf.new_file(kind="WORLD", name="world")
+    bpy.ops.adf.add(role="LIGHT", name="lamp", hang=False)
+    target = tmp_path / "launch.yaml"
+    bpy.ops.adf.export_scene(filepath=str(target))
+    text = (tmp_path / "world.yaml").read_bytes()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.adf.import_launch(filepath=str(target))
+    world = bpy.context.scene.adf.world
+    assert world.adf.kind == "WORLD" and [o.adf.role for o in world.objects] == ["LIGHT"]
+    bpy.ops.adf.export_scene(filepath=str(target))
+    assert (tmp_path / "world.yaml").read_bytes() == text
+
+
+def test_files_can_be_dropped_where_blender_takes_them():
+    if not hasattr(bpy.types, "FileHandler"):
+        pytest.skip("Blender takes dropped files from 4.1 on")
+    handler = bpy.types.ADF_FH_import
+    assert handler.bl_import_operator == "adf.import_file"
+    assert handler.bl_file_extensions.split(";") == [".yaml", ".yml", ".ambf"]
+    names = bpy.ops.adf.import_file.get_rna_type().properties.keys()
+    assert {"filepath", "directory", "files"} <= set(names)  # what Blender hands a dropped file over in
