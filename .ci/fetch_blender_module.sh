@@ -19,8 +19,12 @@ else
     rm -rf "$folder"
     "$python" -m venv "$folder" &&
         timeout -k 10 "$seconds" "$folder/bin/pip" install --quiet --disable-pip-version-check --timeout 15 --retries 1 \
-            "bpy==$version" -r requirements-bpy.txt && rm -f "$folder.why" && exit 0
-    why="bpy $version could not be had from the package index within $seconds s"
+            "bpy==$version" -r requirements-bpy.txt
+    case $? in
+    0) rm -f "$folder.why" && exit 0 ;;
+    124) why="bpy $version was not fetched within $seconds s" ;;
+    *) why="bpy $version could not be had from the package index" ;;
+    esac
 fi
 echo "$why: its tests are skipped" >&2
 echo "$why" >"$folder.why"
