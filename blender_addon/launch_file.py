@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from .ligature.adf import AdfError, Resolver, read_any, read_launch, read_world
+from .ligature.adf.nodes import parse
 from .ligature.adf.patch import PatchError
 from .ligature.adf.update import given_values, new_text, updated
 from .ligature.authoring.save import SaveError, checked_text, save_all
@@ -133,4 +134,5 @@ def launch_text(scene: bpy.types.Scene) -> str:
     top = {**fetch(stored.launch, "launch"), **{key: value for key, value in named.items() if value}}
     if not stored.source:
         return new_text("launch", top, [])
-    return updated(stored.source, "launch", {**unheld_top("launch", stored.source), **top}, [])
+    root = parse(stored.source, Path(stored.filepath))
+    return updated(stored.source, "launch", {**unheld_top("launch", root), **top}, [], (), root)

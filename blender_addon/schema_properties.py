@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import cache
 
 import bpy
 import numpy as np
@@ -43,6 +44,7 @@ _SUBTYPES = {"m": ("DISTANCE", "LENGTH"), "rad": ("ANGLE", "ROTATION"), "kg": ("
 _GROUPS: dict[str, type] = {}
 
 
+@cache
 def identifier(path: str) -> str:
     """The property's name for the key at a dotted path."""
     return re.sub(r"[^a-z0-9]+", "_", path.lower()).strip("_")
@@ -193,6 +195,7 @@ def decimal(value: float) -> float:
     return float(np.format_float_scientific(np.float32(value), unique=True)) + 0.0
 
 
+@cache
 def _keys_below(kind: str, prefix: str) -> list[Key]:
     return [
         key

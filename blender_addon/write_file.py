@@ -11,6 +11,7 @@ import os
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from math import isfinite
 from pathlib import Path
 
@@ -85,10 +86,10 @@ def text_of(collection: bpy.types.Collection, meshes: dict[str, dict] | None = N
     if root is None:
         top = {**top, **_default_paths(kind, top, objects)}
         return new_text(kind, top, items)
-    top = {**unheld_top(kind, stored.source), **top}
+    top = {**unheld_top(kind, root), **top}
     kept = {obj.adf.was for obj in objects}
     removed = [key for key in json.loads(stored.imported_keys or "[]") if key not in kept]
-    return updated(stored.source, kind, top, items, removed)
+    return updated(stored.source, kind, top, items, removed, root)
 
 
 def variant_text(collection: bpy.types.Collection, variant: bpy.types.PropertyGroup) -> str:
@@ -145,7 +146,7 @@ def _prepared(collection: bpy.types.Collection, path: Path) -> tuple[Export, dic
     if stored.kind == "MODEL":
         meshes, files = _mesh_files(collection, path, done)
     done.text = text_of(collection, meshes)
-    data = checked_text(done.text, path)
+    data = done.text.encode("utf-8") if done.text == stored.source else checked_text(done.text, path)
     if stored.byte_order_mark:
         data = BOM_UTF8 + data
     return done, {**files, path: data}
@@ -184,6 +185,7 @@ def _item(obj: bpy.types.Object, root: Mapping | None, meshes: dict) -> Item:
     return Item(kind, obj.adf.key, values, was=obj.adf.was if node is not None else "")
 
 
+@cache
 def _unheld_paths(kind: str) -> list[str]:
     """Keys that neither properties nor placing hold: they stay as the file has them."""
     held = {key.path for key in keys_of(kind)}
@@ -195,9 +197,9 @@ def _unheld_paths(kind: str) -> list[str]:
     ]
 
 
-def unheld_top(kind: str, source: str) -> dict:
+def unheld_top(kind: str, root: Mapping) -> dict:
     """The file's own keys that neither properties nor the scene hold: they stay as they are."""
-    values = _top_values(kind, parse(source, Path()))
+    values = _top_values(kind, root)
     return {path: values[path] for path in _unheld_paths(kind) if path in values}
 
 

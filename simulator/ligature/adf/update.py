@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -95,15 +96,23 @@ def new_text(kind: str, top: Mapping[str, Any], items: Sequence[Item]) -> str:
     return write_document(kind, values)
 
 
-def updated(text: str, kind: str, top: Mapping[str, Any], items: Sequence[Item], removed: Collection[str] = ()) -> str:
+def updated(
+    text: str,
+    kind: str,
+    top: Mapping[str, Any],
+    items: Sequence[Item],
+    removed: Collection[str] = (),
+    parsed: nodes.Mapping | None = None,
+) -> str:
     """``text``, a file of ``kind``, with the changes that make it say ``top`` and hold ``items``.
 
     Objects whose keys are ``removed`` go; all others stay, also those that cannot be read. Keys that
-    the schema does not know, comments, anchors and order stay. Raises `PatchError`.
+    the schema does not know, comments, anchors and order stay. ``parsed`` are the nodes of ``text`` where they are
+    known. Raises `PatchError`.
     """
-    text = _renamed(text, kind, items)
+    before, text = text, _renamed(text, kind, items)
     for _ in range(MAX_ROUNDS):
-        root = nodes.parse(text, Path())
+        root = parsed if parsed is not None and text == before else nodes.parse(text, Path())
         edits = _edits(text, root, kind, top, items, removed)
         if not edits:
             return text
@@ -306,10 +315,7 @@ def _whole_blocks(owner: nodes.Mapping, paths: list[str]) -> list[str]:
 
 def _given(element: Element, prefix: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
-    for key in SCHEMA[element.kind]:
-        if not key.path.startswith(prefix) or "[]" in key.path[len(prefix) :] or key.type is Type.MAP:
-            continue
-        path = key.path[len(prefix) :]
+    for path, key in _plain_keys(element.kind, prefix):
         if not element.has(path) or (key.type is Type.TEXTS and path in LISTS):
             continue
         if key.type is Type.MAPS:
@@ -322,6 +328,13 @@ def _given(element: Element, prefix: str) -> dict[str, Any]:
             except BadValue:
                 continue
     return values
+
+
+@cache
+def _plain_keys(kind: str, prefix: str) -> list[tuple[str, Key]]:
+    """The keys below a prefix that are no blocks, by their paths from there."""
+    below = [(key.path[len(prefix) :], key) for key in SCHEMA[kind] if key.path.startswith(prefix)]
+    return [(path, key) for path, key in below if "[]" not in path and key.type is not Type.MAP]
 
 
 def same(a: Any, b: Any) -> bool:
