@@ -75,6 +75,7 @@ class Painter:
     ) -> None:
         self._context, self._brushes, self._seen, self._view = context, brushes, seen, view
         self._before = before
+        self._ready: set[Program] = set()
         self._calls = [(batch, rows) for batch in batches if len(rows := seen.rows(batch))]
 
     @property
@@ -115,17 +116,25 @@ class Painter:
             if own is not None:
                 self._draw_own(own, batch, rows)
                 return
-        view, program = self._view, self._brushes.built_in(batch, passes)
-        program.write("uProjection", view.projection)
+        program = self._brushes.built_in(batch, passes)
+        if program not in self._ready:
+            self._bind_picture(program, passes)
+            self._ready.add(program)
         if batch.primitive is not None:
             program.set("uShape", batch.primitive[1:])
         if "rgb" in passes:
-            self._brushes.lights.bind(program)
             program.set("uClosed", int(batch.closed))
-            program.write("uWorldFromEye", view.view[:3, :3].T)
             bind_surface(program, batch.surface, self._brushes.textures)
-        program.set("uHalfSize", (view.width / 2, view.height / 2))
         batch.draw(program, self._seen.instances[rows], None if self._before is None else self._before[rows])
+
+    def _bind_picture(self, program: Program, passes: Sequence[str]) -> None:
+        """Fill the uniforms of a built-in program that are the same for the whole picture."""
+        view = self._view
+        program.write("uProjection", view.projection)
+        program.set("uHalfSize", (view.width / 2, view.height / 2))
+        if "rgb" in passes:
+            self._brushes.lights.bind(program)
+            program.write("uWorldFromEye", view.view[:3, :3].T)
 
     def _draw_own(self, program: Program, batch: Batch, rows: NDArray[np.int64]) -> None:
         """Draw with a scene file's program, which knows no instances."""

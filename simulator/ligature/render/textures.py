@@ -7,9 +7,6 @@ from pathlib import Path
 import moderngl
 from PIL import Image
 
-ANISOTROPY = 4.0
-"""Samples along the steeper direction: floors and drapes are seen at grazing angles."""
-
 
 class Textures:
     """The textures of one context by path."""
