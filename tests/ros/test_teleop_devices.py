@@ -94,6 +94,28 @@ def test_a_pen_in_millimetres_is_read_in_metres(node: Any, publish: Callable[...
     device.close()
 
 
+def test_messages_of_a_type_that_is_no_pose_are_told_and_the_pen_is_heard_on(
+    node: Any, publish: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from geometry_msgs.msg import PoseStamped
+    from std_msgs.msg import String
+
+    told: list[str] = []
+    monkeypatch.setattr(node, "logerr_throttle_identical", lambda _, text: told.append(text))
+    device, readings = adapter("touch", "/mixed/")
+    wrong = publish("/mixed/pose", String)
+    until(lambda: wrong.publish("here") or told)
+    assert "/mixed/pose: /ligature_tests" in told[0]
+    assert "sends std_msgs/String, which is not understood here" in told[0]
+    assert not readings
+    wrong.unregister()
+    pose = publish("/mixed/pose", PoseStamped)
+    message = PoseStamped()
+    message.pose.orientation.w = 1.0
+    until(lambda: pose.publish(message) or readings)
+    device.close()
+
+
 def test_a_message_package_that_is_missing_is_named(node: Any) -> None:
     from ligature.teleop.messages import MissingPackage, message_class
 

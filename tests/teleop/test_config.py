@@ -40,6 +40,14 @@ def test_a_file_says_who_leads_whom_and_how() -> None:
     assert config.devices["pad"].options["speed"] == 0.2
 
 
+def test_more_devices_than_arms_wait_until_they_are_told_whom_to_lead() -> None:
+    config = read(GOOD.replace("pad: []", "pad: [none, PSM1, PSM2]"))
+    assert config.pairs["pad"] == ("PSM1", "PSM2")
+    assert config.waiting == {"pad"}
+    assert [config.begins_with(leader) for leader in config.pairs] == ["PSM1", "PSM2", ""]
+    assert read(GOOD).begins_with("pad") == ""
+
+
 def test_a_fixed_camera_stands_in_the_world() -> None:
     config = read(GOOD.replace("camera: ECM", "camera: {position: [0, 0, 1], rpy: [3.14159265, 0, 0]}"))
     assert config.camera == ""

@@ -22,7 +22,9 @@ def test_the_file_of_the_documentation_is_read() -> None:
     page = ROOT / "docs" / "teleoperation.md"
     block = re.search(r"```yaml\n(camera.*?)```", page.read_text("utf-8"), re.DOTALL)
     assert block is not None
-    assert from_text(block[1], page).pairs == {"pen": ("PSM1", "PSM2"), "left": ("PSM2", "PSM1")}
+    config = from_text(block[1], page)
+    assert config.pairs == {"pen": ("PSM1", "PSM2"), "left": ("PSM2", "PSM1"), "pad": ("PSM1", "PSM2")}
+    assert config.waiting == {"pad"}
 
 
 def test_the_command_tells_what_a_file_says_and_what_is_wrong(tmp_path: Path) -> None:

@@ -38,6 +38,16 @@ def test_a_leader_leads_its_first_follower(seat: Seat) -> None:
     assert goals["PSM1"].T_camera_tip[0, 3] == pytest.approx(0.02)
 
 
+def test_a_leader_that_waits_leads_nobody_until_it_is_told_to() -> None:
+    seat = Seat({"MTMR": ("PSM1",), "pad": ("PSM1", "PSM2")}, Settings(scale=1.0, fastest=10.0), waiting=["pad"])
+    seat.enable(True)
+    assert feed(seat, 0.0, leader="pad") == {}
+    assert seat.leaders["pad"].selected is None
+    assert seat.next_follower("pad") == "PSM2", "PSM1 is led"
+    feed(seat, 0.01, leader="pad")
+    assert list(feed(seat, 0.02, 0.02, leader="pad")) == ["PSM2"]
+
+
 def test_a_leader_takes_over_another_follower_without_a_jump(seat: Seat) -> None:
     feed(seat, 0.0)
     feed(seat, 0.01, 0.03)

@@ -30,7 +30,9 @@ def teleop(
         console.print(note, style="yellow", markup=False)
     if check:
         for leader, arms in wanted.pairs.items():
-            console.print(f"{leader} ({wanted.devices[leader].kind}) leads {', '.join(arms)}", markup=False)
+            waits = "waits, and " if leader in wanted.waiting else ""
+            followers = ", ".join(arms) or "the camera alone"
+            console.print(f"{leader} ({wanted.devices[leader].kind}) {waits}leads {followers}", markup=False)
         return 0
     uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if not master_answers(uri):
@@ -68,7 +70,8 @@ def _on_ros(
         with ExitStack() as files:
             recorder = Recorder(files.enter_context(record.open("w", encoding="utf-8"))) if record else None
             node = Teleop(wanted, recorder, Replay(replay) if replay else None)
-            console.print(f"leading: {', '.join(f'{leader} → {arms[0]}' for leader, arms in wanted.pairs.items())}")
+            pairs = (f"{leader} → {wanted.begins_with(leader) or config.NOBODY}" for leader in wanted.pairs)
+            console.print(f"leading: {', '.join(pairs)}")
             node.run(stop.is_set)
     except (ValueError, OSError, RuntimeError) as error:
         console.print(str(error), style="red", markup=False)

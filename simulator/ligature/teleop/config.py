@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 TOPICS = {"hydra": "/hydra_calib", "joy": "/joy", "spacenav": "/spacenav/joy", "keyboard": ""}
 """Topics of devices whose name does not tell it."""
 
+NOBODY = "none"
+"""First in a list of followers: the device waits until it is told whom to lead."""
+
 
 @dataclass(frozen=True, eq=False)
 class DeviceSpec:
@@ -48,9 +51,10 @@ class DeviceSpec:
 class TeleopConfig:
     """A whole teleoperation.
 
-    ``pairs`` are the followers that each device may lead, the first one first. ``camera`` is the arm whose tip makes
-    the view, or, when there is none, ``T_world_camera`` (4, 4) the view in the world. ``rcm_guard`` is the least
-    distance of a tip from its remote centre in metres. ``notes`` are lines to tell the user.
+    ``pairs`` are the followers that each device may lead, the first one first; those ``waiting`` lead none until they
+    are told to. ``camera`` is the arm whose tip makes the view, or, when there is none, ``T_world_camera`` (4, 4) the
+    view in the world. ``rcm_guard`` is the least distance of a tip from its remote centre in metres. ``notes`` are
+    lines to tell the user.
     """
 
     devices: Mapping[str, DeviceSpec]
@@ -62,6 +66,11 @@ class TeleopConfig:
     prefix: str = "/"
     rcm_guard: float = 0.05
     notes: tuple[str, ...] = ()
+    waiting: frozenset[str] = frozenset()
+
+    def begins_with(self, leader: str) -> str:
+        """The follower of ``leader`` at the start; empty when it waits, or leads the camera alone."""
+        return next(iter(self.pairs[leader]), "") if leader not in self.waiting else ""
 
 
 def read(path: Path) -> TeleopConfig:
@@ -147,25 +156,33 @@ class _Reader:
             extra["prefix"] = "/" + "".join(f"{part}/" for part in self.text(node, "prefix").split("/") if part)
         if (node := root.get("rcm guard")) is not None:
             extra["rcm_guard"] = self.number(node, "rcm guard", 0.0, 0.2)
-        return TeleopConfig(devices, self.pairs(root, devices), **extra)
+        pairs, waiting = self.pairs(root, devices)
+        return TeleopConfig(devices, pairs, waiting=waiting, **extra)
 
-    def pairs(self, root: Block, devices: Mapping[str, DeviceSpec]) -> dict[str, tuple[str, ...]]:
+    def pairs(
+        self, root: Block, devices: Mapping[str, DeviceSpec]
+    ) -> tuple[dict[str, tuple[str, ...]], frozenset[str]]:
         found = root.get("pairs")
         if found is None:
             raise self.fail(root.mark, "there are no pairs", "write 'pairs: {MTMR: [PSM1, PSM3]}'")
         pairs: dict[str, tuple[str, ...]] = {}
+        waiting: set[str] = set()
         for name, (key, node) in self.block(found, "pairs").entries.items():
             if name not in devices:
                 raise self.fail(key.mark, f"there is no device '{name}'", f"there are {', '.join(devices)}")
             arms = self.items(node, f"followers of {name}") if isinstance(node, Sequence) else [node]
-            pairs[name] = tuple(self.text(arm, "a follower") for arm in arms)
-            for other, followers in list(pairs.items())[:-1]:
-                if followers[:1] == pairs[name][:1] and followers:
+            followers = tuple(self.text(arm, "a follower") for arm in arms)
+            if followers[:1] == (NOBODY,):
+                waiting.add(name)
+                followers = followers[1:]
+            for other, others in pairs.items():
+                if followers and followers[:1] == others[:1] and not waiting & {name, other}:
                     raise self.fail(
                         node.mark, f"{name} and {other} would both begin with {followers[0]}",
-                        "begin one of the lists with another arm",
+                        f"begin one of the lists with another arm, or with '{NOBODY}' to have it wait",
                     )  # fmt: skip
-        return pairs
+            pairs[name] = followers
+        return pairs, frozenset(waiting)
 
     def camera(self, node: Node) -> dict[str, Any]:
         if isinstance(node, Scalar):

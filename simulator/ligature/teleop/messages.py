@@ -44,7 +44,13 @@ class Listener:
             return
         message = cls()
         message.deserialize(raw._buff)
-        self._take(message, header["callerid"])
+        try:
+            self._take(message, header["callerid"])
+        except AttributeError as error:
+            sender = header["callerid"]
+            rospy.logerr_throttle_identical(
+                10.0, f"{self._topic}: {sender} sends {header['type']}, which is not understood here: {error}"
+            )
 
     def _class_of(self, md5: str, type_: str, definition: str) -> Any:
         if md5 not in self._classes:

@@ -82,7 +82,7 @@ class Teleop:
         self.frames = Frames()
         self._hear_frames()
         specs = {name: config.devices[name] for name in config.pairs}
-        self.seat = Seat(config.pairs, camera_scale=config.camera_scale)
+        self.seat = Seat(config.pairs, camera_scale=config.camera_scale, waiting=config.waiting)
         self.seat.enable(True)
         self._handsets = {name: Handset(spec.calibration, spec.buttons) for name, spec in specs.items()}
         self._devices = {} if replay else {name: self._open(spec) for name, spec in specs.items()}
@@ -410,7 +410,7 @@ class Teleop:
             if f"{pair.leader.name}_{pair.arm.name}" == name:
                 return pair
         names = ", ".join(f"{leader}_{arm}" for leader, arm in self.pairs)
-        raise Conflict(f"there is no pair '{name}'; there are {names}")
+        raise Conflict(f"there is no pair '{name[:40]}'; there are {names}")
 
     def _select(self, leader: str, follower: str | None) -> None:
         before = self.seat.leaders[leader].selected if leader in self.seat.leaders else None

@@ -6,7 +6,7 @@ it leads one at a time; a follower obeys one leader only. Seconds, metres, radia
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -54,7 +54,7 @@ class Seat:
     Parameters
     ----------
     pairs
-        Followers that each leader may lead, the first is selected.
+        Followers that each leader may lead, the first is selected; of those ``waiting`` none is.
     settings
         Of all pairings.
     camera_scale
@@ -67,8 +67,9 @@ class Seat:
     """
 
     def __init__(
-        self, pairs: Mapping[str, Sequence[str]], settings: Settings | None = None, camera_scale: float = 1.0
-    ) -> None:
+        self, pairs: Mapping[str, Sequence[str]], settings: Settings | None = None, camera_scale: float = 1.0,
+        waiting: Collection[str] = (),
+    ) -> None:  # fmt: skip
         self._leaders = {
             name: Leader(name, tuple(followers), pairing=Pairing(settings)) for name, followers in pairs.items()
         }
@@ -78,7 +79,7 @@ class Seat:
         self._camera_hands: list[str] = []
         self._camera_last: list[Array] = []
         for name, followers in pairs.items():
-            if followers:
+            if followers and name not in waiting:
                 self.select(name, followers[0])
 
     @property
