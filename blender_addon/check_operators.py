@@ -4,6 +4,7 @@ from pathlib import Path
 
 import bpy
 
+from . import making
 from .ligature.adf import AdfError, Resolver
 from .ligature.adf.diagnostics import Severity
 from .ligature.adf.reader import read_text
@@ -12,20 +13,28 @@ from .ligature.authoring.lint import Finding, lint
 from .placing import SHAPED, rest_pose
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier, store, unset
-from .write_file import ExportError, has_mesh, members, text_of
+from .write_file import NO_MESH, ExportError, has_mesh, members, text_of
+
+OWN = {"identifier": "its own"}
+"""The fix of a copy that has the identifier of its original."""
 
 ICONS = {"ERROR": "ERROR", "WARNING": "INFO", "INFO": "DOT"}
 
 
 def check_file(collection):
     """Findings of one file as it would be written now, each with its object."""
+    copies = list(_copies(collection))
+    if copies:
+        return copies
     objects = {obj.adf.key: obj for obj in members(collection)}
     broken = [finding for obj in objects.values() for finding in _unplaced(obj)]
     if broken:
         return [(finding, objects.get(finding.key)) for finding in broken]
     try:
         text = text_of(collection)
-    except (ExportError, ValueError) as error:
+    except ExportError as error:
+        return [(Finding("export", Severity.ERROR, error.obj.adf.key if error.obj else "", str(error)), error.obj)]
+    except ValueError as error:
         return [(Finding("export", Severity.ERROR, "", str(error)), None)]
     path = Path(bpy.path.abspath(collection.adf.filepath) or "new.yaml").resolve()
     kind = {"MODEL": "model", "WORLD": "world", "INPUT_DEVICES": "input devices"}[collection.adf.kind]
@@ -39,7 +48,32 @@ def check_file(collection):
     unsaved |= {f"{obj.name}.OBJ" for obj in objects.values() if has_mesh(obj)}
     inflated = {obj.adf.key for obj in objects.values() if obj.adf.inertia_factor != 1.0}
     found = lint(document, Resolver.for_file(path), frozenset(unsaved), frozenset(inflated))
+    found = [*found, *(finding for obj in objects.values() for finding in _unwritten(obj))]
     return [(finding, objects.get(finding.key)) for finding in found]
+
+
+def _copies(collection):
+    """Objects under an identifier that another has, as copies made in Blender are."""
+    first = {}
+    for obj in members(collection):
+        original = first.setdefault(obj.adf.key, obj)
+        if obj.adf.key and original is not obj:
+            message = f"it has the identifier '{obj.adf.key}' of '{original.name}'"
+            yield Finding("identifier-twice", Severity.ERROR, obj.adf.key, message, "give it one of its own", OWN), obj
+
+
+def _unwritten(obj):
+    if obj.adf.role in SHAPED and obj.type not in ("MESH", "EMPTY"):
+        message, _, hint = NO_MESH.format(obj.type.lower()).partition("; ")
+        yield Finding("not-a-mesh", Severity.WARNING, obj.adf.key, message, hint)
+
+
+def _units(scene):
+    """Numbers of Blender are written as metres, whatever the scene shows them as."""
+    units = scene.unit_settings
+    if units.system != "NONE" and abs(units.scale_length - 1.0) > 1e-6:
+        message = f"its unit scale is {units.scale_length:g}, and lengths are written as metres"
+        yield Finding("unit-scale", Severity.WARNING, "", message, "set it to 1 and apply the scale to the objects")
 
 
 def _unplaced(obj):
@@ -66,16 +100,17 @@ class ADF_OT_check(bpy.types.Operator):
     def execute(self, context):
         listed = context.scene.adf.findings
         listed.clear()
-        errors = 0
+        found = [(finding, None, context.scene.name) for finding in _units(context.scene)]
         for collection in bpy.data.collections:
-            if collection.adf.kind in ("NONE", "OTHER"):
-                continue
-            for finding, obj in check_file(collection):
-                item = listed.add()
-                item.severity, item.rule = finding.severity.name, finding.rule
-                item.message = f"{obj.name if obj else finding.key or collection.name}: {finding.message}"
-                item.hint, item.object, item.fixable = finding.hint, obj, bool(finding.fix and obj)
-                errors += finding.severity >= Severity.ERROR
+            if collection.adf.kind not in ("NONE", "OTHER"):
+                found += [(finding, obj, collection.name) for finding, obj in check_file(collection)]
+        errors = 0
+        for finding, obj, place in found:
+            item = listed.add()
+            item.severity, item.rule = finding.severity.name, finding.rule
+            item.message = f"{obj.name if obj else finding.key or place}: {finding.message}"
+            item.hint, item.object, item.fixable = finding.hint, obj, bool(finding.fix and obj)
+            errors += finding.severity >= Severity.ERROR
         self.report({"WARNING"} if errors else {"INFO"}, f"{len(listed)} findings, {errors} errors")
         return {"FINISHED"}
 
@@ -113,6 +148,9 @@ class ADF_OT_fix(bpy.types.Operator):
 
 def mend(obj, fix):
     """Give an object the values of a fix."""
+    if fix is OWN:
+        making.make_own(obj)
+        return
     kind = KIND_OF_ROLE[obj.adf.role]
     group = getattr(obj.adf, identifier(kind))
     store(group, kind, {path: value for path, value in fix.items() if value is not None})

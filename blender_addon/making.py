@@ -5,6 +5,7 @@ Nothing here selects, hides, renames or moves what the user has; new objects are
 
 from __future__ import annotations
 
+import re
 from math import pi
 
 import bmesh
@@ -63,11 +64,27 @@ def give_role(obj: bpy.types.Object, role: str, collection: bpy.types.Collection
     obj.adf.role = role
     group = getattr(obj.adf, role.lower())
     if not group.is_property_set("name"):
-        group.name = obj.name
+        group.name = topic_name(obj.name)
     if role == "BODY":
         for name, value in (("mass", 1.0), ("collision_margin", 0.0001)):
             if not group.is_property_set(name):
                 setattr(group, name, value)
+
+
+def topic_name(name: str) -> str:
+    """A name that ROS takes in topics: Blender counts copies behind a dot, which is none of theirs."""
+    return re.sub(r"[^A-Za-z0-9_/ ]", "_", name)
+
+
+def make_own(obj: bpy.types.Object) -> None:
+    """Make a copy of an object of a file an object of its own: identifier, name and mesh files."""
+    obj.adf.key = free_key(file_of(obj), obj.adf.role, obj.name)
+    obj.adf.was = obj.adf.imported = obj.adf.mesh_print = ""
+    group = getattr(obj.adf, obj.adf.role.lower())
+    group.name = topic_name(obj.name)
+    for name in ("mesh", "collision_mesh"):
+        if hasattr(group, name):
+            group.property_unset(name)
 
 
 def new_object(

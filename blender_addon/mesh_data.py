@@ -240,15 +240,21 @@ class _Evaluated:
         self.scene: bpy.types.Scene | None = None
         self.copy: bpy.types.Object | None = None
         self.user: bpy.types.Object | None = None
+        self.edited: bpy.types.Mesh | None = None
 
     def __enter__(self) -> bpy.types.Mesh:
+        if self.obj.mode == "EDIT":  # what is being edited is read from a copy, which has all layers
+            self.obj.update_from_editmode()
+            self.edited = self.obj.data.copy()
         if not self.obj.modifiers and not (self.obj.data.shape_keys and self.obj.type == "MESH"):
-            return self.obj.data
+            return self.edited or self.obj.data
         # a scene of its own: the object may be hidden or excluded, and then nothing evaluates it
         self.scene = bpy.data.scenes.new("ADF evaluation")
         self.copy = self.obj.copy()
         self.copy.hide_viewport = False
         self.copy.parent = None
+        if self.edited is not None:
+            self.copy.data = self.edited
         self.scene.collection.objects.link(self.copy)
         layer = self.scene.view_layers[0]
         layer.update()
@@ -262,6 +268,8 @@ class _Evaluated:
             bpy.data.objects.remove(self.copy)
         if self.scene is not None:
             bpy.data.scenes.remove(self.scene)
+        if self.edited is not None:
+            bpy.data.meshes.remove(self.edited)
 
 
 def surfaces_of(

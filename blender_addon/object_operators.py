@@ -12,8 +12,9 @@ from .ligature.authoring.generate import mass_keys
 from .ligature.authoring.shapes import Shape, shapes_properties
 from .ligature.mesh.inertia import combined, mass_properties
 from .mesh_data import points_of
-from .placing import children_with, relative_pose, rest_pose, shape_of, shapes_of
+from .placing import SHAPED, children_with, relative_pose, rest_pose, shape_of, shapes_of
 from .properties import ROLES
+from .write_file import NO_MESH
 
 JOINT_KINDS = [
     (kind, kind.title(), f"A {kind} joint")
@@ -94,6 +95,8 @@ class ADF_OT_make(bpy.types.Operator):
                 self.report({"WARNING"}, f"'{obj.name}' is part of a body and stays so")
                 continue
             making.give_role(obj, self.role, making.file_of(obj) or target_file(context, self.role))
+            if self.role in SHAPED and obj.type not in ("MESH", "EMPTY"):
+                self.report({"WARNING"}, f"'{obj.name}': {NO_MESH.format(obj.type.lower())}")
         return {"FINISHED"}
 
 

@@ -27,15 +27,20 @@ from .ligature.authoring.objfile import MeshWriteError, obj_texts
 from .ligature.authoring.placement import matrix_of, pose_of
 from .ligature.authoring.save import SaveError, checked_text, save_all
 from .mesh_data import Textures, mesh_print, surfaces_of
-from .placing import SHAPED, children_with, clean, placed_keys, state_of
+from .placing import SHAPED, children_with, clean, placed_keys, state_of, unchanged
 from .properties import KIND_OF_ROLE
 from .schema_properties import PLACED, fetch, identifier, keys_of, state_text, store
 
 HIGH, LOW = "high resolution path", "low resolution path"
+NO_MESH = "its shape is a {}, which is not written; convert it to a mesh"
 
 
 class ExportError(Exception):
-    """A collection that cannot be written; nothing was changed. The message names the object."""
+    """A collection that cannot be written; nothing was changed. The message names the object, ``obj`` if it is one."""
+
+    def __init__(self, message: str, obj: bpy.types.Object | None = None) -> None:
+        super().__init__(message)
+        self.obj = obj
 
 
 @dataclass
@@ -81,6 +86,7 @@ def text_of(collection: bpy.types.Collection, meshes: dict[str, dict] | None = N
     objects = members(collection)
     _check_keys(objects)
     _check_numbers(objects)
+    _check_joints(objects)
     items = [_item(obj, root, (meshes or {}).get(obj.adf.key, {})) for obj in objects]
     top = fetch(group, kind)
     if root is None:
@@ -160,9 +166,10 @@ def _check_keys(objects: list[bpy.types.Object]) -> None:
     users: dict[str, str] = {}
     for obj in objects:
         if not obj.adf.key:
-            raise ExportError(f"'{obj.name}' has no identifier; give it one in the Physics tab")
+            raise ExportError(f"'{obj.name}' has no identifier; give it one in the Physics tab", obj)
         if obj.adf.key in users:
-            raise ExportError(f"'{obj.name}' and '{users[obj.adf.key]}' have one identifier, '{obj.adf.key}'")
+            words = f"'{obj.name}' and '{users[obj.adf.key]}' have one identifier, '{obj.adf.key}'"
+            raise ExportError(f"{words}; Check Scene can give the copy its own", obj)
         users[obj.adf.key] = obj.name
 
 
@@ -172,7 +179,22 @@ def _check_numbers(objects: list[bpy.types.Object]) -> None:
         for path, value in fetch(getattr(obj.adf, identifier(kind)), kind).items():
             numbers = value if isinstance(value, (tuple, list)) else (value,)
             if any(isinstance(v, float) and not isfinite(v) for v in numbers):
-                raise ExportError(f"'{obj.name}' has a {path} that is not a finite number; give it one")
+                raise ExportError(f"'{obj.name}' has a {path} that is not a finite number; give it one", obj)
+
+
+def _check_joints(objects: list[bpy.types.Object]) -> None:
+    """A joint whose body was deleted, or that has no place in a body of its file, cannot be written anew."""
+    for obj in (o for o in objects if o.adf.role == "JOINT"):
+        state = state_of(obj)
+        if unchanged(obj, "ends", state):
+            continue
+        for end, key in zip(("parent", "child"), state["ends"], strict=True):
+            if not key:
+                raise ExportError(f"'{obj.name}' has no {end} body; choose one in the Physics tab, or delete it", obj)
+        if "frames" not in state and not obj.adf.was:
+            raise ExportError(
+                f"'{obj.name}' joins a body of a file that is not open, so that it has no place there", obj
+            )
 
 
 def _item(obj: bpy.types.Object, root: Mapping | None, meshes: dict) -> Item:
@@ -239,6 +261,8 @@ def _mesh_files(
         if obj.adf.mesh_print == print_now:
             files.update(_moved(collection, obj, own, path))
             continue
+        if obj.type not in ("MESH", "EMPTY"):
+            done.problems.append(f"'{obj.name}': {NO_MESH.format(obj.type.lower())}")
         textures = Textures()
         keys[obj.adf.key] = dict(_object_meshes(obj, own, high, low, textures, files, shared, print_now))
         files.update({high / name: data for name, data in textures.files.items()})

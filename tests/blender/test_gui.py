@@ -124,6 +124,9 @@ def test_panels_draw_operators_are_undone_and_nothing_is_left(session: Callable[
     wrong = {label: how for label, how in found["undone"].items() if how != expected[label.split()[0]]}
     assert wrong == {}
     assert found["left"] == []
+    background, ended = found["background"], found["ended"]
+    assert (background["begun"], background["most"]) == (["RUNNING_MODAL"], 1) and background["pieces"] >= 2
+    assert ended == {"before": 1, "after": 0, "pieces": background["pieces"], "left": background["pieces"]}
     assert len(found["dragged"]) == 3
     for label, told in found["dragged"].items():
         assert abs(told["after"] - told["before"]) > 1e-3, label

@@ -344,6 +344,52 @@ def quality_is_drawn():
     redraw()
 
 
+def pieces():
+    return [o for o in find("BODY", "Ring").children if o.adf.role == "HULL"]
+
+
+def workers():
+    """Processes that this Blender has started and that still run."""
+    children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+    return [child for child in children if "decompose_worker" in Path(f"/proc/{child}/cmdline").read_text()]
+
+
+@step
+def decompose_in_the_background():
+    select(find("BODY", "Ring"))
+    for old in pieces():
+        bpy.data.objects.remove(old)
+    begun = bpy.ops.adf.decompose("INVOKE_DEFAULT", threshold=0.35, max_hulls=4, seed=1)
+    RESULT["background"] = {"begun": sorted(begun), "waited": 0, "most": len(workers())}
+    STEPS.insert(0, wait_for_pieces)
+
+
+def wait_for_pieces():
+    told = RESULT["background"]
+    told["waited"] += 1
+    told["pieces"] = len(pieces())
+    if not told["pieces"] and told["waited"] < 600:
+        STEPS.insert(0, wait_for_pieces)
+
+
+@step
+def end_a_decomposition():
+    bpy.ops.adf.decompose("INVOKE_DEFAULT", threshold=0.01, seed=2)
+    RESULT["ended"] = {"before": len(workers()), "pieces": len(pieces())}
+
+
+@step
+def press_escape():
+    area = view()["area"]
+    for value in ("PRESS", "RELEASE"):
+        window.main().event_simulate(type="ESC", value=value, x=area.x + 200, y=area.y + 200)
+
+
+@step
+def nothing_goes_on():
+    RESULT["ended"] |= {"after": len(workers()), "left": len(pieces())}
+
+
 @step
 def disable():
     addon_utils.disable("adf_studio", default_set=True)

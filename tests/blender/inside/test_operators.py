@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from adf_studio.ligature.adf import Resolver, read_any, read_launch
+from adf_studio.ligature.mesh import load_mesh
 from adf_studio.mesh_data import shape_data
 from adf_studio.placing import relative_pose, rest_pose, shape_of
 
@@ -146,6 +147,78 @@ def test_no_operator_selects_renames_moves_or_hides_what_the_user_has(tmp_path):
         assert getattr(bpy.ops.adf, name)(**arguments) == {"FINISHED"}, name
         bpy.context.view_layer.update()
         assert users([part, other, hidden]) == before, name
+
+
+def test_a_copy_made_in_blender_gets_an_identifier_a_name_and_mesh_files_of_its_own(tmp_path):
+    collection = model()
+    part = body("part")
+    target = {"filepath": str(tmp_path / "m.yaml"), "collection": collection.name}
+    bpy.ops.adf.fit_shape(kind="BOX")
+    bpy.ops.adf.export_file(**target)
+    select(*part.children, part)
+    bpy.ops.object.duplicate()
+    copy = bpy.context.object
+    copy.data.vertices[0].co.x -= 1.0
+    with pytest.raises(RuntimeError, match="have one identifier, 'BODY part'; Check Scene can give the copy its own"):
+        bpy.ops.adf.export_file(**target)
+    bpy.ops.adf.check()
+    findings = bpy.context.scene.adf.findings
+    assert [(f.rule, f.object, f.fixable) for f in findings] == [("identifier-twice", copy, True)]
+    bpy.ops.adf.fix(everything=True)
+    assert part.adf.key == "BODY part" and (copy.adf.key, copy.adf.body.name) == ("BODY part.001", "part_001")
+    before = (tmp_path / "high_res" / "part.OBJ").read_bytes()
+    assert bpy.ops.adf.export_file(**target) == {"FINISHED"}
+    document = read_any(tmp_path / "m.yaml", Resolver([tmp_path]))
+    assert [e.text("mesh") for e in document.elements("bodies")] == ["part.OBJ", "part_001.OBJ"]
+    assert not document.diagnostics and (tmp_path / "high_res" / "part.OBJ").read_bytes() == before
+
+
+@pytest.mark.parametrize("modified", [False, True])
+def test_what_is_being_edited_is_written_as_it_is_seen(tmp_path, modified):
+    collection = model()
+    part = body("part")
+    if modified:
+        part.modifiers.new("array", "ARRAY").count = 2
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.resize(value=(3.0, 1.0, 1.0))
+    meshes = len(bpy.data.meshes)
+    bpy.ops.adf.export_file(filepath=str(tmp_path / "m.yaml"), collection=collection.name)
+    assert bpy.context.mode == "EDIT_MESH" and len(bpy.data.meshes) == meshes
+    mesh = load_mesh(tmp_path / "high_res" / "part.OBJ", Resolver([tmp_path]))
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), [6.0 if modified else 3.0, 1.0, 1.0], atol=1e-6)
+    assert mesh.parts[0].uvs is not None
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_a_joint_whose_body_was_deleted_is_told_and_nothing_is_written(tmp_path):
+    collection = model()
+    parent, child = body("parent"), body("child", location=(1, 0, 0))
+    select(child, parent)
+    bpy.ops.adf.connect(type="revolute")
+    target = {"filepath": str(tmp_path / "m.yaml"), "collection": collection.name}
+    bpy.ops.adf.export_file(**target)
+    before = (tmp_path / "m.yaml").read_bytes()
+    bpy.data.objects.remove(child)
+    with pytest.raises(
+        RuntimeError, match="'parent-child' has no child body; choose one in the Physics tab, or delete it"
+    ):
+        bpy.ops.adf.export_file(**target)
+    assert (tmp_path / "m.yaml").read_bytes() == before
+    bpy.ops.adf.check()
+    assert [f.object.name for f in bpy.context.scene.adf.findings] == ["parent-child"]
+
+
+def test_what_would_not_be_written_as_it_looks_is_told(capfd):
+    model()
+    bpy.ops.curve.primitive_bezier_circle_add()
+    select(bpy.context.object)
+    bpy.ops.adf.make(role="BODY")
+    bpy.context.scene.unit_settings.system, bpy.context.scene.unit_settings.scale_length = "METRIC", 0.001
+    bpy.ops.adf.check()
+    told = {f.rule: f.message for f in bpy.context.scene.adf.findings}
+    assert told["not-a-mesh"] == "BezierCircle: its shape is a curve, which is not written"
+    assert told["unit-scale"] == "Scene: its unit scale is 0.001, and lengths are written as metres"
 
 
 def test_a_launch_file_among_dropped_files_is_opened_with_all_that_it_names():
