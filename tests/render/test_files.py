@@ -46,3 +46,12 @@ def test_exr_keeps_all_channels_in_one_file(frame: Frame, tmp_path: Path) -> Non
     assert set(channels) == {"R", "G", "B", "Z", "id", "N.X", "N.Y", "N.Z"}
     assert (channels["Z"] == frame.depth).all() and (channels["id"] == frame.ids).all()
     assert (channels["N.Z"] == frame.normals[..., 2]).all()
+
+
+@pytest.mark.parametrize("format", ["npy", "png", "exr"])
+def test_nothing_half_written_stays_when_a_file_cannot_take_its_name(frame: Frame, tmp_path: Path, format: str) -> None:
+    last = tmp_path / {"npy": "C_normals.npy", "png": "C_normals.png", "exr": "C.exr"}[format]
+    last.mkdir()
+    with pytest.raises(OSError, match=last.name):
+        write_frame(frame, tmp_path, "C", format)
+    assert last.is_dir() and not [path.name for path in tmp_path.iterdir() if path.name.startswith(".")]

@@ -78,3 +78,14 @@ def test_two_pictures_of_one_state_are_equal(drawn, tmp_path: Path) -> None:
     simulation = Simulation(ligature.load(path))
     again = Renderer(simulation.scene).render(simulation.state, view)
     assert (again.rgb == frame.rgb).all() and (again.depth == frame.depth).all() and (again.ids == frame.ids).all()
+
+
+@pytest.mark.parametrize("size", [(0, 240), (-1, 240), (320, 1_000_000)])
+def test_a_picture_that_cannot_be_drawn_is_refused(tmp_path: Path, size: tuple[int, int]) -> None:
+    (tmp_path / "m.yaml").write_text(SCENE)
+    simulation = Simulation(ligature.load(tmp_path / "m.yaml"))
+    try:
+        with pytest.raises(ValueError, match=f"a picture cannot be {size[0]} x {size[1]}: each is "):
+            simulation.cameras["C"].capture(size)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,3 +67,16 @@ def test_a_stop_more_doubles_the_light(simulate: Make) -> None:
     usable = (dark.rgb > 40) & (bright.rgb < 250)
     assert usable.sum() > 100
     assert (light(bright.rgb[usable]) / light(dark.rgb[usable])).mean() == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"noise": float("nan")}, "the noise of a sensor has to be finite, not nan"),
+        ({"depth_noise": -1.0}, "the depth_noise of a sensor is a standard deviation, not -1.0"),
+        ({"distortion": (0.0, float("inf"), 0.0, 0.0, 0.0)}, "the distortion of a sensor has to be finite"),
+    ],
+)
+def test_a_sensor_that_makes_no_sense_is_refused(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        ImageSensor(**wrong)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated, Optional
@@ -188,13 +189,16 @@ def render(
     kinds = [kind for kind in annotations.split(",") if kind]
     if not set(kinds) <= set(ANNOTATIONS):
         raise typer.BadParameter(f"--annotations is any of {', '.join(ANNOTATIONS)}, not '{annotations}'")
-    lens = _five_numbers(distortion)
-    sensor = ImageSensor(exposure, noise, lens, depth_noise, seed)
-    resolution = (width, height) if width and height else None
+    if not math.isfinite(seconds):
+        raise typer.BadParameter(f"--seconds is a finite number, not '{seconds}'")
+    try:
+        sensor = ImageSensor(exposure, noise, _five_numbers(distortion), depth_noise, seed)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
     console = Console(highlight=False, soft_wrap=True)
     raise typer.Exit(
         run_render(
-            launch, indices(models), root or [], camera, out, seconds, resolution, format, kinds, sensor, console
+            launch, indices(models), root or [], camera, out, seconds, (width, height), format, kinds, sensor, console
         )
     )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from rich.console import Console
 import ligature
 from ligature.render import Frame, ImageSensor, RenderUnavailable
 from ligature.render.annotations import coco, mask_image
-from ligature.render.files import write_calibration, write_frame
+from ligature.render.files import write_calibration, write_frame, write_json, write_png
 
 ANNOTATIONS = ("coco", "mask")
 PASSES = ("rgb", "depth", "ids", "normals")
@@ -24,29 +23,34 @@ def render(
     camera: str,
     out: Path,
     seconds: float,
-    resolution: tuple[int, int] | None,
+    resolution: tuple[int, int],
     format: str,
     annotations: Sequence[str],
     sensor: ImageSensor,
     console: Console,
 ) -> int:
-    """Write what ``camera`` sees after ``seconds`` below ``out``; returns the exit status."""
+    """Write what ``camera`` sees after ``seconds`` below ``out``; returns the exit status.
+
+    A 0 in ``resolution`` is the camera's own width or height.
+    """
     try:
         scene = ligature.load(launch, models, roots=roots)
         simulation = ligature.Simulation(scene)
         handle = simulation.cameras[camera]
+        own = handle.camera.resolution
+        size = resolution[0] or own[0], resolution[1] or own[1]
         simulation.step(max(1, round(seconds / simulation.dt)))
-        frame = handle.capture(resolution, passes=PASSES, sensor=sensor)
+        frame = handle.capture(size, passes=PASSES, sensor=sensor)
         name = handle.camera.identity.name
         files = write_frame(frame, out, name, format)
-        calibration = handle.calibration(resolution, sensor=sensor)
+        calibration = handle.calibration(size, sensor=sensor)
         files.append(write_calibration(calibration, handle.pose, out / f"{name}_camera.json"))
         files += [_annotate(kind, frame, scene.drawn_names, out, name) for kind in annotations]
     except ligature.SceneError as error:
         for diagnostic in error.diagnostics:
             console.print(str(diagnostic), style="red", markup=False)
         return 2
-    except (KeyError, RenderUnavailable, OSError) as error:
+    except (KeyError, ValueError, RenderUnavailable, OSError) as error:
         console.print(str(error.args[0] if isinstance(error, KeyError) else error), style="red", markup=False)
         return 1
     for problem in handle.problems:
@@ -57,11 +61,7 @@ def render(
 
 def _annotate(kind: str, frame: Frame, names: dict[int, str], out: Path, name: str) -> Path:
     if kind == "mask":
-        path = out / f"{name}_mask.png"
-        mask_image(frame.ids).save(path)
         table = {str(number): names[number] for number in sorted(set(frame.ids[frame.ids > 0].tolist()))}
-        (out / f"{name}_mask.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
-        return path
-    path = out / f"{name}_coco.json"
-    path.write_text(json.dumps(coco(frame.ids, names, f"{name}.png")), encoding="utf-8")
-    return path
+        write_json(table, out / f"{name}_mask.json")
+        return write_png(mask_image(frame.ids), out / f"{name}_mask.png")
+    return write_json(coco(frame.ids, names, f"{name}.png"), out / f"{name}_coco.json")

@@ -119,8 +119,13 @@ def projection_matrix(camera: Camera, width: int, height: int, eye: str = "") ->
 
 
 def view_of(camera: Camera, pose: Array, resolution: tuple[int, int] | None = None, eye: str = "") -> CameraView:
-    """The view of ``camera``, or of its eye ``"left"`` or ``"right"``, standing at ``pose`` (7,) in world axes."""
+    """The view of ``camera``, or of its eye ``"left"`` or ``"right"``, standing at ``pose`` (7,) in world axes.
+
+    Raises ValueError for a ``resolution`` without pixels.
+    """
     width, height = resolution or camera.resolution
+    if width < 1 or height < 1:
+        raise ValueError(f"a picture cannot be {width} x {height}: each is at least 1 pixel")
     return CameraView(
         view_matrix(eye_pose(camera, np.asarray(pose), eye)),
         projection_matrix(camera, width, height, eye),

@@ -6,6 +6,9 @@ Depth in metres, or in steps of `DEPTH_STEP` in the 16 bits of a PNG, where 0 is
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,31 @@ DEPTH_STEP = 1e-4
 """Metres of one step of depth in a PNG file, which reaches 6.5 m."""
 
 
+@contextmanager
+def staged(path: Path) -> Iterator[Path]:
+    """A file beside ``path`` to write to, which takes its name when all is written; nothing half-written has it."""
+    part = path.with_name(f".{path.name}.part")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_json(values: Any, path: Path) -> Path:
+    """Write ``values`` as JSON."""
+    with staged(path) as part:
+        part.write_text(json.dumps(values, indent=1), encoding="utf-8")
+    return path
+
+
+def write_png(image: Image.Image, path: Path) -> Path:
+    """Write ``image`` as PNG."""
+    with staged(path) as part:
+        image.save(part, "PNG")
+    return path
+
+
 def write_frame(frame: Frame, folder: Path, name: str, format: str) -> list[Path]:
     """Write colour as ``name.png``, and depth, ids and normals in ``format``; returns the files.
 
@@ -28,8 +56,7 @@ def write_frame(frame: Frame, folder: Path, name: str, format: str) -> list[Path
     with the channels R G B (linear light), Z, id, and N.X N.Y N.Z.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / f"{name}.png"]
-    Image.fromarray(frame.rgb).save(files[0])
+    files = [write_png(Image.fromarray(frame.rgb), folder / f"{name}.png")]
     arrays: dict[str, NDArray[Any]] = {"depth": frame.depth, "ids": frame.ids, "normals": frame.normals}
     if format == "exr":
         files.append(folder / f"{name}.exr")
@@ -38,9 +65,10 @@ def write_frame(frame: Frame, folder: Path, name: str, format: str) -> list[Path
     for kind, values in arrays.items():
         path = folder / f"{name}_{kind}.{format}"
         if format == "npy":
-            np.save(path, values)
+            with staged(path) as part, part.open("wb") as file:
+                np.save(file, values)
         else:
-            Image.fromarray(_levels(kind, values)).save(path)
+            write_png(Image.fromarray(_levels(kind, values)), path)
         files.append(path)
     return files
 
@@ -49,8 +77,7 @@ def write_calibration(calibration: Calibration, pose: NDArray[np.float64], path:
     """Write intrinsics and the pose (7,) of the camera frame in world axes, as JSON."""
     values = {name: getattr(calibration, name).tolist() for name in ("K", "D", "R", "P")}
     size = {"width": calibration.width, "height": calibration.height}
-    path.write_text(json.dumps({**size, **values, "pose": pose.tolist()}, indent=1), encoding="utf-8")
-    return path
+    return write_json({**size, **values, "pose": pose.tolist()}, path)
 
 
 def _levels(kind: str, values: NDArray[Any]) -> NDArray[np.uint8] | NDArray[np.uint16]:
@@ -69,4 +96,5 @@ def _write_exr(frame: Frame, path: Path) -> None:
     channels |= {letter: np.ascontiguousarray(linear[..., i]) for i, letter in enumerate("RGB")}
     channels |= {f"N.{letter}": np.ascontiguousarray(frame.normals[..., i]) for i, letter in enumerate("XYZ")}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File(header, channels).write(str(path))
+    with staged(path) as part:
+        OpenEXR.File(header, channels).write(str(part))

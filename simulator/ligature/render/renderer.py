@@ -243,5 +243,13 @@ class Renderer:
             raise ValueError(f"{sorted(unknown) or 'no pass'} cannot be drawn; there are {', '.join(PASSES)}")
         key = (view.width, view.height, tuple(passes), samples)
         if key not in self._targets:
-            self._targets[key] = Target(self._context, key[:2], passes, samples)
+            most = self._context.info["GL_MAX_TEXTURE_SIZE"]
+            if not (0 < view.width <= most and 0 < view.height <= most):
+                raise ValueError(f"a picture cannot be {view.width} x {view.height}: each is 1 to {most} pixels here")
+            try:
+                self._targets[key] = Target(self._context, key[:2], passes, samples)
+            except (moderngl.Error, MemoryError) as error:
+                raise ValueError(
+                    f"a picture of {view.width} x {view.height} does not fit the memory: {error}"
+                ) from None
         return self._targets[key]

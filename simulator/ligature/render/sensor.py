@@ -39,6 +39,11 @@ class ImageSensor:
         Standard deviation of depth in metres.
     seed
         Seed of all noise.
+
+    Raises
+    ------
+    ValueError
+        When a number is not finite, or a standard deviation is negative.
     """
 
     exposure: float = 0.0
@@ -46,6 +51,14 @@ class ImageSensor:
     distortion: tuple[float, float, float, float, float] = NO_DISTORTION
     depth_noise: float = 0.0
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("exposure", "noise", "distortion", "depth_noise"):
+            value = getattr(self, name)
+            if not np.isfinite(value).all():
+                raise ValueError(f"the {name} of a sensor has to be finite, not {value}")
+            if "noise" in name and value < 0:
+                raise ValueError(f"the {name} of a sensor is a standard deviation, not {value}")
 
     def view(self, view: CameraView) -> CameraView:
         """What has to be drawn to show ``view`` through this lens: a larger picture where the lens bends corners in."""
