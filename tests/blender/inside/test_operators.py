@@ -209,15 +209,16 @@ def test_a_joint_whose_body_was_deleted_is_told_and_nothing_is_written(tmp_path)
     assert [f.object.name for f in bpy.context.scene.adf.findings] == ["parent-child"]
 
 
-def test_what_would_not_be_written_as_it_looks_is_told(capfd):
+def test_what_would_not_be_written_as_it_looks_is_told():
     model()
     bpy.ops.curve.primitive_bezier_circle_add()
+    bpy.context.object.name = "rim"
     select(bpy.context.object)
     bpy.ops.adf.make(role="BODY")
     bpy.context.scene.unit_settings.system, bpy.context.scene.unit_settings.scale_length = "METRIC", 0.001
     bpy.ops.adf.check()
     told = {f.rule: f.message for f in bpy.context.scene.adf.findings}
-    assert told["not-a-mesh"] == "BezierCircle: its shape is a curve, which is not written"
+    assert told["not-a-mesh"] == "rim: its shape is a curve, which is not written"
     assert told["unit-scale"] == "Scene: its unit scale is 0.001, and lengths are written as metres"
 
 
