@@ -289,6 +289,12 @@ def test_an_error_in_the_vertex_shader_names_the_vertex_shader(stage: Callable[.
     assert (mark.file.name, mark.line) == ("own.vert", 2)
 
 
+def test_an_error_of_the_preprocessor_names_the_shader_and_the_line(stage: Callable[..., Drawn]) -> None:
+    renderer, *_ = stage(shader("labels.vert"), "uniform float a;\n/* void main() {}\n")
+    found = renderer.problems[0].diagnostics[0]
+    assert found.mark.file.name == "own.frag" and "Unterminated comment" in found.message
+
+
 def test_shaders_that_do_not_link_are_reported(stage: Callable[..., Drawn]) -> None:
     vertex = "varying vec4 vWay;\nvoid main() { gl_Position = ftransform(); vWay = gl_Position; }\n"
     renderer, *_ = stage(vertex, "varying vec3 vWay;\nvoid main() { gl_FragColor = vec4(vWay, 1.0); }\n")

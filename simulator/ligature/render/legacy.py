@@ -29,7 +29,7 @@ AMBIENT_LIGHT = 0.35
 
 MAX_SHADER_BYTES = 1 << 20
 
-_MESA = re.compile(r"^\d+:(\d+)\((\d+)\): error: (.*)$", re.MULTILINE)
+_MESA = re.compile(r"^\d+:(\d+)\((\d+)\): (?:preprocessor )?error: (.*)$", re.MULTILINE)
 _NVIDIA = re.compile(r"^\d+\((\d+)\) : (error .*)$", re.MULTILINE)
 _OTHERS = re.compile(r"^ERROR: \d+:(\d+): (.*)$", re.MULTILINE)
 

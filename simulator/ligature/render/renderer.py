@@ -71,10 +71,11 @@ class Renderer:
         wanted = SAMPLES if samples is None else samples
         self._samples = 0 if self._smoothed else min(wanted, self._context.max_samples)
         self._programs = Programs(self._context)
-        self._textures = Textures(self._context)
+        loader = VisualLoader()
+        self.problems: list[AdfError] = loader.problems
+        self._textures = Textures(self._context, self.problems)
         self._targets: dict[tuple[int, int, tuple[str, ...], int], Target] = {}
         self._lights = Lights(self._context, scene)
-        loader = VisualLoader()
         pieces = loader.of_scene(scene)
         self._tubes = [Tube(scene, rod) for rod in scene.rods]
         rods = self._rod_pieces(loader)
@@ -82,7 +83,6 @@ class Renderer:
         self._instances = Instances(ordered)
         self.drawn_triangles = 0
         """Triangles of the last picture, what lies outside it and what is drawn coarsely taken off."""
-        self.problems: list[AdfError] = loader.problems
         resolver = Resolver(scene.roots) if scene.roots else None
         self._brushes = Brushes(self._context, self._programs, self._textures, self._lights, resolver, self.problems)
         self._brushes.prepare(batch.shaders for batch in self._batches)

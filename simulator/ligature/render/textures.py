@@ -5,14 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import moderngl
+import numpy as np
 from PIL import Image
+
+from ligature.adf import AdfError, Diagnostic, Mark, Severity
 
 
 class Textures:
     """The textures of one context by path."""
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
+    def __init__(self, context: moderngl.Context, problems: list[AdfError]) -> None:
+        self._context, self._problems = context, problems
         self._loaded: dict[Path, moderngl.Texture | None] = {}
         self.white = context.texture((1, 1), 4, b"\xff" * 4)
         """Stands in where a shader wants a texture that a surface lacks."""
@@ -22,7 +25,7 @@ class Textures:
         self.lit.compare_func = "<="
 
     def get(self, path: Path | None) -> moderngl.Texture | None:
-        """The texture of ``path``; None when it is not a picture, as the mesh reader has reported."""
+        """The texture of ``path``; None when it does not exist or is no picture, which the problems then say."""
         if path is None:
             return None
         if path not in self._loaded:
@@ -32,8 +35,12 @@ class Textures:
     def _load(self, path: Path) -> moderngl.Texture | None:
         try:
             with Image.open(path) as picture:
-                image = picture.convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
-        except (OSError, Image.DecompressionBombError):
+                image = _eight_bits(picture).convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
+        except FileNotFoundError:
+            return None  # as the mesh reader has said
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+            message = f"texture '{path.name}' is not a picture that can be read: {error}"
+            self._problems.append(AdfError(Diagnostic(Severity.WARNING, message, Mark(path, 1, 1), "", "render")))
             return None
         if max(image.size) > self._context.info["GL_MAX_TEXTURE_SIZE"]:
             image.thumbnail((self._context.info["GL_MAX_TEXTURE_SIZE"],) * 2)
@@ -41,3 +48,10 @@ class Textures:
         texture.build_mipmaps()
         texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         return texture
+
+
+def _eight_bits(picture: Image.Image) -> Image.Image:
+    """``picture``, of which 16 bits of grey have become 8, where Pillow's own conversion would cut them off."""
+    if not picture.mode.startswith("I"):
+        return picture
+    return Image.fromarray((np.asarray(picture, dtype=np.uint32) >> 8).clip(0, 255).astype(np.uint8))

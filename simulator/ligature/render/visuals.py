@@ -99,7 +99,9 @@ class VisualLoader:
     def _mesh(self, path: Path) -> _Loaded | None:
         if path not in self._meshes:
             try:
-                self._meshes[path] = _Loaded(load_mesh(path, Resolver([path.parent])))
+                mesh = load_mesh(path, Resolver([path.parent]))
+                self.problems += [AdfError(found) for found in mesh.diagnostics if found.message.startswith("texture")]
+                self._meshes[path] = _Loaded(mesh)
             except MeshError as error:
                 self.problems.append(error)
                 self._meshes[path] = None
