@@ -66,12 +66,6 @@ def stage(request: Any, ros_env: dict[str, str], node: Any) -> Iterator[Stage]:
         program.end()
 
 
-@pytest.fixture
-def lab(request: Any) -> bool:
-    """Whether the scene is the lab's."""
-    return bool(request.node.callspec.params["stage"] == "lab")
-
-
 @pytest.fixture(scope="module")
 def psm1(stage: Stage) -> Psm:
     return Psm(stage, "psm1")
@@ -225,10 +219,8 @@ def test_the_evaluation_reads_needle_and_camera_from_their_literal_topics(
 
 
 def test_a_needle_led_through_entry_and_exit_is_two_insertions_in_order(
-    stage: Stage, needle: Any, holes: dict[str, Any], lab: bool
+    stage: Stage, needle: Any, holes: dict[str, Any]
 ) -> None:
-    if not lab:
-        pytest.skip("a pose command pushes with the needle's own mass: a tenth of a gram does not part the tissue")
     stage.world.reset_bodies()
     stage.sleep(0.2)
     path = stitch_path(measured(holes["Entry1"]), measured(holes["Exit1"]))

@@ -26,6 +26,12 @@ What holds it is an arm of kilograms. A needle of 0.1 g between stiff pads and a
 from one to the other within a tick: a force F meets the next reaction only after F dt²/m, 11 mm for 1 N.
 """
 
+LEAST_LED_MASS = 0.5
+"""The same of a body that a command leads by setting its velocity anew each tick: that of the challenge's needle.
+
+It pushes with the momentum that it has: one of 0.1 g with 3 mN at 30 mm/s, and does not part the rim of a hole.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
@@ -53,6 +59,10 @@ class BulletGrips:
     _body_at: dict[tuple[int, int], int]
     _world_gravity: Array
     _impulses: dict[int, Array]
+
+    def driven(self, body: int) -> bool:
+        """Whether a command sets the velocity of a body."""
+        raise NotImplementedError
 
     def _setup_grips(self) -> None:
         self._free_bodies = {tree.root for tree in self.trees if is_alone(tree, self.scene.bodies)}
@@ -136,26 +146,39 @@ class BulletGrips:
             self._weigh(body)
 
     def _weigh(self, body: int) -> None:
-        """Give Bullet the mass that a body has, and note what its weight must be relieved of."""
-        place = self.place_of[body]
-        mass, inertia = self.mass_of(body) if body in self._gripped else (place.body.mass, inertia_of(place.body))
+        """Give Bullet the mass that a body pushes with, and note by what the weight of that is off.
+
+        What is held has its own weight, what is led falls as before: its command makes up for that.
+        """
+        place, led = self.place_of[body], self.driven(body)
+        least = LEAST_LED_MASS if led else LEAST_HELD_MASS if body in self._gripped else 0.0
+        mass, inertia = self._at_least(least, body)
         pybullet.changeDynamics(
             place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self.client
         )
         extra = mass - place.body.mass
         if extra > 0.0:
-            self._burdens[body] = place, -extra * self._world_gravity
+            fall = place.body.gravity if led else np.zeros(3)
+            self._burdens[body] = place, extra * (fall - self._world_gravity)
         else:
             self._burdens.pop(body, None)
 
     def mass_of(self, body: int) -> tuple[float, Array]:
         """Mass and principal moments (3,) by which a body resists forces now."""
+        held = body in self._free_bodies and self.is_held(body)
+        return self._at_least(LEAST_HELD_MASS if held else 0.0, body)
+
+    def _at_least(self, mass: float, body: int) -> tuple[float, Array]:
+        """Mass and principal moments (3,) of a body, scaled up to ``mass``."""
         described = self.scene.bodies[body]
-        inertia = inertia_of(described)
-        if body in self._free_bodies and self.is_held(body):
-            scale = max(1.0, LEAST_HELD_MASS / described.mass)
-            return scale * described.mass, scale * inertia
-        return described.mass, inertia
+        scale = mass / described.mass if mass > described.mass else 1.0
+        return scale * described.mass, scale * inertia_of(described)
+
+    def _led_anew(self, body: int, before: bool) -> None:
+        """Have a light free body push as firmly as what leads it, since a command that leads it came or went."""
+        light = body in self._free_bodies and self.scene.bodies[body].mass < LEAST_LED_MASS
+        if light and self.driven(body) != before:
+            self._weigh(body)
 
     def is_held(self, body: int) -> bool:
         """Whether something holds a body."""

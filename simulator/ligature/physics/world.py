@@ -109,7 +109,9 @@ class World(BulletQueries, BulletGrips):
             control = self._body_controls.get(command.body)
             if control is None:
                 control = self._body_controls[command.body] = BodyControl(self.place_of[command.body], self.dt)
+            before = self.driven(command.body)
             control.set(command.type, np.array(command.target, dtype=float))
+            self._led_anew(command.body, before)
         types = command.joint_types
         for i, (joint, value) in enumerate(zip(body.joints, command.joint_values, strict=False)):
             tree = self._tree_of_joint.get(joint)
@@ -136,7 +138,9 @@ class World(BulletQueries, BulletGrips):
 
     def release(self, body: int) -> None:
         """Clear the command of a body: no force, its joints limp."""
+        before = self.driven(body)
         self._body_controls.pop(body, None)
+        self._led_anew(body, before)
         for joint in self.scene.bodies[body].joints:
             if joint in self._tree_of_joint:
                 self._tree_of_joint[joint].release(joint)
@@ -302,6 +306,7 @@ class World(BulletQueries, BulletGrips):
         for body, kept in memory["bodies"].items():
             control_ = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
             control_.recall(kept)
+            self._led_anew(body, False)
         self.hold_again(memory["held"])
         self._hold_up_again(*memory["held_up"])
         self._motions.forget_all()
