@@ -29,6 +29,11 @@ def test_every_flag_has_its_long_name_too() -> None:
     assert short == long
 
 
+def test_input_devices_are_taken_with_their_proxies() -> None:
+    assert options("-l 2 -i 0,3").devices == (0, 3)
+    assert options("-l 2").devices == ()
+
+
 def test_blanks_in_the_list_of_indices_are_allowed() -> None:
     assert options("-l '10, 11,6'").models == (10, 11, 6)
 

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from ligature.adf.diagnostics import AdfError
 from ligature.model.scene import InputDevice
-from ligature.teleop.launch import of_devices
+from ligature.teleop.launch import of_devices, of_launch_file
+
+from tests.model.test_proxies import write_scene
 
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
 
@@ -74,13 +76,28 @@ def test_what_has_no_effect_on_an_arm_is_told(scene: ligature.Scene) -> None:
     }  # fmt: skip
     config = of_devices(scene, [device("pen", "PHANTOM Omni", **settings)], SMALL)
     assert config.notes == (
-        "pen: it leads the arm itself, so that its shadow model is not loaded",
+        "pen: it leads the arm itself and not its proxy",
         "pen: controller gain, max force: no effect on an arm",
         "pen: enable joint control: a grip leads the jaw all the same",
         "pair cameras: the scene has no camera 'nowhere'",
     )
     assert config.camera == "ECM"
     assert config.devices["pen"].buttons == {"white": "previous"}
+
+
+def test_where_no_arm_is_left_a_device_leads_its_proxy(tmp_path: Path) -> None:
+    config = of_launch_file(write_scene(tmp_path))
+    assert config.pairs == {"arm1": ("Proxy0",), "second": ("Proxy1",)}
+    assert [spec.topic for spec in config.proxies.values()] == [
+        "/ambf/env/simulated_device/palm", "/ambf/env/simulated_device/palm1",
+    ]  # fmt: skip
+    assert config.proxies["Proxy0"].limits.tolist() == [[-0.3, 0.0], [0.5, 0.7]]
+    assert (config.devices["arm1"].settings.jaw, config.devices["arm1"].settings.scale) == ((0.0, 1.0), 0.5)
+    assert "third: it leads nothing, because the scene has no arm" in config.notes
+    (tmp_path / "devices.yaml").write_text(
+        (tmp_path / "devices.yaml").read_text().replace("  workspace", "  enable joint control: false\n  workspace")
+    )
+    assert of_launch_file(tmp_path / "launch.yaml", (0,)).proxies["Proxy0"].limits.shape == (2, 0)
 
 
 def test_the_paired_camera_makes_the_view_of_a_scene_without_an_endoscope(scene: ligature.Scene) -> None:

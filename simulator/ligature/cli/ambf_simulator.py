@@ -16,7 +16,6 @@ _WITHOUT_EFFECT = {
     ("-f", "--fixed_htx_timestep"): "fixed haptic step",
     ("-e", "--enableforces"): "force feedback of devices",
     ("-n", "--ndevs"): "number of input devices",
-    ("-i", "--load_devices"): "indices of input devices",
     ("--plugins",): "simulator plug-ins",
 }
 
@@ -29,6 +28,7 @@ def parser() -> argparse.ArgumentParser:
         "-l", "--load_multibodies", dest="l", help="indices of multibody configs, as 10,11,6 (default 1 without -a)"
     )
     flags.add_argument("-a", "--load_multibody_files", dest="a", help="model files, separated by commas")
+    flags.add_argument("-i", "--load_devices", dest="i", default="", help="indices of input devices, for their proxies")
     flags.add_argument("-p", "--phx_frequency", dest="p", type=float, default=1000.0, help="updates per second")
     flags.add_argument("-t", "--fixed_phx_timestep", dest="t", type=_switch, help="the step is always fixed here")
     flags.add_argument("-s", "--sim_speed_factor", dest="s", type=float, default=1.0, help="simulated over wall time")
@@ -69,6 +69,10 @@ def options_of(arguments: list[str]) -> RunOptions:
         models = model_indices(text)
     except ValueError as error:
         flags.error(f"-l {error}")
+    try:
+        devices = model_indices(given.i)
+    except ValueError as error:
+        flags.error(f"-i {error}")
     if not given.p >= 1 or not 0 < given.s < float("inf"):
         flags.error("-p must be at least 1 update per second, and -s larger than 0")
     for name in ("override_min_comm_freq", "override_max_comm_freq"):
@@ -79,7 +83,7 @@ def options_of(arguments: list[str]) -> RunOptions:
         given.launch_file, models, tuple(f for f in (given.a or "").split(",") if f), tuple(given.root), given.ns,
         min(given.p, FASTEST), given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
-        window=bool(given.g), notes=_notes(given),
+        window=bool(given.g), notes=_notes(given), devices=devices,
     )  # fmt: skip
 
 

@@ -27,6 +27,8 @@ Launch = Annotated[Path, typer.Argument(help="Launch file, or one model file.")]
 Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
 Roots = Annotated[list[Path] | None, typer.Option("--root", help="Folder below which files may be opened too.")]  # noqa: UP045
 
+Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies are to be there.")]  # noqa: UP045
+
 CockpitAddress = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
@@ -89,6 +91,7 @@ def run(
     ] = None,
     cockpit: Annotated[bool, typer.Option("--cockpit", help="Serve the scene as a web page on this machine.")] = False,
     cockpit_at: CockpitAddress = None,
+    devices: Devices = None,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -104,6 +107,7 @@ def run(
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
         task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
+        devices=indices(devices) or (),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
 
@@ -127,11 +131,12 @@ def cockpit(
     at: CockpitAddress = None,
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
     speed: Annotated[float, typer.Option("-s", help="Simulated over wall time.", min=0.001)] = 1.0,
+    devices: Devices = None,
 ) -> None:
     """Run a scene with a live web page and without ROS; see `run --cockpit` for both."""
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
-        cockpit=_served_at(at), ros=False, notes=rate_notes(rate),
+        cockpit=_served_at(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
     )  # fmt: skip
     raise typer.Exit(Supervisor(options).run())
 

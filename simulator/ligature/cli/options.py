@@ -21,7 +21,7 @@ class RunOptions:
     whether pictures are published (None: of the cameras for which the scene says so), ``window`` whether
     one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
     the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines to tell the user at
-    the start.
+    the start, ``devices`` are indices of the input devices whose proxies are there.
     """
 
     scene: str
@@ -44,11 +44,12 @@ class RunOptions:
     cockpit: str = ""
     ros: bool = True
     notes: tuple[str, ...] = ()
+    devices: tuple[int, ...] = ()
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
         arms = [arm_entry(text) for text in self.arms] if self.arms else None
-        return ligature.load(self.scene, self.models, self.files, self.roots, self.prefix, arms)
+        return ligature.load(self.scene, self.models, self.files, self.roots, self.prefix, arms, self.devices)
 
     def shown_cameras(self, scene: Scene) -> tuple[Camera, ...]:
         """The cameras whose pictures are published."""
@@ -64,8 +65,8 @@ class RunOptions:
     def from_text(cls, text: str) -> RunOptions:
         """The options of `to_text`."""
         values = json.loads(text)
-        for name in ("models", "files", "roots", "arms", "notes"):
-            if values[name] is not None:
+        for name in ("models", "files", "roots", "arms", "notes", "devices"):
+            if values.get(name) is not None:
                 values[name] = tuple(values[name])
         return cls(**values)
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
-from ligature.model import attached, trees
+from ligature.model import attached, proxies, trees
 from ligature.model.arms import find_arms
 from ligature.model.frames import pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, shader_files
@@ -99,6 +99,16 @@ class SceneBuilder:
         if not top.flag("ligature rod"):
             self._no_rod.update(local)
         self.arrive(before)
+
+    def add_proxy(self, document: Document, shaders: ShaderFiles | None, device: Element) -> int:
+        """Create the proxy of an input device; the index of its root link, -1 when it has no body."""
+        before = self.counts()
+        self.add_model(document, shaders)
+        first = before["body"]
+        children = {joint.child for joint in self.joints[before["joint"] :]}
+        taken = {body.identity.topic for body in self.bodies}
+        self.bodies[first:], root = proxies.placed(device, self.bodies[first:], children, taken)
+        return -1 if root is None else root
 
     def arrive(self, before: dict[str, int]) -> None:
         """Let all objects created since ``before`` (count by kind) enter the world."""

@@ -43,6 +43,7 @@ def load(
     roots: Sequence[str | Path] = (),
     namespace_prefix: str = "",
     arms: Sequence[Mapping[str, str]] | None = None,
+    devices: Sequence[int] = (),
 ) -> Scene:
     """Load a scene.
 
@@ -62,6 +63,8 @@ def load(
     arms
         Which bodies are arms, as the launch key ``ligature arms`` would say (`ligature.model.arms`), instead of
         what the file says and what is found.
+    devices
+        Indices of the input devices of a launch file whose proxies are to be there.
 
     Raises
     ------
@@ -76,7 +79,7 @@ def load(
         raise SceneError(*error.diagnostics) from error
     if document.kind == "launch":
         assert isinstance(document, LaunchDocument)
-        scene = _load_launch(document, models, files, resolver, namespace_prefix, arms)
+        scene = _load_launch(document, models, files, resolver, namespace_prefix, arms, devices)
     elif document.kind == "model":
         scene = _load_models([document], files, resolver, namespace_prefix, start.stem, arms)
     else:
@@ -121,6 +124,7 @@ def _load_launch(
     resolver: Resolver,
     prefix: str,
     arms: Sequence[Mapping[str, str]] | None,
+    devices: Sequence[int],
 ) -> Scene:
     found = list(launch.diagnostics)
     world = _world_document(launch, resolver, found)
@@ -139,7 +143,7 @@ def _load_launch(
         builder.add_model(document, shaders)
     for document in _selected(launch, models, resolver, builder):
         builder.add_model(document, shaders)
-    _add_devices(launch, builder, resolver)
+    _add_devices(launch, builder, resolver, devices, shaders)
     return builder.finish()
 
 
@@ -236,7 +240,10 @@ def _selected(
     return documents
 
 
-def _add_devices(launch: LaunchDocument, builder: SceneBuilder, resolver: Resolver) -> None:
+def _add_devices(
+    launch: LaunchDocument, builder: SceneBuilder, resolver: Resolver, chosen: Sequence[int],
+    shaders: ShaderFiles | None,
+) -> None:  # fmt: skip
     reference = launch.devices
     if reference is None or reference.path is None:
         if reference is not None and reference.diagnostic is not None:
@@ -248,7 +255,33 @@ def _add_devices(launch: LaunchDocument, builder: SceneBuilder, resolver: Resolv
         builder.diagnostics += error.diagnostics
         return
     builder.diagnostics += document.diagnostics
-    builder.devices += [_device(element) for element in document.elements("input devices")]
+    elements = document.elements("input devices")
+    builder.devices += [_device(element) for element in elements]
+    for index in dict.fromkeys(chosen):
+        if not 0 <= index < len(elements):
+            message = f"there is no input device {index}; 'input devices' lists {len(elements)}, counted from 0"
+            builder.report(Diagnostic(Severity.ERROR, message, document.top.mark_of("input devices"), "", "index"))
+        elif elements[index].text("simulated multibody"):
+            proxy = _proxy(elements[index], document, builder, resolver, shaders)
+            builder.devices[index] = replace(builder.devices[index], proxy=proxy)
+
+
+def _proxy(
+    element: Element, document: Document, builder: SceneBuilder, resolver: Resolver, shaders: ShaderFiles | None
+) -> int:
+    """Create the proxy of an input device; the index of its root link, -1 when it cannot be had."""
+    mark = element.mark_of("simulated multibody")
+    try:
+        path = resolver.resolve(element.text("simulated multibody"), document.path.parent, mark)
+        model = read_model(path, resolver)
+    except ResolutionError as error:
+        builder.report(Diagnostic(Severity.ERROR, error.diagnostic.message, mark, error.diagnostic.hint, "path"))
+        return -1
+    except AdfError as error:
+        builder.diagnostics += error.diagnostics
+        return -1
+    builder.diagnostics += model.diagnostics
+    return builder.add_proxy(model, shaders, element)
 
 
 def _device(element: Element) -> InputDevice:

@@ -70,7 +70,7 @@ def body_of(
         restitution=element.number("restitution"),
         linear_damping=min(max(element.number("damping.linear"), 0.0), 1.0),
         angular_damping=min(max(element.number("damping.angular"), 0.0), 1.0),
-        controller=_cartesian(element),
+        controller=controller_of(element, "controller", CartesianController()),
         publish_children_names=element.flag("publish children names"),
         publish_joint_names=element.flag("publish joint names"),
         publish_joint_positions=element.flag("publish joint positions"),
@@ -93,14 +93,15 @@ def _warn_no_mass(element: Element, context: FileContext) -> None:
     context.report(Diagnostic(severity, message, element.mark, "add mass: kilograms; 0 makes it static", "mass"))
 
 
-def _cartesian(element: Element) -> CartesianController:
-    if not element.has("controller"):
-        return CartesianController()
-    output = element.value("controller output type")
+def controller_of(element: Element, key: str, otherwise: CartesianController) -> CartesianController:
+    """The Cartesian controller below ``key``; without that key, ``otherwise``."""
+    if not element.has(key):
+        return otherwise
+    output = element.value("controller output type") if key == "controller" else None
 
     def half(name: str) -> tuple[Gains, OutputType]:
-        given = element.has(f"controller.{name}")
-        gains = Gains(*(element.number(f"controller.{name}.{k}") for k in "PID")) if given else Gains()
+        given = element.has(f"{key}.{name}")
+        gains = Gains(*(element.number(f"{key}.{name}.{k}") for k in "PID")) if given else Gains()
         if output is not None:
             return gains, OutputType[output]
         return gains, OutputType.FORCE if given else OutputType.VELOCITY

@@ -438,13 +438,17 @@ class Light:
 
 @dataclass(frozen=True)
 class InputDevice:
-    """An input device of the launch file (§8), as written; teleoperation gives it a meaning."""
+    """An input device of the launch file (§8), as written; teleoperation gives it a meaning.
+
+    ``proxy`` is the body that its hand leads, the root link of its proxy; -1 when that was not asked for.
+    """
 
     key: str
     hardware_name: str
     root_link: str
     settings: dict[str, Any]
     mark: Mark | None = None
+    proxy: int = -1
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,18 @@ class DeviceSpec:
     settings: Settings = field(default_factory=Settings)
 
 
+GRIP = (0.0, 1.0)
+"""Angles of a proxy's grip that mean closed and open."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProxySpec:
+    """A proxy's root link on ROS, and limits (2, n) of the joints that the grip leads, in the order of its commands."""
+
+    topic: str
+    limits: Array
+
+
 @dataclass(frozen=True, eq=False)
 class TeleopConfig:
     """A whole teleoperation.
@@ -54,7 +66,7 @@ class TeleopConfig:
     ``pairs`` are the followers that each device may lead, the first one first; those ``waiting`` lead none until they
     are told to. ``camera`` is the arm whose tip makes the view, or, when there is none, ``T_world_camera`` (4, 4) the
     view in the world. ``rcm_guard`` is the least distance of a tip from its remote centre in metres. ``notes`` are
-    lines to tell the user.
+    lines to tell the user. ``proxies`` are the followers that are no arms.
     """
 
     devices: Mapping[str, DeviceSpec]
@@ -67,6 +79,7 @@ class TeleopConfig:
     rcm_guard: float = 0.05
     notes: tuple[str, ...] = ()
     waiting: frozenset[str] = frozenset()
+    proxies: Mapping[str, ProxySpec] = field(default_factory=dict)
 
     def begins_with(self, leader: str) -> str:
         """The follower of ``leader`` at the start; empty when it waits, or leads the camera alone."""

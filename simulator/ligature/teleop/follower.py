@@ -98,6 +98,9 @@ class Arm:
         """The frame of the set-point and the set-point (4, 4) in it; None while it is unknown."""
         return None if self._setpoint is None else self._setpoint[1:]
 
+    def keep(self) -> None:
+        """Nothing: an arm holds its last set-point."""
+
     def force_in(self, camera: str) -> Array:
         """Force (3,) of the world on the tip in the camera's axes; zeros while it is unknown."""
         T = self._frames.between(camera, self.name)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from ligature.model.load import load as load_scene
 from ligature.model.optics import T_CAMERA_OPTICAL
 from ligature.model.scene import ArmKind, InputDevice, Scene
 from ligature.teleop.calibration import Calibration
-from ligature.teleop.config import TOPICS, DeviceSpec, TeleopConfig
+from ligature.teleop.config import GRIP, TOPICS, DeviceSpec, ProxySpec, TeleopConfig
 from ligature.teleop.devices import module
 from ligature.teleop.feedback import FeedbackSettings
 from ligature.teleop.pairing import Settings
@@ -51,28 +52,35 @@ def of_launch_file(path: Path, indices: tuple[int, ...] | None = None) -> Teleop
 
     ``indices`` choose among its devices, as AMBF's ``-i`` does. Raises `AdfError` when none can lead an arm.
     """
-    scene = load_scene(path)
-    devices = scene.input_devices
+    devices = load_scene(path).input_devices
     for index in indices or ():
         if not 0 <= index < len(devices):
             raise _problem(path, f"there is no input device {index}", f"there are {len(devices)}, counted from 0")
-    return of_devices(scene, devices if indices is None else [devices[index] for index in indices], path)
+    chosen = tuple(range(len(devices))) if indices is None else indices
+    scene = load_scene(path, devices=chosen)
+    return of_devices(scene, [scene.input_devices[index] for index in chosen], path)
 
 
 def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> TeleopConfig:
     """The teleoperation of some devices of a scene.
 
     A device leads the arm that has its root link, one without a root link the first arm that is free; it may be
-    switched to all others. Devices that cannot lead are passed over; the notes say why, and what of the others has no
-    effect.
+    switched to all others. Where no arm is left it leads its proxy, if the scene has it. Devices that cannot lead are
+    passed over; the notes say why, and what of the others has no effect.
     """
     arms = [arm.name for arm in scene.arms if arm.kind is ArmKind.PSM]
     specs, wanted, notes = _specs(scene, devices)
     pairs: dict[str, tuple[str, ...]] = {}
-    for device, spec in specs:
+    proxies: dict[str, ProxySpec] = {}
+    for number, (device, spec) in enumerate(specs):
         taken = {followers[0] for followers in pairs.values()}
         free = [arm for arm in arms if arm not in taken and arm not in wanted.values()]
         first = wanted.get(spec.name) or next(iter(free), None)
+        if first is None and device.proxy >= 0:
+            name = f"Proxy{len(proxies)}"
+            pairs[spec.name], proxies[name] = (name,), _proxy(scene, device)
+            specs[number] = device, replace(spec, settings=replace(spec.settings, jaw=GRIP))
+            continue
         if first is None or first in taken:
             why = f"{first} is led already" if first else "no arm is left" if arms else "the scene has no arm"
             notes.append(f"{device.key}: it leads nothing, because {why}")
@@ -84,8 +92,19 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
     chosen = [(device, spec) for device, spec in specs if spec.name in pairs]
     camera, T_world_camera = _view(scene, [device for device, _ in chosen], notes)
     return TeleopConfig(
-        {spec.name: spec for _, spec in chosen}, pairs, camera, T_world_camera, notes=tuple(dict.fromkeys(notes))
-    )
+        {spec.name: spec for _, spec in chosen}, pairs, camera, T_world_camera, notes=tuple(dict.fromkeys(notes)),
+        proxies=proxies,
+    )  # fmt: skip
+
+
+def _proxy(scene: Scene, device: InputDevice) -> ProxySpec:
+    """The proxy of a device; its grip leads the joints with limits, unless the device says that it does not."""
+    root = scene.bodies[device.proxy]
+    joints = [scene.joints[index] for index in root.joints]
+    limits = np.array([[joint.low or 0.0, joint.high or 0.0] for joint in joints]).reshape(-1, 2).T
+    if str(device.settings.get("enable joint control", True)).lower() in ("false", "0"):
+        limits = limits[:, :0]
+    return ProxySpec(root.identity.topic, limits)
 
 
 def _specs(
@@ -123,7 +142,7 @@ def _without_effect(device: InputDevice) -> list[str]:
     settings = device.settings
     notes = []
     if settings.get("simulated multibody"):
-        notes.append("it leads the arm itself, so that its shadow model is not loaded")
+        notes.append("it leads the arm itself and not its proxy")
     unused = [key for key in ("controller gain", "location", "max force", "max jerk") if key in settings]
     if "angular" in (settings.get("haptic gain") or {}) and float(settings["haptic gain"]["angular"]) != 0.0:
         unused.append("haptic gain: angular")

@@ -34,6 +34,7 @@ from ligature.teleop.haptics import Haptics
 from ligature.teleop.messages import pose_numbers
 from ligature.teleop.pair import MOST_SCALE, Pair
 from ligature.teleop.pairing import HOLDING, Status, Tip
+from ligature.teleop.proxy import Proxy
 from ligature.teleop.record import Recorder, Replay
 from ligature.teleop.seat import Conflict, Leader, Seat
 
@@ -117,7 +118,9 @@ class Teleop:
         )
         return device
 
-    def _arm(self, name: str) -> Arm:
+    def _arm(self, name: str) -> Arm | Proxy:
+        if name in self._config.proxies:
+            return Proxy(name, self._config.proxies[name], self.frames)
         return Arm(name, self._config.prefix + name, self.frames, lambda arm, sender: self.put("rival", (arm, sender)))
 
     def _pair(self, leader: str, arm: str) -> Pair:
@@ -184,6 +187,8 @@ class Teleop:
         for pair in self.pairs.values():
             pair.advance(now, tips[pair.arm.name], idle)
         self._lead(now, tips)
+        for arm in self.arms.values():
+            arm.keep()
         self._warn()
         if now >= self._next_readings:
             self._next_readings = now + READINGS_PERIOD

@@ -14,6 +14,7 @@ from ligature.teleop.devices.device import Device
 from ligature.teleop.follower import Arm
 from ligature.teleop.handset import Handset
 from ligature.teleop.pairing import HOLDING, Hand, Status, Tip
+from ligature.teleop.proxy import Proxy
 from ligature.teleop.seat import Leader, Seat
 
 ALIGNED = np.deg2rad(5.0)
@@ -29,7 +30,7 @@ class Pair:
     """A leader that may lead a follower; ``wanted`` says that it should, as far as the pair is selected."""
 
     def __init__(
-        self, leader: Leader, arm: Arm, seat: Seat, handset: Handset, device: Device | None, topics: PairTopics
+        self, leader: Leader, arm: Arm | Proxy, seat: Seat, handset: Handset, device: Device | None, topics: PairTopics
     ) -> None:
         self.leader, self.arm, self.topics = leader, arm, topics
         self._seat, self._handset, self._device = seat, handset, device
