@@ -112,7 +112,7 @@ def test_render_names_the_cameras_there_are(tmp_path: Path) -> None:
 def test_render_refuses_what_it_cannot_write(tmp_path: Path) -> None:
     assert "npy, png, exr" in ligature("render", SMALL, "--camera", "cameraL", "--format", "gif").stderr
     assert "five numbers" in ligature("render", SMALL, "--camera", "cameraL", "--distortion", "1,2").stderr
-    assert "finite" in ligature("render", SMALL, "--camera", "cameraL", "--noise", "nan").stderr
+    assert "between 0 and 10" in ligature("render", SMALL, "--camera", "cameraL", "--noise", "nan").stderr
     assert "finite" in ligature("render", SMALL, "--camera", "cameraL", "--seconds", "nan").stderr
 
 

@@ -11,7 +11,7 @@ from ligature import Simulation
 from ligature.render import ImageSensor
 from ligature.render.sensor import distort, undistort
 
-from tests.render.conftest import BEADS, camera
+from tests.render.conftest import BEADS, LENS, camera
 from tests.render.test_cameras import optical, seen
 
 Make = Callable[..., Simulation]
@@ -72,11 +72,19 @@ def test_a_stop_more_doubles_the_light(simulate: Make) -> None:
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"noise": float("nan")}, "the noise of a sensor has to be finite, not nan"),
-        ({"depth_noise": -1.0}, "the depth_noise of a sensor is a standard deviation, not -1.0"),
+        ({"noise": float("nan")}, "the noise of a sensor lies between 0 and 10, not at nan"),
+        ({"depth_noise": -1.0}, "the depth_noise of a sensor lies between 0 and 1000, not at -1"),
+        ({"exposure": 1e9}, "the exposure of a sensor lies between -32 and 32, not at 1e[+]09"),
         ({"distortion": (0.0, float("inf"), 0.0, 0.0, 0.0)}, "the distortion of a sensor has to be finite"),
     ],
 )
 def test_a_sensor_that_makes_no_sense_is_refused(wrong: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         ImageSensor(**wrong)
+
+
+def test_a_lens_that_cannot_be_undone_is_refused(simulate: Make) -> None:
+    sensor = ImageSensor(distortion=(-5.0, 0.0, 0.0, 0.0, 0.0))
+    wide = LENS.replace("angle: 0.9", "angle: 2.0")
+    with pytest.raises(ValueError, match="cannot be undone over this picture"):
+        simulate(C=camera("C", lens=wide)).cameras["C"].capture(sensor=sensor)

@@ -21,6 +21,7 @@ from ligature.model.scene import Camera, Scene
 from ligature.model.state import new_state, state_dtype
 from ligature.render import CameraView, ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
 from ligature.render.calibration import calibrations
+from ligature.render.sensor import IDEAL
 from ligature.render.shutter import Shutter
 from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
 from ligature.ros.master import MasterWatch, NameTaken
@@ -96,6 +97,7 @@ class Studio:
         self._node = CameraNode(scene, self.cameras, bool(options.cameras))
         self._follower = Follower(scene)
         MasterWatch(self._follower.poll).start()
+        self._refused: set[str] = set()
         self._exposures = [_Exposure(topics) for topics in self._node.topics]
 
     def turn(self, now: float) -> None:
@@ -134,8 +136,9 @@ class Studio:
 
     def _draw(self, exposure: _Exposure, wishes: Wishes, stamp: float) -> None:
         index, eye = exposure.key
-        camera, sensor = self._camera(index), ImageSensor(**self._follower.sensors[index])
+        camera = self._camera(index)
         view = view_of(camera, self._state["camera_world"][0, index], eye=eye)
+        sensor = self._sensor(camera, view)
         moment = (index, int(self._state["tick"][0]))
         passes = wishes.passes | {"rgb", "depth"} if wishes.cloud else wishes.passes
         drawn = self._renderer.render(self._state, sensor.view(view), sorted(passes), camera.preprocessing_shaders)
@@ -150,6 +153,21 @@ class Studio:
                 grain = random.standard_normal(frame.depth.shape, dtype=np.float32)
                 points[..., 2] -= np.float32(mean + bias) + np.float32(deviation) * grain
             exposure.topics.publish_cloud(points, frame.rgb, stamp)
+
+    def _sensor(self, camera: Camera, view: CameraView) -> ImageSensor:
+        """What the parameters say of a camera's sensor; one without faults, told once, when they cannot be used."""
+        values = self._follower.sensors[camera.index]
+        wrong = f"{camera.identity.topic}: {values}"
+        if wrong in self._refused:
+            return IDEAL
+        try:
+            sensor = ImageSensor(**values)
+            sensor.view(view)
+        except ValueError as error:
+            tell("warning", f"{camera.identity.topic}/sensor: {error}; its pictures have no faults")
+            self._refused.add(wrong)
+            return IDEAL
+        return sensor
 
     def _points(self, camera: Camera, depth: np.ndarray, view: CameraView) -> np.ndarray:
         """Points (h, w, 3) in the optical frame, by the camera's own ``depth compute shaders`` where it has some."""

@@ -23,6 +23,10 @@ WIDEST = 2.0
 """Most that a picture is drawn wider and higher than it is shown, to have something for bent corners."""
 
 
+LIMITS = {"exposure": 32.0, "noise": 10.0, "depth_noise": 1000.0}
+"""Largest magnitudes that a sensor takes: beyond them there is nothing to be seen."""
+
+
 @dataclass(frozen=True)
 class ImageSensor:
     """A lens and a sensor.
@@ -43,7 +47,8 @@ class ImageSensor:
     Raises
     ------
     ValueError
-        When a number is not finite, or a standard deviation is negative.
+        When a number is not finite or beyond `LIMITS`, or a standard deviation is negative; and from `view`, when the
+        distortion cannot be undone over the picture.
     """
 
     exposure: float = 0.0
@@ -53,12 +58,12 @@ class ImageSensor:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("exposure", "noise", "distortion", "depth_noise"):
-            value = getattr(self, name)
-            if not np.isfinite(value).all():
-                raise ValueError(f"the {name} of a sensor has to be finite, not {value}")
-            if "noise" in name and value < 0:
-                raise ValueError(f"the {name} of a sensor is a standard deviation, not {value}")
+        if not np.isfinite(self.distortion).all():
+            raise ValueError(f"the distortion of a sensor has to be finite, not {self.distortion}")
+        for name, most in LIMITS.items():
+            value, least = getattr(self, name), -most if name == "exposure" else 0.0
+            if not least <= value <= most:
+                raise ValueError(f"the {name} of a sensor lies between {least:g} and {most:g}, not at {value:g}")
 
     def view(self, view: CameraView) -> CameraView:
         """What has to be drawn to show ``view`` through this lens: a larger picture where the lens bends corners in."""
@@ -155,7 +160,10 @@ def _sources(distortion: tuple[float, ...], key: tuple[float, ...], width: int, 
     K = np.array(key).reshape(3, 3)
     u, v = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
     rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(K).T
-    ideal = undistort(rays[..., :2], distortion)
+    with np.errstate(over="ignore", invalid="ignore"):
+        ideal = undistort(rays[..., :2], distortion)
+    if not np.isfinite(ideal).all():
+        raise ValueError(f"a lens with the distortion {distortion} cannot be undone over this picture")
     pixels = np.concatenate([ideal, np.ones_like(u)[..., None]], axis=-1) @ K.T
     return pixels[..., 0], pixels[..., 1]
 
