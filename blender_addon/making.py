@@ -18,6 +18,7 @@ from .mesh_data import shape_data
 from .placing import hang, place, rest_pose
 from .properties import KIND_OF_ROLE
 from .read_file import SHAPE_COLOUR, set_shape
+from .references import file_of
 
 PREFIXES = {
     "BODY": "BODY ", "JOINT": "JOINT ", "GHOST_OBJECT": "GHOST ", "SENSOR": "SENSOR ", "ACTUATOR": "ACTUATOR ",
@@ -25,14 +26,6 @@ PREFIXES = {
 }  # fmt: skip
 HANGING = ("GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SUTURE", "VOLUME")
 """Roles whose objects may hang on a body."""
-
-
-def file_of(obj: bpy.types.Object | None) -> bpy.types.Collection | None:
-    """The collection of a file that holds an object."""
-    return next(
-        (c for c in bpy.data.collections if c.adf.kind != "NONE" and obj is not None and obj.name in c.all_objects),
-        None,
-    )
 
 
 def new_file(scene: bpy.types.Scene, name: str, kind: str, namespace: str = "/ambf/env/") -> bpy.types.Collection:
@@ -64,7 +57,7 @@ def give_role(obj: bpy.types.Object, role: str, collection: bpy.types.Collection
     obj.adf.role = role
     group = getattr(obj.adf, role.lower())
     if not group.is_property_set("name"):
-        group.name = topic_name(obj.name)
+        group.name = obj.name if role == "JOINT" else topic_name(obj.name)
     if role == "BODY":
         for name, value in (("mass", 1.0), ("collision_margin", 0.0001)):
             if not group.is_property_set(name):
@@ -81,7 +74,7 @@ def make_own(obj: bpy.types.Object) -> None:
     obj.adf.key = free_key(file_of(obj), obj.adf.role, obj.name)
     obj.adf.was = obj.adf.imported = obj.adf.mesh_print = ""
     group = getattr(obj.adf, obj.adf.role.lower())
-    group.name = topic_name(obj.name)
+    group.name = obj.name if obj.adf.role == "JOINT" else topic_name(obj.name)
     for name in ("mesh", "collision_mesh"):
         if hasattr(group, name):
             group.property_unset(name)

@@ -31,6 +31,7 @@ from .ligature.authoring.placement import (
 )
 from .ligature.authoring.shapes import Shape
 from .properties import KIND_OF_ROLE
+from .references import reference
 from .schema_properties import decimal, decimals
 
 SHAPED = ("BODY", "GHOST_OBJECT", "SOFT_BODY")
@@ -148,15 +149,15 @@ def state_of(obj: bpy.types.Object) -> dict[str, list]:
     if role == "JOINT":
         parent, child = obj.adf.parent_object, obj.adf.child_object
         state["ends"] = [
-            parent.adf.key if parent else obj.adf.parent_text,
-            child.adf.key if child else obj.adf.child_text,
+            reference(obj, parent, obj.adf.parent_text) if parent else obj.adf.parent_text,
+            reference(obj, child, obj.adf.child_text) if child else obj.adf.child_text,
         ]
         if parent is not None and child is not None:
             state["frames"] = [*_flat(relative_pose(parent, obj)), *_flat(relative_pose(parent, child))]
         return state
     owner = owner_of(obj)
     state["pose"] = _flat(relative_pose(owner, obj))
-    state["parent"] = [owner.adf.key if owner else obj.adf.parent_text]
+    state["parent"] = [reference(obj, owner, obj.adf.parent_text) if owner else obj.adf.parent_text]
     if role == "CAMERA" and obj.type == "CAMERA":
         state["lens"] = [obj.data.angle_y, obj.data.clip_start, obj.data.clip_end]
     if role == "LIGHT" and obj.type == "LIGHT":

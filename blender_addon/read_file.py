@@ -17,7 +17,7 @@ import numpy as np
 
 from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any
 from .ligature.adf.reader import read_text
-from .ligature.adf.references import find_by_text, merged
+from .ligature.adf.references import find_by_text
 from .ligature.adf.update import Item, given_values, new_text
 from .ligature.authoring.generate import Parts
 from .ligature.authoring.placement import matrix_of
@@ -26,6 +26,7 @@ from .ligature.mesh import Mesh, MeshError, load_mesh
 from .mesh_data import MeshMaker, mesh_print, shape_data
 from .placing import SHAPED, hang, place, place_joint, place_light, place_view, rest_pose, state_of
 from .properties import ROLE_OF_KIND
+from .references import qualified
 from .schema_properties import fetch, identifier, state_text, store
 
 EMPTY_LOOK = {"joint": "SINGLE_ARROW", "sensor": "CONE", "actuator": "SPHERE", "suture": "SINGLE_ARROW"}
@@ -324,13 +325,6 @@ def find_open(text: str, kinds: tuple[str, ...]) -> bpy.types.Object | None:
 
 
 KINDS = {role: kind for kind, role in ROLE_OF_KIND.items()}
-
-
-def qualified(collection: bpy.types.Collection, obj: bpy.types.Object) -> str:
-    """The object's identifier with its namespace (ADF §4.1)."""
-    group = getattr(collection.adf, collection.adf.kind.lower(), None)
-    own = getattr(obj.adf, identifier(KINDS[obj.adf.role]))
-    return merged(getattr(group, "namespace", ""), getattr(own, "namespace", "")) + obj.adf.key
 
 
 def set_shape(obj: bpy.types.Object, shape: Shape, use: str, order: int) -> None:

@@ -209,6 +209,26 @@ def test_a_joint_whose_body_was_deleted_is_told_and_nothing_is_written(tmp_path)
     assert [f.object.name for f in bpy.context.scene.adf.findings] == ["parent-child"]
 
 
+def test_a_joint_to_a_body_of_another_file_names_it_with_its_namespace(tmp_path):
+    for name in ("one", "two"):
+        bpy.ops.adf.new_file(kind="MODEL", name=name, namespace=f"/ambf/env/{name}/")
+        body(f"{name}_body")
+    select(bpy.data.objects["one_body"], bpy.data.objects["two_body"])
+    bpy.ops.adf.connect(type="revolute")
+    target = tmp_path / "launch.yaml"
+    bpy.ops.adf.export_scene(filepath=str(target))
+    ends = {"parent": "BODY two_body", "child": "/ambf/env/one/BODY one_body"}
+    joint = read_any(tmp_path / "two.yaml", Resolver([tmp_path])).elements("joints")[0]
+    assert {name: joint.text(name) for name in ends} == ends and joint.text("name") == "two_body-one_body"
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.adf.import_launch(filepath=str(target))
+    made = next(o for o in bpy.data.objects if o.adf.role == "JOINT")
+    assert made.adf.child_object is bpy.data.objects["one_body"]
+    text = (tmp_path / "two.yaml").read_bytes()
+    bpy.ops.adf.export_scene(filepath=str(target))
+    assert (tmp_path / "two.yaml").read_bytes() == text
+
+
 def test_what_would_not_be_written_as_it_looks_is_told():
     model()
     bpy.ops.curve.primitive_bezier_circle_add()

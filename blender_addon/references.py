@@ -1,0 +1,43 @@
+"""How files name each other's objects: which collection holds an object, and the text that means it."""
+
+from __future__ import annotations
+
+import bpy
+
+from .ligature.adf.references import merged
+from .properties import KIND_OF_ROLE
+from .schema_properties import identifier
+
+
+def file_of(obj: bpy.types.Object | None) -> bpy.types.Collection | None:
+    """The collection of a file that holds an object."""
+    return next(
+        (c for c in bpy.data.collections if c.adf.kind != "NONE" and obj is not None and obj.name in c.all_objects),
+        None,
+    )
+
+
+def qualified(collection: bpy.types.Collection, obj: bpy.types.Object) -> str:
+    """The object's identifier with its namespace (ADF §4.1)."""
+    own = getattr(obj.adf, identifier(KIND_OF_ROLE[obj.adf.role]))
+    return merged(_namespace(collection), getattr(own, "namespace", "")) + obj.adf.key
+
+
+def _namespace(collection: bpy.types.Collection | None) -> str:
+    group = None if collection is None else getattr(collection.adf, collection.adf.kind.lower(), None)
+    return getattr(group, "namespace", "")
+
+
+def reference(obj: bpy.types.Object, other: bpy.types.Object, given: str = "") -> str:
+    """How the file of ``obj`` names another object: with its namespace when it is of a file that has another one.
+
+    ``given`` is what the file or the user says; it stays where it means that object and none of the own file.
+    """
+    here, there = file_of(obj), file_of(other)
+    if here is None or there is None or there is here:
+        return other.adf.key
+    whole = qualified(there, other)
+    for text in (given, other.adf.key if whole == _namespace(here) + other.adf.key else ""):
+        if text and whole.endswith(text) and not any(own.adf.key == text for own in here.all_objects):
+            return text
+    return whole
