@@ -240,6 +240,27 @@ def test_a_damped_hinge_slows_down_as_its_damper_says(load: Callable[..., tuple[
     assert decay == pytest.approx(0.01 / (2 * about) * 2 * np.pi / frequency, rel=0.03)
 
 
+def test_a_double_pendulum_on_a_cart_falls_as_in_mujoco(load: Callable[..., tuple[Scene, str]]) -> None:
+    rod = '<geom type="capsule" fromto="0 0 0 0.1 0 -0.4" size="0.02" contype="0" conaffinity="0"/>'
+    world = f"""<body name="cart" pos="0 0 1"><joint name="x" type="slide" axis="1 0 0"/>
+      <geom type="box" size="0.1 0.05 0.05" contype="0" conaffinity="0"/>
+      <body name="upper" euler="0 -0.9 0.2"><joint name="a" axis="0 1 0"/>{rod}
+        <body name="lower" pos="0.1 0 -0.4" euler="0.5 0 0"><joint name="b" axis="1 0 0"/>{rod}</body></body></body>"""
+    scene, _ = load(world)
+    sim = ligature.Simulation(scene)
+    model = mujoco.MjModel.from_xml_string(f"{HEAD}<worldbody>{world}</worldbody></mujoco>")
+    model.opt.timestep, model.opt.integrator = 1e-4, mujoco.mjtIntegrator.mjINT_RK4
+    data = mujoco.MjData(model)
+    for _ in range(10):
+        sim.step(40)
+        mujoco.mj_step(model, data, 400)
+        for name in ("cart", "upper", "lower"):
+            T = pose7_matrix(sim.bodies[name].pose)
+            np.testing.assert_allclose(T[:3, 3], data.body(name).xpos, atol=4e-3)
+            np.testing.assert_allclose(T[:3, :3], data.body(name).xmat.reshape(3, 3), atol=0.03)
+    assert np.abs(data.qpos).max() > 1.0  # it has gone far
+
+
 def test_every_geom_becomes_a_shape_of_its_size(load: Callable[..., tuple[Scene, str]]) -> None:
     scene, output = load(
         """<geom name="floor" type="plane" size="1 1 .1" pos="0 0 -1"/>
