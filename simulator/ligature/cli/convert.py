@@ -21,6 +21,9 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
     if source.suffix.lower() not in (".urdf", ".xml"):
         console.print(f"{source}: only URDF (.urdf) and MJCF (.xml) are converted", style="red", markup=False)
         return 1
+    if not source.is_file():
+        console.print(f"{source}: there is no such file", style="red", markup=False)
+        return 1
     try:
         converted = _mjcf(source) if _is_mjcf(source) else _urdf(source)
         written = save_all(_files(converted, out.resolve(), namespace))
