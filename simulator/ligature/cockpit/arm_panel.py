@@ -56,7 +56,7 @@ class ArmStatus:
         badges += [("HOMED", "#1971c2")] if record["homed"] else [("NOT HOMED", "#868e96")]
         badges += [("BUSY", "#f59f00")] if record["busy"] else []
         marks = " ".join(badge(word, colour) for word, colour in badges)
-        x, y, z = (1e3 * record["measured_cp"][:3]).tolist()
+        x, y, z = (np.round(1e3 * record["measured_cp"][:3], 1) + 0.0).tolist()  # and no -0.0
         force = float(np.linalg.norm(record["spatial_measured_cf"][:3]))
         tip = f"tip {x:.1f} {y:.1f} {z:.1f} mm · {force:.2f} N"
         note = f'<br><span style="color:#f08c00">{escape(self.note)}</span>' if self.note else ""

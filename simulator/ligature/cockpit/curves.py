@@ -27,7 +27,7 @@ COLOURS = ("#4dabf7", "#ffa94d", "#69db7c", "#f783ac", "#b197fc")
 
 SCORE = "task score, % of holes"
 
-RANGES = {SCORE: (0.0, 100.0)}
+RANGES = {SCORE: (-5.0, 105.0)}
 """Of charts whose values have bounds."""
 
 Values = Callable[[Any], list[float]]
@@ -131,7 +131,7 @@ def _charts(scene: Scene) -> list[tuple[str, list[str], Values]]:
     needles = [needle.body for needle in scene.needles]
 
     def tension(state: Any) -> list[float]:
-        return [float(np.abs(state["rod_tension"][bodies]).max()) for _, bodies in threads]
+        return [round(float(np.abs(state["rod_tension"][bodies]).max()), 3) for _, bodies in threads]
 
     def forces(state: Any) -> list[float]:
         return [float(np.linalg.norm(state["arm"][i]["spatial_measured_cf"][:3])) for i, _ in arms]
