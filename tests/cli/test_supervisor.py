@@ -34,6 +34,18 @@ def test_events_and_log_lines_are_told_apart() -> None:
     assert next_of(events) == ("tester", "ended", "0")
 
 
+def test_a_process_that_draws_stands_behind_those_in_other_sessions_too() -> None:
+    """Its session's group is nice, where the kernel shares the processor among sessions."""
+    code = "import os; print(os.nice(0), open('/proc/self/autogroup').read().strip())"
+    events: Queue[Event] = Queue()
+    Child("drawing", [sys.executable, "-c", code], events, dict(os.environ), nice=7)
+    _, event, text = next_of(events)
+    if not Path("/proc/self/autogroup").exists():
+        pytest.skip("this kernel shares the processor among processes alone")
+    assert event == "log"
+    assert text.startswith("7 /autogroup-") and text.endswith(" nice 7")
+
+
 def test_bytes_that_are_no_text_do_not_hide_the_end() -> None:
     _, events = child("import os; os.write(1, bytes([0xff, 0xfe, 10])); raise SystemExit(3)")
     assert next_of(events) == ("tester", "log", "\ufffd\ufffd")

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ligature.bus.block import remove, remove_leftovers
-from ligature.bus.process import end_with_parent
+from ligature.bus.process import end_with_parent, stand_behind
 from ligature.cli import master
 from ligature.cli.options import RunOptions
 
@@ -37,8 +37,8 @@ _ENVIRONMENT = {
 _DRAWING = ("window", "render", "cockpit")
 """Processes that a run can do without; status 0 means that they have nothing to draw, or nowhere."""
 
-_BEHIND = ("nice", "-n", "10")
-"""For the processes that draw: software would leave no processor time to physics otherwise."""
+_BEHIND = 10
+"""How far the processes that draw stand behind: software would leave no processor time to physics otherwise."""
 
 _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
@@ -49,8 +49,10 @@ Event = tuple[str, str, str]
 class Child:
     """One process of a run and the thread that listens to it."""
 
-    def __init__(self, name: str, command: Sequence[str], events: Queue[Event], env: dict[str, str]) -> None:
-        self.name, self._command, self._events, self._env = name, list(command), events, env
+    def __init__(
+        self, name: str, command: Sequence[str], events: Queue[Event], env: dict[str, str], nice: int = 0
+    ) -> None:
+        self.name, self._command, self._events, self._env, self._nice = name, list(command), events, env, nice
         self.quick_deaths = 0
         self.start()
 
@@ -59,9 +61,15 @@ class Child:
         self.started = time.monotonic()
         self.process = subprocess.Popen(
             self._command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", errors="replace",
-            bufsize=1, env=self._env, preexec_fn=end_with_parent, start_new_session=True,
+            bufsize=1, env=self._env, preexec_fn=self._prepare, start_new_session=True,
         )  # fmt: skip
         threading.Thread(target=self._listen, args=(self.process,), daemon=True).start()
+
+    def _prepare(self) -> None:
+        """In the new process, in its session, before it is the program."""
+        end_with_parent()
+        if self._nice:
+            stand_behind(self._nice)
 
     def _listen(self, process: subprocess.Popen[str]) -> None:
         assert process.stdout is not None
@@ -135,8 +143,8 @@ class Supervisor:
     def _start_drawing(self, name: str, module: str) -> None:
         """Start a process that draws, behind all others; without a ROS master the run is over."""
         if "ros" in self._children or not self._options.ros:
-            command = [*_BEHIND, sys.executable, "-m", module, self._options.to_text()]
-            self._children[name] = Child(name, command, self._events, self._env)
+            command = [sys.executable, "-m", module, self._options.to_text()]
+            self._children[name] = Child(name, command, self._events, self._env, _BEHIND)
 
     def _master_ready(self) -> bool:
         """Whether a ROS master answers, after one was started where there was none."""
