@@ -35,6 +35,9 @@ FINENESS = 1.0 / 32.0
 MOST_TRIANGLES = 20000
 """Triangles beyond which edges are left as long as they are."""
 
+REMEMBERED = 32
+"""Measurements whose deviations can be drawn; older ones keep their figures."""
+
 _deviations: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 """Corners (n, 3, 3) of the coloured triangles and the deviation (n, 3) at each, by the print of what was measured."""
 
@@ -82,6 +85,8 @@ def measure(body: bpy.types.Object) -> Figures:
     kept.volume = figures.volume or 0.0
     kept.measured = collision_print(body)
     _deviations[kept.measured] = corners, skin.deviations(points)[back.reshape(-1)].reshape(-1, 3)
+    while len(_deviations) > REMEMBERED:
+        del _deviations[next(iter(_deviations))]
     return figures
 
 
