@@ -133,14 +133,14 @@ class Instances:
         instances = np.zeros(len(eye), dtype=INSTANCE)
         instances["model_view"] = (view @ self.T_world_piece).swapaxes(1, 2)
         instances["ids"] = self.ids
-        return Seen(inside, depth, depth - self.radii, instances)
+        return Seen(inside, depth, instances)
 
 
 class Seen:
-    """What a frustum holds: a mask over all instances, their depths and nearest points, and their matrices."""
+    """What a frustum holds: a mask over all instances, the depths of their middles, and their matrices."""
 
-    def __init__(self, mask: NDArray[np.bool_], depth: Array, nearest: Array, instances: NDArray[np.void]) -> None:
-        self.mask, self.depth, self.nearest, self.instances = mask, depth, nearest, instances
+    def __init__(self, mask: NDArray[np.bool_], depth: Array, instances: NDArray[np.void]) -> None:
+        self.mask, self.depth, self.instances = mask, depth, instances
 
     def rows(self, batch: Batch) -> NDArray[np.int64]:
         """Rows of the instances of ``batch`` that are seen."""

@@ -94,12 +94,15 @@ class Painter:
         return any(self._brushes.own(batch.shaders) for batch, _ in self._calls)
 
     def paint(self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None) -> None:
-        """Draw ``passes``: the opaque from near to far, then the transparent from far to near."""
+        """Draw ``passes``: the opaque from near to far, then the transparent from far to near.
+
+        Middles tell what is near: a table's nearest point is often nearer than all that lies on it.
+        """
         context, seen = self._context, self._seen
         context.enable_only(moderngl.DEPTH_TEST)
         buffer.use()
         opaque = [(batch, rows) for batch, rows in self._calls if batch.surface.opaque]
-        for batch, rows in sorted(opaque, key=lambda call: float(seen.nearest[call[1]].min())):
+        for batch, rows in sorted(opaque, key=lambda call: float(seen.depth[call[1]].min())):
             self._draw(batch, passes, rows, shaders)
         clear = [(batch, row) for batch, rows in self._calls if not batch.surface.opaque for row in rows]
         if clear and "rgb" in passes:
