@@ -36,6 +36,7 @@ def blender(scripts: Path, corpus: Path) -> Callable[..., str]:
         environment = {
             **os.environ,
             "BLENDER_USER_SCRIPTS": str(scripts),
+            "BLENDER_USER_DATAFILES": str(scripts / "datafiles"),
             "LIGATURE_TEST_PACKAGES": sysconfig.get_paths()["purelib"],
             "LIGATURE_CORPUS": str(corpus),
             "LIGATURE_ROOT": str(ROOT),

@@ -57,6 +57,7 @@ def run_session(script: str, display: str, scripts: Path, tmp_path: Path) -> tup
     environment = {
         **os.environ, "DISPLAY": display, "LIBGL_ALWAYS_SOFTWARE": "1", "BLENDER_USER_SCRIPTS": str(scripts),
         "BLENDER_USER_CONFIG": str(tmp_path / "config"), "PYTHONDONTWRITEBYTECODE": "1",
+        "BLENDER_USER_DATAFILES": str(tmp_path / "datafiles"),  # no decomposition of an earlier run is taken
         "LIGATURE_TEST_PACKAGES": sysconfig.get_paths()["purelib"],
         "LIGATURE_COMMAND": str(Path(sys.executable).parent / "ligature"),
         "PYTHONPATH": str(ROOT / "simulator"), "LIGATURE_ROOT": str(ROOT),

@@ -50,6 +50,7 @@ def test_the_add_on_holds_in_the_blender_module(python: str, scripts: Path, corp
     environment = {
         **{name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
         "BLENDER_USER_SCRIPTS": str(scripts),
+        "BLENDER_USER_DATAFILES": str(scripts / "datafiles"),
         "LIGATURE_CORPUS": str(corpus),
         "LIGATURE_ROOT": str(ROOT),
         "LIGATURE_PYTHON": sys.executable,
