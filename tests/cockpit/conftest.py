@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from ligature.bus import Block
 from ligature.bus.block import FOLDER
+from ligature.bus.process import end_with_parent
 from ligature.cockpit.stage import VIEW_ANGLE, first_view
 from ligature.model.frames import pose7_matrix
 from ligature.model.state import new_state
@@ -55,7 +56,7 @@ class Served:
         command = [str(Path(sys.executable).parent / "ligature"), "cockpit", str(scene), "--at", "127.0.0.1:0"]
         self.process = subprocess.Popen(
             [*command, "-p", "250", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env=dict(os.environ, COLUMNS="200"), cwd=folder,
+            env=dict(os.environ, COLUMNS="200"), cwd=folder, preexec_fn=end_with_parent,
         )  # fmt: skip
         threading.Thread(target=self._read, daemon=True).start()
         try:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ligature.bus.process import end_with_parent
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -34,8 +35,9 @@ class Program:
     def __init__(self, command: Sequence[str], env: dict[str, str]) -> None:
         self.lines: list[str] = []
         self.process = subprocess.Popen(
-            [str(word) for word in command], env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
+            [str(word) for word in command], env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            preexec_fn=end_with_parent,
+        )  # fmt: skip
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
@@ -104,7 +106,7 @@ def start_master(port: int, env: dict[str, str]) -> subprocess.Popen[bytes]:
 
     master = subprocess.Popen(
         ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(port)], env=env,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=end_with_parent,
     )  # fmt: skip
     deadline = time.monotonic() + 20
     while not master_answers(f"http://127.0.0.1:{port}"):
