@@ -140,11 +140,11 @@ class Supervisor:
                     "tasks", [sys.executable, "-m", "ligature.cli.tasks_process", text], self._events, self._env
                 )
 
-    def _start_drawing(self, name: str, module: str) -> None:
-        """Start a process that draws, behind all others; without a ROS master the run is over."""
+    def _start_drawing(self, name: str, module: str, nice: int = _BEHIND) -> None:
+        """Start a process that draws, behind all others unless told; without a ROS master the run is over."""
         if "ros" in self._children or not self._options.ros:
             command = [sys.executable, "-m", module, self._options.to_text()]
-            self._children[name] = Child(name, command, self._events, self._env, _BEHIND)
+            self._children[name] = Child(name, command, self._events, self._env, nice)
 
     def _master_ready(self) -> bool:
         """Whether a ROS master answers, after one was started where there was none."""
@@ -173,7 +173,8 @@ class Supervisor:
             if process == "physics" and self._options.window:
                 self._start_drawing("window", "ligature.cli.window_process")
             if process == "physics" and self._options.cockpit:
-                self._start_drawing("cockpit", "ligature.cli.cockpit_process")
+                # an arm is led from the page, which has its pictures drawn by a process that stands behind
+                self._start_drawing("cockpit", "ligature.cli.cockpit_process", 0)
             if self._options.ros:
                 self._progress.update("connecting to ROS")
             else:

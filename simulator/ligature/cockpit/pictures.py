@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent
+from ligature.bus.process import end_with_parent, stand_behind
 from ligature.model.optics import EYES, stereo_partners
 from ligature.model.scene import Scene
 from ligature.model.state import new_state, state_dtype
@@ -31,8 +31,8 @@ PERIOD = 0.2
 REST = 3.0
 """Seconds of rest for each second of drawing."""
 
-NICE = 5
-"""How far drawing stands behind the rest of the cockpit."""
+NICE = 10
+"""How far drawing stands behind physics and the rest of the cockpit."""
 
 PHYSICS_SILENCE = 5.0
 
@@ -106,7 +106,8 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
     """The process: draws what was asked for last."""
     end_with_parent()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    os.nice(NICE)
+    os.setsid()
+    stand_behind(NICE)
     sight: Sight | None = None
     easel: _Easel | None = None
     while True:
