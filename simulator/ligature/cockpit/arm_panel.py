@@ -68,7 +68,7 @@ class ArmControls:
 
     def __init__(self, client: ClientHandle, status: ArmStatus, state: Any, act: Act) -> None:
         self.facts = status.facts
-        self._act, self._touched = act, 0.0
+        self._act, self._touched, self._astray = act, 0.0, False
         self._ready: bool | None = None
         gui = client.gui
         with status.folder:
@@ -101,12 +101,12 @@ class ArmControls:
         self._act("gizmo", self.facts.index, bool(event.target.value))
 
     async def _on_joint(self, joint: int, value: float) -> None:
-        self._touched = time.monotonic()
+        self._touched, self._astray = time.monotonic(), True
         self._act("joint", self.facts.index, (joint, _inside(self.facts.joints[joint], value)))
 
     async def _on_grip(self, value: float) -> None:
         assert self.facts.grip is not None
-        self._touched = time.monotonic()
+        self._touched, self._astray = time.monotonic(), True
         self._act("grip", self.facts.index, _inside(self.facts.grip, value))
 
     async def _on_drag(self, event: TransformControlsEvent) -> None:
@@ -132,9 +132,10 @@ class ArmControls:
         if not idle or time.monotonic() - self._touched < TOUCHED:
             return
         for slider, joint, value in zip(self._sliders, self.facts.joints, self.facts.setpoints(state), strict=True):
-            _follow(slider, joint, float(value))
+            _follow(slider, joint, float(value), self._astray)
         if self._grip is not None and self.facts.grip is not None:
-            _follow(self._grip, self.facts.grip, self._opening(state))
+            _follow(self._grip, self.facts.grip, self._opening(state), self._astray)
+        self._astray = False
 
     def place_gizmo(self, state: Any) -> None:
         """Take the gizmo to the tip, unless it is dragged."""
@@ -165,8 +166,14 @@ def _slider(gui: Any, joint: JointFacts, value: float) -> Any:
     return gui.add_slider(f"{joint.name.replace('_', ' ')} {joint.unit}", low, high, 0.1, shown)
 
 
-def _follow(slider: Any, joint: JointFacts, value: float) -> None:
+def _follow(slider: Any, joint: JointFacts, value: float, astray: bool) -> None:
+    """Take a slider to a value; one that is ``astray`` also where its copy here has that value already.
+
+    What the browser sends of a drag and what it is sent cross on their way, and it keeps the older of the two.
+    """
     shown = float(np.clip(round(joint.scale * value, 1), slider.min, slider.max))
+    if astray and abs(shown - slider.value) <= 0.05:
+        slider.value = shown + (0.1 if shown < slider.max else -0.1)
     if abs(shown - slider.value) > 0.05:
         slider.value = shown
 
