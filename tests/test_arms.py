@@ -8,10 +8,11 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
-from ligature.model.commands import ArmCommand, BodyCommand, CommandType
+from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import inverse, pose7_matrix, rpy_matrix
 from ligature.model.scene import ArmKind
 from ligature.robots.arm import Arm
+from ligature.robots.commands import MoveJp, ServoJp
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENE = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -294,14 +295,14 @@ def test_a_reset_ends_moves_and_arms_stay_where_it_puts_them(whole: Simulation, 
 
 def test_commands_that_travelled_do_what_calls_do_and_refusals_become_warnings(whole: Simulation, psm: Arm) -> None:
     psm.events.clear()
-    whole.apply(ArmCommand(0, "move_jp", (0.1, 0, 0.12, 0, 0, 0)))
+    whole.apply(MoveJp(0, (0.1, 0, 0.12, 0, 0, 0)))
     assert psm.is_busy
-    whole.apply(ArmCommand(0, "move_jp", (0.1,) * 4))
+    whole.apply(MoveJp(0, (0.1,) * 4))
     told = [(event.name, event.value) for event in psm.events]
     assert ("goal_reached", False) in told
     assert any(name == "warning" and "move_jp takes 6 numbers" in value for name, value in told)
     with pytest.raises(ValueError, match="finite"):
-        whole.apply(ArmCommand(0, "servo_jp", (float("nan"),) * 6))
+        whole.apply(ServoJp(0, (float("nan"),) * 6))
 
 
 def test_a_snapshot_in_the_middle_of_moves_continues_bit_for_bit(whole: Simulation, psm: Arm) -> None:

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
-from ligature.model.commands import ArmCommand
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.scene import ArmDescription, ArmKind, Scene
 from ligature.physics import World
 from ligature.robots import ecm_arm, mtm_arm, psm_arm
 from ligature.robots.arm import Arm
 from ligature.robots.axes import Axes
-from ligature.robots.dispatch import carry_out
+from ligature.robots.commands import ArmCommand
 from ligature.robots.ecm import Ecm
 from ligature.robots.ecm_arm import EcmArm
 from ligature.robots.fitting import (
@@ -75,10 +74,10 @@ class ArmSet(Mapping[str, Arm]):
         """Carry out a command; what the arm refuses becomes its warning."""
         arm = self._arms[command.arm]
         try:
-            carry_out(arm, command)
+            command.carry_out(arm)
         except Refused as error:
             arm.emit("warning", str(error))
-            if "move_" in command.verb:
+            if command.moves:
                 arm.emit("goal_reached", False)
 
     def release(self, index: int) -> None:

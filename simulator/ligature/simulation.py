@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import time as clock
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -21,7 +21,6 @@ from ligature.arms import ArmSet
 from ligature.grasping import Clamps, Grasps, Holder
 from ligature.model.commands import (
     ActuatorCommand,
-    ArmCommand,
     BodyCommand,
     Command,
     CommandType,
@@ -30,13 +29,14 @@ from ligature.model.commands import (
     Release,
     Reset,
     WatchContacts,
-    check,
 )
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
+from ligature.model.messages import Message, handle
 from ligature.model.scene import Body, Camera, Joint, Scene
 from ligature.model.state import MAX_TOUCHES, StateRecord, new_state
 from ligature.physics import World
+from ligature.robots.commands import ArmCommand
 from ligature.sensing.actuators import Actuators
 from ligature.sensing.attachments import Attachments
 from ligature.sensing.contacts import Contacts
@@ -219,6 +219,16 @@ class Simulation:
         self.grasps = Grasps(scene, self._world, self._rods, clamps, lambda: self._actuators.held)
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
+        self._handlers: dict[type[Message], Callable[[Any], None]] = {
+            BodyCommand: self._world.set_command,
+            ActuatorCommand: self._actuate,
+            PlaceCommand: lambda c: self._attachments.place(c.kind, c.index, c.pose),
+            ParentCommand: lambda c: self._attachments.adopt(c.kind, c.index, c.parent),
+            ArmCommand: self.arms.apply,
+            WatchContacts: self._watch,
+            Release: self._release,
+            Reset: lambda c: self.reset(bodies_only=c.bodies_only),
+        }
         self._write_state()
 
     # --- time -------------------------------------------------------------------------------
@@ -270,25 +280,16 @@ class Simulation:
 
     def apply(self, command: Command) -> None:
         """Take a command; it acts from the next tick on. Raises ValueError for numbers that are not finite."""
-        check(command)
-        if isinstance(command, BodyCommand):
-            self._world.set_command(command)
-        elif isinstance(command, ActuatorCommand):
-            problem = self._actuators.apply(command, self.state["body_pose"][0])
-            if problem is not None:
-                self.problems.append(problem)
-        elif isinstance(command, PlaceCommand):
-            self._attachments.place(command.kind, command.index, command.pose)
-        elif isinstance(command, WatchContacts):
-            self._watching = command.enabled
-        elif isinstance(command, ParentCommand):
-            self._attachments.adopt(command.kind, command.index, command.parent)
-        elif isinstance(command, ArmCommand):
-            self.arms.apply(command)
-        elif isinstance(command, Release):
-            self._release(command)
-        elif isinstance(command, Reset):
-            self.reset(bodies_only=command.bodies_only)
+        command.check()
+        handle(self._handlers, command)
+
+    def _actuate(self, command: ActuatorCommand) -> None:
+        problem = self._actuators.apply(command, self.state["body_pose"][0])
+        if problem is not None:
+            self.problems.append(problem)
+
+    def _watch(self, command: WatchContacts) -> None:
+        self._watching = command.enabled
 
     def _release(self, command: Release) -> None:
         if command.kind == "body":
@@ -303,7 +304,7 @@ class Simulation:
 
         Raises ValueError for a link of an arm.
         """
-        check(BodyCommand(body, CommandType.POSITION, tuple(pose)))
+        BodyCommand(body, CommandType.POSITION, tuple(pose)).check()
         before = pose7_matrix(self._world.pose7(body))
         self.grasps.let_go_of(body)
         self._world.set_pose(body, pose)

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 from ligature.bus.record import Excerpt, Header, Moment, Record, RecordError, RecordWriter, is_record
-from ligature.model.commands import ArmCommand, BodyCommand, Command, CommandType, Reset
+from ligature.model.commands import BodyCommand, Command, CommandType, Reset
+from ligature.robots.commands import ServoJp
 
 HEADER = Header('{"scene": "a.yaml"}', "ab" * 32)
 COMMANDS: list[tuple[int, Command]] = [
-    (1, ArmCommand(0, "servo_jp", (0.1, 0.2, 0.3))),
+    (1, ServoJp(0, (0.1, 0.2, 0.3))),
     (1, Reset(True)),
     (7, BodyCommand(3, CommandType.FORCE, (1.0, 0.0, 1e-300, 0.0, 0.0, 0.0))),
 ]
@@ -106,8 +107,8 @@ def test_what_is_no_record_is_told_so(tmp_path: Path, whole: Path) -> None:
     for data, message in (
         (b"", "is no record of a run"),
         (b"#ROSBAG V2.0\nabc", "is no record of a run"),
-        (b'{"format": "ligature record 9", "options": "", "begin": ""}\n', "this version reads 'ligature record 1'"),
-        (b'{"format": "ligature record 1", "begin": ""}\n', "is no record of a run"),
+        (b'{"format": "ligature record 9", "options": "", "begin": ""}\n', "this version reads 'ligature record 2'"),
+        (b'{"format": "ligature record 2", "begin": ""}\n', "is no record of a run"),
         (whole.read_bytes()[:-44] + struct.pack("<QI", 9, 70_000), "no frame of a record"),
         (whole.read_bytes()[:-44] + struct.pack("<QI", 2, 8), "no frame of a record"),
     ):

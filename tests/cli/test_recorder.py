@@ -19,7 +19,8 @@ from ligature.bus.record import Record
 from ligature.cli.options import RunOptions
 from ligature.cli.physics import Loop
 from ligature.cli.replay import replay
-from ligature.model.commands import ArmCommand, Reset
+from ligature.model.commands import Reset
+from ligature.robots.commands import PlaceJp, ServoJp
 from rich.console import Console
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -83,17 +84,17 @@ def again(file: Path) -> tuple[int, str]:
 
 def moved(run: Run) -> None:
     """The arm goes somewhere, the scene is reset, and the arm goes on."""
-    run.push(ArmCommand(0, "servo_jp", (0.12, 0.1, 0.12, 0.0, 0.0, 0.1)))
+    run.push(ServoJp(0, (0.12, 0.1, 0.12, 0.0, 0.0, 0.1)))
     run.updates(20)
     run.push(Reset())
     run.updates(5)
-    run.push(ArmCommand(0, "servo_jp", (0.14, 0.1, 0.12, 0.1, 0.0, 0.1)))
+    run.push(ServoJp(0, (0.14, 0.1, 0.12, 0.1, 0.0, 0.1)))
     run.updates(20)
 
 
 def test_two_parts_of_a_run_are_simulated_again_bit_for_bit(start: Callable[..., Run]) -> None:
     run = start(cockpit="127.0.0.1:0")
-    run.push(ArmCommand(0, "place_jp", HOME))
+    run.push(PlaceJp(0, HOME))
     run.updates(10)
     for name in ("first", "second.record"):
         run.push(Recording(name))
@@ -117,7 +118,7 @@ def test_two_parts_of_a_run_are_simulated_again_bit_for_bit(start: Callable[...,
 
 def test_a_run_that_ends_ends_its_recordings(start: Callable[..., Run]) -> None:
     run = start(record="whole.record")
-    run.push(ArmCommand(0, "place_jp", HOME), Recording("part"))
+    run.push(PlaceJp(0, HOME), Recording("part"))
     run.updates(10)
     run.loop.end()
     part, whole = Record.read(Path("recordings/part.record")), Record.read(Path("whole.record"))
@@ -193,7 +194,7 @@ def test_a_journal_without_room_is_told_when_a_recording_is_asked_for(
     run = start(cockpit="127.0.0.1:0")
     with open("/dev/full", "wb") as full:
         os.dup2(full.fileno(), run.loop._recorder._journal._file.fileno())  # type: ignore[union-attr]
-    run.push(ArmCommand(0, "place_jp", HOME))
+    run.push(PlaceJp(0, HOME))
     run.push(Recording("part"))
     run.hears("nothing is recorded: No space left on device: 'recordings/part.record'")
     run.loop._recorder.flush()

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from ligature.bus.codec import CodecError, LoopCommand, decode, encode
+from ligature.bus.codec import CodecError, decode, encode
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
 
-FORMAT = "ligature record 1"
+FORMAT = "ligature record 2"
 END, BEGIN = 0xFFFFFFFF, 0xFFFFFFFE
 _HEAD = struct.Struct("<QI")
 _HASH_BYTES = 32
@@ -178,7 +178,7 @@ class Record:
                 command = decode(data[at : at + length])
             except CodecError as error:
                 raise RecordError(f"{path}: at byte {at}: {error}") from error
-            if isinstance(command, LoopCommand):
+            if not isinstance(command, Command):
                 raise RecordError(f"{path}: at byte {at}: no command of a record")
             commands.append((update, command))
         raise RecordError(

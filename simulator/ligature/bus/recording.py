@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ligature.model.messages import Message, Text, wire
+
 SUFFIX = ".record"
 MOST_BYTES = 150
 """Of a name: with what is put after it, file systems take it."""
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Message, code=11):
     """Record what happens from now on as the file ``name`` in the folder of recordings; an empty name ends it."""
 
-    name: str
+    name: str = wire(Text())
+
+    def check(self) -> None:  # noqa: D102
+        file_name(self.name)
 
 
 def file_name(text: str) -> str:

@@ -6,17 +6,19 @@ import gc
 import math
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
 import ligature
 from ligature.adf import Severity
 from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Recording, Throttle
-from ligature.bus.codec import Message
 from ligature.bus.process import end_with_parent, stop_on_signal, tell
 from ligature.cli.options import RunOptions
 from ligature.cli.recorder import Recorder
+from ligature.model.commands import Command
+from ligature.model.messages import Message, handle
 from ligature.simulation import Simulation
 
 TICK = 1e-3
@@ -79,6 +81,12 @@ class Loop:
         self._period = self._ticks * TICK
         self._mailbox = Mailbox(simulation.scene, block.rings)
         self._pacer = Pacer(self._period, options.speed)
+        self._handlers: dict[type[Message], Callable[[Any], None]] = {
+            Throttle: self._pacer.throttle,
+            Pace: self._pacer.pace,
+            Recording: self._record,
+            Command: self._simulate,
+        }
         self._start = self._mark = time.monotonic()
         self._durations = np.zeros(WINDOW)
         self._updates = 0
@@ -122,15 +130,14 @@ class Loop:
 
     def _obey(self, messages: Iterable[Message]) -> None:
         for message in messages:
-            if isinstance(message, Throttle):
-                self._pacer.throttle(message)
-            elif isinstance(message, Pace):
-                self._pacer.pace(message)
-            elif isinstance(message, Recording):
-                self._recorder.obey(self._updates + 1, message)
-            else:
-                self._recorder.note(self._updates + 1, message)
-                self._simulation.apply(message)
+            handle(self._handlers, message)
+
+    def _record(self, message: Recording) -> None:
+        self._recorder.obey(self._updates + 1, message)
+
+    def _simulate(self, command: Command) -> None:
+        self._recorder.note(self._updates + 1, command)
+        self._simulation.apply(command)
 
     def _figures(self) -> None:
         """Once a second: rates, times and counts of the loop, and what went wrong."""

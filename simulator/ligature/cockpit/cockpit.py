@@ -30,9 +30,9 @@ from ligature.cockpit.pursuit import ArmPursuits
 from ligature.cockpit.ros_panel import Health, Remote, RosPanel, TeleopControls, obey_teleop
 from ligature.cockpit.simulation_panel import Clockwork, SimulationControls, SimulationPanel
 from ligature.cockpit.stage import Stage, first_view
-from ligature.model.commands import ArmCommand
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import new_state
+from ligature.robots.commands import Hold, StateCommand
 
 PERIOD = 0.01
 STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD = 0.05, 0.2, 0.4
@@ -205,9 +205,9 @@ class Cockpit:
         if word == "command":
             pursuits.stop()
             if value == "Hold":
-                self._outbox.push(ArmCommand(arm, "hold"))
+                self._outbox.push(Hold(arm))
             else:
-                self._outbox.push(ArmCommand(arm, "state_command", (), value.lower()))
+                self._outbox.push(StateCommand(arm, value.lower()))
         elif word == "joint":
             joint, target = value
             pursuits.joint(facts.setpoints(state), joint, target, facts.speed)
@@ -236,7 +236,7 @@ class Cockpit:
         for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
             dragged = arm < len(self._controls) and self._controls[arm].dragging
             if pursuits.stop() or dragged:
-                self._outbox.push(ArmCommand(arm, "hold"))
+                self._outbox.push(Hold(arm))
                 if why and status.note != f"hold: {why}":
                     status.note = f"hold: {why}"
                     self._warn(f"{status.facts.name} holds: {why}")

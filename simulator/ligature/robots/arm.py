@@ -9,7 +9,7 @@ simulated time. A command that is not carried out raises `Refused` and changes n
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,6 +71,9 @@ class Arm(Device):
     kinematics
         Of the arm; the others as for `Device`.
     """
+
+    kind: ClassVar[str]
+    """PSM, ECM or MTM."""
 
     def __init__(self, name: str, kinematics: Kinematics, axes: Axes, home: Array, following_bound: ArrayLike) -> None:
         super().__init__(name, axes, home, following_bound)

@@ -21,7 +21,7 @@ from std_msgs.msg import Empty
 
 from ligature.bus import Outbox, Throttle, Watchdog
 from ligature.bus.codec import CodecError, Message
-from ligature.model.commands import Command, Release, Reset, check
+from ligature.model.commands import Command, Release, Reset
 from ligature.model.scene import Scene
 from ligature.ros import conversion
 from ligature.ros.schedule import Key
@@ -99,7 +99,7 @@ class Reception:
         def take(message: Any) -> None:
             command = self._convert(template, message)
             if command is not None:
-                check(command)
+                command.check()
                 self._push(topic, command)
             self._feed(key, template.kind == "body" and template.ask(*conversion.wishes(message)))
 

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
-from ligature.model.commands import ActuatorCommand, ArmCommand, BodyCommand, Command, CommandType, Release
+from ligature.model.commands import ActuatorCommand, BodyCommand, Command, CommandType, Release
 from ligature.model.frames import frame, matrix_pose7, pose7_matrix, rpy_matrix
 from ligature.model.scene import ArmDescription, ArmKind, Scene
+from ligature.robots.commands import VERBS, Adopt
 from ligature.robots.ecm import SrcCamera
 from ligature.ros.arms.outlet import ArmOutlet
 from ligature.ros.arms.readings import set_pose
@@ -164,8 +165,8 @@ class _Psm:
         """Send a command, after having the arm take it where it stands."""
         record = self._newest()["arm"][self._index]
         if not (record["operating"] == 1 and record["homed"]):
-            self._push(ArmCommand(self._index, "state_command", (), "adopt"))
-        self._push(ArmCommand(self._index, verb, values))
+            self._push(Adopt(self._index))
+        self._push(VERBS[verb](self._index, values))
 
     def jaw(self, value: float) -> None:
         """Both fingers to ``value``, which opens the jaw by twice that; holds what both feel when nearly closed."""

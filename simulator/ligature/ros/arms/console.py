@@ -15,9 +15,9 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Bool, Empty, Float64, Float64MultiArray, String
 
-from ligature.model.commands import ArmCommand
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.scene import ArmKind
+from ligature.robots.commands import ArmCommand, StateCommand
 from ligature.ros.arms.outlet import ArmOutlet
 from ligature.ros.arms.readings import set_pose
 
@@ -82,7 +82,7 @@ class Console:
 
     def _all(self, command: str) -> None:
         for arm in self._arms:
-            self._push(ArmCommand(arm, "state_command", (), command))
+            self._push(StateCommand(arm, command))
 
 
 def _relay(publishers: Sequence[Any]) -> Callable[[Any], None]:

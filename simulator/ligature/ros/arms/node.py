@@ -15,12 +15,12 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from ligature.bus import Block, Outbox
-from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError
 from ligature.bus.events import RUN
-from ligature.model.commands import ArmCommand, Command, check
+from ligature.model.commands import Command
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
+from ligature.robots.commands import ArmCommand
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.ros.arms.challenge import ChallengeFace
 from ligature.ros.arms.commands import listeners
@@ -161,8 +161,7 @@ class ArmsNode:
 
     def push(self, command: Command) -> None:
         """Send a command to the physics; raises ValueError when it may not go there."""
-        check(command)
-        check_bounds(command)
+        command.check()
         self._outbox.push(command)
 
 
