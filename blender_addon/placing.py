@@ -142,7 +142,7 @@ def tidy(values) -> tuple[float, ...]:
 def state_of(obj: bpy.types.Object) -> dict[str, list]:
     """What the object's transform, children and data say, by the group of keys that it decides.
 
-    Compared with the state just after the import it tells which keys keep the file's own text.
+    Compared with the state just after the import it shows which keys keep the file's own text.
     """
     role = obj.adf.role
     state: dict[str, list] = {}

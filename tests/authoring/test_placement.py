@@ -118,7 +118,7 @@ def test_a_view_that_looks_nowhere_has_the_formats_identity() -> None:
     np.testing.assert_array_equal(T[:3, 1], [0.0, 0.0, 1.0])
 
 
-def test_poses_are_told_apart_beyond_single_precision() -> None:
+def test_poses_are_distinguished_beyond_single_precision() -> None:
     A = pose_matrix((1, 2, 3), (0.1, 0.2, 0.3))
     assert same_place(A, A.astype(np.float32).astype(float))
     assert not same_place(A, pose_matrix((1, 2, 3.0001), (0.1, 0.2, 0.3)))

@@ -156,7 +156,7 @@ def test_joints_are_read_by_name_or_index() -> None:
 
 
 @pytest.mark.parametrize("joint", ["elbow", 3, -1])
-def test_a_joint_that_is_not_there_gives_none_and_commands_nothing(joint: Any, caplog: Any) -> None:
+def test_a_joint_that_is_missing_gives_none_and_commands_nothing(joint: Any, caplog: Any) -> None:
     body = body_with_joints()
     assert body.get_joint_pos(joint) is None
     body.set_joint_pos(joint, 1.0)

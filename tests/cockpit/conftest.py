@@ -230,7 +230,7 @@ class Person:
         return found[1:]
 
     def goes(self) -> None:
-        with suppress(Exception):  # a browser that was killed cannot be told to end
+        with suppress(Exception):  # a browser that was killed cannot be asked to end
             self.driver.quit()
 
 

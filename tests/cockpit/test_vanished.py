@@ -106,7 +106,7 @@ def vanish(running: Served, operator: Person, happens: Callable[[list[int]], Non
 
 def test_an_arm_holds_when_the_browser_is_killed_in_a_drag(running: Served, operator: Person) -> None:
     vanish(running, operator, killed, "the operator's browser is gone")
-    with somebody() as next_:  # who looks at the page later is told
+    with somebody() as next_:  # later viewers see it too
         next_.opens(running.url)
         next_.sees("hold: the operator's browser is gone")
 

@@ -63,7 +63,7 @@ def until(condition: Callable[[], Any], what: Any = "", seconds: float = PATIENC
 
 
 def patiently(ask: Callable[[], Any], seconds: float = PATIENCE) -> Any:
-    """What a client tells, although a busy machine keeps its messages waiting for longer than the client does."""
+    """What a client reports, although a busy machine keeps its messages waiting for longer than the client does."""
     deadline = time.monotonic() + seconds
     while True:
         try:
@@ -202,7 +202,7 @@ class Paddle(Driver):
 
 
 def camera_of(arms: dict[str, Any], name: str, listen: Callable[..., Any]) -> Array:
-    """T_base_camera of an arm, from what the set-up joints tell."""
+    """T_base_camera of an arm, as the set-up joints report it."""
     from geometry_msgs.msg import PoseStamped
 
     from tests.ros.crtk import pose7

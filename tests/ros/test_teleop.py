@@ -1,4 +1,4 @@
-"""Teleoperation through ROS only: device nodes that publish the real message types lead the arms of a simulator.
+"""Teleoperation through ROS only: device nodes that publish the real message types drive the arms of a simulator.
 
 Nothing here is measured against the clock; `tests.bench.teleop_suture` and `tests.bench.teleop_latency` measure.
 """
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.ros
 
 CONFIG = """
 camera: ECM
-settings: {scale: 0.5, fastest: 1.0, patience: 2.0, align: false}
+settings: {scale: 0.5, max velocity: 1.0, timeout: 2.0, align: false}
 devices:
   pen: {kind: touch, topic: /arm1/, buttons: {grey: clutch, white: close}}
   paddle: {kind: hydra, paddle: left, buttons: {bumper: clutch}}
@@ -219,7 +219,7 @@ def test_the_pen_switches_to_the_other_arm_without_a_jump(
     status.wait(lambda m: m.data == "following")
 
 
-def test_an_arm_that_two_leaders_claim_holds_and_the_claim_is_told(
+def test_an_arm_that_two_leaders_claim_holds_and_the_claim_is_reported(
     pen: Pen, arms: dict[str, Any], publish: Callable[..., Any], listen: Callable[..., Any]
 ) -> None:
     from std_msgs.msg import String

@@ -93,7 +93,7 @@ def test_an_exact_estimate_has_no_error_and_a_turned_one_the_way_of_its_points(s
     assert score.E_tip == pytest.approx(2 * 0.01 * np.sin(0.05))
 
 
-def test_a_scene_without_holes_is_told_so() -> None:
+def test_a_scene_without_holes_is_reported() -> None:
     scene = ligature.load(SMALL)
     with pytest.raises(MissingBodies, match=r"has 0 pairs of holes Entry1, Exit1, …, not 1"):
         Scenery.of(scene)

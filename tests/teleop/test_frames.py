@@ -22,7 +22,7 @@ def test_two_branches_meet_in_the_world() -> None:
     assert frames.between("ECM", "MTMR") is None
 
 
-def test_arms_told_in_the_camera_need_no_world() -> None:
+def test_arms_reported_in_the_camera_need_no_world() -> None:
     frames = Frames()
     frames.put("ECM", "PSM1_base", T_WORLD_PSM, 1)
     assert frames.between("ECM", "PSM1_base") == pytest.approx(T_WORLD_PSM)

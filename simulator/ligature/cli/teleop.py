@@ -1,4 +1,4 @@
-"""The command ``ligature teleop``: devices lead arms on ROS, whoever runs those."""
+"""The command ``ligature teleop``: devices drive arms on ROS, whoever runs those."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def teleop(
     file: Path, record: Path | None, replay: Path | None, calibrate: str | None, check: bool,
     devices: tuple[int, ...] | None, console: Console,
 ) -> int:  # fmt: skip
-    """Lead until Ctrl-C; returns the exit status."""
+    """Drive until Ctrl-C; returns the exit status."""
     try:
         wanted = _configuration(file, devices)
     except (AdfError, OSError) as error:
@@ -32,7 +32,7 @@ def teleop(
         for leader, arms in wanted.pairs.items():
             waits = "waits, and " if leader in wanted.waiting else ""
             followers = ", ".join(arms) or "the camera alone"
-            console.print(f"{leader} ({wanted.devices[leader].kind}) {waits}leads {followers}", markup=False)
+            console.print(f"{leader} ({wanted.devices[leader].kind}) {waits}drives {followers}", markup=False)
         return 0
     uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if not master_answers(uri):
@@ -71,7 +71,7 @@ def _on_ros(
             recorder = Recorder(files.enter_context(record.open("w", encoding="utf-8"))) if record else None
             node = Teleop(wanted, recorder, Replay(replay) if replay else None)
             pairs = (f"{leader} → {wanted.begins_with(leader) or config.NOBODY}" for leader in wanted.pairs)
-            console.print(f"leading: {', '.join(pairs)}")
+            console.print(f"driving: {', '.join(pairs)}")
             node.run(stop.is_set)
     except (ValueError, OSError, RuntimeError) as error:
         console.print(str(error), style="red", markup=False)

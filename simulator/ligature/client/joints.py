@@ -73,7 +73,7 @@ class JointedObject(BaseObject):
         return len(self._listed.joint_positions)
 
     def is_joint_idx_valid(self, joint_idx: int) -> bool:
-        """Whether there is a joint of that index; tells which there are when not."""
+        """Whether there is a joint of that index; logs the known ones when not."""
         if 0 <= joint_idx < self.get_num_joints():
             return True
         rospy.logwarn(f"{self._name}: no joint {joint_idx}; {self._extent()}")

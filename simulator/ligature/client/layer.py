@@ -28,8 +28,8 @@ class ral:  # noqa: N801 - the name that clients import
     """One view of this process's ROS node: topic names begin with ``namespace``.
 
     A process has one node. The first ``ral`` starts it, with an anonymous name made of ``node_name``; later ones
-    share it. A master that restarts is told about all topics again. Raises ConnectionError when no ROS master answers
-    within `MASTER_PATIENCE`.
+    share it. A master that restarts is informed about all topics again. Raises ConnectionError when no ROS master
+    answers within `MASTER_PATIENCE`.
     """
 
     def __init__(self, node_name: str, namespace: str = "", node: Any = None) -> None:

@@ -16,7 +16,7 @@ KEY = "ligature_operator"
 """Name below which a browser keeps the key of its operator."""
 
 KEY_PATIENCE = 10.0
-"""Seconds that a browser is given to tell its key."""
+"""Seconds in which a browser must report its key."""
 
 Put = Callable[[str, int, Any], None]
 

@@ -21,7 +21,7 @@ LEFT_WIDTH, RIGHT_WIDTH, CAMERA_HEIGHT = 380, 370, 260
 
 
 def serve(address: Address, gate: Gate) -> ViserServer:
-    """A page at ``address`` behind ``gate``; raises `AddressError` when the address cannot be had."""
+    """A page at ``address`` behind ``gate``; raises `AddressError` when the address is unavailable."""
     if address.port:
         check_free(address)
     with guarded(gate), contextlib.redirect_stdout(io.StringIO()):

@@ -32,7 +32,7 @@ REST = 3.0
 """Seconds of rest for each second of drawing."""
 
 NICE = 10
-"""How far drawing stands behind physics and the rest of the cockpit."""
+"""How much lower the scheduling priority of drawing is than that of physics and the rest of the cockpit."""
 
 PHYSICS_SILENCE = 5.0
 

@@ -73,7 +73,7 @@ class DatasetWriter:
     rate
         Samples per simulated second.
     phases
-        Names that `sample` may be told.
+        Names that `sample` takes.
 
     Raises
     ------
@@ -209,7 +209,7 @@ class DatasetWriter:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Tells in one way what may go wrong with a disk, and leaves nothing behind then."""
+        """Reports in one way what may go wrong with a disk, and leaves nothing behind then."""
         try:
             yield
             if self._disk.error is not None:

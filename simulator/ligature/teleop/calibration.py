@@ -23,7 +23,7 @@ AXES = {
 """Directions in the view by the words of an operator."""
 
 SHORTEST = 0.03
-"""Metres that a motion must span to tell a direction."""
+"""Metres that a motion must span to report a direction."""
 
 SQUARE = np.deg2rad(25.0)
 """How far from a right angle two motions of a hand may be."""
@@ -32,7 +32,7 @@ BROKEN = np.full((4, 4), np.nan)
 
 
 class Unclear(ValueError):
-    """Motions that do not tell the axes; the message says what to do."""
+    """Motions that do not show the axes; the message says what to do."""
 
 
 @dataclass(frozen=True, eq=False)

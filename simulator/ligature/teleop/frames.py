@@ -1,6 +1,6 @@
-"""Where the arms' frames stand to each other, from what arms, set-up joints and tf tell. Metres.
+"""Where the arms' frames stand to each other, from what arms, set-up joints and tf report. Metres.
 
-Each frame is known in one parent. What tf tells has preference over the set-up joints, which tell of the same frames.
+Each frame is known in one parent. What tf reports has preference over the set-up joints, which report the same frames.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Frames:
         self._lock = threading.Lock()
 
     def put(self, parent: str, child: str, T_parent_child: Array, rank: int = 0) -> None:
-        """Learn where ``child`` is; what was told with a lower ``rank`` counts more."""
+        """Learn where ``child`` is; what was reported with a lower ``rank`` counts more."""
         if parent == child or not np.isfinite(T_parent_child).all():
             return
         with self._lock:

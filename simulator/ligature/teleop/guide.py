@@ -1,4 +1,4 @@
-"""The guided calibration of a device: three motions and a squeeze tell its axes and its grip. Metres, radians."""
+"""The guided calibration of a device: three motions and a squeeze show its axes and its grip. Metres, radians."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Ear:
         raise Unclear(f"the device said nothing for {PATIENCE:g} s, or no poses; is its driver running?")
 
 
-def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], tell: Callable[[str], None]) -> str:
+def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], show: Callable[[str], None]) -> str:
     """Ask the operator to move a device; returns the YAML lines for its block in the configuration."""
     if name not in config.devices:
         raise Unclear(f"there is no device '{name}'; there are {', '.join(config.devices)}")
@@ -66,5 +66,5 @@ def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], t
     grips = (before.closed, before.opened)
     if opened is not None and closed is not None and abs(opened - closed) > 1e-3:
         grips = (closed, opened)
-    tell(f"Write this into the block of {name}:")
+    show(f"Write this into the block of {name}:")
     return Calibration(axes, before.handle, *grips).text()

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 DEFAULTS = Calibration(axes=axes_of_words("right", "up", "near"))
 OPTIONS: dict[str, Any] = {"unit": 1.0, "force type": "omni_msgs/OmniFeedback"}
-"""``unit``: metres of one unit of the driver's positions, 0.001 for those that tell millimetres."""
+"""``unit``: metres of one unit of the driver's positions, 0.001 for those that report millimetres."""
 
 
 class Adapter(Device):
