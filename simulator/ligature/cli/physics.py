@@ -14,7 +14,8 @@ import ligature
 from ligature.adf import Severity
 from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Recording, Throttle
 from ligature.bus.codec import Message
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.cli.recorder import Recorder
 from ligature.simulation import Simulation
