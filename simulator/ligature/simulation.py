@@ -31,6 +31,8 @@ from ligature.model.commands import (
     Reset,
     WatchContacts,
     check,
+    check_object,
+    objects_of,
 )
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
@@ -202,6 +204,7 @@ class Simulation:
         self.state: StateRecord = new_state(scene)
         self.phases = {name: Stopwatch() for name in PHASES}
         self.problems: list[Diagnostic] = []
+        self._objects = objects_of(scene)
         self._tick = 0
         self._resets = 0
         self._watching = False
@@ -269,8 +272,13 @@ class Simulation:
     # --- commands ---------------------------------------------------------------------------
 
     def apply(self, command: Command) -> None:
-        """Take a command; it acts from the next tick on. Raises ValueError for numbers that are not finite."""
+        """Take a command; it acts from the next tick on.
+
+        Raises ValueError, and changes nothing, for numbers that are not finite or too many, and for an object that the
+        scene does not have. What an arm refuses becomes its warning, what goes wrong in it its FAULT.
+        """
         check(command)
+        check_object(command, self._objects)
         if isinstance(command, BodyCommand):
             self._world.set_command(command)
         elif isinstance(command, ActuatorCommand):

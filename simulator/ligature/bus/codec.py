@@ -7,6 +7,8 @@ import struct
 from ligature.bus.pacing import Pace, Throttle
 from ligature.bus.recording import Recording
 from ligature.model.commands import (
+    MOST_BYTES,
+    MOST_NUMBERS,
     VERBS,
     ActuatorCommand,
     ArmCommand,
@@ -20,8 +22,6 @@ from ligature.model.commands import (
     WatchContacts,
 )
 
-MAX_JOINTS = 64
-MAX_TEXT = 200
 _TYPES = tuple(sorted(CommandType))
 _KINDS = ("body", "camera", "light", "actuator", "sensor", "ghost", "world", "arm")
 
@@ -37,6 +37,15 @@ class CodecError(ValueError):
 
 def encode(message: Message) -> bytes:
     """The bytes of a command; raises `CodecError` when it does not fit."""
+    try:
+        return _encode(message)
+    except CodecError:
+        raise
+    except (struct.error, OverflowError, ValueError) as error:
+        raise CodecError(f"this command does not fit into a message: {error}") from error
+
+
+def _encode(message: Message) -> bytes:
     if isinstance(message, BodyCommand):
         return _body(message)
     if isinstance(message, ActuatorCommand):
@@ -81,8 +90,8 @@ def decode(data: bytes) -> Message:
 
 def _body(message: BodyCommand) -> bytes:
     n, m, t = len(message.target), len(message.joint_values), len(message.joint_types)
-    if max(n, m, t) > MAX_JOINTS:
-        raise CodecError(f"a command has at most {MAX_JOINTS} numbers")
+    if max(n, m, t) > MOST_NUMBERS:
+        raise CodecError(f"a command has at most {MOST_NUMBERS} numbers")
     head = struct.pack("<BiBBBB", 1, message.body, int(message.type), n, m, t)
     return head + struct.pack(
         f"<{n}d{m}d{t}B", *message.target, *message.joint_values, *(int(v) for v in message.joint_types)
@@ -91,8 +100,8 @@ def _body(message: BodyCommand) -> bytes:
 
 def _arm(message: ArmCommand) -> bytes:
     n = len(message.values)
-    if n > MAX_JOINTS:
-        raise CodecError(f"a command has at most {MAX_JOINTS} numbers")
+    if n > MOST_NUMBERS:
+        raise CodecError(f"a command has at most {MOST_NUMBERS} numbers")
     head = struct.pack(f"<BiBB{n}d", 7, message.arm, VERBS.index(message.verb), n, *message.values)
     return head + _texts(message.text)
 
@@ -101,8 +110,8 @@ def _texts(*texts: str) -> bytes:
     data = b""
     for text in texts:
         raw = text.encode("utf-8")
-        if len(raw) > MAX_TEXT:
-            raise CodecError(f"a name has at most {MAX_TEXT} bytes")
+        if len(raw) > MOST_BYTES:
+            raise CodecError(f"a name has at most {MOST_BYTES} bytes")
         data += struct.pack("<B", len(raw)) + raw
     return data
 

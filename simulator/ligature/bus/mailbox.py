@@ -11,11 +11,11 @@ from collections.abc import Mapping
 
 from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError, Message, decode
-from ligature.bus.newest import Newest, object_of
+from ligature.bus.newest import Newest
 from ligature.bus.pacing import Pace, Throttle
 from ligature.bus.recording import Recording, file_name
 from ligature.bus.ring import Ring
-from ligature.model.commands import ParentCommand, Release, check
+from ligature.model.commands import Release, check, check_object, object_of, objects_of
 from ligature.model.scene import Scene
 
 SILENCE = 0.5
@@ -30,13 +30,7 @@ class Mailbox:
 
     def __init__(self, scene: Scene, rings: Mapping[str, Ring]) -> None:
         self._rings = rings
-        self._limits = {
-            "body": len(scene.bodies),
-            "actuator": len(scene.actuators),
-            "camera": len(scene.cameras),
-            "light": len(scene.lights),
-            "arm": len(scene.arms),
-        }
+        self._objects = objects_of(scene)
         self._owned: dict[str, set[tuple[str, int]]] = {name: set() for name in rings}
         self.received = self.coalesced = self.rejected = 0
         self.last_rejection = ""
@@ -51,12 +45,16 @@ class Mailbox:
                     message = decode(data)
                     self._check(message)
                 except (CodecError, ValueError) as error:
-                    self.rejected += 1
-                    self.last_rejection = str(error)
+                    self.reject(error)
                     continue
                 self._put(box, name, message)
             self._bury(box, name, ring)
         return box.messages()
+
+    def reject(self, error: ValueError) -> None:
+        """Count a command that is not carried out."""
+        self.rejected += 1
+        self.last_rejection = str(error)
 
     def _put(self, box: Newest, producer: str, message: Message) -> None:
         owned = self._owned[producer]
@@ -83,8 +81,4 @@ class Mailbox:
         if not isinstance(message, Pace):
             check(message)
         check_bounds(message)
-        item = object_of(message)
-        if item is not None and not 0 <= item[1] < self._limits.get(item[0], 0):
-            raise ValueError(f"there is no {item[0]} number {item[1]}")
-        if isinstance(message, ParentCommand) and not 0 <= (message.parent or 0) < self._limits["body"]:
-            raise ValueError(f"there is no body number {message.parent} to hang a {message.kind} on")
+        check_object(message, self._objects)

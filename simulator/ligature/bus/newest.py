@@ -5,28 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from ligature.bus.codec import Message
-from ligature.model.commands import (
-    STREAMED,
-    ActuatorCommand,
-    ArmCommand,
-    BodyCommand,
-    ParentCommand,
-    PlaceCommand,
-    Release,
-)
-
-
-def object_of(message: Message) -> tuple[str, int] | None:
-    """Kind and index of the object that a command is for; None for events."""
-    if isinstance(message, BodyCommand):
-        return "body", message.body
-    if isinstance(message, ActuatorCommand):
-        return "actuator", message.actuator
-    if isinstance(message, ArmCommand):
-        return "arm", message.arm
-    if isinstance(message, PlaceCommand | ParentCommand | Release):
-        return message.kind, message.index
-    return None
+from ligature.model.commands import STREAMED, ActuatorCommand, ArmCommand, ParentCommand, object_of
 
 
 def _slot(message: Message) -> Hashable | None:

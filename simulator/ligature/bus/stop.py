@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterable
 from types import FrameType
 
-END_TIMEOUT = 1.5
+END_TIMEOUT = 1.2
 """Seconds from the first signal after which the kernel ends a process that has not ended by itself."""
 
 _NAP = 0.02

@@ -130,8 +130,12 @@ class Loop:
             elif isinstance(message, Recording):
                 self._recorder.obey(self._updates + 1, message)
             else:
-                self._recorder.note(self._updates + 1, message)
-                self._simulation.apply(message)
+                try:
+                    self._simulation.apply(message)
+                except ValueError as error:
+                    self._mailbox.reject(error)
+                else:
+                    self._recorder.note(self._updates + 1, message)
 
     def _figures(self) -> None:
         """Once a second: rates, times and counts of the loop, and what went wrong."""

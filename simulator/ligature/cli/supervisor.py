@@ -23,7 +23,7 @@ from ligature.cli import master
 from ligature.cli.options import RunOptions
 
 MASTER_PATIENCE = 15.0
-LAST_TIMEOUT = END_TIMEOUT + 0.4
+LAST_TIMEOUT = 1.8
 """Seconds after a signal at which the supervisor itself ends, should whoever reads its output no longer do so."""
 
 RESTART_PAUSE = 0.3

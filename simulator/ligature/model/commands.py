@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+from ligature.model.scene import Scene
 
 Vector = tuple[float, ...]
 
@@ -126,12 +129,23 @@ Command = BodyCommand | ActuatorCommand | PlaceCommand | ParentCommand | ArmComm
 LARGEST = 1e9
 """Largest magnitude of a number in a command, in SI units."""
 
+MOST_NUMBERS, MOST_BYTES = 64, 200
+"""Most numbers of one kind in a command, and most bytes of each of its texts."""
+
+PLACED = ("camera", "light")
+"""Kinds of objects that a `PlaceCommand` or `ParentCommand` moves."""
+
+RELEASED = ("body", "actuator", "camera", "light", "arm")
+"""Kinds of objects whose commands a `Release` clears."""
+
 _LENGTHS = {CommandType.POSITION: 7, CommandType.VELOCITY: 6, CommandType.FORCE: 6}
 
 
 def check(command: Command) -> None:
     """Raise ValueError, saying what was expected, when a command may not reach the physics."""
     if isinstance(command, BodyCommand):
+        _few("joint commands", command.joint_values)
+        _few("types of joint commands", command.joint_types)
         wanted = _LENGTHS[command.type]
         if len(command.target) != wanted:
             raise ValueError(f"a {command.type.name} command has {wanted} numbers, not {len(command.target)}")
@@ -139,14 +153,69 @@ def check(command: Command) -> None:
         _finite("joint commands", command.joint_values)
         if command.type is CommandType.POSITION:
             _unit(command.target[3:])
-    elif isinstance(command, ActuatorCommand) and command.offset is not None:
-        _pose("the offset", command.offset)
+    elif isinstance(command, ActuatorCommand):
+        _short("the name of a body", command.body)
+        _short("the name of a sensor", command.sensor or "")
+        if command.offset is not None:
+            _pose("the offset", command.offset)
     elif isinstance(command, PlaceCommand) and command.pose is not None:
         _pose("the pose", command.pose)
     elif isinstance(command, ArmCommand):
         if command.verb not in VERBS:
-            raise ValueError(f"arms know no '{command.verb}'; they know {', '.join(VERBS)}")
+            raise ValueError(f"arms know no '{command.verb[:40]}'; they know {', '.join(VERBS)}")
+        _few(command.verb, command.values)
+        _short(f"the text of {command.verb}", command.text)
         _finite(command.verb, command.values)
+
+
+def objects_of(scene: Scene) -> dict[str, int]:
+    """How many objects of each kind that can be commanded a scene has."""
+    return {
+        "body": len(scene.bodies),
+        "actuator": len(scene.actuators),
+        "camera": len(scene.cameras),
+        "light": len(scene.lights),
+        "arm": len(scene.arms),
+    }
+
+
+def object_of(command: object) -> tuple[str, int] | None:
+    """Kind and index of the object that a command is for; None for events."""
+    if isinstance(command, BodyCommand):
+        return "body", command.body
+    if isinstance(command, ActuatorCommand):
+        return "actuator", command.actuator
+    if isinstance(command, ArmCommand):
+        return "arm", command.arm
+    if isinstance(command, PlaceCommand | ParentCommand | Release):
+        return command.kind, command.index
+    return None
+
+
+def check_object(command: object, objects: Mapping[str, int]) -> None:
+    """Raise ValueError when a command is for an object that is not among ``objects``, as from `objects_of`."""
+    item = object_of(command)
+    if item is None:
+        return
+    kind, index = item
+    known = PLACED if isinstance(command, PlaceCommand | ParentCommand) else RELEASED
+    if kind not in known:
+        raise ValueError(f"a '{kind[:40]}' takes no {type(command).__name__}; {', '.join(known)} do")
+    if not 0 <= index < objects[kind]:
+        raise ValueError(f"there is no {kind} number {index}")
+    if isinstance(command, ParentCommand) and not 0 <= (command.parent or 0) < objects["body"]:
+        raise ValueError(f"there is no body number {command.parent} to hang a {kind} on")
+
+
+def _few(what: str, values: tuple[object, ...]) -> None:
+    if len(values) > MOST_NUMBERS:
+        raise ValueError(f"{what} takes at most {MOST_NUMBERS} numbers, not {len(values)}")
+
+
+def _short(what: str, text: str) -> None:
+    size = len(text) if len(text) > MOST_BYTES else len(text.encode("utf-8"))
+    if size > MOST_BYTES:
+        raise ValueError(f"{what} has at most {MOST_BYTES} bytes, not {size}")
 
 
 def _pose(what: str, values: Vector) -> None:
