@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import enum
 import random
+import re
 import sys
 import time
 import typing
@@ -30,6 +31,7 @@ from ligature.bus.pacing import Pace, Pacer, Throttle
 from ligature.bus.ring import RING_BYTES, Ring
 from ligature.model import commands as table
 from ligature.model.scene import Scene
+from ligature.robots.arm import Arm
 from ligature.robots.ecm import ENDOSCOPES
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.robots.operating_state import TRANSITIONS, State
@@ -37,26 +39,36 @@ from ligature.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = (
-    "scenes/suturing_small/launch.yaml", "scenes/suturing/launch.yaml", "scenes/peg_transfer/launch.yaml",
+    "scenes/peg_transfer/launch.yaml", "scenes/suturing_small/launch.yaml", "scenes/peg_transfer/launch.yaml",
+    "scenes/needle_pick/launch.yaml", "scenes/suturing/launch.yaml",
 )  # fmt: skip
 
 KINDS = tuple(typing.get_args(table.Command)) + tuple(typing.get_args(LoopCommand))
+_HINTS = {kind: typing.get_type_hints(kind) for kind in KINDS}
 NUMBERS = (
     0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-200, 1e-15, 1e-5, -1e-5, 0.01, 0.5, 1.0, -1.0, 3.141592653589793, -3.2, 7.0,
     100.0, -1e3, 1e4, 1e6, -1e6, 1e9, -1e9, 1e12, 1e100, 1.7e308, -1.7e308, float("inf"), float("-inf"), float("nan"),
 )  # fmt: skip
 INTEGERS = (-1, -2, 255, 256, 2**31 - 1, 2**31, -(2**31) - 1, 2**40, 10**400)
-BATCH = 24
+BATCH = 120
 """Most commands between two steps."""
 
-TICKS = 4
+TICKS = 3
 """Most ticks of a step."""
+
+POWER_UP = 250
+"""Ticks in which an arm powers up and begins to move; threads make so many too slow."""
 
 LAST = 40
 """Commands that are shown with a failure."""
 
+MADE = "a fault that the test made"
+
 HUGE = 10_000_000
 """Characters of the longest texts."""
+
+
+_NUMBER = re.compile(r"[\d.e+-]+")
 
 
 class Failure(AssertionError):
@@ -92,7 +104,7 @@ class Generator:
     def command(self) -> tuple[Message, tuple[Any, ...]]:
         """A command, and the key under which `accepted` remembers its form."""
         kind = self._rng.choices(KINDS, weights=[30 if k is table.ArmCommand else 4 for k in KINDS])[0]
-        hints = typing.get_type_hints(kind)
+        hints = _HINTS[kind]
         values: dict[str, Any] = {}
         for field in fields(kind):
             key = (kind.__name__, values.get("verb"), values.get("type"), self._kind_of(values), field.name)
@@ -193,10 +205,10 @@ class Run:
         self._ring = Ring(memoryview(bytearray(RING_BYTES)))
         self._outbox, self._mailbox = Outbox(self._ring), Mailbox(scene, {"test": self._ring})
         self._pacer = Pacer(1e-3)
-        self._log, self._last = EventLog(memoryview(bytearray(LOG_BYTES))), deque[str](maxlen=LAST)
+        self._log, self._last = EventLog(memoryview(bytearray(LOG_BYTES))), deque[tuple[bool, Message]](maxlen=LAST)
         self.sent = self.taken = 0
         self.seen: Counter[tuple[str, str, str]] = Counter()
-        self.faults: Counter[str] = Counter()
+        self.faults, self.refusals = Counter[str](), Counter[str]()
         self._finite = _floats(self.simulation.state)
 
     def go(self, commands: int) -> None:
@@ -206,26 +218,41 @@ class Run:
             try:
                 self._burst(min(self.rng.randrange(1, BATCH), end - self.sent))
             except Exception as error:
-                shown = "\n".join(self._last)
+                shown = "\n".join(_shown(*sent) for sent in self._last)
                 raise Failure(f"seed {self.seed}, after {self.sent} commands: {error!r}; the last:\n{shown}") from error
 
+    def _prepare(self, arm: Arm, state: State) -> None:
+        """Bring an arm into an operating state: what it refuses is refused there."""
+        if state is State.FAULT:
+            arm.fault(MADE)
+            return
+        arm.disable()
+        if state is not State.DISABLED:
+            arm.adopt()
+        if state is State.PAUSED:
+            arm.pause()
+        if state is State.ENABLED and self.rng.random() < 0.3:
+            arm.unhome()
+
     def _burst(self, count: int) -> None:
+        for arm in self.simulation.arms.values():
+            if self.rng.random() < 0.3:
+                self._prepare(arm, self.rng.choice((State.ENABLED, State.ENABLED, *State)))
         through_bus = self.rng.random() < 0.5
         for _ in range(count):
             self._send(*self._generator.command(), through_bus)
         if through_bus:
             for message in self._mailbox.take():
                 self._obey(message)
-        if self.rng.random() < 0.02 and len(self.simulation.arms):
-            self.rng.choice(list(self.simulation.arms.values())).fault("a fault that the test made")
         if self.rng.random() < 0.002:
             self.simulation.restore(self.simulation.snapshot())
-        self.simulation.step(self.rng.randrange(1, TICKS + 1))
+        long = not self.scene.rods and self.rng.random() < 0.03
+        self.simulation.step(POWER_UP if long else self.rng.randrange(1, TICKS + 1))
         self._check()
 
     def _send(self, message: Message, key: tuple[Any, ...], through_bus: bool) -> None:
         self.sent += 1
-        self._last.append(f"{'bus ' if through_bus else ''}{repr(message)[:300]}")
+        self._last.append((through_bus, message))
         if isinstance(message, table.ArmCommand) and 0 <= message.arm < len(self.scene.arms):
             arm = self.simulation.arms[self.scene.arms[message.arm].name]
             self.seen[self.scene.arms[message.arm].kind.name, message.verb[:40], arm.operating_state.state.name] += 1
@@ -264,7 +291,9 @@ class Run:
         for arm, name, value in self.simulation.arms.events():
             self._log.write(arm, name, value)
             if name == "error":
-                self.faults[str(value).partition(": ")[2][:60]] += 1
+                self.faults[str(value).partition(": ")[2][:60]] += MADE not in value
+            elif name == "warning":
+                self.refusals[_NUMBER.sub("0", str(value))[:60]] += 1
         for event in self._log.read():
             assert 0 <= event.arm < len(self.scene.arms)
         assert self._log.lost == 0
@@ -272,6 +301,16 @@ class Run:
             assert len(str(problem)) < 2000, "a problem repeats what it is about"
         assert len(self.simulation.problems) < 1000
         self.simulation.problems.clear()
+
+
+def _shown(through_bus: bool, message: Message) -> str:
+    """A command as a line: long texts and vectors are cut."""
+    parts = []
+    for field in fields(message):
+        value = getattr(message, field.name)
+        cut = value[:100] if isinstance(value, str) else value
+        parts.append(f"{field.name}={repr(cut)[:300]}")
+    return f"{'bus ' if through_bus else ''}{type(message).__name__}({', '.join(parts)})"
 
 
 def _floats(state: np.ndarray) -> list[tuple[str, np.ndarray]]:
@@ -304,7 +343,7 @@ def main() -> int:
     flags.add_argument("--scene", action="append", help="instead of ours; may be repeated")
     given = flags.parse_args()
     scenes = [ligature.load(ROOT / scene) for scene in given.scene or SCENES]
-    seen, faults, failures = Counter[tuple[str, str, str]](), Counter[str](), 0
+    seen, faults, refusals, failures = Counter[tuple[str, str, str]](), Counter[str](), Counter[str](), 0
     begin, sent, taken, seed = time.monotonic(), 0, 0, given.seed
     while sent < given.commands:
         run = Run(scenes[seed % len(scenes)], seed)
@@ -317,12 +356,14 @@ def main() -> int:
         sent, taken, seed = sent + run.sent, taken + run.taken, seed + 1
         seen.update(run.seen)
         faults.update(run.faults)
+        refusals.update(run.refusals)
         sys.stdout.write(f"{sent} commands after {time.monotonic() - begin:.0f} s\n")
         sys.stdout.flush()
         if failures > 20:
             break
-    for text, count in faults.most_common(12):
-        sys.stdout.write(f"  {count} × FAULT: {text}\n")
+    for what, counts in (("FAULT", faults), ("refused", refusals)):
+        for text, count in counts.most_common(30):
+            sys.stdout.write(f"  {count} × {what}: {text!r}\n")
     absent = missing(seen, {arm.kind.name for scene in scenes for arm in scene.arms})
     sys.stdout.write(
         f"{sent} commands, {taken} of them taken, in {time.monotonic() - begin:.0f} s; {failures} failures;"

@@ -109,7 +109,7 @@ def _arm(message: ArmCommand) -> bytes:
 def _texts(*texts: str) -> bytes:
     data = b""
     for text in texts:
-        raw = text.encode("utf-8")
+        raw = text[: MOST_BYTES + 1].encode("utf-8")  # a character takes at least one byte
         if len(raw) > MOST_BYTES:
             raise CodecError(f"a name has at most {MOST_BYTES} bytes")
         data += struct.pack("<B", len(raw)) + raw

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from ruckig import InputParameter, Result, Ruckig, Trajectory
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from ligature.robots.operating_state import Refused
 
@@ -42,7 +42,10 @@ class JointTrajectory:
         request.max_velocity, request.max_acceleration = fastest.tolist(), hardest.tolist()
         request.max_jerk = [float("inf")] * n
         self._trajectory = Trajectory(n)
-        result = Ruckig(n).calculate(request, self._trajectory)
+        try:
+            result = Ruckig(n).calculate(request, self._trajectory)
+        except RuckigError:  # numbers so small or so large that its own arithmetic does not hold
+            result = Result.Error
         if result not in (Result.Working, Result.Finished):
             raise Refused(
                 f"there is no trajectory within {LONGEST:g} s from {np.round(position, 4).tolist()} to"
