@@ -44,12 +44,12 @@ class JointTrajectory:
         self._trajectory = Trajectory(n)
         try:
             result = Ruckig(n).calculate(request, self._trajectory)
-        except RuckigError:  # numbers so small or so large that its own arithmetic does not hold
+        except (RuckigError, ValueError):  # arithmetic that fails; a result that its Python enumeration lacks
             result = Result.Error
         if result not in (Result.Working, Result.Finished):
             raise Refused(
-                f"there is no trajectory within {LONGEST:g} s from {np.round(position, 4).tolist()} to"
-                f" {np.round(goal, 4).tolist()} ({result.name}); raise 'trajectory_j/set_ratio'"
+                f"ruckig finds no trajectory within {LONGEST:g} s from {np.round(position, 4).tolist()} to"
+                f" {np.round(goal, 4).tolist()}; raise 'trajectory_j/set_ratio'"
             )
         self.goal = goal
 
