@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterable
 from types import FrameType
 
-END_TIMEOUT = 1.2
+END_TIMEOUT = 1.0
 """Seconds from the first signal after which the kernel ends a process that has not ended by itself."""
 
 _NAP = 0.02
@@ -42,6 +42,12 @@ class Stop:
         while not self._set and time.monotonic() < deadline:
             time.sleep(min(_NAP, max(deadline - time.monotonic(), 0.0)))
         return self._set
+
+    def disarm(self) -> None:
+        """All that could wait for something is done: the interpreter may end in its own time."""
+        if self._timeout is not None:
+            self._timeout = None
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         """The handler: takes no lock, allocates nothing that others wait for, and may interrupt itself."""

@@ -243,6 +243,7 @@ class Supervisor:
             child.end(deadline - time.monotonic())
         remove(self._options.bus)
         self._say("ended")
+        self._signalled.disarm()
 
     def _say(self, text: str) -> None:
         self._console.print(text)
