@@ -43,12 +43,6 @@ class Stop:
             time.sleep(min(_NAP, max(deadline - time.monotonic(), 0.0)))
         return self._set
 
-    def disarm(self) -> None:
-        """All that could wait for something is done: the interpreter may end in its own time."""
-        if self._timeout is not None:
-            self._timeout = None
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-
     def _handle(self, number: int, frame: FrameType | None) -> None:
         """The handler: takes no lock, allocates nothing that others wait for, and may interrupt itself."""
         if not self._set:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from queue import Empty, Queue
+from typing import NoReturn
 
 from rich.console import Console
 from rich.markup import escape
@@ -45,6 +46,18 @@ _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "di
 
 Event = tuple[str, str, str]
 """Process, event, text."""
+
+
+def supervise(options: RunOptions) -> NoReturn:
+    """Run from start to end, then leave with the exit status.
+
+    Everything that the run had is gone by then. The interpreter would take apart what the simulator's modules hold,
+    which takes a second on a busy machine.
+    """
+    status = Supervisor(options).run()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
 
 
 class Child:
@@ -243,7 +256,6 @@ class Supervisor:
             child.end(deadline - time.monotonic())
         remove(self._options.bus)
         self._say("ended")
-        self._signalled.disarm()
 
     def _say(self, text: str) -> None:
         self._console.print(text)
