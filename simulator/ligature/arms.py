@@ -5,7 +5,7 @@ World axes, metres, radians.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,7 @@ class ArmSet(Mapping[str, Arm]):
         return len(self._arms)
 
     def apply(self, command: ArmCommand) -> None:
-        """Carry out a command; what the arm refuses becomes its warning."""
+        """Carry out a command; what the arm refuses becomes its warning, whatever else it raises its FAULT."""
         arm = self._arms[command.arm]
         try:
             command.carry_out(arm)
@@ -79,26 +79,35 @@ class ArmSet(Mapping[str, Arm]):
             arm.emit("warning", str(error))
             if command.moves:
                 arm.emit("goal_reached", False)
+        except Exception as error:  # no command ends a run
+            arm.fault(f"{command.verb} failed: {_words(error)}")
+
+    def _guarded(self, what: str, arm: Arm, act: Callable[..., None], *arguments: Any) -> None:
+        """Have an arm do something; whatever it raises becomes its FAULT, and the other arms go on."""
+        try:
+            act(*arguments)
+        except Exception as error:
+            arm.fault(f"{what} failed: {_words(error)}")
 
     def release(self, index: int) -> None:
         """Whoever commanded an arm is gone: it stays where it is."""
         arm = self._arms[index]
         if arm.is_enabled and arm.is_homed:
-            arm.hold()
+            self._guarded("hold", arm, arm.hold)
 
     def tick(self, dt: float) -> None:
         """Advance all arms by ``dt`` seconds."""
         self._ticks += 1
         for arm in self._arms:
-            arm.tick(dt)
+            self._guarded("the motion", arm, arm.tick, dt)
         if self._ticks % WATCH_PERIOD == 0:
             for arm in self._arms:
-                arm.watch(WATCH_PERIOD * dt)
+                self._guarded("the watch over following errors", arm, arm.watch, WATCH_PERIOD * dt)
 
     def write(self, records: NDArray[np.void]) -> None:
         """Write the state of all arms, ``records`` (arms,)."""
-        for arm_record, record in zip(self._records, records, strict=True):
-            arm_record.write(record)
+        for arm, arm_record, record in zip(self._arms, self._records, records, strict=True):
+            self._guarded("the reading", arm, arm_record.write, record)
 
     def events(self) -> list[tuple[int, str, Any]]:
         """What happened since the last call: number of the arm, name and value."""
@@ -111,7 +120,7 @@ class ArmSet(Mapping[str, Arm]):
     def reset(self) -> None:
         """The scene was put back to its start: moves end, and arms hold where they are now."""
         for arm in self._arms:
-            arm.settle()
+            self._guarded("the reset", arm, arm.settle)
 
     def memory(self) -> list[dict[str, Any]]:
         """For snapshots."""
@@ -122,6 +131,11 @@ class ArmSet(Mapping[str, Arm]):
         self._ticks = memory[0]["ticks"]
         for arm, kept in zip(self._arms, memory[1:], strict=True):
             arm.recall(kept)
+
+
+def _words(error: Exception) -> str:
+    """What an exception says, and of which kind it is unless the arm itself raised it."""
+    return str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
 
 
 # --- building -------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ from ligature.model.commands import (
     Release,
     Reset,
     WatchContacts,
+    object_counts,
 )
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
@@ -202,6 +203,7 @@ class Simulation:
         self.state: StateRecord = new_state(scene)
         self.phases = {name: Stopwatch() for name in PHASES}
         self.problems: list[Diagnostic] = []
+        self._counts = object_counts(scene)
         self._tick = 0
         self._resets = 0
         self._watching = False
@@ -279,8 +281,13 @@ class Simulation:
     # --- commands ---------------------------------------------------------------------------
 
     def apply(self, command: Command) -> None:
-        """Take a command; it acts from the next tick on. Raises ValueError for numbers that are not finite."""
+        """Take a command; it acts from the next tick on.
+
+        Raises ValueError, and changes nothing, for invalid values, and for an object that the scene does not have.
+        What an arm rejects becomes its warning, what goes wrong in it its FAULT.
+        """
         command.check()
+        command.check_indices(self._counts)
         handle(self._handlers, command)
 
     def _actuate(self, command: ActuatorCommand) -> None:

@@ -17,8 +17,10 @@ def encode(message: Message) -> bytes:
         return bytes([message.code]) + b"".join(
             field.pack(getattr(message, name)) for name, _, field in message.fields()
         )
-    except struct.error as error:
-        raise CodecError(f"{type(message).__name__}: {error}") from error
+    except CodecError:
+        raise
+    except (struct.error, OverflowError, ValueError) as error:
+        raise CodecError(f"{type(message).__name__} does not fit into a message: {error}") from error
 
 
 def decode(data: bytes) -> Message:

@@ -13,7 +13,7 @@ from ligature.bus.codec import CodecError, Message, decode
 from ligature.bus.newest import Newest
 from ligature.bus.pacing import WORLD, Throttle
 from ligature.bus.ring import Ring
-from ligature.model.commands import Release
+from ligature.model.commands import Release, object_counts
 from ligature.model.scene import Scene
 
 SILENCE = 0.5
@@ -25,14 +25,7 @@ class Mailbox:
 
     def __init__(self, scene: Scene, rings: Mapping[str, Ring]) -> None:
         self._rings = rings
-        self._counts = {
-            "world": 1,
-            "body": len(scene.bodies),
-            "actuator": len(scene.actuators),
-            "camera": len(scene.cameras),
-            "light": len(scene.lights),
-            "arm": len(scene.arms),
-        }
+        self._counts = {**object_counts(scene), WORLD[0]: 1}
         self._owned: dict[str, set[tuple[str, int]]] = {name: set() for name in rings}
         self.received = self.coalesced = self.rejected = 0
         self.last_rejection = ""
@@ -48,12 +41,16 @@ class Mailbox:
                     message.check()
                     message.check_indices(self._counts)
                 except (CodecError, ValueError) as error:
-                    self.rejected += 1
-                    self.last_rejection = str(error)
+                    self.reject(error)
                     continue
                 self._put(box, name, message)
             self._bury(box, name, ring)
         return box.messages()
+
+    def reject(self, error: ValueError) -> None:
+        """Count a command that is not carried out."""
+        self.rejected += 1
+        self.last_rejection = str(error)
 
     def _put(self, box: Newest, producer: str, message: Message) -> None:
         owned = self._owned[producer]

@@ -1,4 +1,4 @@
-"""What every process of a run does: end with its parent, end on a signal, tell its parent how it is.
+"""What every process of a run does: end with its parent, tell its parent how it is.
 
 A process tells by lines on standard output: ``@event text``; everything else is a log line.
 """
@@ -9,7 +9,6 @@ import ctypes
 import os
 import signal
 import sys
-import threading
 import time
 
 _GROUP_TRIES, _GROUP_PAUSE = 4, 0.11
@@ -48,14 +47,6 @@ def stand_behind(nice: int) -> None:
             time.sleep(_GROUP_PAUSE)
         except OSError:  # a kernel without such groups
             return
-
-
-def stop_on_signal() -> threading.Event:
-    """An event that SIGTERM sets; SIGINT is left to the parent, which the terminal also tells."""
-    stop = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: stop.set())
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return stop
 
 
 def tell(event: str, text: str = "") -> None:

@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
-from ligature.cli.supervisor import Supervisor
+from ligature.cli.supervisor import supervise
 
 FASTEST = 1000.0
 """Updates per second of one tick each: no update can be shorter."""
@@ -89,7 +89,7 @@ def options_of(arguments: list[str]) -> RunOptions:
 
 def main() -> None:
     """Entry point of the command."""
-    sys.exit(Supervisor(options_of(sys.argv[1:])).run())
+    supervise(options_of(sys.argv[1:]))
 
 
 def _switch(text: str) -> bool:

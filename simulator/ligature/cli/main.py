@@ -14,7 +14,7 @@ from ligature.cli.bench import bench as run_bench
 from ligature.cli.check import check as run_check
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
 from ligature.cli.poses import poses as run_poses
-from ligature.cli.supervisor import Supervisor
+from ligature.cli.supervisor import supervise
 
 app = typer.Typer(
     add_completion=False,
@@ -109,7 +109,7 @@ def run(
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
         devices=indices(devices) or (),
     )  # fmt: skip
-    raise typer.Exit(Supervisor(options).run())
+    supervise(options)
 
 
 def _served_at(text: str | None) -> str:
@@ -138,7 +138,7 @@ def cockpit(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
         cockpit=_served_at(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
     )  # fmt: skip
-    raise typer.Exit(Supervisor(options).run())
+    supervise(options)
 
 
 @app.command()

@@ -14,7 +14,8 @@ import numpy as np
 import ligature
 from ligature.adf import Severity
 from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Recording, Throttle
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.cli.recorder import Recorder
 from ligature.model.commands import Command
@@ -136,8 +137,12 @@ class Loop:
         self._recorder.obey(self._updates + 1, message)
 
     def _simulate(self, command: Command) -> None:
-        self._recorder.note(self._updates + 1, command)
-        self._simulation.apply(command)
+        try:
+            self._simulation.apply(command)
+        except ValueError as error:
+            self._mailbox.reject(error)
+        else:
+            self._recorder.note(self._updates + 1, command)
 
     def _figures(self) -> None:
         """Once a second: rates, times and counts of the loop, and what went wrong."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ligature.bus.process import end_with_parent
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m|\[[0-9.]+\]: |\[ ?(INFO|WARN|ERROR)\] ")
@@ -84,9 +85,7 @@ def _commanded() -> list[str]:
 
 def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
     """What the recorder said, and its status; a signal to this program or the end of time has it end well."""
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, _: stopped.append(number))
+    stop = stop_on_signal((signal.SIGINT, signal.SIGTERM), timeout=None)
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         start_new_session=True, preexec_fn=end_with_parent,
@@ -95,7 +94,7 @@ def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
     deadline = time.monotonic() + seconds if seconds > 0 else float("inf")
     asked = False
     while True:
-        if not asked and (stopped or time.monotonic() > deadline):
+        if not asked and (stop.is_set() or time.monotonic() > deadline):
             process.send_signal(signal.SIGINT)
             deadline, asked = time.monotonic() + END_PATIENCE, True
         elif asked and time.monotonic() > deadline:

@@ -13,7 +13,8 @@ import numpy as np
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.joining import SCENE_PATIENCE
 from ligature.cli.options import RunOptions
 from ligature.model.optics import stereo_partners

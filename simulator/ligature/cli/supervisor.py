@@ -12,18 +12,20 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from queue import Empty, Queue
+from typing import NoReturn
 
 from rich.console import Console
 from rich.markup import escape
 
 from ligature.bus.block import remove, remove_leftovers
 from ligature.bus.process import end_with_parent, stand_behind
+from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
 from ligature.cli import master
 from ligature.cli.options import RunOptions
 
 MASTER_PATIENCE = 15.0
-END_PATIENCE = 1.5
-"""Seconds that processes are given to end before they are killed."""
+LAST_TIMEOUT = 1.8
+"""Seconds after a signal at which the supervisor itself ends, should whoever reads its output no longer do so."""
 
 RESTART_PAUSE = 0.3
 QUICK_DEATH, MAX_QUICK_DEATHS = 5.0, 5
@@ -44,6 +46,18 @@ _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "di
 
 Event = tuple[str, str, str]
 """Process, event, text."""
+
+
+def supervise(options: RunOptions) -> NoReturn:
+    """Run from start to end, then leave with the exit status.
+
+    Everything that the run had is gone by then. The interpreter would take apart what the simulator's modules hold,
+    which takes a second on a busy machine.
+    """
+    status = Supervisor(options).run()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
 
 
 class Child:
@@ -103,17 +117,17 @@ class Supervisor:
         self._events: Queue[Event] = Queue()
         self._children: dict[str, Child] = {}
         self._begin = time.monotonic()
-        self._published = self._stop = False
+        self._published = self._over = False
+        self._signalled = Stop(None)
         self._status = 0
         self._env = dict(os.environ, **_ENVIRONMENT)
 
     def run(self) -> int:
         """Run until Ctrl-C, a signal, or the end of the physics process."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: setattr(self, "_stop", True))
+        self._signalled = stop_on_signal((signal.SIGINT, signal.SIGTERM), LAST_TIMEOUT)
         try:
             self._start()
-            while not self._stop:
+            while not self._stopping:
                 try:
                     self._handle(*self._events.get(timeout=0.1))
                 except Empty:
@@ -121,6 +135,11 @@ class Supervisor:
         finally:
             self._end_all()
         return self._status
+
+    @property
+    def _stopping(self) -> bool:
+        """Whether the run is over, by a signal or by itself."""
+        return self._over or self._signalled.is_set()
 
     def _start(self) -> None:
         self._say(f"loading [bold]{escape(self._options.scene)}[/bold]")
@@ -159,11 +178,11 @@ class Supervisor:
         self._say(f"no ROS master answers at {uri}: starting one")
         child = self._children["master"] = Child("master", master.command(uri), self._events, self._env)
         deadline = time.monotonic() + MASTER_PATIENCE
-        while time.monotonic() < deadline and not self._stop and child.process.poll() is None:
+        while time.monotonic() < deadline and not self._stopping and child.process.poll() is None:
             if master.master_answers(uri):
                 return True
             time.sleep(0.05)
-        if not self._stop:
+        if not self._stopping:
             self._fail(f"the ROS master that was started for {uri} does not answer; start 'roscore' and try again")
         return False
 
@@ -198,7 +217,7 @@ class Supervisor:
             self._console.print(f"{process}: {text}", style="dim", markup=False)
 
     def _ended(self, process: str, status: int) -> None:
-        if self._stop:
+        if self._stopping:
             return
         child = self._children[process]
         if process == "physics":
@@ -223,12 +242,12 @@ class Supervisor:
     def _fail(self, text: str) -> None:
         self._console.print(text, style="red", markup=False)
         self._status = self._status or 1
-        self._stop = True
+        self._over = True
 
     def _end_all(self) -> None:
-        self._stop = True
+        self._over = True
         self._progress.stop()
-        deadline = time.monotonic() + END_PATIENCE
+        deadline = time.monotonic() + END_TIMEOUT
         order = [self._children[n] for n in (*_DRAWING, "tasks", "ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
             if child.process.poll() is None:

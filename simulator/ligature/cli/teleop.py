@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from contextlib import ExitStack
 from pathlib import Path
 
 from rich.console import Console
 
 from ligature.adf.diagnostics import AdfError
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
@@ -58,15 +58,13 @@ def _on_ros(
     from ligature.teleop.node import Teleop, begin_node
     from ligature.teleop.record import Recorder, Replay
 
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     begin_node()
     try:
         if calibrate is not None:
             block = calibration_of(wanted, calibrate, console.input, console.print)
             console.print(block, markup=False, end="")
             return 0
+        stop = stop_on_signal((signal.SIGINT, signal.SIGTERM))  # not before: Ctrl-C ends a question of the guide
         with ExitStack() as files:
             recorder = Recorder(files.enter_context(record.open("w", encoding="utf-8"))) if record else None
             node = Teleop(wanted, recorder, Replay(replay) if replay else None)

@@ -25,6 +25,7 @@ from ligature.model.messages import (
     Vector,
     wire,
 )
+from ligature.model.scene import Scene
 
 
 class CommandType(enum.IntEnum):
@@ -35,8 +36,11 @@ class CommandType(enum.IntEnum):
     VELOCITY = 2
 
 
-KINDS = ("body", "camera", "light", "actuator", "sensor", "ghost", "world", "arm")
-"""Kinds of objects that commands name."""
+MOUNTED = ("camera", "light")
+"""Kinds of objects that a `PlaceCommand` or `ParentCommand` moves."""
+
+RELEASED = ("body", "actuator", "camera", "light", "arm")
+"""Kinds of objects whose commands a `Release` clears."""
 
 MAX_POSITION = 1e4
 """Metres from the origin of a pose; 1e9 m between two attached bodies leaves the doubles no digits to act in."""
@@ -103,10 +107,10 @@ class ActuatorCommand(Command, code=2):
 
 
 @dataclass(frozen=True)
-class _OfObject(Command):
-    """A command to object number ``index`` of a ``kind``."""
+class _Mounted(Command):
+    """A command to a camera or a light (``kind``)."""
 
-    kind: str = wire(Choice(KINDS))
+    kind: str = wire(Choice(MOUNTED))
     index: int = wire(INDEX)
 
     @property
@@ -115,14 +119,14 @@ class _OfObject(Command):
 
 
 @dataclass(frozen=True)
-class PlaceCommand(_OfObject, code=3):
+class PlaceCommand(_Mounted, code=3):
     """Put a camera or a light (``kind``) at a pose in its parent's frame; None leaves it where it is."""
 
     pose: Vector | None = wire(Pose(bound=MAX_POSITION, optional=True), "the pose")
 
 
 @dataclass(frozen=True)
-class ParentCommand(_OfObject, code=8):
+class ParentCommand(_Mounted, code=8):
     """Mount a camera or a light (``kind``) on body ``parent``, None for the world; its pose there does not change."""
 
     parent: int | None = wire(OptionalIndex())
@@ -138,8 +142,15 @@ class ParentCommand(_OfObject, code=8):
 
 
 @dataclass(frozen=True)
-class Release(_OfObject, code=4):
+class Release(Command, code=4):
     """The watchdog of one object expired: its command is cleared (interface reference §2.4)."""
+
+    kind: str = wire(Choice(RELEASED))
+    index: int = wire(INDEX)
+
+    @property
+    def object(self) -> tuple[str, int]:  # noqa: D102
+        return self.kind, self.index
 
     @property
     def releases(self) -> bool:  # noqa: D102
@@ -158,3 +169,14 @@ class WatchContacts(Command, code=9):
     """Write contact points and forces into states from now on, or no longer: somebody looks at them."""
 
     enabled: bool = wire(FLAG)
+
+
+def object_counts(scene: Scene) -> dict[str, int]:
+    """How many objects of each kind that can be commanded a scene has, for `Message.check_indices`."""
+    return {
+        "body": len(scene.bodies),
+        "actuator": len(scene.actuators),
+        "camera": len(scene.cameras),
+        "light": len(scene.lights),
+        "arm": len(scene.arms),
+    }

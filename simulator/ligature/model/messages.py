@@ -91,12 +91,15 @@ class Choice(Field):
     options: tuple[Any, ...]
 
     def pack(self, value: Any) -> bytes:  # noqa: D102
-        if value not in self.options:
-            raise CodecError(f"'{value}' is none of {', '.join(map(str, self.options))}")
-        return struct.pack("<B", self.options.index(value))
+        self.check("", value)
+        return bytes([self.options.index(value)])
 
     def unpack(self, data: bytes, at: int) -> tuple[Any, int]:  # noqa: D102
         return self.options[data[at]], at + 1
+
+    def check(self, what: str, value: Any) -> None:  # noqa: D102
+        if value not in self.options:
+            raise CodecError(f"'{str(value)[:40]}' is none of {', '.join(map(str, self.options))}")
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,9 @@ class Choices(Field):
     def unpack(self, data: bytes, at: int) -> tuple[Any, int]:  # noqa: D102
         end = at + 1 + data[at]
         return tuple([self.options[place] for place in _slice(data, at + 1, end)]), end
+
+    def check(self, what: str, value: Any) -> None:  # noqa: D102
+        _fits(value)
 
 
 @dataclass(frozen=True)
@@ -163,6 +169,7 @@ class Numbers(Field):
             return
         if self.length is not None and len(value) != self.length:
             raise ValueError(f"{what} has {self.length} numbers, not {len(value)}")
+        _fits(value)
         for number in value:
             if not math.isfinite(number):
                 raise ValueError(f"{what} must be finite, not {number}")
@@ -192,9 +199,7 @@ class Text(Field):
     def pack(self, value: Any) -> bytes:  # noqa: D102
         if value is None:
             return bytes([_ABSENT])
-        raw: bytes = value.encode("utf-8", "replace")
-        if len(raw) > MAX_TEXT:
-            raise CodecError(f"a name has at most {MAX_TEXT} bytes")
+        raw = _encoded(value)
         return bytes([len(raw)]) + raw
 
     def unpack(self, data: bytes, at: int) -> tuple[Any, int]:  # noqa: D102
@@ -203,6 +208,18 @@ class Text(Field):
             return None, at + 1
         end = at + 1 + n
         return _slice(data, at + 1, end).decode("utf-8"), end
+
+
+    def check(self, what: str, value: Any) -> None:  # noqa: D102
+        if value is not None:
+            _encoded(value)
+
+
+def _encoded(text: str) -> bytes:
+    raw = text[: MAX_TEXT + 1].encode("utf-8", "replace")  # a character takes at least one byte
+    if len(raw) > MAX_TEXT:
+        raise CodecError(f"a text has at most {MAX_TEXT} bytes")
+    return raw
 
 
 def check_unit(quaternion: Vector) -> None:

@@ -173,11 +173,12 @@ class Arm(Device):
         self._start_move(axes, axes.checked(goal, what))
 
     def _start_move(self, axes: Axes, goal: Array) -> None:
-        if axes.moving:
+        moving = axes.moving
+        axes.move(goal)
+        if moving:
             self.emit("goal_reached", False)
         if axes is self.joints:
             self._pushing = None
-        axes.move(goal)
         self._begin_busy()
 
     def move_jr(self, step: ArrayLike) -> None:

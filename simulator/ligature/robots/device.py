@@ -25,6 +25,9 @@ FOLLOWING_PATIENCE = 1.0
 """Seconds that a following error beyond its bound is suffered before the arm stops with a fault."""
 
 
+MOST_CHARACTERS = 300
+"""Most characters of the reason of a fault."""
+
 MOST_EVENTS = 500
 """Most events that are kept for a front end to fetch; the oldest go first."""
 
@@ -156,9 +159,9 @@ class Device:
             self._move_home()
 
     def _move_home(self) -> None:
+        self.joints.move(self._home)
         self.emit("desired_state", "HOMED")
         self._homing = True
-        self.joints.move(self._home)
         self._begin_busy()
 
     def _powered(self) -> None:
@@ -176,8 +179,9 @@ class Device:
         self._off_all()
 
     def fault(self, why: str) -> None:
-        """Stop with a fault; ``disable`` ends it."""
-        self.emit("error", f"{self.name}: {why}")
+        """Stop with a fault; ``disable`` ends it. A fault that is there already is not reported again."""
+        if self._state is not State.FAULT:
+            self.emit("error", f"{self.name}: {why[:MOST_CHARACTERS]}")
         self._switch_off(State.FAULT)
         self._tell_state()
 

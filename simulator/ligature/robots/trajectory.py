@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from ruckig import InputParameter, Result, Ruckig, Trajectory
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
+
+from ligature.robots.operating_state import Refused
 
 Array = NDArray[np.float64]
+
+LONGEST = 7000.0
+"""Seconds of the longest trajectory that ruckig calculates reliably (its documentation, "Numerical Stability")."""
 
 
 class JointTrajectory:
@@ -20,6 +25,11 @@ class JointTrajectory:
         Where to end at rest (n,).
     fastest, hardest
         Limits of velocity and acceleration (n,).
+
+    Raises
+    ------
+    Refused
+        When ruckig finds no trajectory: it calculates none of more than `LONGEST` seconds.
     """
 
     def __init__(self, position: Array, velocity: Array, goal: Array, fastest: Array, hardest: Array) -> None:
@@ -32,9 +42,15 @@ class JointTrajectory:
         request.max_velocity, request.max_acceleration = fastest.tolist(), hardest.tolist()
         request.max_jerk = [float("inf")] * n
         self._trajectory = Trajectory(n)
-        result = Ruckig(n).calculate(request, self._trajectory)
+        try:
+            result = Ruckig(n).calculate(request, self._trajectory)
+        except (RuckigError, ValueError):  # arithmetic that fails; a result that its Python enumeration lacks
+            result = Result.Error
         if result not in (Result.Working, Result.Finished):
-            raise ValueError(f"no trajectory from {position} to {goal}: {result}")
+            raise Refused(
+                f"ruckig finds no trajectory within {LONGEST:g} s from {np.round(position, 4).tolist()} to"
+                f" {np.round(goal, 4).tolist()}; raise 'trajectory_j/set_ratio'"
+            )
         self.goal = goal
 
     def __deepcopy__(self, memo: object) -> JointTrajectory:

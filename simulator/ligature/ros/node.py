@@ -16,6 +16,7 @@ import rosgraph.names
 import rospy
 
 from ligature.bus import Block, Outbox
+from ligature.bus.stop import Stop
 from ligature.model.commands import ParentCommand
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
@@ -67,7 +68,7 @@ class Node:
         self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
         self._master = MasterWatch(Parameters(scene, self._adopt).poll)
 
-    def run(self, stop: threading.Event, on_first: Callable[[], None]) -> None:
+    def run(self, stop: Stop, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
         self._master.start()
         told, housekeeping = False, 0.0

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Bool, Empty
 
 from ligature.bus import Block
+from ligature.bus.stop import Stop
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from ligature.ros.bags import REPORTS, reported_pose
@@ -63,7 +64,7 @@ class TaskNode:
         self._teams: set[str] = set()
         self._told = 0
 
-    def run(self, stop: threading.Event) -> None:
+    def run(self, stop: Stop) -> None:
         """Watch until ``stop`` is set or the physics process is gone."""
         MasterWatch().start()
         telling, looking, tick = 0.0, 0.0, -1
