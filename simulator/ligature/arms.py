@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.scene import ArmDescription, ArmKind, Scene
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem
 from ligature.physics import World
 from ligature.robots import ecm_arm, mtm_arm, psm_arm
 from ligature.robots.arm import Arm
@@ -45,18 +47,17 @@ WATCH_PERIOD = 5
 """Ticks between two looks at following errors."""
 
 
-class ArmSet(Mapping[str, Arm]):
+class ArmSet(Subsystem, Mapping[str, Arm]):
     """The arms of a running scene by name."""
 
-    def __init__(self, scene: Scene, world: World) -> None:
-        self._world = world
+    def __init__(self, scene: Scene, world: World, dt: float = 1e-3) -> None:
+        self._world, self._dt = world, dt
         self.problems: list[Diagnostic] = []
         self._arms: list[Arm] = []
         for description in scene.arms:
             self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
         self._by_name = {arm.name: arm for arm in self._arms}
         self._records = [ArmRecord(arm) for arm in self._arms]
-        self._ticks = 0
 
     def __getitem__(self, name: str) -> Arm:
         if name not in self._by_name:
@@ -95,19 +96,23 @@ class ArmSet(Mapping[str, Arm]):
         if arm.is_enabled and arm.is_homed:
             self._guarded("hold", arm, arm.hold)
 
-    def tick(self, dt: float) -> None:
-        """Advance all arms by ``dt`` seconds."""
-        self._ticks += 1
+    def step(self, tick: int) -> None:
+        """Advance all arms by a tick."""
         for arm in self._arms:
-            self._guarded("the motion", arm, arm.tick, dt)
-        if self._ticks % WATCH_PERIOD == 0:
+            self._guarded("the motion", arm, arm.tick, self._dt)
+        if (tick + 1) % WATCH_PERIOD == 0:
             for arm in self._arms:
-                self._guarded("the watch over following errors", arm, arm.watch, WATCH_PERIOD * dt)
+                self._guarded("the watch over following errors", arm, arm.watch, WATCH_PERIOD * self._dt)
 
-    def write(self, records: NDArray[np.void]) -> None:
-        """Write the state of all arms, ``records`` (arms,)."""
-        for arm, arm_record, record in zip(self._arms, self._records, records, strict=True):
+    def write_state(self, state: StateRecord) -> None:
+        """Write the state of all arms."""
+        for arm, arm_record, record in zip(self._arms, self._records, state["arm"][0], strict=True):
             self._guarded("the reading", arm, arm_record.write, record)
+
+    def take_problems(self) -> list[Diagnostic]:
+        """What was found since the last call."""
+        found, self.problems = self.problems, []
+        return found
 
     def events(self) -> list[tuple[int, str, Any]]:
         """What happened since the last call: number of the arm, name and value."""
@@ -122,15 +127,15 @@ class ArmSet(Mapping[str, Arm]):
         for arm in self._arms:
             self._guarded("the reset", arm, arm.settle)
 
-    def memory(self) -> list[dict[str, Any]]:
-        """For snapshots."""
-        return [{"ticks": self._ticks}, *(arm.memory() for arm in self._arms)]
+    def snapshot(self) -> list[dict[str, Any]]:
+        """Everything that lasts from tick to tick."""
+        return [arm.snapshot() for arm in self._arms]
 
-    def recall(self, memory: Sequence[dict[str, Any]]) -> None:
-        """Continue from `memory`."""
-        self._ticks = memory[0]["ticks"]
-        for arm, kept in zip(self._arms, memory[1:], strict=True):
-            arm.recall(kept)
+    def restore(self, snapshot: Sequence[dict[str, Any]]) -> None:
+        """Continue from `snapshot`."""
+        for arm, state in zip(self._arms, snapshot, strict=True):
+            arm.restore(state)
+        self._records = [ArmRecord(arm) for arm in self._arms]
 
 
 def _words(error: Exception) -> str:
@@ -204,10 +209,10 @@ class JawPlant:
     def reset(self) -> None:
         """Nothing: the fingers belong to the physics."""
 
-    def memory(self) -> None:
+    def snapshot(self) -> None:
         """Nothing: it is part of the physics."""
 
-    def recall(self, memory: None) -> None:
+    def restore(self, snapshot: None) -> None:
         """Nothing."""
 
 
@@ -282,13 +287,13 @@ class CameraPlant:
         self._state[:] = 0.0
         self._state[0] = self._start
 
-    def memory(self) -> Array:
+    def snapshot(self) -> Array:
         """The joint values that the camera's pose stands for."""
         return self._state.copy()
 
-    def recall(self, memory: Array) -> None:
-        """Continue from `memory`."""
-        self._state[:] = memory
+    def restore(self, snapshot: Array) -> None:
+        """Continue from `snapshot`."""
+        self._state[:] = snapshot
 
 
 def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:

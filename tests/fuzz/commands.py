@@ -1,7 +1,6 @@
 """Commands of every kind, with every content, to every object: ``python -m tests.fuzz.commands --commands 1000000``.
 
-What there is to command is read from the code: the classes of `Command` with the types of their fields, the verbs of
-arms, the words of operating states, the names of the scene. What the generator finds to be accepted it repeats more
+What there is to command is read from the code: every message with its fields, the words of operating states, the names of the scene. What the generator finds to be accepted it repeats more
 often, so that it gets beyond the refusals. A sequence is the same for the same seed and number.
 
 Whatever is commanded, `Simulation.apply` refuses it with ValueError or takes it, `Simulation.step` raises nothing, and
@@ -11,12 +10,10 @@ every number of the state is finite.
 from __future__ import annotations
 
 import argparse
-import enum
 import random
 import re
 import sys
 import time
-import typing
 from collections import Counter, deque
 from dataclasses import fields
 from pathlib import Path
@@ -25,13 +22,15 @@ from typing import Any
 import ligature
 import numpy as np
 from ligature.bus import Mailbox, Outbox
-from ligature.bus.codec import CodecError, LoopCommand, Message
+from ligature.bus.codec import CodecError, Message
 from ligature.bus.events import LOG_BYTES, EventLog
 from ligature.bus.pacing import Pace, Pacer, Throttle
 from ligature.bus.ring import RING_BYTES, Ring
-from ligature.model import commands as table
+from ligature.model.commands import Command, object_counts
+from ligature.model.messages import Choice, Choices, Field, Numbers, OptionalIndex, Packed, Real, Text
 from ligature.model.scene import Scene
 from ligature.robots.arm import Arm
+from ligature.robots.commands import VERBS, ArmCommand
 from ligature.robots.ecm import ENDOSCOPES
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.robots.operating_state import TRANSITIONS, State
@@ -43,8 +42,9 @@ SCENES = (
     "scenes/needle_pick/launch.yaml", "scenes/suturing/launch.yaml",
 )  # fmt: skip
 
-KINDS = tuple(typing.get_args(table.Command)) + tuple(typing.get_args(LoopCommand))
-_HINTS = {kind: typing.get_type_hints(kind) for kind in KINDS}
+Key = tuple[Any, ...]
+KINDS = tuple(Message.by_code.values())
+WEIGHTS = [1 if issubclass(kind, ArmCommand) else 4 for kind in KINDS]
 NUMBERS = (
     0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-200, 1e-15, 1e-5, -1e-5, 0.01, 0.5, 1.0, -1.0, 3.141592653589793, -3.2, 7.0,
     100.0, -1e3, 1e4, 1e6, -1e6, 1e9, -1e9, 1e12, 1e100, 1.7e308, -1.7e308, float("inf"), float("-inf"), float("nan"),
@@ -80,10 +80,10 @@ class Generator:
 
     def __init__(self, scene: Scene, rng: random.Random) -> None:
         self._scene, self._rng = scene, rng
-        self._objects = table.objects_of(scene)
-        self._lengths: dict[tuple[Any, ...], list[int]] = {}
+        self._counts = object_counts(scene)
+        self._lengths: dict[Key, list[int]] = {}
         self._words = [
-            *TRANSITIONS, "adopt", *ENDOSCOPES, *(tool.type for tool in INSTRUMENTS.values()), "p", "t", "w", "ptw",
+            *TRANSITIONS, *ENDOSCOPES, *(tool.type for tool in INSTRUMENTS.values()),
             *(body.identity.identifier for body in scene.bodies[:40]), *(s.identity.identifier for s in scene.sensors),
         ]  # fmt: skip
         self._texts = [
@@ -101,17 +101,15 @@ class Generator:
         ]
         self._huge = ("x" * HUGE, "😀" * HUGE)
 
-    def command(self) -> tuple[Message, tuple[Any, ...]]:
+    def command(self) -> tuple[Message, Key]:
         """A command, and the key under which `accepted` remembers its form."""
-        kind = self._rng.choices(KINDS, weights=[30 if k is table.ArmCommand else 4 for k in KINDS])[0]
-        hints = _HINTS[kind]
+        kind = self._rng.choices(KINDS, weights=WEIGHTS)[0]
         values: dict[str, Any] = {}
-        for field in fields(kind):
-            key = (kind.__name__, values.get("verb"), values.get("type"), self._kind_of(values), field.name)
-            values[field.name] = self._value(field.name, hints[field.name], values, key)
-        return kind(**values), (kind.__name__, values.get("verb"), values.get("type"), self._kind_of(values))
+        for name, _, field in kind.fields():
+            values[name] = self._value(name, field, values, (kind, self._form(values), name))
+        return kind(**values), (kind, self._form(values))
 
-    def accepted(self, command: Message, key: tuple[Any, ...]) -> None:
+    def accepted(self, command: Message, key: Key) -> None:
         """Remember how long the vectors of a command were that was taken."""
         for field in fields(command):
             value = getattr(command, field.name)
@@ -120,40 +118,39 @@ class Generator:
                 if len(value) not in lengths:
                     lengths.append(len(value))
 
-    def _kind_of(self, values: dict[str, Any]) -> Any:
+    def _form(self, values: dict[str, Any]) -> Any:
+        """What decides how many numbers a command takes, beside its class."""
         index = values.get("arm")
         known = isinstance(index, int) and 0 <= index < len(self._scene.arms)
-        return self._scene.arms[index].kind if known and index is not None else values.get("kind")
+        return self._scene.arms[index].kind if known and index is not None else values.get("type", values.get("kind"))
 
-    def _value(self, name: str, hint: Any, values: dict[str, Any], key: tuple[Any, ...]) -> Any:
-        rng, options = self._rng, typing.get_args(hint)
-        if type(None) in options:
-            if rng.random() < 0.4:
-                return None
-            hint = next(option for option in options if option is not type(None))
-        if hint is bool:
-            return rng.random() < 0.5
-        if hint is int:
-            return self._index(name, values)
-        if hint is float:
+    def _value(self, name: str, field: Field, values: dict[str, Any], key: Key) -> Any:
+        rng = self._rng
+        if getattr(field, "optional", False) and rng.random() < 0.4:
+            return None
+        if isinstance(field, Packed):
+            return rng.random() < 0.5 if field.type is bool else self._index(name, values)
+        if isinstance(field, OptionalIndex):
+            return None if rng.random() < 0.4 else self._index(name, values)
+        if isinstance(field, Real):
             return self._number()
-        if hint is str:
-            return self._text(name)
-        if isinstance(hint, type) and issubclass(hint, enum.Enum):
-            return rng.choice(list(hint))
-        item = typing.get_args(hint)[0]
-        length = self._length(key)
-        if isinstance(item, type) and issubclass(item, enum.Enum):
-            return tuple(rng.choice(list(item)) for _ in range(length))
-        return self._vector(length)
+        if isinstance(field, Choice):
+            return rng.choice(field.options) if rng.random() < 0.98 else rng.choice(("ghost", "", "x" * HUGE, None))
+        if isinstance(field, Choices):
+            return tuple(rng.choice(field.options) for _ in range(self._length(key)))
+        if isinstance(field, Numbers):
+            ours = field.length is not None and rng.random() < 0.8
+            return self._vector(field.length if ours and field.length else self._length(key))
+        assert isinstance(field, Text), field
+        return self._text()
 
     def _index(self, name: str, values: dict[str, Any]) -> int:
         if self._rng.random() < 0.02:
             return self._rng.choice(INTEGERS)
         what = values.get("kind", name) if name == "index" else "body" if name == "parent" else name
-        return self._rng.randrange(self._objects.get(what, 3) + (self._rng.random() < 0.02) or 1)
+        return self._rng.randrange(self._counts.get(what, 3) + (self._rng.random() < 0.02) or 1)
 
-    def _length(self, key: tuple[Any, ...]) -> int:
+    def _length(self, key: Key) -> int:
         known = self._lengths.get(key)
         if known and self._rng.random() < 0.9:
             return self._rng.choice(known)
@@ -176,23 +173,15 @@ class Generator:
             numbers[rng.randrange(length)] = rng.choice(NUMBERS)
         return tuple(numbers)
 
-    def _text(self, name: str) -> str:
+    def _text(self) -> str:
         rng, mode = self._rng, self._rng.random()
-        if name == "verb":
-            return rng.choice(table.VERBS) if mode < 0.99 else rng.choice(self._texts)
-        if name == "kind":
-            return (
-                rng.choice(tuple(self._objects)) if mode < 0.95 else rng.choice(("ghost", "world", "sensor", "", "x"))
-            )
         if mode < 0.7:
             return rng.choice(self._words)
         if mode < 0.71:
             return rng.choice(self._huge)
-        return (
-            rng.choice(self._texts)
-            if mode < 0.85
-            else "".join(chr(rng.randrange(1, 0xD7FF)) for _ in range(rng.randrange(70)))
-        )
+        if mode < 0.85:
+            return rng.choice(self._texts)
+        return "".join(chr(rng.randrange(1, 0xD7FF)) for _ in range(rng.randrange(70)))
 
 
 class Run:
@@ -250,12 +239,12 @@ class Run:
         self.simulation.step(POWER_UP if long else self.rng.randrange(1, TICKS + 1))
         self._check()
 
-    def _send(self, message: Message, key: tuple[Any, ...], through_bus: bool) -> None:
+    def _send(self, message: Message, key: Key, through_bus: bool) -> None:
         self.sent += 1
         self._last.append((through_bus, message))
-        if isinstance(message, table.ArmCommand) and 0 <= message.arm < len(self.scene.arms):
+        if isinstance(message, ArmCommand) and 0 <= message.arm < len(self.scene.arms):
             arm = self.simulation.arms[self.scene.arms[message.arm].name]
-            self.seen[self.scene.arms[message.arm].kind.name, message.verb[:40], arm.operating_state.state.name] += 1
+            self.seen[self.scene.arms[message.arm].kind.name, message.verb, arm.operating_state.state.name] += 1
         if through_bus:
             try:
                 self._outbox.push(message)
@@ -269,8 +258,9 @@ class Run:
         try:
             if isinstance(message, Throttle):
                 self._pacer.throttle(message)
-            elif isinstance(message, typing.get_args(LoopCommand)):
-                if isinstance(message, Pace) and message.speed > 0.0:
+            elif not isinstance(message, Command):
+                message.check()
+                if isinstance(message, Pace):
                     self._pacer.pace(message)
             else:
                 before = {name: len(arm.events) for name, arm in self.simulation.arms.items()}
@@ -330,7 +320,7 @@ def _floats(state: np.ndarray) -> list[tuple[str, np.ndarray]]:
 
 def missing(seen: Counter[tuple[str, str, str]], kinds: set[str]) -> list[tuple[str, str, str]]:
     """What was not commanded yet: every verb of every kind of arm in every operating state."""
-    wanted = ((kind, verb, state.name) for kind in kinds for verb in table.VERBS for state in State)
+    wanted = ((kind, verb, state.name) for kind in kinds for verb in VERBS for state in State)
     return sorted(set(wanted) - set(seen))
 
 

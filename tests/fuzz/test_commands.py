@@ -8,8 +8,9 @@ import ligature
 import pytest
 from ligature.bus.codec import CodecError, encode
 from ligature.bus.events import LOG_BYTES, MOST_BYTES, SLOTS, EventLog
-from ligature.model.commands import VERBS, ActuatorCommand, ArmCommand, Release, Reset, check
+from ligature.model.commands import ActuatorCommand, Command, Release, Reset
 from ligature.model.scene import Scene
+from ligature.robots.commands import VERBS, Hold, MoveJp, StateCommand, TrajectorySetRatio
 from ligature.robots.operating_state import State
 from ligature.simulation import Simulation
 
@@ -67,7 +68,7 @@ def test_what_an_arm_raises_becomes_its_fault_and_the_others_go_on(
             simulation.arms.events()
             simulation.step(10)
             simulation.apply(Release("arm", 0))
-            simulation.apply(ArmCommand(0, "hold"))
+            simulation.apply(Hold(0))
             simulation.apply(Reset())
             simulation.step(10)
         told = [value for arm, name, value in simulation.arms.events() if (arm, name) == (0, "error")]
@@ -85,15 +86,15 @@ def test_a_move_that_would_take_hours_is_refused_and_the_arm_stays_ready(scene: 
     simulation = Simulation(scene)
     arm = next(iter(simulation.arms.values()))
     arm.adopt()
-    simulation.apply(ArmCommand(0, "trajectory_j/set_ratio", (ratio,)))
-    simulation.apply(ArmCommand(0, "move_jp", (0.5, 0.3, 0.2, 1.0, 0.4, 0.4)))
+    simulation.apply(TrajectorySetRatio(0, ratio))
+    simulation.apply(MoveJp(0, (0.5, 0.3, 0.2, 1.0, 0.4, 0.4)))
     events = [(name, value) for index, name, value in simulation.arms.events() if index == 0]
     assert any(name == "warning" and "raise 'trajectory_j/set_ratio'" in value for name, value in events), events
     assert ("goal_reached", False) in events
     assert not arm.is_busy and arm.is_enabled
     simulation.step(5)
-    simulation.apply(ArmCommand(0, "trajectory_j/set_ratio", (1.0,)))
-    simulation.apply(ArmCommand(0, "move_jp", (0.5, 0.3, 0.2, 1.0, 0.4, 0.4)))
+    simulation.apply(TrajectorySetRatio(0, 1.0))
+    simulation.apply(MoveJp(0, (0.5, 0.3, 0.2, 1.0, 0.4, 0.4)))
     assert arm.is_busy
     simulation.close()
 
@@ -101,26 +102,24 @@ def test_a_move_that_would_take_hours_is_refused_and_the_arm_stays_ready(scene: 
 def test_homing_that_would_take_hours_ends_in_a_fault_not_the_run(scene: Scene) -> None:
     simulation = Simulation(scene)
     arm = next(iter(simulation.arms.values()))
-    simulation.apply(ArmCommand(0, "trajectory_j/set_ratio", (1e-5,)))
+    simulation.apply(TrajectorySetRatio(0, 1e-5))
     arm.place_jp((0.4, 0.3, 0.2, 1.0, 0.4, 0.4))
-    simulation.apply(ArmCommand(0, "state_command", (), "home"))
+    simulation.apply(StateCommand(0, "home"))
     simulation.step(300)
     assert arm.operating_state.state is State.FAULT
     told = [value for index, name, value in simulation.arms.events() if (index, name) == (0, "error")]
     assert len(told) == 1 and "trajectory_j/set_ratio" in told[0]
-    simulation.apply(ArmCommand(0, "trajectory_j/set_ratio", (1.0,)))
+    simulation.apply(TrajectorySetRatio(0, 1.0))
     for word in ("disable", "home"):
-        simulation.apply(ArmCommand(0, "state_command", (), word))
+        simulation.apply(StateCommand(0, word))
     simulation.step(300)
     assert arm.is_busy or arm.is_homed
     simulation.close()
 
 
-@pytest.mark.parametrize(
-    "command", [ArmCommand(0, "state_command", (), "x" * 10_000_000), ActuatorCommand(0, True, "é" * 101)]
-)
-def test_long_texts_are_refused_without_repeating_them(command: ArmCommand | ActuatorCommand) -> None:
-    for refuse, error in ((check, ValueError), (encode, CodecError)):
+@pytest.mark.parametrize("command", [StateCommand(0, "x" * 10_000_000), ActuatorCommand(0, True, "é" * 101)])
+def test_long_texts_are_refused_without_repeating_them(command: Command) -> None:
+    for refuse, error in ((Command.check, ValueError), (encode, CodecError)):
         with pytest.raises(error, match="at most 200 bytes") as found:
             refuse(command)
         assert len(str(found.value)) < 100

@@ -284,11 +284,11 @@ def test_forward_and_inverse_kinematics_on_demand(ready: PsmArm) -> None:
 def test_a_recalled_arm_goes_on_as_the_other_did(ready: PsmArm) -> None:
     ready.move_jp([0.5, 0.2, 0.15, 0, 0, 0])
     advance(ready, 0.3)
-    memory = ready.memory()
-    plant = ready.joints.plant.memory()
+    kept = ready.snapshot()
+    plant = ready.joints.plant.snapshot()
     advance(ready, 0.5)
     first = ready.measured_js().position
-    ready.recall(memory)
-    ready.joints.plant.recall(plant)
+    ready.restore(kept)
+    ready.joints.plant.restore(plant)
     advance(ready, 0.5)
     assert (ready.measured_js().position == first).all()

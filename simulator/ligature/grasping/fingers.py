@@ -140,6 +140,18 @@ class Fingers:
             for joint in self.jaw.joints:
                 self._world.let_joint(joint)
 
+    def reset(self) -> None:
+        """Follow commands, in a world that was put back to its start."""
+        self._slowed = False
+
+    def snapshot(self) -> bool:
+        """Whether anything but commands acts on the fingers."""
+        return self._slowed
+
+    def restore(self, snapshot: bool) -> None:
+        """Continue from `snapshot`; the joints belong to the world."""
+        self._slowed = snapshot
+
     def positions(self) -> tuple[float, float]:
         """Where both joints are."""
         one, two = (self._world.joint_position(joint) for joint in self.jaw.joints)

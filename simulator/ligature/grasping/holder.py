@@ -42,8 +42,10 @@ class Holder:
         return ("clamp", number, child)
 
     def holds(self, handle: Any) -> bool:
-        """Whether what a handle stands for has not slipped out."""
-        return handle[0] != "clamp" or self._clamps.holds(handle[1])
+        """Whether what a handle stands for has neither slipped out nor been let go by a reset."""
+        if handle[0] == "clamp":
+            return self._clamps.holds(handle[1])
+        return handle[0] != "rod" or self._rods.holds(handle[1], handle[2])
 
     def remove_fixed(self, handle: Any) -> None:
         """Let go what `add_fixed` or `add_yielding` holds."""

@@ -209,7 +209,6 @@ class Text(Field):
         end = at + 1 + n
         return _slice(data, at + 1, end).decode("utf-8"), end
 
-
     def check(self, what: str, value: Any) -> None:  # noqa: D102
         if value is not None:
             _encoded(value)

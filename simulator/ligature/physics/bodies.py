@@ -156,13 +156,13 @@ class BodyControl:
         by_pose = self.type is CommandType.POSITION and body.controller.linear_output is not OutputType.FORCE
         return self.type is CommandType.VELOCITY or by_pose
 
-    def memory(self) -> tuple[int, Array, Array, int, Array | None]:
+    def snapshot(self) -> tuple[int, Array, Array, int, Array | None]:
         """Everything that lasts from tick to tick."""
         return int(self.type), self.target.copy(), self._kick.copy(), self._kick_ticks, self._last
 
-    def recall(self, memory: tuple[int, Array, Array, int, Array | None]) -> None:
-        """Continue from `memory`."""
-        type_, self.target, self._kick, self._kick_ticks, self._last = memory
+    def restore(self, snapshot: tuple[int, Array, Array, int, Array | None]) -> None:
+        """Continue from `snapshot`."""
+        type_, self.target, self._kick, self._kick_ticks, self._last = snapshot
         self.type = CommandType(type_)
 
     def _pose(self) -> Array:

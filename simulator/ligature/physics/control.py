@@ -9,6 +9,7 @@ does, a D near 1 chatters at the rate of the loop; the implicit form is the same
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from ligature.model.commands import CommandType
 from ligature.model.scene import Joint, JointType, OutputType
+from ligature.model.subsystem import kept, put_back
 from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
 from ligature.physics.motions import Motions
 
@@ -164,6 +166,10 @@ class TreeControl:
         if type_ is CommandType.VELOCITY:
             self._switch(row, VELOCITY, value)
             return
+        self._aim(row, value)
+
+    def _aim(self, row: int, value: float) -> None:
+        """Take a position command for one axis."""
         value = min(max(value, self._low[row]), self._high[row])
         if self.mode[row] != POSITION:
             self._motions.joints(self._index)
@@ -362,19 +368,28 @@ class TreeControl:
         self._pushed_links = [self.links[row] for row in self._pushed]
         self._giving = bool((self._give[self._driven] > 0.0).any())
 
-    def memory(self) -> dict[str, Array]:
-        """Everything that lasts from tick to tick, for snapshots."""
-        return {
-            name: np.array(getattr(self, name))
-            for name in (
-                "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_fastest",
-                "_hardest", "_give", "owned",
-            )
-        }  # fmt: skip
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        return kept(self, _KEPT)
 
-    def recall(self, memory: dict[str, Array]) -> None:
-        """Continue from `memory`."""
-        for name, value in memory.items():
-            setattr(self, name, value.copy())
-        self._driven = []
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot` in a new Bullet world."""
+        put_back(self, snapshot)
         self._sort()
+
+    def follow(self, before: TreeControl) -> None:
+        """Take the commands of ``before``, the same axes in an earlier world, as if they came now."""
+        for name in ("target", "_pace", "_fastest", "_hardest", "_give", "owned"):
+            getattr(self, name)[:] = getattr(before, name)
+        aimed = before.mode == POSITION
+        self.mode[~aimed] = before.mode[~aimed]
+        for row in np.flatnonzero(aimed).tolist():
+            self._aim(row, float(before.target[row]))
+        self._sort()
+
+
+_KEPT = (
+    "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_fastest", "_hardest", "_give",
+    "owned", "_stops", "_slowed",
+)  # fmt: skip
+"""Attributes of a `TreeControl` that last from tick to tick."""

@@ -63,8 +63,8 @@ class Drive:
     def reset(self) -> None:
         """Nothing: the joints belong to the physics, which put them back."""
 
-    def memory(self) -> None:
+    def snapshot(self) -> None:
         """Nothing: it is part of the physics."""
 
-    def recall(self, memory: None) -> None:
+    def restore(self, snapshot: None) -> None:
         """Nothing."""

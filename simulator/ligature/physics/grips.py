@@ -5,7 +5,7 @@ Mixed into `World`. World axes, SI units.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +68,7 @@ class BulletGrips:
         self._free_bodies = {tree.root for tree in self.trees if is_alone(tree, self.scene.bodies)}
         self._burdens: dict[int, tuple[Placement, Array]] = {}
         self.clamped: set[int] = set()
+        self._passing: set[tuple[int, int]] = set()
         self._held_up: dict[int, int] = {}
         self._gripped: dict[int, int] = {}
 
@@ -94,6 +95,7 @@ class BulletGrips:
 
     def let_pass(self, body: int, other: int, passes: bool) -> None:
         """Switch contacts between two bodies off, or on again unless the scene has them off."""
+        (self._passing.add if passes else self._passing.discard)((body, other))
         a, b = self.place_of[body], self.place_of[other]
         touch = not passes and other not in self.scene.bodies[body].no_collision_with
         pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(touch), physicsClientId=self.client)
@@ -194,9 +196,14 @@ class BulletGrips:
         for place, lift in self._burdens.values():
             place.push(lift)
 
-    def _hold_up_again(self, held_up: Mapping[int, int], gripped: Mapping[int, int]) -> None:
-        """Take up the counts of `hold_up` after a rebuild."""
-        self._held_up, self._gripped = dict(held_up), dict(gripped)
-        for body in self._gripped:
-            if body in self._free_bodies:
+    def _weigh_again(self) -> None:
+        """Give a new Bullet world the masses of bodies that are gripped, or led by commands."""
+        for body in sorted(self._free_bodies):
+            light = self.scene.bodies[body].mass < LEAST_LED_MASS
+            if body in self._gripped or (light and self.driven(body)):
                 self._weigh(body)
+
+    def _part_again(self) -> None:
+        """Switch off the contacts in a new Bullet world that `let_pass` switched off."""
+        for body, other in sorted(self._passing):
+            self.let_pass(body, other, True)

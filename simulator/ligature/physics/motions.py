@@ -110,6 +110,18 @@ def _weigh(
             load[p, a] += load[r, a]
 
 
+@njit(cache=True)
+def _below(twist: Array, rows: Integers, velocity: Array, limit: float) -> bool:
+    """Whether ``rows`` of ``twist`` (r, 6) and all of ``velocity`` (a,) are finite and below ``limit``."""
+    sound = True
+    for row in rows:
+        for a in range(6):
+            sound = sound and abs(twist[row, a]) < limit
+    for a in range(velocity.shape[0]):
+        sound = sound and abs(velocity[a]) < limit
+    return sound
+
+
 class Motions:
     """Motion of everything in one Bullet world.
 
@@ -136,6 +148,7 @@ class Motions:
         self._client = client
         counts = [1 + len(tree.frames) for tree in trees]
         self._begin = np.cumsum([0, *counts]).tolist()
+        self._bases_at = np.array(self._begin[:-1], dtype=np.int64)
         axes = np.cumsum([0, *(len(tree.axes) for tree in trees)]).tolist()
         self.slices = [slice(a, b) for a, b in zip(axes[:-1], axes[1:], strict=True)]
         self._links = [[link for link, *_ in tree.axes] for tree in trees]
@@ -244,9 +257,12 @@ class Motions:
         for tree in range(len(self._uids)):
             self.links(tree)
 
-    def slower_than(self, limit: float) -> bool:
-        """Whether all velocities are finite and below ``limit``."""
-        return bool((np.abs(self.twist) < limit).all() and (np.abs(self.velocity) < limit).all())
+    def sound(self, limit: float) -> bool:
+        """Whether the velocities of all bases and joints are finite and below ``limit``."""
+        for tree in range(len(self._uids)):
+            self.pace(tree)
+            self.joints(tree)
+        return bool(_below(self.twist, self._bases_at, self.velocity, limit))
 
     def speeds(self, tree: int) -> list[float]:
         """Velocities of a tree's base and joints."""

@@ -7,6 +7,7 @@ world axes, twists are linear at the centre of mass, then angular, in world axes
 from __future__ import annotations
 
 import weakref
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,6 +21,7 @@ from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Body, Scene
 from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem, kept, put_back
 from ligature.physics.articulation import Tree, build, inertia_of, is_alone
 from ligature.physics.bodies import BodyControl, Placement
 from ligature.physics.closures import Closures
@@ -49,8 +51,34 @@ IMMOVABLE = 1e6
 MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
 
+_KEPT = ("_held_up", "_gripped", "_passing", "clamped", "_impulses", "_next_handle", "_told_owned")
+"""Attributes that last from tick to tick as they are."""
 
-class World(BulletQueries, BulletGrips):
+
+class Controllers(Subsystem):
+    """Controllers, springs, gravity and damping of a `World`: they act before rods and grasps feel how bodies move.
+
+    All that they remember belongs to the world, which keeps it in its snapshots.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def step(self, tick: int) -> None:
+        """Act on joints and bodies for the coming step of the world."""
+        self._world.pre_step()
+
+    def reset(self) -> None:
+        """Nothing: it is part of the world."""
+
+    def snapshot(self) -> None:
+        """Nothing: it is part of the world."""
+
+    def restore(self, snapshot: None) -> None:
+        """Nothing: it is part of the world."""
+
+
+class World(Subsystem, BulletQueries, BulletGrips):
     """All rigid bodies of ``scene`` outside rods; one Bullet client of its own."""
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
@@ -161,10 +189,12 @@ class World(BulletQueries, BulletGrips):
         for control_ in self._body_controls.values():
             control_.apply()
 
-    def step(self) -> None:
-        """Advance Bullet by one tick."""
+    def step(self, tick: int = 0) -> None:
+        """Advance Bullet by one tick, and put back what diverged in it."""
         pybullet.stepSimulation(physicsClientId=self.client)
         self._motions.expire()
+        if not self._motions.sound(MAX_SPEED):
+            self._heal()
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists, joints and wrenches into a state record."""
@@ -247,24 +277,39 @@ class World(BulletQueries, BulletGrips):
 
     # --- health, reset, snapshots -----------------------------------------------------------
 
-    def heal(self) -> list[Diagnostic]:
-        """Put trees that diverged back to where the scene starts; what was found since the last call."""
+    def take_problems(self) -> list[Diagnostic]:
+        """What was found since the last call."""
         found, self.problems = self.problems, []
-        self._motions.everything()
-        if self._motions.slower_than(MAX_SPEED):
-            return found
+        return found
+
+    def _heal(self) -> None:
+        """Put trees that diverged back to where the scene starts."""
         for k, tree in enumerate(self.trees):
             if not all(abs(speed) < MAX_SPEED for speed in self._motions.speeds(k)):
                 self._restart(k, tree)
                 name = self.scene.bodies[tree.root].identity.identifier
                 message = f"'{name}' diverged and was put back to its initial pose"
-                found.append(Diagnostic(Severity.ERROR, message, code="diverged"))
-        return found
+                self.report(Diagnostic(Severity.ERROR, message, code="diverged"))
 
     def reset(self) -> None:
-        """Put every body back to its initial pose, at rest; commands hold on."""
-        for k, tree in enumerate(self.trees):
-            self._restart(k, tree)
+        """Put every body back to its initial pose, at rest.
+
+        The world is built anew, for Bullet's own caches would go on. Commands hold, as if they were sent again; so do
+        the constraints of actuators.
+        """
+        controls, commands, held = self._controls, self._body_controls, self.held_constraints()
+        handle = self._next_handle
+        self.close()
+        self._create()
+        for control, before in zip(self._controls, controls, strict=True):
+            control.follow(before)
+        self._held_up = dict(Counter(grasp.child for grasp in held.values()))
+        for body, command in commands.items():
+            self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
+            self._body_controls[body].set(command.type, command.target.copy())
+        self._weigh_again()
+        self.hold_again(held)
+        self._next_handle = handle
 
     def _restart(self, index: int, tree: Tree) -> None:
         body = self.scene.bodies[tree.root]
@@ -274,7 +319,7 @@ class World(BulletQueries, BulletGrips):
         self._motions.forget(index)
 
     def snapshot(self) -> dict[str, Any]:
-        """All dynamic state; the world is rebuilt from it, so that it and a restored one continue alike."""
+        """All dynamic state but Bullet's own caches: a world continues like a restored one once it is restored, too."""
         trees = []
         for tree in self.trees:
             pose = pybullet.getBasePositionAndOrientation(tree.uid, physicsClientId=self.client)
@@ -282,33 +327,35 @@ class World(BulletQueries, BulletGrips):
             links = [link for link, *_ in tree.axes]
             states = pybullet.getJointStates(tree.uid, links, physicsClientId=self.client) if links else []
             trees.append((pose, velocity, [(s[0], s[1]) for s in states]))
-        memory = {
+        return {
             "trees": trees,
-            "controls": [control.memory() for control in self._controls],
+            "controls": [control.snapshot() for control in self._controls],
+            "told": dict(self._motions.told),
             "held": self.held_constraints(),
-            "held_up": (dict(self._held_up), dict(self._gripped)),
-            "bodies": {body: control.memory() for body, control in self._body_controls.items()},
+            "bodies": {body: control.snapshot() for body, control in self._body_controls.items()},
+            **kept(self, _KEPT),
         }
-        self.restore(memory)
-        return memory
 
-    def restore(self, memory: dict[str, Any]) -> None:
-        """Rebuild the world and continue from `snapshot` (DESIGN §4.6: rebuilding is what is exact)."""
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Build the world anew and continue from `snapshot`: Bullet's own saved states are not exact."""
         self.close()
         self._create()
-        for tree, (pose, velocity, joints) in zip(self.trees, memory["trees"], strict=True):
+        for tree, (pose, velocity, joints) in zip(self.trees, snapshot["trees"], strict=True):
             self.place_of[tree.root].put_inertial(*pose)
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
-        for control, kept in zip(self._controls, memory["controls"], strict=True):
-            control.recall(kept)
-        for body, kept in memory["bodies"].items():
-            control_ = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
-            control_.recall(kept)
-            self._led_anew(body, False)
-        self.hold_again(memory["held"])
-        self._hold_up_again(*memory["held_up"])
+        self._motions.told.update(snapshot["told"])
+        for control, state in zip(self._controls, snapshot["controls"], strict=True):
+            control.restore(state)
+        for body, state in snapshot["bodies"].items():
+            command = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
+            command.restore(state)
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+        self._weigh_again()
+        self._part_again()
+        self.hold_again(snapshot["held"])
+        self._next_handle = snapshot["_next_handle"]
         self._motions.forget_all()
 
     def close(self) -> None:

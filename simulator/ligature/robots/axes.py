@@ -196,15 +196,15 @@ class Axes:
 
     # --- snapshots --------------------------------------------------------------------------
 
-    def memory(self) -> dict[str, object]:
+    def snapshot(self) -> dict[str, object]:
         """Everything that lasts from tick to tick but the plant's own."""
         names = ("mode", "ratio_v", "ratio_a", "_setpoint", "_trajectory", "_since", "_streaming", "limits")
-        return {**{name: getattr(self, name) for name in names}, "plant": self.plant.memory()}
+        return {**{name: getattr(self, name) for name in names}, "plant": self.plant.snapshot()}
 
-    def recall(self, memory: dict[str, object]) -> None:
-        """Continue from `memory`."""
-        for name, value in memory.items():
+    def restore(self, snapshot: dict[str, object]) -> None:
+        """Continue from `snapshot`."""
+        for name, value in snapshot.items():
             if name == "plant":
-                self.plant.recall(value)
+                self.plant.restore(value)
             else:
                 setattr(self, name, value)

@@ -278,14 +278,14 @@ class Device:
         "time", "_state", "_homed", "_busy", "_told", "_pending", "_due", "_busy_until", "_homing", "_astray",
     )  # fmt: skip
 
-    def memory(self) -> dict[str, Any]:
+    def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick, for snapshots."""
         kept = {name: getattr(self, name) for name in self._KEPT}
-        return {**kept, "groups": [axes.memory() for axes in self._groups()]}
+        return {**kept, "groups": [axes.snapshot() for axes in self._groups()]}
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Continue from `memory`."""
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
         for name in self._KEPT:
-            setattr(self, name, memory[name])
-        for axes, kept in zip(self._groups(), memory["groups"], strict=True):
-            axes.recall(kept)
+            setattr(self, name, snapshot[name])
+        for axes, kept in zip(self._groups(), snapshot["groups"], strict=True):
+            axes.restore(kept)

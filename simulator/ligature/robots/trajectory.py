@@ -33,6 +33,7 @@ class JointTrajectory:
     """
 
     def __init__(self, position: Array, velocity: Array, goal: Array, fastest: Array, hardest: Array) -> None:
+        self._asked = position.copy(), velocity.copy(), goal.copy(), fastest.copy(), hardest.copy()
         n = len(goal)
         request = InputParameter(n)
         request.current_position, request.current_velocity = position.tolist(), velocity.tolist()
@@ -52,6 +53,10 @@ class JointTrajectory:
                 f" {np.round(goal, 4).tolist()}; raise 'trajectory_j/set_ratio'"
             )
         self.goal = goal
+
+    def __reduce__(self) -> tuple[type[JointTrajectory], tuple[Array, ...]]:
+        """Planned again in another process: the same request has the same trajectory."""
+        return JointTrajectory, self._asked
 
     def __deepcopy__(self, memo: object) -> JointTrajectory:
         """Itself: a trajectory never changes."""

@@ -47,3 +47,7 @@ class Masses(Protocol):
 
     def is_held(self, body: int) -> bool:
         """Whether something holds a body, so that it does not fall."""
+
+
+class SutureBodies(HeldBodies, Masses, Protocol):
+    """The rigid bodies around threads and holes of a scene."""

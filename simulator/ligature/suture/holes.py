@@ -10,6 +10,7 @@ puncture anywhere else in tissue makes another such passage. World axes, SI unit
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from ligature.model.frames import inverse
 from ligature.model.piercing import Hole, Tissue
 from ligature.model.scene import Scene
 from ligature.model.state import MAX_INSERTIONS, StateRecord
+from ligature.model.subsystem import kept, put_back
 from ligature.suture import passages as arrays
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.holding import hold_alone, react
@@ -50,6 +52,9 @@ SURPRISE = 0.5
 
 MOST_BLIND = 32
 """Most ticks between two looks."""
+
+_KEPT = ("_blind", "_turn", "_near", "_gaps")
+"""Attributes of `Holes` that last from tick to tick: when to look for new passages, and where."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +155,7 @@ class Holes:
                 self._p, self._s, self._rod_tables[owner], rod.first, self._before[owner], line, owner, self._gaps[line]
             )
         nearest = self._gaps.min(axis=0)
-        self._near = nearest < NEAR
+        self._near[:] = nearest < NEAR
         self._blind = int(min(max(float(nearest.min()), 0.0) / (SURPRISE * self._dt), MOST_BLIND))
 
     def _read_holes(self, holes: list[int]) -> None:
@@ -166,9 +171,9 @@ class Holes:
         for line in sorted(set(p.line[:n].tolist())):
             if line < len(self._needles):
                 self._read_needle(line)
-        kept = [c for c in range(n) if self._follows(c)]
-        if len(kept) < n:
-            self._keep(kept)
+        lasting = [c for c in range(n) if self._follows(c)]
+        if len(lasting) < n:
+            self._keep(lasting)
 
     def _follows(self, c: int) -> bool:
         owner = int(self._passages.line[c]) - len(self._needles)
@@ -229,9 +234,8 @@ class Holes:
         if not found and not state["insertion_count"][0]:
             return
         state["insertion_count"] = len(found)
-        state["insertion_hole"], state["insertion_body"] = -1, -1
-        for name in ("depth", "point", "force"):
-            state[f"insertion_{name}"] = 0.0
+        for name in ("hole", "body", "depth", "point", "force"):
+            state[f"insertion_{name}"] = 0
         for row, insertion in enumerate(found):
             for name in ("hole", "body", "depth", "point", "force"):
                 state[f"insertion_{name}"][0, row] = getattr(insertion, name)
@@ -245,27 +249,34 @@ class Holes:
         self._blind = 0
 
     def reset(self) -> None:
-        """Empty all holes."""
-        self._passages.filled[0] = 0
-        self._blind = 0
-
-    def memory(self) -> dict[str, Array]:
-        """Everything that lasts from tick to tick, but when it was last looked for new passages; see `restart`."""
-        n = int(self._passages.filled[0])
-        return {name: np.array(getattr(self._passages, name)[:n]) for name in arrays.MEMORY}
-
-    def recall(self, memory: dict[str, Array]) -> None:
-        """Continue from `memory`."""
-        n = len(memory["hole"])
-        self._passages.filled[0] = n
-        for name in arrays.MEMORY:
-            getattr(self._passages, name)[:n] = memory[name]
-        self.restart()
-
-    def restart(self) -> None:
-        """Look for new passages in the next tick, as after `recall`."""
+        """Empty all holes, and look for new passages in the next tick."""
+        self._clear()
         self._blind, self._turn = 0, -1
         self._near[:] = True
+        self._gaps[:] = 0.0
+        self._read_holes(list(range(len(self._scene.holes))))
+
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        n = int(self._passages.filled[0])
+        rows = {name: np.array(getattr(self._passages, name)[:n]) for name in arrays.ROWS}
+        return {"rows": rows, "pose": self._sites.pose, "twist": self._sites.twist, **kept(self, _KEPT)}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        self._clear()
+        n = len(snapshot["rows"]["hole"])
+        self._passages.filled[0] = n
+        for name in arrays.ROWS:
+            getattr(self._passages, name)[:n] = snapshot["rows"][name]
+        self._sites.pose[:], self._sites.twist[:] = snapshot["pose"], snapshot["twist"]
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+
+    def _clear(self) -> None:
+        """No passages, and none of earlier ones left in the rows behind."""
+        self._passages.filled[0] = 0
+        for name in arrays.ROWS:
+            getattr(self._passages, name)[:] = 0
 
 
 def _sites(scene: Scene, bodies: HeldBodies) -> arrays.Sites:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, quaternion_matrix
 from ligature.model.poses import compose_rows
+from ligature.model.subsystem import kept, put_back
 from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.bonds import PINCH
@@ -95,6 +97,8 @@ class Rod:
         The joints of the chain with their springs, angles and loads, those of the end ties included.
     tension
         (n,) pull along each element in newtons at the last tick.
+    settled_soundly
+        Whether the state after the last tick is finite and below `MAX_SPEED`.
     """
 
     def __init__(
@@ -131,7 +135,7 @@ class Rod:
         self._tables = [table_of(group) for group in (self._nodes, self.joints, self._shapes, self._work)]
         self._touch_tables = {id(touches): table_of(touches) for touches in self._touches}
         self._shape_poses = np.zeros_like(self._shapes.pose)
-        self._counts = np.zeros(4, np.int64)
+        self._counts = np.zeros(5, np.int64)
         self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
@@ -150,7 +154,7 @@ class Rod:
         self.take_passages(passages(1), 0)
         self.impulse = np.zeros((self._total, 6))
         self.tension = np.zeros(n)
-        self.newton_steps = 0
+        self.newton_steps, self.settled_soundly = 0, True
         self.reset()
 
     # --- building ---------------------------------------------------------------------------
@@ -187,39 +191,51 @@ class Rod:
 
     def reset(self) -> None:
         """Put every element back to its initial pose, at rest, and let go of all grips."""
+        nodes, own = self._nodes, self._own
         poses = np.array([matrix_pose7(T) for T in self.description.T_world_inertial])
-        self._nodes.x[self._own], self._nodes.q[self._own] = poses[:, :3], poses[:, 3:]
-        self._nodes.v[:], self._nodes.w[:] = 0.0, 0.0
+        nodes.x[:], nodes.q[:] = 0.0, [0.0, 0.0, 0.0, 1.0]
+        nodes.x[own], nodes.q[own] = poses[:, :3], poses[:, 3:]
+        nodes.v[:], nodes.w[:] = 0.0, 0.0
+        for partner in self.partners:
+            nodes.fixed[self.node_of[partner.body]] = partner.fixed
         self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
         self.grips, self._pads, self._near = [], (), None
         self._bonds = self._gather_bonds()
         self.tension[:], self.impulse[:] = 0.0, 0.0
+        self._clear_touches()
+
+    def _clear_touches(self) -> None:
+        """No contacts, and none of earlier ones left in the rows behind."""
         for touches in self._touches:
-            touches.count[0] = 0
+            for array in touches:
+                array[:] = 0
 
-    def memory(self) -> dict[str, Array]:
+    def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
-        nodes, joints, touches = self._nodes, self.joints, self._touches[0]
-        kept = {name: getattr(nodes, name).copy() for name in ("x", "q", "v", "w")}
-        kept |= {"angle": joints.angle.copy(), "load": joints.load.copy(), "tension": self.tension.copy()}
-        n = int(touches.count[0])
-        kept |= {f"touch_{name}": np.array(getattr(touches, name)[:n]) for name in TOUCH_MEMORY}
-        kept["grips"] = np.array([[g.element, g.body, *g.points.ravel()] for g in self.grips]).reshape(-1, 20)
-        return kept
-
-    def recall(self, memory: dict[str, Array]) -> None:
-        """Continue from `memory`."""
-        for name in ("x", "q", "v", "w"):
-            getattr(self._nodes, name)[:] = memory[name]
-        self.joints.angle[:], self.joints.load[:] = memory["angle"], memory["load"]
-        self.tension[:] = memory["tension"]
         touches = self._touches[0]
-        n = len(memory["touch_key"])
-        touches.count[0] = n
-        for name in TOUCH_MEMORY:
-            getattr(touches, name)[:n] = memory[f"touch_{name}"]
-        self.grips = [Grip(int(g[0]), int(g[1]), g[2:].reshape(3, 2, 3)) for g in memory["grips"]]
-        self._pads, self._near = (), None
+        n = int(touches.count[0])
+        return {
+            **{name: getattr(self._nodes, name) for name in NODES_KEPT},
+            **{name: getattr(self.joints, name) for name in JOINTS_KEPT},
+            **{f"touch_{name}": np.array(getattr(touches, name)[:n]) for name in TOUCHES_KEPT},
+            **kept(self, _KEPT),
+            "skip": self.skip,
+        }
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        for name in NODES_KEPT:
+            getattr(self._nodes, name)[:] = snapshot[name]
+        for name in JOINTS_KEPT:
+            getattr(self.joints, name)[:] = snapshot[name]
+        self._clear_touches()
+        touches = self._touches[0]
+        n = touches.count[0] = len(snapshot["touch_key"])
+        for name in TOUCHES_KEPT:
+            getattr(touches, name)[:n] = snapshot[f"touch_{name}"]
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+        self.skip[:] = snapshot["skip"]
+        self._near = None
         self._bonds = self._gather_bonds()
 
     def finite(self) -> bool:
@@ -426,9 +442,9 @@ class Rod:
         run_tick(
             self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
             work, self._passage_table, self._owner, grips, points, self._motion, self._met, self._counts,
-            self._self_skip, self._stiffness, self.impulse, self.tension, self.dt,
+            self._self_skip, self._stiffness, self.impulse, self.tension, MAX_SPEED, self.dt,
         )  # fmt: skip
-        self.newton_steps = int(self._counts[2])
+        self.newton_steps, self.settled_soundly = int(self._counts[2]), bool(self._counts[4])
         self._touches = (c, a, b) if self._counts[3] else (b, c, a)
 
     def impulse_on(self, body: int) -> Array:
@@ -436,7 +452,13 @@ class Rod:
         return self.impulse[self.node_of[body]]
 
 
-TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "mode", "bond", "normal", "force", "start")
+NODES_KEPT = ("x", "q", "v", "w", "mass", "inertia", "gravity", "fixed")
+JOINTS_KEPT = ("angle", "load")
+TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bond", "normal", "force", "start")
+"""Arrays of nodes, joints and contact points that last from tick to tick."""
+
+_KEPT = ("tension", "impulse", "grips", "_pads", "newton_steps", "settled_soundly")
+"""Attributes of a `Rod` that do."""
 
 
 def _pinch_rows(pads: Pads) -> list[Array]:

@@ -6,6 +6,7 @@ World axes, SI units; poses and twists as in `ligature.model.state`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,7 @@ class Rods:
         self._colliders = Colliders(scene, dt)
         self.rods = [self._rod(scene, from_chain(scene, chain), dt) for chain in scene.rods]
         self._skip = [rod.skip.copy() for rod in self.rods]
+        self.problems: list[Diagnostic] = []
         self._of_body = {body: (rod, e) for rod in self.rods for e, body in enumerate(rod.description.bodies)}
 
     def _rod(self, scene: Scene, description: RodDescription, dt: float) -> Rod:
@@ -73,6 +75,8 @@ class Rods:
             rod.step()
             for body, impulse in rod.pushes():
                 bodies.apply_impulse(body, impulse[:3], impulse[3:])
+            if not rod.settled_soundly:
+                self._heal(rod)
 
     def grip(self, body: int, element_body: int, T_body_a: Array, T_element_b: Array) -> None:
         """Hold frame a (4, 4) of a body and frame b of an element together; both are given in body frames B.
@@ -125,32 +129,38 @@ class Rods:
         for rod in self.rods:
             rod.write(state["body_pose"][0], state["body_twist"][0], state["rod_tension"][0])
 
+    def holds(self, body: int, element_body: int) -> bool:
+        """Whether `grip` holds an element."""
+        rod, element = self._of_body[element_body]
+        return any((grip.element, grip.body) == (element, body) for grip in rod.grips)
+
     def reset(self) -> None:
         """Put every rod back to its initial shape, at rest."""
-        for rod in self.rods:
+        for rod, skip in zip(self.rods, self._skip, strict=True):
             rod.reset()
-        self._colliders.restart()
+            rod.skip[:] = skip
+        self._colliders.reset()
 
-    def heal(self) -> list[Diagnostic]:
-        """Put rods that diverged back to their initial shape, and say so."""
-        found = []
-        for rod in self.rods:
-            if not rod.finite():
-                rod.reset()
-                message = f"rod '{rod.description.name}' diverged and was put back to its initial shape"
-                found.append(Diagnostic(Severity.ERROR, message, code="diverged"))
+    def take_problems(self) -> list[Diagnostic]:
+        """What was found since the last call."""
+        found, self.problems = self.problems, []
         return found
 
-    def memory(self) -> list[dict[str, Array]]:
-        """Everything that lasts from tick to tick."""
-        self._colliders.restart()
-        return [rod.memory() for rod in self.rods]
+    def _heal(self, rod: Rod) -> None:
+        """Put a rod that diverged back to its initial shape, and report it."""
+        rod.reset()
+        message = f"rod '{rod.description.name}' diverged and was put back to its initial shape"
+        self.problems.append(Diagnostic(Severity.ERROR, message, code="diverged"))
 
-    def recall(self, memory: list[dict[str, Array]]) -> None:
-        """Continue from `memory`."""
-        for rod, kept in zip(self.rods, memory, strict=True):
-            rod.recall(kept)
-        self._colliders.restart()
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        return {"rods": [rod.snapshot() for rod in self.rods], "colliders": self._colliders.snapshot()}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        for rod, state in zip(self.rods, snapshot["rods"], strict=True):
+            rod.restore(state)
+        self._colliders.restore(snapshot["colliders"])
 
 
 def _partner(scene: Scene, index: int, free: bool) -> Partner:
