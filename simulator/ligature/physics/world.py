@@ -91,7 +91,7 @@ class World(BulletQueries, BulletGrips):
         )
         self._damped = self._damping_factors()
         self._silence_pairs()
-        self._closures = Closures(self.client, scene, self.place_of, self.report)
+        self._closures = Closures(self.client, scene, self.trees, self.place_of, self._motions)
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
         self._setup_queries()
         self._setup_grips()
@@ -267,10 +267,8 @@ class World(BulletQueries, BulletGrips):
             self._restart(k, tree)
 
     def _restart(self, index: int, tree: Tree) -> None:
-        body = self.scene.bodies[tree.root]
-        self.place_of[tree.root].put(matrix_pose7(body.T_world_body))
-        for link, *_ in tree.axes:
-            pybullet.resetJointState(tree.uid, link, 0.0, 0.0, physicsClientId=self.client)
+        self.place_of[tree.root].put(matrix_pose7(self.scene.start.roots[tree.root]))
+        tree.put_joints(self.client)
         self._motions.forget(index)
 
     def snapshot(self) -> dict[str, Any]:
