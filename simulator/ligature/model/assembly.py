@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ligature.adf import Diagnostic, Severity
 from ligature.model.axes import Axis, axes_of
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_quaternion, matrix_rpy
-from ligature.model.mechanism import Chain, Mechanism, chain_of
+from ligature.model.mechanism import Chain, Mechanism, chain_of, rotation
 from ligature.model.scene import Articulation, Body, Closure, Joint, JointType, Start
 
 Array = NDArray[np.float64]
@@ -36,10 +36,16 @@ TOLD_M, TOLD_RAD = 2e-3, 0.02
 CLOSED = 1e-9
 """Gap in metres at which a loop counts as closed."""
 
-PIVOT = 1.5e-3
-"""Metres by which a pivot may be moved where a loop cannot close otherwise: two pivots of three digits each."""
+FRAME_M, FRAME_RAD = 1.5e-3, 0.01
+"""Metres and radians by which a joint's frame may be corrected so that its loop closes.
 
-STEPS = 60
+Rounding to three digits moves a pivot by 0.9 mm; axes that are meant to be parallel are up to 0.008 rad apart.
+"""
+
+CORRECTIONS = 5
+"""Rounds of corrections; each squares what is left open."""
+
+STEPS = 30
 """Gauss-Newton steps; four are usual, each step at a limit costs one more."""
 
 REDUNDANT = 0.02
@@ -48,7 +54,7 @@ REDUNDANT = 0.02
 Rounding tilts axes that are meant to be parallel by up to 0.008 rad.
 """
 
-SAMPLES, SAMPLE_STEP = 6, 0.3
+SAMPLES, SAMPLE_STEP = 10, 0.3
 """Configurations in which redundancy is looked for, and the largest coordinate (rad) of the step to each."""
 
 
@@ -209,9 +215,9 @@ class _Assembly:
         x = mechanism.gather(self.coordinates, self.roots)
         before, file_gap = mechanism.poses(x), float(mechanism.gaps(x)[:, 0].max())
         x = mechanism.solve(x, STEPS, CLOSED, REDUNDANT)
-        mechanism, x, corrected = self._corrected(mechanism, x, trees)
-        chains = mechanism.chains
-        redundant, slack = self._redundant(mechanism, x)
+        mechanism, places, corrected = self._corrected(mechanism, x, trees)
+        chains, x = mechanism.chains, places[0]
+        redundant, slack = self._redundant(mechanism, places)
         mechanism.scatter(x, self.coordinates, self.roots)
         after = mechanism.poses(x)
         moved = {body: float(np.linalg.norm(after[body][:3, 3] - before[body][:3, 3])) for body in after}
@@ -225,39 +231,67 @@ class _Assembly:
     def _mechanism(self, trees: list[int], chains: list[Chain]) -> Mechanism:
         return Mechanism(self.bodies, self.joints, [self.forest[k] for k in trees], chains)
 
-    def _corrected(self, mechanism: Mechanism, x: Array, trees: list[int]) -> tuple[Mechanism, Array, float]:
-        """Share what is still open out among the joints' pivots, if that is within what rounding does to them."""
-        moves = mechanism.corrections(x)
-        largest = max(float(np.linalg.norm(move)) for move in moves.values())
-        if not CLOSED < largest <= PIVOT:
-            return mechanism, x, 0.0
-        inner = mechanism.inner_of()
-        for index, move in moves.items():
-            self.joints[index] = _shifted(self.joints[index], inner[index], move, self.bodies)
-        chains = [self._chain(self.joints[chain.joint]) for chain in mechanism.chains]
-        mechanism.scatter(x, self.coordinates, self.roots)
-        closed = self._mechanism(trees, chains)
-        return closed, closed.gather(self.coordinates, self.roots), largest
+    def _corrected(
+        self, mechanism: Mechanism, x: Array, trees: list[int]
+    ) -> tuple[Mechanism, list[Array], tuple[float, float]]:
+        """Correct frames of joints by what roundings do to them, so that the loops close wherever they can go.
 
-    def _redundant(self, mechanism: Mechanism, x: Array) -> tuple[list[tuple[Axis, ...]], list[float]]:
-        """Directions of each loop that the others hold, found where the mechanism can go; what is open there (m)."""
-        rng = np.random.default_rng(0)
-        places = [x]
+        Where that takes more than roundings, they are to close at the start at least. Returns the mechanism, places
+        that it can go to, the start first, and the largest corrections (m, rad).
+        """
+        places = self._places(mechanism, x)
+        return (
+            self._close_at(mechanism, places, trees)
+            or self._close_at(mechanism, places[:1], trees, places[1:])
+            or (mechanism, places, (0.0, 0.0))
+        )
+
+    def _close_at(
+        self, mechanism: Mechanism, places: list[Array], trees: list[int], others: Sequence[Array] = ()
+    ) -> tuple[Mechanism, list[Array], tuple[float, float]] | None:
+        """Correct frames so that the loops close at ``places``; None if that takes more than roundings."""
+        joints = list(self.joints)
+        total = {index: np.zeros((4, 3)) for index in mechanism.inner_of()}
+        size = np.zeros(2)
+        for _ in range(CORRECTIONS):
+            if max(float(mechanism.gaps(place)[:, 0].max()) for place in places) < CLOSED:
+                break
+            moves, inner = mechanism.corrections(places, REDUNDANT), mechanism.inner_of()
+            for index, move in moves.items():
+                total[index] += move
+                self.joints[index] = _shifted(self.joints[index], inner[index], move, self.bodies)
+            size = np.abs(list(total.values())).max(axis=(0, 2)).reshape(2, 2).max(axis=0)
+            if size[0] > FRAME_M or size[1] > FRAME_RAD:
+                self.joints[:] = joints
+                return None
+            chains = [self._chain(self.joints[chain.joint]) for chain in mechanism.chains]
+            mechanism = self._mechanism(trees, chains)
+            mechanism.gather(self.coordinates, self.roots)
+            places = [mechanism.solve(place, STEPS, CLOSED, REDUNDANT) for place in places]
+        return mechanism, [*places, *others], (float(size[0]), float(size[1]))
+
+    def _places(self, mechanism: Mechanism, x: Array) -> list[Array]:
+        """The configuration ``x`` (n,) and others that a walk within the limits leads to."""
+        rng, places = np.random.default_rng(0), [x]
         for _ in range(SAMPLES):
-            trial = mechanism.solve(
-                mechanism.wandered(x, rng, SAMPLE_STEP, REDUNDANT), STEPS, CLOSED, REDUNDANT, limited=False
-            )
+            trial = mechanism.wandered(places[-1], rng, SAMPLE_STEP, REDUNDANT)
+            trial = mechanism.solve(trial, STEPS, CLOSED, REDUNDANT)
             if mechanism.hard_gap(trial, REDUNDANT) < 1e-4 * mechanism.size:
                 places.append(trial)
+        return places
+
+    def _redundant(self, mechanism: Mechanism, places: list[Array]) -> tuple[list[tuple[Axis, ...]], list[float]]:
+        """Directions of each loop that the others hold at all ``places``, and what is open there, in metres."""
         grams = [np.zeros((6, 6)) for _ in mechanism.chains]
         for place in places:
             for k, gram in enumerate(mechanism.freedoms(place, REDUNDANT)):
                 grams[k] += gram
         found, slack = [], []
+        stuck = len(places) == 1 and mechanism.tangent(places[0], REDUNDANT).shape[1] > 0
         for k, chain in enumerate(mechanism.chains):
-            free = []
+            free: list[Axis] = []
             for offset, prismatic in ((0, True), (3, False)):
-                if not prismatic and chain.point:
+                if stuck or (not prismatic and chain.point):
                     continue
                 block = grams[k][offset : offset + 3, offset : offset + 3]
                 scale, directions = np.linalg.eigh(block)
@@ -270,7 +304,7 @@ class _Assembly:
         return found, slack
 
     def _report_assembled(
-        self, mechanism: Mechanism, x: Array, moved: dict[int, float], file_gap: float, corrected: float
+        self, mechanism: Mechanism, x: Array, moved: dict[int, float], file_gap: float, corrected: tuple[float, float]
     ) -> None:
         first = self.joints[mechanism.chains[0].joint].identity
         left = float(mechanism.gaps(x)[:, 0].max())
@@ -285,7 +319,7 @@ class _Assembly:
         elif file_gap > 1e-4:
             message = (
                 f"the loop of joint {loops} is open by {1e3 * file_gap:.3g} mm and closes as it starts; "
-                f"'{name}' moves furthest, by {1e3 * moved[furthest]:.2g} mm, and pivots by up to {1e3 * corrected:.2g} mm"
+                f"'{name}' moves furthest, by {1e3 * moved[furthest]:.2g} mm, and pivots by up to {1e3 * corrected[0]:.2g} mm"
             )
             severity = Severity.WARNING if moved[furthest] > PLACED_M else Severity.INFO
             self.diagnostics.append(Diagnostic(severity, message, first.mark, "", "loop"))
@@ -302,13 +336,20 @@ class _Assembly:
 
 
 def _shifted(joint: Joint, inner: int, move: Array, bodies: Sequence[Body]) -> Joint:
-    """A joint whose frame on the body ``inner`` is moved by ``move`` (3,), in the body's inertial frame."""
-    shift = frame(np.eye(3), move)
-    T_a, T_b = joint.T_parent_a, joint.T_child_b
-    T_a, T_b = (shift @ T_a, T_b) if joint.parent == inner else (T_a, shift @ T_b)
+    """A joint whose frames on its inner and outer body are moved by ``move`` (4, 3), as `Mechanism.corrections` does."""
+    forward = joint.parent == inner
+    first, second = (joint.T_parent_a, joint.T_child_b) if forward else (joint.T_child_b, joint.T_parent_a)
+    first, second = moved(first, move[0], move[1]), moved(second, move[2], move[3])
+    T_a, T_b = (first, second) if forward else (second, first)
     parent, child = bodies[joint.parent], bodies[joint.child]
     T_zero = parent.T_body_inertial @ T_a @ inverse(child.T_body_inertial @ T_b)
-    return replace(joint, T_parent_a=T_a, T_child_b=T_b, T_parent_child_zero=T_zero)
+    axis = T_a[:3, 0 if joint.type is JointType.PRISMATIC else 2].copy()
+    return replace(joint, axis=axis, T_parent_a=T_a, T_child_b=T_b, T_parent_child_zero=T_zero)
+
+
+def moved(T: Array, shift: Array, turn: Array) -> Array:
+    """A frame (4, 4) shifted and turned about its origin, both (3,) in the axes that it is given in."""
+    return frame(rotation(turn) @ T[:3, :3], T[:3, 3] + shift)
 
 
 def _signed(direction: Array) -> Array:

@@ -18,6 +18,9 @@ from ligature.model.scene import Articulation, Body, Joint, JointType
 
 Array = NDArray[np.float64]
 
+ROUNDED_M, ROUNDED_RAD = 1e-3, 2e-3
+"""What the frames of joints are off where a file has three digits; only their ratio matters."""
+
 LEAST_SIZE = 1e-3
 """Size in metres that the smallest mechanism counts as."""
 
@@ -181,7 +184,7 @@ class Mechanism:
             moves[root] = []
             if root in self._base:
                 at = self._base[root]
-                T = frame(_rotation(x[at + 3 : at + 6]) @ T[:3, :3], T[:3, 3] + x[at : at + 3])
+                T = frame(rotation(x[at + 3 : at + 6]) @ T[:3, :3], T[:3, 3] + x[at : at + 3])
                 direction[at : at + 6] = np.tile(np.eye(3), (2, 1))
                 origin[at : at + 6] = T[:3, 3]
                 moves[root] = list(range(at, at + 6))
@@ -232,31 +235,52 @@ class Mechanism:
 
     # --- closing ----------------------------------------------------------------------------
 
-    def corrections(self, x: Array) -> dict[int, Array]:
-        """What each joint's frame on its inner body is to be moved by (3,), in that body's axes, so that points meet.
+    def corrections(self, places: Sequence[Array], rcond: float) -> dict[int, Array]:
+        """What joints' frames are to be moved by so that the loops close at ``places``, by joint.
 
-        The least squares of all joints of the loops: what many roundings added up to is shared out among them.
+        A row (4, 3) holds translation and rotation vector of the frame on the inner body, in that body's axes, then
+        those on the outer one. The least squares of all joints, metres and radians weighed as files round them: what
+        many roundings add up to is shared out. Only directions that the mechanism cannot close itself are looked at.
         """
-        poses = self.poses(x)
         joints = self._all_chains()
-        column = {chain.joint: 3 * i for i, chain in enumerate(joints)}
-        carries: dict[int, list[int]] = {root: [] for root, _ in self._trees}
+        column = {chain.joint: 12 * i for i, chain in enumerate(joints)}
+        rows, wanted = [], []
+        for x in places:
+            residual, J = self._evaluate(x)
+            u, s, _ = np.linalg.svd(J, full_matrices=True)
+            weak = u[:, int((s > rcond).sum()) :].T
+            rows.append(weak @ self._frame_columns(x, column))
+            wanted.append(-weak @ residual)
+        scale = np.tile(np.repeat([ROUNDED_M, ROUNDED_RAD], 3), 2 * len(joints))
+        moved = scale * np.linalg.lstsq(np.concatenate(rows) * scale, np.concatenate(wanted), rcond=1e-6)[0]
+        return {joint: moved[at : at + 12].reshape(4, 3) for joint, at in column.items()}
+
+    def _frame_columns(self, x: Array, column: Mapping[int, int]) -> Array:
+        """Derivative (6 k, 12 n) of the residual for moves of the joints' frames, as `corrections` numbers them."""
+        poses, direction, origin, _ = self._forward(x)
+        paths: dict[int, list[Chain]] = {root: [] for root, _ in self._trees}
         for _, steps in self._trees:
             for chain in steps:
-                carries[chain.outer] = [*carries[chain.inner], chain.joint]
-        J = np.zeros((3 * len(self.chains), 3 * len(joints)))
-        residual = self.residual(x).reshape(-1, 6)[:, :3] * self.size
-        for k, chain in enumerate(self.chains):
-            R = (poses[chain.inner] @ chain.T_inner)[:3, :3]
-            residual[k] = R @ residual[k]
-            for sign, path in ((1.0, carries[chain.outer]), (-1.0, [*carries[chain.inner], chain.joint])):
-                for joint in path:
-                    J[3 * k : 3 * k + 3, column[joint] : column[joint] + 3] += sign * np.eye(3)
-        moved = -np.linalg.lstsq(J, residual.ravel(), rcond=1e-9)[0]
-        return {
-            chain.joint: poses[chain.inner][:3, :3].T @ moved[column[chain.joint] : column[chain.joint] + 3]
-            for chain in joints
-        }
+                paths[chain.outer] = [*paths[chain.inner], chain]
+        D = np.zeros((6 * len(self.chains), 12 * len(column)))
+        for k, closing in enumerate(self.chains):
+            T_end, _ = self._along(closing, poses[closing.inner], x, direction, origin)
+            T_outer = poses[closing.outer] @ closing.T_outer
+            R = (poses[closing.inner] @ closing.T_inner)[:3, :3].T
+            ways = ((1.0, T_outer[:3, 3], paths[closing.outer]), (-1.0, T_end[:3, 3], [*paths[closing.inner], closing]))
+            for sign, end, way in ways:
+                for chain in way:
+                    before = (poses[chain.inner] @ chain.T_inner)[:3, 3]
+                    after = T_end[:3, 3] if chain is closing else (poses[chain.outer] @ chain.T_outer)[:3, 3]
+                    at = column[chain.joint]
+                    for side, body, around in ((sign, chain.inner, before), (-sign, chain.outer, after)):
+                        axes = poses[body][:3, :3]
+                        D[6 * k : 6 * k + 3, at : at + 3] += side * R @ axes / self.size
+                        D[6 * k : 6 * k + 3, at + 3 : at + 6] += side * R @ np.cross(axes.T, end - around).T / self.size
+                        if not closing.point:
+                            D[6 * k + 3 : 6 * k + 6, at + 3 : at + 6] += side * R @ axes
+                        at += 6
+        return D
 
     def solve(
         self, x: Array, steps: int, closed: float, rcond: float, limited: bool = True, kept: Sequence[int] = ()
@@ -331,7 +355,8 @@ def _null(J: Array, rcond: float) -> Array:
     return np.asarray(v[int((s > rcond).sum()) :].T)
 
 
-def _rotation(vector: Array) -> Array:
+def rotation(vector: Array) -> Array:
+    """Rotation (3, 3) by a rotation vector (3,)."""
     angle = float(np.linalg.norm(vector))
     return np.eye(3) if angle < 1e-12 else axis_rotation(vector / angle, angle)
 
