@@ -45,6 +45,12 @@ Rounding to three digits moves a pivot by 0.9 mm; axes that are meant to be para
 CORRECTIONS = 5
 """Rounds of corrections; each squares what is left open."""
 
+CONSISTENT = 1e-6
+"""Gap (m, rad) up to which what the other joints hold as well is held twice: two that agree do not fight."""
+
+OPEN = 1e-4
+"""Gap in metres from which on an open loop is reported."""
+
 STEPS = 30
 """Gauss-Newton steps; four are usual, each step at a limit costs one more."""
 
@@ -154,7 +160,9 @@ class _Assembly:
         metres, radians = float(np.linalg.norm(E[:3, 3])), _angle(E[:3, :3])
         if metres > TOLD_M or radians > TOLD_RAD:
             name, key = self.bodies[outer].identity.identifier, joint.identity.key
-            message = f"'{name}' starts {1e3 * metres:.3g} mm and {radians:.3g} rad off its location, where '{key}' holds it"
+            message = (
+                f"'{name}' starts {1e3 * metres:.3g} mm and {radians:.3g} rad off its location, where '{key}' holds it"
+            )
             hint = "move the body, or the joint's pivots, axes, offset and limits"
             self.diagnostics.append(Diagnostic(Severity.INFO, message, joint.identity.mark, hint, "moved"))
 
@@ -226,7 +234,7 @@ class _Assembly:
             free = redundant[k]
             self.closures.append(Closure(chain.joint, chain.inner, chain.outer, free, slack[k]))
             if free:
-                self._report_redundant(chain, len(free), slack[k])
+                self._report_redundant(chain, slack[k])
 
     def _mechanism(self, trees: list[int], chains: list[Chain]) -> Mechanism:
         return Mechanism(self.bodies, self.joints, [self.forest[k] for k in trees], chains)
@@ -240,6 +248,9 @@ class _Assembly:
         that it can go to, the start first, and the largest corrections (m, rad).
         """
         places = self._places(mechanism, x)
+        ranks = [mechanism.rank(place, 3.0 * REDUNDANT) for place in places]
+        # near a singular place a gap is not one of the files, and closing it there takes large corrections
+        places = [x, *(place for place, rank in zip(places[1:], ranks[1:], strict=True) if rank == max(ranks))]
         return (
             self._close_at(mechanism, places, trees)
             or self._close_at(mechanism, places[:1], trees, places[1:])
@@ -296,11 +307,13 @@ class _Assembly:
                 block = grams[k][offset : offset + 3, offset : offset + 3]
                 scale, directions = np.linalg.eigh(block)
                 free += [
-                    Axis(prismatic, _signed(directions[:, i])) for i in range(3) if np.sqrt(max(scale[i], 0.0)) < REDUNDANT
+                    Axis(prismatic, _signed(directions[:, i]))
+                    for i in range(3)
+                    if np.sqrt(max(scale[i], 0.0)) < REDUNDANT
                 ]
-            found.append(tuple(free))
-            gaps = np.array([mechanism.gaps(place)[k, 0] for place in places])
-            slack.append(float(gaps.max()) if free else 0.0)
+            open_by = max(float(mechanism.gaps(place)[k].max()) for place in places)
+            found.append(tuple(free) if open_by > CONSISTENT else ())
+            slack.append(open_by if free else 0.0)
         return found, slack
 
     def _report_assembled(
@@ -312,31 +325,31 @@ class _Assembly:
         name = self.bodies[furthest].identity.identifier
         others = len(mechanism.chains) - 1
         loops = f"'{first.key}'" + (f" and {others} more" if others else "")
-        if left > 1e-4:
+        if left > OPEN:
             message = f"the loop of joint {loops} does not close: {1e3 * left:.3g} mm remain, and are held as they are"
             hint = "correct the joint's pivots, or widen the limits of the joints of the loop"
             self.diagnostics.append(Diagnostic(Severity.WARNING, message, first.mark, hint, "loop"))
-        elif file_gap > 1e-4:
+        elif file_gap > OPEN:
             message = (
-                f"the loop of joint {loops} is open by {1e3 * file_gap:.3g} mm and closes as it starts; "
-                f"'{name}' moves furthest, by {1e3 * moved[furthest]:.2g} mm, and pivots by up to {1e3 * corrected[0]:.2g} mm"
+                f"the loop of joint {loops} is open by {1e3 * file_gap:.3g} mm and closes as it starts: "
+                f"'{name}' moves furthest, by {1e3 * moved[furthest]:.2g} mm, "
+                f"pivots by up to {1e3 * corrected[0]:.2g} mm"
             )
             severity = Severity.WARNING if moved[furthest] > PLACED_M else Severity.INFO
             self.diagnostics.append(Diagnostic(severity, message, first.mark, "", "loop"))
 
-    def _report_redundant(self, chain: Chain, count: int, slack: float) -> None:
+    def _report_redundant(self, chain: Chain, slack: float) -> None:
         joint = self.joints[chain.joint]
-        rows = 3 if chain.point else 6
-        if slack > 1e-4 or (count == rows and not chain.axes):
+        if slack > OPEN:
             message = (
-                f"joint '{joint.identity.key}' repeats what the other joints of its loop hold; where they differ it opens, "
-                f"by up to {1e3 * slack:.2g} mm"
+                f"joint '{joint.identity.key}' repeats what the other joints of its loop hold; "
+                f"where they differ it opens, by up to {1e3 * slack:.2g} mm"
             )
             self.diagnostics.append(Diagnostic(Severity.INFO, message, joint.identity.mark, "", "loop"))
 
 
 def _shifted(joint: Joint, inner: int, move: Array, bodies: Sequence[Body]) -> Joint:
-    """A joint whose frames on its inner and outer body are moved by ``move`` (4, 3), as `Mechanism.corrections` does."""
+    """A joint whose frames on its inner and outer body are moved by ``move`` (4, 3) of `Mechanism.corrections`."""
     forward = joint.parent == inner
     first, second = (joint.T_parent_a, joint.T_child_b) if forward else (joint.T_child_b, joint.T_parent_a)
     first, second = moved(first, move[0], move[1]), moved(second, move[2], move[3])

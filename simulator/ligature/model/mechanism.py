@@ -47,10 +47,19 @@ def chain_of(joint: Joint, forward: bool) -> Chain:
     axes = axes_of(joint) or ()
     point, n = joint.type is JointType.P2P, len(axes)
     if forward:
-        return Chain(joint.index, joint.parent, joint.child, joint.T_parent_a, joint.T_child_b, axes, tuple(range(n)), point)
+        return Chain(
+            joint.index, joint.parent, joint.child, joint.T_parent_a, joint.T_child_b, axes, tuple(range(n)), point
+        )
     turned = tuple(axis.reversed() for axis in reversed(axes))
     return Chain(
-        joint.index, joint.child, joint.parent, joint.T_child_b, joint.T_parent_a, turned, tuple(reversed(range(n))), point
+        joint.index,
+        joint.child,
+        joint.parent,
+        joint.T_child_b,
+        joint.T_parent_a,
+        turned,
+        tuple(reversed(range(n))),
+        point,
     )
 
 
@@ -167,7 +176,9 @@ class Mechanism:
     def gaps(self, x: Array) -> Array:
         """Open metres and radians (k, 2) of each loop."""
         residual = self.residual(x).reshape(-1, 6)
-        return np.stack([np.linalg.norm(residual[:, :3], axis=1) * self.size, np.linalg.norm(residual[:, 3:], axis=1)], 1)
+        return np.stack(
+            [np.linalg.norm(residual[:, :3], axis=1) * self.size, np.linalg.norm(residual[:, 3:], axis=1)], 1
+        )
 
     def residual(self, x: Array) -> Array:
         """Open lengths and rotation vectors (6 k,), lengths per size, in the joints' frames on the inner bodies."""
@@ -324,6 +335,10 @@ class Mechanism:
         u, s, _ = np.linalg.svd(J, full_matrices=False)
         return float(np.linalg.norm(u[:, s > rcond].T @ residual)) * self.size
 
+    def rank(self, x: Array, rcond: float) -> int:
+        """Number of directions in which the loops' ends can move."""
+        return int((np.linalg.svd(self._evaluate(x)[1], compute_uv=False) > rcond).sum())
+
     def tangent(self, x: Array, rcond: float) -> Array:
         """Motions (n, m) without units that keep the loops closed."""
         return _null(self._evaluate(x)[1], rcond)
@@ -334,7 +349,7 @@ class Mechanism:
         if not N.shape[1]:
             return x.copy()
         step = N @ rng.standard_normal(N.shape[1])
-        return x + largest * step / max(np.abs(step).max(), 1e-12) * self._unit
+        return np.asarray(x + largest * step / max(np.abs(step).max(), 1e-12) * self._unit)
 
     def freedoms(self, x: Array, rcond: float) -> list[Array]:
         """For each loop the Gram matrix (6, 6) of its ends' motions while the loops before it stay closed."""

@@ -184,7 +184,9 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         flags=pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_MAINTAIN_LINK_ORDER,
         **at,
     )
-    tree = Tree(uid, uid if stand is None else stand, root.index, link_of, axes, root.static, plan.frames(), start, ends)
+    tree = Tree(
+        uid, uid if stand is None else stand, root.index, link_of, axes, root.static, plan.frames(), start, ends
+    )
     _set_dynamics(client, tree, plan, bodies)
     tree.put_joints(client)
     return tree

@@ -1,11 +1,11 @@
 """Joints that no tree holds, as Bullet constraints.
 
-Bullet has no constraint for most types of joints between trees. So a closing joint is built as any other, on the tree of
-its inner body, and carries a part of its outer body, which is welded to the rest of that: limits, motors, springs and
-reported positions are those of joints of trees. A point-to-point joint is a constraint of points.
+Bullet has no constraint for most types of joints between trees. So a closing joint is built as any other, on the tree
+of its inner body, and carries a part of its outer body, which is welded to the rest of that: limits, motors, springs
+and reported positions are those of joints of trees. A point-to-point joint is a constraint of points.
 
-A weld holds what the start of the scene holds, so that nothing is torn then. Along what the other joints of a loop hold
-already the closing joint is free (`ligature.model.assembly`): two stiff ways to hold one thing fight over its roundings.
+A weld holds what the start of the scene holds, so that nothing is torn then. Along what the other joints of a loop
+hold differently, in spite of corrected frames (`ligature.model.assembly`), the closing joint is free.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from ligature.model.frames import inverse, matrix_quaternion, pose7_matrix
-from ligature.model.mechanism import chain_of
+from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Closure, Scene
 from ligature.physics.articulation import Tree, is_point, needs_link
 from ligature.physics.bodies import Placement
@@ -51,19 +51,23 @@ class Closures:
         tree = self._trees[inner.tree]
         link = tree.ends[closure.joint]
         self._motions.links(inner.tree)
-        T_world_end = pose7_matrix(self._motions.pose[self._motions.row(inner.tree, link)])
-        T_outer_end = inverse(self._frame(closure.outer)) @ T_world_end
-        kind = pybullet.JOINT_POINT2POINT if is_point(self._scene, closure) else pybullet.JOINT_FIXED
-        self._create(kind, (tree.uid, link), (outer.uid, outer.link), np.zeros(3), T_outer_end)
+        T_world_link = pose7_matrix(self._motions.pose[self._motions.row(inner.tree, link)])
+        point = is_point(self._scene, closure)
+        # at the joint: a force there does not turn the light end about its axis, so that the solver's rows agree
+        T_link_end = np.eye(4) if point else self._chain(closure).T_outer
+        T_outer_end = inverse(self._frame(closure.outer)) @ T_world_link @ T_link_end
+        kind = pybullet.JOINT_POINT2POINT if point else pybullet.JOINT_FIXED
+        self._create(kind, (tree.uid, link), (outer.uid, outer.link), T_link_end, T_outer_end)
 
     def _hold_point(self, closure: Closure) -> None:
         inner, outer = self._place_of[closure.inner], self._place_of[closure.outer]
-        joint = self._scene.joints[closure.joint]
-        T_inner = chain_of(joint, joint.child == closure.outer).T_inner
+        T_inner = self._chain(closure).T_inner
         T_outer_end = inverse(self._frame(closure.outer)) @ self._frame(closure.inner) @ T_inner
-        self._create(
-            pybullet.JOINT_POINT2POINT, (inner.uid, inner.link), (outer.uid, outer.link), T_inner[:3, 3], T_outer_end
-        )
+        self._create(pybullet.JOINT_POINT2POINT, (inner.uid, inner.link), (outer.uid, outer.link), T_inner, T_outer_end)
+
+    def _chain(self, closure: Closure) -> Chain:
+        joint = self._scene.joints[closure.joint]
+        return chain_of(joint, joint.child == closure.outer)
 
     def _frame(self, body: int) -> Array:
         """Inertial frame (4, 4) of a body in the world."""
@@ -71,10 +75,11 @@ class Closures:
         self._place_of[body].read_inertial(pose, twist)
         return pose7_matrix(pose)
 
-    def _create(self, kind: int, one: tuple[int, int], other: tuple[int, int], at: Array, T_outer_end: Array) -> None:
+    def _create(self, kind: int, one: tuple[int, int], other: tuple[int, int], T_one: Array, T_other: Array) -> None:
         constraint = pybullet.createConstraint(
-            *one, *other, kind, [0.0] * 3, at.tolist(), T_outer_end[:3, 3].tolist(), [0.0, 0.0, 0.0, 1.0],
-            matrix_quaternion(T_outer_end[:3, :3]).tolist(), physicsClientId=self._client,
+            *one, *other, kind, [0.0] * 3, T_one[:3, 3].tolist(), T_other[:3, 3].tolist(),
+            matrix_quaternion(T_one[:3, :3]).tolist(), matrix_quaternion(T_other[:3, :3]).tolist(),
+            physicsClientId=self._client,
         )  # fmt: skip
         pybullet.changeConstraint(constraint, maxForce=MAX_FORCE, physicsClientId=self._client)
         self.ids.append(int(constraint))
