@@ -14,6 +14,7 @@ import numpy as np
 from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
 from ligature.model import attached, proxies, trees
 from ligature.model.arms import find_arms
+from ligature.model.assembly import assemble
 from ligature.model.frames import pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, shader_files
 from ligature.model.holes import find_holes
@@ -142,6 +143,8 @@ class SceneBuilder:
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
         forest, loops = trees.articulations(self.bodies, self.joints, rod_bodies, rod_joints)
+        start, closures, moved = assemble(self.bodies, self.joints, forest, loops)
+        self.diagnostics += moved
         for rod in rods:
             message = f"{len(rod.bodies)} bodies from '{rod.name}' on are simulated as one elastic rod"
             mark = self.bodies[rod.bodies[0]].identity.mark
@@ -167,6 +170,8 @@ class SceneBuilder:
             input_devices=tuple(self.devices),
             articulations=forest,
             loops=loops,
+            start=start,
+            closures=closures,
             rods=rods,
             needles=needles,
             holes=holes,

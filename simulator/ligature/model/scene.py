@@ -9,16 +9,20 @@ immutable and knows nothing of Bullet; objects refer to each other by their inde
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Mark
 from ligature.model.piercing import Hole, Needle, Tissue
+
+if TYPE_CHECKING:
+    from ligature.model.axes import Axis
 
 Array = NDArray[np.float64]
 """A float64 array; the docstring beside each use gives its shape and frame."""
@@ -477,6 +481,33 @@ class Articulation:
 
 
 @dataclass(frozen=True, eq=False)
+class Start:
+    """Where the articulations start.
+
+    ``coordinates`` are the positions of a joint's free axes (`ligature.model.axes`) by joint, of trees and loops;
+    ``roots`` the pose T_world_body (4, 4) of each articulation's first body by body.
+    """
+
+    coordinates: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+    roots: Mapping[int, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """How a joint that closes a loop is held: from body ``inner`` it leads to ``outer``.
+
+    Along the ``free`` axes, in the joint's frame on ``inner``, the other joints hold the two already; there they may
+    differ, by up to ``slack`` metres.
+    """
+
+    joint: int
+    inner: int
+    outer: int
+    free: tuple[Axis, ...] = ()
+    slack: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class RodChain:
     """A chain of bodies that is simulated as one elastic rod (DESIGN §4.1), from end to end.
 
@@ -578,6 +609,8 @@ class Scene:
     input_devices: tuple[InputDevice, ...] = ()
     articulations: tuple[Articulation, ...] = ()
     loops: tuple[int, ...] = ()
+    start: Start = Start()
+    closures: tuple[Closure, ...] = ()
     rods: tuple[RodChain, ...] = ()
     needles: tuple[Needle, ...] = ()
     holes: tuple[Hole, ...] = ()

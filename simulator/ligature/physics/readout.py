@@ -65,9 +65,9 @@ class Readout:
         self._axes = np.array([row for row, _ in reported.values()], dtype=np.int64)
         self._turns = np.array([joint.type is JointType.REVOLUTE for _, joint in reported.values()], dtype=bool)
         self._feedback = np.array([joint.feedback for _, joint in reported.values()], dtype=bool)
-        measured = [(joint.child, row) for row, _, _, joint in axes if joint.feedback]
-        self._loaded = np.array([child for child, _ in measured], dtype=np.int64)
-        self._measured = np.array([row for _, row in measured], dtype=np.int64)
+        measured = {joint.index: (joint.child, row) for row, _, _, joint in axes if joint.feedback}
+        self._loaded = np.array([child for child, _ in measured.values()], dtype=np.int64)
+        self._measured = np.array([row for _, row in measured.values()], dtype=np.int64)
         for _, link, tree, joint in axes:
             if joint.feedback:
                 motions.measure(tree)
