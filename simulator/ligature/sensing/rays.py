@@ -32,7 +32,7 @@ class Rays:
         self.slices = [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         n = int(ends[-1])
         self.hits = RayHits(np.full(n, -1, dtype=np.int32), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
-        self._stick = [_Stick(sensor) for sensor in self.sensors]
+        self._stick = [_Stick(sensor, sensor.parent not in scene.rod_bodies) for sensor in self.sensors]
 
     @property
     def measurement(self) -> Array:
@@ -62,8 +62,8 @@ class Rays:
 class _Stick:
     """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3)."""
 
-    def __init__(self, sensor: Sensor) -> None:
-        self._sensor = sensor
+    def __init__(self, sensor: Sensor, pushes_back: bool) -> None:
+        self._sensor, self._pushes_back = sensor, pushes_back
         n = len(sensor.rays)
         self._body = np.full(n, -1, dtype=np.int64)
         self._on_sensed, self._on_parent = np.zeros((n, 3)), np.zeros((n, 3))
@@ -79,7 +79,8 @@ class _Stick:
                 continue
             force = self._force(ray, segments[ray], hits, body_pose)
             apply_force(body, force, hits.point[ray])
-            apply_force(self._sensor.parent, -force, hits.point[ray])
+            if self._pushes_back:
+                apply_force(self._sensor.parent, -force, hits.point[ray])
 
     def _force(self, ray: int, segment: Array, hits: RayHits, body_pose: Array) -> Array:
         """Force (3,) on the sensed body from one ray: normal, sticking and sliding parts."""

@@ -114,7 +114,7 @@ COLLISION = (
         choices=MESH_TYPES,
         fault=Fault.VALUE,
     ),
-    Key("collision margin", N, 0.001, "m", "collision margin"),
+    Key("collision margin", N, 0.001, "m", "collision margin", least=0.0),
     Key("collision groups", Type.INTEGERS, (), doc="two bodies in groups collide only if they share one"),
     Key("scale", N, 1.0, doc="factor on meshes and joint pivots"),
 )
