@@ -140,7 +140,7 @@ class _Author:
 
     def _body(self, model: int, T: Array, tree: int, mass: float | None = None) -> _Placed:
         rng = self.rng
-        key = f"BODY b{len(self.bodies)}"
+        key = f"BODY b{len(self.bodies):03d}"
         block: Block = {"name": rng.choice((key[5:], f"body {key[5:]}", "same name"))}
         block["mass"] = _log(rng, 1e-3, 10.0) if mass is None else mass
         block |= self._shape(block["mass"])

@@ -20,6 +20,7 @@ from ligature.model.frames import inverse, matrix_quaternion
 from ligature.model.scene import Articulation, Body, Joint, Scene
 from ligature.physics import shapes
 from ligature.physics.axes import Axis, axes_of
+from ligature.physics.response import moved_inertia
 
 Array = NDArray[np.float64]
 
@@ -129,7 +130,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
     axes: list[tuple[int, int, Axis, float]] = []
     for link in articulation.links[1:]:
         assert link.joint is not None
-        inner = articulation.links[link.parent_link].body
+        inner = bodies[articulation.links[link.parent_link].body]
         _append(plan, client, cache, bodies[link.body], joints[link.joint], inner, link_of, T_link_inertial, axes, dt)
     T_world_inertial = root.T_world_body @ root.T_body_inertial
     at = {
@@ -170,28 +171,37 @@ def _append(
     cache: CollisionCache,
     outer: Body,
     joint: Joint,
-    inner: int,
+    inner: Body,
     link_of: dict[int, int],
     T_link_inertial: dict[int, Array],
     axes: list[tuple[int, int, Axis, float]],
     dt: float,
 ) -> None:
     """Add the links of one joint and the body it carries away from the root."""
-    forward = joint.parent == inner
+    forward = joint.parent == inner.index
     T_inner_frame = joint.T_parent_a if forward else joint.T_child_b
     T_outer_frame = joint.T_child_b if forward else joint.T_parent_a
     free = axes_of(joint) or ()
-    steps = free if forward else tuple(axis.reversed() for axis in reversed(free))
-    T_parent_link = T_link_inertial[inner] @ T_inner_frame
-    parent = link_of[inner]
+    steps = tuple(free) if forward else tuple(axis.reversed() for axis in reversed(free))
+    T_parent_link = T_link_inertial[inner.index] @ T_inner_frame
+    parent = link_of[inner.index]
     inertia = _inertia_on(outer, steps, dt)
+
+    def moved(axis: Axis) -> float:
+        if inner.static or outer.static or not axis.sprung:
+            return _effective(outer, inertia, axis, T_outer_frame)
+        frames = (T_inner_frame, T_outer_frame)
+        return moved_inertia(
+            (inner.mass, outer.mass), (inertia_of(inner), inertia), frames, steps, steps.index(axis)
+        )
+
     for axis in steps[:-1]:
         plan.masses.append(LIGHT * max(outer.mass, 1e-6))
         plan.inertias.append(np.full(3, LIGHT * max(float(inertia.max()), LEAST_INERTIA)))
         plan.shapes.append(shapes.NO_SHAPE)
         plan.add(parent, _joint_type(axis), axis.direction, T_parent_link, np.eye(4))
         parent = len(plan.masses) - 1
-        axes.append((parent, joint.index, axis, _effective(outer, inertia, axis, T_outer_frame)))
+        axes.append((parent, joint.index, axis, moved(axis)))
         T_parent_link = np.eye(4)
     T_own = inverse(T_outer_frame)
     plan.masses.append(outer.mass)
@@ -205,7 +215,7 @@ def _append(
     link_of[outer.index] = len(plan.masses) - 1
     T_link_inertial[outer.index] = T_own
     if last is not None:
-        axes.append((link_of[outer.index], joint.index, last, _effective(outer, inertia, last, T_outer_frame)))
+        axes.append((link_of[outer.index], joint.index, last, moved(last)))
 
 
 def inertia_of(body: Body) -> Array:
