@@ -37,6 +37,7 @@ from ligature.model.lookup import find_by_text
 from ligature.model.scene import Body, Camera, Joint, Scene
 from ligature.model.state import MAX_TOUCHES, StateRecord, new_state
 from ligature.physics import World
+from ligature.physics.guard import Guard
 from ligature.sensing.actuators import Actuators
 from ligature.sensing.attachments import Attachments
 from ligature.sensing.contacts import Contacts
@@ -52,6 +53,10 @@ PHASES = ("control", "suture", "bodies", "sensing", "state")
 
 LOOK_TICKS = 16
 """Ticks between two looks at contacts that are watched."""
+
+
+GUARD_TICKS = 10
+"""Ticks between two looks at bodies that are too fast: one takes 5 µs."""
 
 
 class Stopwatch:
@@ -202,7 +207,7 @@ class Simulation:
         self.state: StateRecord = new_state(scene)
         self.phases = {name: Stopwatch() for name in PHASES}
         self.problems: list[Diagnostic] = []
-        self._tick = 0
+        self._tick = self._watched = 0
         self._resets = 0
         self._watching = False
         self._world = World(scene, dt)
@@ -219,6 +224,7 @@ class Simulation:
         self.grasps = Grasps(scene, self._world, self._rods, clamps, lambda: self._actuators.held)
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
+        self._guard = Guard(scene, self._world, self.state)
         self._write_state()
 
     # --- time -------------------------------------------------------------------------------
@@ -234,6 +240,7 @@ class Simulation:
             self._advance()
         with self.phases["state"]:
             self._write_bodies()
+            self._watch()
         with self.phases["sensing"]:
             self._sense()
         with self.phases["state"]:
@@ -252,6 +259,15 @@ class Simulation:
         with self.phases["bodies"]:
             self._world.step()
         self._tick += 1
+
+    def _watch(self) -> None:
+        """Note what moves as nothing commands."""
+        passed = self._tick - self._watched
+        if passed >= GUARD_TICKS:
+            self._watched = self._tick
+            alarm = self._guard.look(passed * self.dt)
+            if alarm is not None:
+                self.problems.append(alarm)
 
     def _sense(self) -> None:
         """Ghosts, rays, contact sensors and the poses of what rides on bodies."""
@@ -384,6 +400,8 @@ class Simulation:
     def _write_state(self) -> None:
         """Fill the state record anew, after something was put elsewhere."""
         self._write_bodies()
+        self._guard.forget()
+        self._watched = self._tick
         self._attachments.update(self.state["body_pose"][0])
         self._write_rest()
 

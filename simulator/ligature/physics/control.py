@@ -156,6 +156,12 @@ class TreeControl:
         """Whether anything has to be done each tick."""
         return bool(self._driven or self._pushed)
 
+    @property
+    def commanded(self) -> bool:
+        """Whether a client commands a joint: an arm has its own limits of speed."""
+        pushed = (self.mode == FORCE) & (self.target != 0.0)
+        return bool((pushed | (self.mode == POSITION) | (self.mode == VELOCITY)).any())
+
     def command(self, joint: Joint, type_: CommandType, value: float) -> None:
         """Take a command for one joint; a position command of a sprung or disabled joint has no effect.
 

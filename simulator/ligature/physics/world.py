@@ -245,6 +245,27 @@ class World(BulletQueries, BulletGrips):
         forced = control is not None and control.type is CommandType.FORCE
         return mass, inertia, control.target.copy() if control is not None and forced else np.zeros(6)
 
+    def kin(self, body: int) -> set[int]:
+        """The bodies of the tree, or the rod, that ``body`` belongs to."""
+        groups = [tree.link_of.keys() for tree in self.trees] + [rod.bodies for rod in self.scene.rods]
+        return set(next(group for group in groups if body in group))
+
+    def commanded(self, bodies: set[int]) -> bool:
+        """Whether a command acts on any of ``bodies`` or their joints that may make them as fast as it likes."""
+        controls = (self._body_controls.get(body) for body in bodies)
+        if any(control is not None and control.acts for control in controls):
+            return True
+        trees = {id(c): c for c in self._controls if not bodies.isdisjoint(c.tree.link_of)}
+        return any(control.commanded for control in trees.values())
+
+    def overlap(self, bodies: set[int]) -> tuple[float, int]:
+        """How deep in metres one of ``bodies`` overlaps another body, and which; (0, -1) when none does."""
+        deepest = (0.0, -1)
+        for body in sorted(bodies & self.place_of.keys()):
+            for contact in self.contacts(body, 0.0):
+                deepest = max(deepest, (-contact.distance, contact.body))
+        return deepest
+
     # --- health, reset, snapshots -----------------------------------------------------------
 
     def heal(self) -> list[Diagnostic]:
