@@ -89,6 +89,8 @@ class SceneBuilder:
         )  # fmt: skip
         before = {kind: len(self._list(kind)) for kind in KINDS}
         local = self._add_bodies(document, model, context, shaders)
+        if not top.flag("ligature rod"):
+            self._no_rod.update(local)
         self._add_sutures(document, model, local)
         self._add_ghosts(document, model, context)
         self._add_sensors(document, model, local)
@@ -97,8 +99,6 @@ class SceneBuilder:
         self.add_cameras_and_lights(document, model.namespace, model.index)
         if top.flag("ignore inter-collision"):
             self._silent_files.append(local)
-        if not top.flag("ligature rod"):
-            self._no_rod.update(local)
         self.arrive(before)
 
     def add_proxy(self, document: Document, shaders: ShaderFiles | None, device: Element) -> int:

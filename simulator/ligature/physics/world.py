@@ -29,6 +29,7 @@ from ligature.physics.gravity import common_gravity, gravity_lifts
 from ligature.physics.grips import BulletGrips
 from ligature.physics.mobility import mobility
 from ligature.physics.motions import Motions
+from ligature.physics.parting import Parting
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
 
@@ -93,6 +94,7 @@ class World(BulletQueries, BulletGrips):
         self._silence_pairs()
         self._closures = Closures(self.client, scene, self.place_of, self.report)
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
+        self._parting = Parting(self.client, self.dt)
         self._setup_queries()
         self._setup_grips()
 
@@ -139,6 +141,8 @@ class World(BulletQueries, BulletGrips):
     def release(self, body: int) -> None:
         """Clear the command of a body: no force, its joints limp."""
         before = self.driven(body)
+        if before:
+            self._parting.begin()
         self._body_controls.pop(body, None)
         self._led_anew(body, before)
         for joint in self.scene.bodies[body].joints:
@@ -164,6 +168,7 @@ class World(BulletQueries, BulletGrips):
     def step(self) -> None:
         """Advance Bullet by one tick."""
         pybullet.stepSimulation(physicsClientId=self.client)
+        self._parting.ticked()
         self._motions.expire()
 
     def write_state(self, state: StateRecord) -> None:
@@ -201,11 +206,13 @@ class World(BulletQueries, BulletGrips):
             name = self.scene.bodies[body].identity.identifier
             raise ValueError(f"body '{name}' hangs on joints; set its joints, or the pose of its root")
         place.put(pose)
+        self._parting.begin()
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
         """Set a joint to a position and velocity at once, without dynamics."""
         control = self._tree_of_joint[joint]
         control.put([control.row[joint]], [position], velocity)
+        self._parting.begin()
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
@@ -286,6 +293,7 @@ class World(BulletQueries, BulletGrips):
         """Put every body back to its initial pose, at rest; commands hold on."""
         for k, tree in enumerate(self.trees):
             self._restart(k, tree)
+        self._parting.begin()
 
     def _restart(self, index: int, tree: Tree) -> None:
         body = self.scene.bodies[tree.root]
@@ -306,6 +314,7 @@ class World(BulletQueries, BulletGrips):
         memory = {
             "trees": trees,
             "controls": [control.memory() for control in self._controls],
+            "parting": self._parting.memory(),
             "held": self.held_constraints(),
             "held_up": (dict(self._held_up), dict(self._gripped)),
             "bodies": {body: control.memory() for body, control in self._body_controls.items()},
@@ -328,6 +337,7 @@ class World(BulletQueries, BulletGrips):
             control_ = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
             control_.recall(kept)
             self._led_anew(body, False)
+        self._parting.recall(memory["parting"])
         self.hold_again(memory["held"])
         self._hold_up_again(*memory["held_up"])
         self._motions.forget_all()
