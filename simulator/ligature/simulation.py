@@ -38,6 +38,7 @@ from ligature.model.scene import Body, Camera, Joint, Scene
 from ligature.model.state import StateRecord, new_state
 from ligature.model.subsystem import Subsystem
 from ligature.physics import Controllers, World
+from ligature.physics.guard import Guard
 from ligature.robots.commands import ArmCommand
 from ligature.sensing.actuators import Actuators
 from ligature.sensing.attachments import Attachments
@@ -52,6 +53,10 @@ Handle = TypeVar("Handle")
 
 PHASES = ("control", "suture", "bodies", "sensing", "state")
 """What the time of a tick is spent on, in order."""
+
+
+GUARD_TICKS = 10
+"""Ticks between two looks at bodies that are too fast: one takes 5 µs."""
 
 
 class Stopwatch:
@@ -205,6 +210,7 @@ class Simulation:
         self.problems: list[Diagnostic] = []
         self._counts = object_counts(scene)
         self._clock = Clock()
+        self._watched = 0
         self._world = World(scene, dt)
         self._suture = Suture(scene, self._world, dt)
         self._attachments = Attachments(scene)
@@ -234,7 +240,9 @@ class Simulation:
             Release: self._release,
             Reset: lambda c: self.reset(bodies_only=c.bodies_only),
         }
+        self._guard = Guard(scene, self._world, self.state)
         self._write_state()
+        self._watch_anew()
 
     # --- time -------------------------------------------------------------------------------
 
@@ -248,6 +256,7 @@ class Simulation:
         for _ in range(ticks):
             self._advance()
         self._write_state()
+        self._watch()
 
     def _advance(self) -> None:
         """One tick: commands become motor targets and forces, threads and grasps exchange impulses, bodies move."""
@@ -256,6 +265,20 @@ class Simulation:
                 for subsystem in subsystems:
                     subsystem.step(self._clock.since_reset)
         self._clock.advance()
+
+    def _watch(self) -> None:
+        """Report what moves as nothing commands."""
+        passed = self._clock.tick - self._watched
+        if passed >= GUARD_TICKS:
+            self._watched = self._clock.tick
+            alarm = self._guard.check(passed * self.dt)
+            if alarm is not None:
+                self.problems.append(alarm)
+
+    def _watch_anew(self) -> None:
+        """Bodies were put elsewhere: they have the motion that the state has."""
+        self._watched = self._clock.tick
+        self._guard.reset()
 
     def _write_state(self) -> None:
         """Fill the state record: what is, then what sensors make of it. Looking changes nothing."""
@@ -310,6 +333,7 @@ class Simulation:
         self._suture.rods.carry(body, pose7_matrix(pose) @ inverse(before))
         self._suture.holes.forget(body)
         self._write_state()
+        self._watch_anew()
 
     def reset(self, bodies_only: bool = False) -> None:
         """Put everything back to where the scene starts, to the bit; time goes on and commands hold.
@@ -321,6 +345,7 @@ class Simulation:
                 subsystem.reset()
         self._clock.restart()
         self._write_state()
+        self._watch_anew()
 
     # --- snapshots --------------------------------------------------------------------------
 
@@ -342,6 +367,7 @@ class Simulation:
         for n, subsystem in reversed(list(enumerate(self._subsystems))):
             subsystem.restore(parts[f"{n}"])
         self.state[:] = snapshot.state
+        self._watch_anew()
 
     def state_hash(self, clock: bool = True) -> str:
         """SHA-256 of the full state: equal for equal scenes, commands and versions.

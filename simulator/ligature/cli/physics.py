@@ -31,6 +31,11 @@ CLOCK_NAP = 1e-3
 
 _EVENTS = {Severity.INFO: "finding", Severity.WARNING: "warning", Severity.ERROR: "problem"}
 
+ALARMS = ("speed", "diverged")
+"""Codes of findings that `/diagnostics` repeats."""
+
+ALARM_BYTES = 240
+
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
 
@@ -168,6 +173,10 @@ class Loop:
                 f"{self._mailbox.rejected - self._warned} commands rejected: {self._mailbox.last_rejection}",
             )
             self._warned = self._mailbox.rejected
+        for problem in self._simulation.problems:
+            if problem.code in ALARMS:
+                figures["alarms"] += 1
+                figures["alarm"] = str(problem).encode("utf-8")[:ALARM_BYTES]
         for problem in self._simulation.problems[:5]:
             tell("warning", str(problem))
         self._simulation.problems.clear()

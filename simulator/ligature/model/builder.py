@@ -6,6 +6,7 @@ that cannot be built is reported and left out; the rest goes on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +26,7 @@ from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
 from ligature.model.parts import body_of, joint_of, sensor_of
 from ligature.model.piercing import Hole, Needle
-from ligature.model.rods import rod_chains
+from ligature.model.rods import rod_chains, without_ties_between
 from ligature.model.scene import (
     Actuator,
     Attachment,
@@ -89,6 +90,8 @@ class SceneBuilder:
         )  # fmt: skip
         before = {kind: len(self._list(kind)) for kind in KINDS}
         local = self._add_bodies(document, model, context, shaders)
+        if not top.flag("ligature rod"):
+            self._no_rod.update(local)
         self._add_sutures(document, model, local)
         self._add_ghosts(document, model, context)
         self._add_sensors(document, model, local)
@@ -97,8 +100,6 @@ class SceneBuilder:
         self.add_cameras_and_lights(document, model.namespace, model.index)
         if top.flag("ignore inter-collision"):
             self._silent_files.append(local)
-        if not top.flag("ligature rod"):
-            self._no_rod.update(local)
         self.arrive(before)
 
     def add_proxy(self, document: Document, shaders: ShaderFiles | None, device: Element) -> int:
@@ -139,9 +140,11 @@ class SceneBuilder:
         """The scene of everything added."""
         self._arrivals.report_orphans()
         self.diagnostics += self._arrivals.diagnostics
-        rods = rod_chains(self.bodies, self.joints, frozenset(self._no_rod))
+        rods, between = without_ties_between(rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints)
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
+        self._report_ties(between)
+        self._report_sensors(rod_bodies)
         forest, loops = trees.articulations(self.bodies, self.joints, rod_bodies, rod_joints)
         start, closures, moved = assemble(self.bodies, self.joints, forest, loops)
         self.diagnostics += moved
@@ -150,7 +153,8 @@ class SceneBuilder:
             mark = self.bodies[rod.bodies[0]].identity.mark
             self.report(Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature rod: false'", "rod"))
         bodies = self._finished_bodies()
-        arms, findings = find_arms(bodies, self.joints, self.world.extra.get("ligature arms"))
+        movable = [joint for joint in self.joints if joint.index not in {*loops, *rod_joints}]
+        arms, findings = find_arms(bodies, movable, self.world.extra.get("ligature arms"))
         self.diagnostics += findings
         ghosts = self._attached("ghost", self.ghosts)
         needles = find_needles(bodies, self.joints, forest, rods)
@@ -176,10 +180,25 @@ class SceneBuilder:
             needles=needles,
             holes=holes,
             arms=arms,
-            jaws=find_jaws(bodies, self.joints, arms),
+            jaws=find_jaws(bodies, movable, arms),
             diagnostics=tuple(self.diagnostics),
             roots=self.resolver.roots,
         )
+
+    def _report_ties(self, joints: Sequence[Joint]) -> None:
+        """Joints between two elements of rods: a rod is tied to bodies."""
+        for joint in joints:
+            message = f"joint '{joint.identity.key}' joins two elements of rods; it is left out"
+            hint = "join an element and a body, or write 'ligature rod: false' for one of the two chains"
+            self.report(Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "rod"))
+
+    def _report_sensors(self, rod_bodies: frozenset[int]) -> None:
+        """Resistance sensors on rods push what they touch and not the rod."""
+        for sensor in self.sensors:
+            if sensor.type is SensorType.RESISTANCE and sensor.parent in rod_bodies:
+                message = f"resistance sensor '{sensor.identity.key}' does not push back the rod that it is on"
+                hint = "put it on a body, or write 'ligature rod: false'"
+                self.report(Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod"))
 
     def _report_piercing(self, needles: tuple[Needle, ...], holes: tuple[Hole, ...]) -> None:
         """Name the recognised needles and tissue holes."""

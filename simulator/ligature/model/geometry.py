@@ -242,7 +242,7 @@ def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[
         if not isinstance(piece, ConvexPart):
             shapes.append(TriMesh(piece.vertices, piece.faces))
         elif len(piece.vertices) == 1:
-            shapes.append(Sphere(element.number("collision margin")))
+            shapes.append(Sphere(_point_radius(element)))
         else:
             shapes.append(Hull(piece.vertices))
     places = [
@@ -250,6 +250,17 @@ def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[
         for piece, shape in zip(pieces, shapes, strict=True)
     ]
     return tuple(Collider(shape, T) for shape, T in zip(shapes, places, strict=True))
+
+
+def _point_radius(element: Element) -> float:
+    """Radius of the spheres that stand for the points of a mesh: the collision margin."""
+    radius = element.number("collision margin")
+    if not radius > 0.0:
+        raise _error(
+            element, "collision margin", f"its points are spheres of radius {radius:g}",
+            "give a 'collision margin' above 0, or another 'collision mesh type'",
+        )  # fmt: skip
+    return radius
 
 
 def _body_low(element: Element) -> str:

@@ -21,6 +21,7 @@ from ligature.model.frames import inverse, matrix_quaternion
 from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Articulation, Body, Closure, JointType, Scene
 from ligature.physics import shapes
+from ligature.physics.response import moved_inertia
 
 Array = NDArray[np.float64]
 
@@ -147,14 +148,18 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         chain = chain_of(joints[link.joint], joints[link.joint].child == outer.index)
         T_link_body = inverse(outer.T_body_inertial @ chain.T_outer)
         shape = shapes.create(client, cache, outer.colliders, T_link_body, True, outer.collision_margin)
-        link_of[outer.index] = _append(plan, outer, chain, shape, link_of, T_link_inertial, axes, dt)
+        link_of[outer.index] = _append(
+            plan, outer, bodies[chain.inner], chain, shape, link_of, T_link_inertial, axes, dt
+        )
         T_link_inertial[outer.index] = inverse(chain.T_outer)
         start += _positions(scene, chain)
     ends = {}
     for closure in scene.closures:
         if closure.inner in link_of and needs_link(scene, closure):
             end, chain = _end(scene, bodies, closure)
-            ends[closure.joint] = _append(plan, end, chain, shapes.NO_SHAPE, link_of, T_link_inertial, axes, dt)
+            ends[closure.joint] = _append(
+                plan, end, bodies[chain.inner], chain, shapes.NO_SHAPE, link_of, T_link_inertial, axes, dt
+            )
             start += [0.0] * len(closure.free) + _positions(scene, chain)
     T_world_inertial = scene.start.roots[root.index] @ root.T_body_inertial
     at = {
@@ -195,6 +200,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
 def _append(
     plan: _Plan,
     outer: Body,
+    inner: Body,
     chain: Chain,
     shape: int,
     link_of: dict[int, int],
@@ -206,13 +212,22 @@ def _append(
     T_parent_link = T_link_inertial[chain.inner] @ chain.T_inner
     parent = link_of[chain.inner]
     inertia = _inertia_on(outer, chain.axes, dt)
+
+    def moved(axis: Axis) -> float:
+        if inner.static or outer.static or not axis.sprung:
+            return _effective(outer, inertia, axis, chain.T_outer)
+        frames = (chain.T_inner, chain.T_outer)
+        return moved_inertia(
+            (inner.mass, outer.mass), (inertia_of(inner), inertia), frames, chain.axes, chain.axes.index(axis)
+        )
+
     for axis in chain.axes[:-1]:
         plan.masses.append(LIGHT * max(outer.mass, 1e-6))
         plan.inertias.append(np.full(3, LIGHT * max(float(inertia.max()), LEAST_INERTIA)))
         plan.shapes.append(shapes.NO_SHAPE)
         plan.add(parent, _joint_type(axis), axis.direction, T_parent_link, np.eye(4))
         parent = len(plan.masses) - 1
-        axes.append((parent, chain.joint, axis, _effective(outer, inertia, axis, chain.T_outer)))
+        axes.append((parent, chain.joint, axis, moved(axis)))
         T_parent_link = np.eye(4)
     plan.masses.append(outer.mass)
     plan.inertias.append(inertia)
@@ -223,7 +238,7 @@ def _append(
     plan.add(parent, type_, direction, T_parent_link, inverse(chain.T_outer))
     link = len(plan.masses) - 1
     if last is not None:
-        axes.append((link, chain.joint, last, _effective(outer, inertia, last, chain.T_outer)))
+        axes.append((link, chain.joint, last, moved(last)))
     return link
 
 

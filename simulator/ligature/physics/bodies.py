@@ -156,6 +156,11 @@ class BodyControl:
         by_pose = self.type is CommandType.POSITION and body.controller.linear_output is not OutputType.FORCE
         return self.type is CommandType.VELOCITY or by_pose
 
+    @property
+    def acts(self) -> bool:
+        """Whether the command does anything: a force of zero does not."""
+        return self.type is not CommandType.FORCE or bool(np.any(self.target))
+
     def snapshot(self) -> tuple[int, Array, Array, int, Array | None]:
         """Everything that lasts from tick to tick."""
         return int(self.type), self.target.copy(), self._kick.copy(), self._kick_ticks, self._last

@@ -8,6 +8,7 @@ does, a D near 1 chatters at the rate of the loop; the implicit form is the same
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from typing import Any
 
@@ -99,6 +100,7 @@ class TreeControl:
     ) -> None:
         self._client, self.tree, self._dt = client, tree, dt
         self._motions, self._index = motions, index
+        self._anchor = tree.root if tree.static else -1
         owners = [joints[joint] for _, joint, _, _ in tree.axes]
         self.links = [link for link, *_ in tree.axes]
         self.row = {joint: i for i, (_, joint, _, _) in enumerate(tree.axes)}
@@ -114,7 +116,7 @@ class TreeControl:
             [j.type is JointType.REVOLUTE and a.low is None for j, (_, _, a, _) in zip(owners, tree.axes, strict=True)],
             dtype=bool,
         )
-        self._spring_setup()
+        self._spring_setup(owners)
         self.mode = np.full(n, FREE)
         self.target = np.zeros(n)
         self._pace = np.zeros(n)
@@ -135,19 +137,32 @@ class TreeControl:
         self.position, self.velocity = motions.position[rows], motions.velocity[rows]
         self._sort()
 
-    def _spring_setup(self) -> None:
+    def _spring_setup(self, owners: list[Joint]) -> None:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
         axes = [axis for _, _, axis, _ in self.tree.axes]
         moved = np.array([m for *_, m in self.tree.axes])
+        crowd = self._crowding(owners)
         self._stiffness = np.minimum([a.stiffness for a in axes], moved / (STIFFEST * self._dt**2))
-        self._damping = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / self._dt)
+        self._damping = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / (crowd * self._dt))
         self._rest = np.array([a.rest for a in axes])
         self._sprung = np.array([a.sprung for a in axes], dtype=bool)
+
+    def _crowding(self, owners: list[Joint]) -> Array:
+        """Number (n,) of sprung joints that share a body with that of each axis: their dampers act together."""
+        sprung = {j.index: j for j, (_, _, axis, _) in zip(owners, self.tree.axes, strict=True) if axis.sprung}
+        at = Counter(body for j in sprung.values() for body in {j.parent, j.child} - {self._anchor})
+        return np.array([max(1, at[j.parent], at[j.child]) for j in owners], dtype=float)
 
     @property
     def active(self) -> bool:
         """Whether anything has to be done each tick."""
         return bool(self._driven or self._pushed)
+
+    @property
+    def commanded(self) -> bool:
+        """Whether a client commands a joint: an arm has its own limits of speed."""
+        pushed = (self.mode == FORCE) & (self.target != 0.0)
+        return bool((pushed | (self.mode == POSITION) | (self.mode == VELOCITY)).any())
 
     def command(self, joint: Joint, type_: CommandType, value: float) -> None:
         """Take a command for one joint; a position command of a sprung or disabled joint has no effect.

@@ -31,6 +31,7 @@ from ligature.physics.gravity import common_gravity, gravity_lifts
 from ligature.physics.grips import BulletGrips
 from ligature.physics.mobility import mobility
 from ligature.physics.motions import Motions
+from ligature.physics.parting import Parting
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
 
@@ -125,6 +126,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         self._silence_pairs()
         self._closures = Closures(self.client, scene, self.trees, self.place_of, self._motions)
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
+        self._parting = Parting(self.client, self.dt)
         self._setup_queries()
         self._setup_grips()
 
@@ -171,6 +173,8 @@ class World(Subsystem, BulletQueries, BulletGrips):
     def release(self, body: int) -> None:
         """Clear the command of a body: no force, its joints limp."""
         before = self.driven(body)
+        if before:
+            self._parting.begin()
         self._body_controls.pop(body, None)
         self._led_anew(body, before)
         for joint in self.scene.bodies[body].joints:
@@ -196,6 +200,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
     def step(self, tick: int = 0) -> None:
         """Advance Bullet by one tick, and put back what diverged in it."""
         pybullet.stepSimulation(physicsClientId=self.client)
+        self._parting.step()
         self._motions.expire()
         if not self._motions.sound(MAX_SPEED):
             self._heal()
@@ -235,11 +240,13 @@ class World(Subsystem, BulletQueries, BulletGrips):
             name = self.scene.bodies[body].identity.identifier
             raise ValueError(f"body '{name}' hangs on joints; set its joints, or the pose of its root")
         place.put(pose)
+        self._parting.begin()
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
         """Set a joint to a position and velocity at once, without dynamics."""
         control = self._tree_of_joint[joint]
         control.put([control.row[joint]], [position], velocity)
+        self._parting.begin()
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
@@ -278,6 +285,27 @@ class World(Subsystem, BulletQueries, BulletGrips):
         control = self._body_controls.get(body)
         forced = control is not None and control.type is CommandType.FORCE
         return mass, inertia, control.target.copy() if control is not None and forced else np.zeros(6)
+
+    def kin(self, body: int) -> set[int]:
+        """The bodies of the tree, or the rod, that ``body`` belongs to."""
+        groups = [tree.link_of.keys() for tree in self.trees] + [rod.bodies for rod in self.scene.rods]
+        return set(next(group for group in groups if body in group))
+
+    def commanded(self, bodies: set[int]) -> bool:
+        """Whether a command acts on any of ``bodies`` or their joints that may make them as fast as it likes."""
+        controls = (self._body_controls.get(body) for body in bodies)
+        if any(control is not None and control.acts for control in controls):
+            return True
+        trees = {id(c): c for c in self._controls if not bodies.isdisjoint(c.tree.link_of)}
+        return any(control.commanded for control in trees.values())
+
+    def overlap(self, bodies: set[int]) -> tuple[float, int]:
+        """How deep in metres one of ``bodies`` overlaps another body, and which; (0, -1) when none does."""
+        deepest = (0.0, -1)
+        for body in sorted(bodies & self.place_of.keys()):
+            for contact in self.contacts(body, 0.0):
+                deepest = max(deepest, (-contact.distance, contact.body))
+        return deepest
 
     # --- health, reset, snapshots -----------------------------------------------------------
 
@@ -333,6 +361,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
             "trees": trees,
             "controls": [control.snapshot() for control in self._controls],
             "told": dict(self._motions.told),
+            "parting": self._parting.snapshot(),
             "held": self.held_constraints(),
             "bodies": {body: control.snapshot() for body, control in self._body_controls.items()},
             **kept(self, _KEPT),
@@ -357,6 +386,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         self._weigh_again()
         self._part_again()
         self.hold_again(snapshot["held"])
+        self._parting.restore(snapshot["parting"])
         self._next_handle = snapshot["_next_handle"]
         self._motions.forget_all()
 

@@ -31,6 +31,10 @@ class Diagnostics:
         status = DiagnosticStatus(name="ligature: physics loop", hardware_id="ligature")
         status.level = DiagnosticStatus.OK if factor >= SLOW or factor == 0.0 else DiagnosticStatus.WARN
         status.message = f"real-time factor {factor:.2f}"
+        alarms, alarm = int(figures["alarms"]), bytes(figures["alarm"]).decode("utf-8", "ignore")
+        if alarms:
+            status.level = DiagnosticStatus.WARN
+            status.message += f"; {alarm}"
         rows = {
             "loop rate (Hz)": f"{figures['loop_hz']:.1f}",
             "real-time factor": f"{factor:.3f}",
@@ -45,6 +49,7 @@ class Diagnostics:
             "messages published": str(figures["published"]),
             "publications dropped": str(figures["publish_late"]),
             "messages missed by slow clients": str(self.missed),
+            "bodies faster than commanded": str(alarms),
             "camera frames drawn": str(figures["frames"]),
             "camera frames dropped": str(figures["frames_dropped"]),
             "camera frame time (ms)": f"{1e3 * figures['frame_seconds']:.1f}",

@@ -35,8 +35,8 @@ class Rays(Subsystem):
         self.slices = [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         n = int(ends[-1])
         self.hits = RayHits(np.full(n, -1, dtype=np.int32), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
-        pushing = [s for s in self.sensors if s.type is SensorType.RESISTANCE and s.parent not in scene.rod_bodies]
-        self._stick = [_Stick(sensor) for sensor in pushing]
+        pushing = [s for s in self.sensors if s.type is SensorType.RESISTANCE]
+        self._stick = [_Stick(sensor, sensor.parent not in scene.rod_bodies) for sensor in pushing]
 
     def step(self, tick: int) -> None:
         """Let every resistance sensor push during the coming step of the bodies."""
@@ -88,8 +88,8 @@ def _segments(sensor: Sensor, T_world_parent: Array) -> Array:
 class _Stick:
     """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3)."""
 
-    def __init__(self, sensor: Sensor) -> None:
-        self._sensor = sensor
+    def __init__(self, sensor: Sensor, pushes_back: bool) -> None:
+        self._sensor, self._pushes_back = sensor, pushes_back
         n = len(sensor.rays)
         self._body = np.full(n, -1, dtype=np.int64)
         self._on_sensed, self._on_parent = np.zeros((n, 3)), np.zeros((n, 3))
@@ -115,7 +115,8 @@ class _Stick:
                 continue
             force = self._force(ray, segments[ray], hits, T_parent, poses[body])
             bodies.apply_force(body, force, hits.point[ray])
-            bodies.apply_force(parent, -force, hits.point[ray])
+            if self._pushes_back:
+                bodies.apply_force(parent, -force, hits.point[ray])
 
     def _force(self, ray: int, segment: Array, hits: RayHits, T_parent: Array, T_sensed: Array) -> Array:
         """Force (3,) on the sensed body from one ray: normal, sticking and sliding parts."""
