@@ -100,7 +100,11 @@ def model(draw: Any) -> dict[str, Any]:
     made: dict[str, Any] = {"namespace": space, "bodies": keys, "joints": [], "cameras": [], "sensors": []}
     reference = st.builds(lambda s, w: s + w, st.one_of(st.just(""), st.just(space), SPACES), WORDS)
     for key in keys:
-        made[key] = {"name": key.replace("/", "_"), "mass": 1, "namespace": draw(st.sampled_from(["", "", "/x/", "y/"]))}
+        made[key] = {
+            "name": key.replace("/", "_"),
+            "mass": 1,
+            "namespace": draw(st.sampled_from(["", "", "/x/", "y/"])),
+        }
     for i in range(draw(st.integers(0, 4))):
         made["joints"].append(f"JOINT {i}")
         made[f"JOINT {i}"] = {

@@ -52,7 +52,7 @@ def test_frames_of_two_simulators_are_told_apart(start: Callable[..., Program], 
     second = start(BIN / "ligature", "run", SMALL, "-p", "100", "--ns", "/left")
     second.wait_for("first state published")
     tf, fixed = listen("/tf", TFMessage), listen("/tf_static", TFMessage)
-    info = listen("/left/ambf/env/cameras/cameraL/CameraInfo", CameraInfo).wait()
+    info = listen("/left/ambf/env/cameras/cameraL/CameraInfo", CameraInfo).wait(seconds=60.0)
     poses = {
         topic: listen(f"/left/{topic}", PoseStamped).wait().header.frame_id
         for topic in ("PSM1/local/measured_cp", "MTML/measured_cp", "SUJ/PSM1/local/measured_cp")
@@ -64,7 +64,7 @@ def test_frames_of_two_simulators_are_told_apart(start: Callable[..., Program], 
         messages = [*tf.messages, *fixed.messages]
         return {(t.header.frame_id, t.child_frame_id) for message in messages for t in message.transforms}
 
-    tf.wait(lambda _: with_prefix <= seen(), 30.0)
+    tf.wait(lambda _: with_prefix <= seen(), 60.0)
     assert info.header.frame_id == "left/cameraL_optical"
     assert set(poses.values()) == {"left/PSM1_base", "left/HRSV", "left/Cart"}
     half = [pair for pair in seen() if pair[0].startswith("left/") != pair[1].startswith("left/")]
