@@ -8,7 +8,7 @@ SCENES ?= 10000
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
-.PHONY: run demo film test test-slow setup lint types check-imports unit fuzz bench soak docs addon test-blender blender-module clean
+.PHONY: run demo film test test-slow setup lint types check-imports unit fuzz bench contact-sheet soak docs addon test-blender blender-module clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -69,6 +69,10 @@ fuzz: setup
 
 bench: setup
 	$(PYTHON) -m tests.bench.run
+
+# every scene drawn with and without shaders of its own, in build/contact_sheet.png
+contact-sheet: setup
+	$(PYTHON) -m tests.bench.contact_sheet
 
 # two simulated hours of servo on both arms, as fast as the machine allows
 soak: setup

@@ -307,7 +307,7 @@ def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list
     fingers = IdealPlant(ends[0], ends[1], np.full(1, 1e-3), np.full(1, 1e-2), np.zeros(1))
     gripper = Axes(("gripper",), ends, np.full(1, 20.0), np.full(1, 200.0), fingers)
     arm = MtmArm(description.name, kinematics, joints, gripper)
-    arm.set_base_frame(console_pose(side), "HRSV")
+    arm.set_base_frame(console_pose(side), f"{scene.world.frame_prefix}HRSV")
     arm.set_tip_wrench(lambda: np.zeros(6))
     return arm
 

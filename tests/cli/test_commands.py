@@ -129,3 +129,21 @@ def test_demo_needs_the_repository(
         "import sys; sys.exit(0 if sys.argv[1:4] == ['--throws', '2', '--seed'] else 3)"
     )
     assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 0
+
+
+def test_render_warns_of_a_picture_that_is_mostly_white(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(
+        "bodies: [Wall]\ncameras: [C]\nlights: [L]\n"
+        "Wall: {name: Wall, mass: 0, shape: BOX, geometry: {x: 0.1, y: 9, z: 9}, location: {position: {x: -1, y: 0, z: 0}}, "
+        "color rgba: {r: 0.9, g: 0.9, b: 0.9, a: 1}}\n"
+        "C: {name: C, location: {x: 0, y: 0, z: 0}, look at: {x: -1, y: 0, z: 0}, up: {x: 0, y: 0, z: 1}, "
+        "field view angle: 0.7, clipping plane: {near: 0.1, far: 10}}\n"
+        "L: {name: L, location: {x: 0, y: 0, z: 0}, direction: {x: -1, y: 0, z: 0}, cutoff angle: 1.5, spot exponent: 0, "
+        "attenuation: {constant: 0.1}}\n"
+    )
+    picture = ("render", tmp_path / "m.yaml", "--camera", "C", "--out", tmp_path / "out", "--width", 64, "--height", 48)
+    bright, dark = ligature(*picture), ligature(*picture, "--exposure", -5)
+    if "no OpenGL" in bright.stdout:
+        pytest.skip(bright.stdout)
+    assert "100% of the picture of C is saturated (white); lower --exposure" in bright.stdout
+    assert bright.returncode == 0 and "saturated" not in dark.stdout

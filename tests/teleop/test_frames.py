@@ -29,6 +29,15 @@ def test_arms_reported_in_the_camera_need_no_world() -> None:
     assert frames.between("ECM", "ECM") == pytest.approx(np.eye(4))
 
 
+@pytest.mark.parametrize("written", ["left/{}", "/left/{}", "{}"])
+def test_frames_of_a_simulator_with_a_prefix_are_the_arms_own(written: str) -> None:
+    frames = Frames("left/")
+    frames.put(written.format("world"), written.format("PSM1_base"), T_WORLD_PSM)
+    assert frames.between("world", "PSM1_base") == pytest.approx(T_WORLD_PSM)
+    assert frames.has_prefix("left/PSM1_base") and not frames.has_prefix("PSM1_base")
+    assert Frames().has_prefix("PSM1_base")
+
+
 def test_tf_counts_more_than_set_up_joints_and_nonsense_counts_nothing() -> None:
     frames = Frames()
     frames.put("ECM", "PSM1_base", np.eye(4), 1)

@@ -52,7 +52,7 @@ KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
 class SceneBuilder:
     """Collects the objects of a scene; `finish` settles what needs all of them."""
 
-    def __init__(self, name: str, resolver: Resolver, world: WorldSettings, prefix: str = "") -> None:
+    def __init__(self, name: str, resolver: Resolver, world: WorldSettings) -> None:
         self.name = name
         self.resolver = resolver
         self.world = world
@@ -66,7 +66,7 @@ class SceneBuilder:
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
         self.devices: list[InputDevice] = []
-        self._names = {kind: Names(prefix) for kind in (*KINDS, "suture")}
+        self._names = {kind: Names() for kind in (*KINDS, "suture")}
         self._arrivals = Arrivals()
         self._scales: list[float] = []
         self._groups: list[tuple[int, ...]] = []

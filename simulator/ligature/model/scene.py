@@ -149,7 +149,8 @@ class Identity:
 
     ``identifier`` is the qualified identifier with its remap suffix, for example
     ``/ambf/env/phantom/BODY Needle``; ``topic`` is the ROS name below which its topics live, for
-    example ``/ambf/env/phantom/Needle``; ``name`` is the bare name without blanks.
+    example ``/ambf/env/phantom/Needle``; ``name`` is the bare name without blanks; ``namespace`` is what
+    the files say, without the prefix of the scene.
     """
 
     key: str
@@ -162,6 +163,7 @@ class Identity:
     publish_high: int = 1000
     parent_text: str = ""
     mark: Mark | None = None
+    namespace: str = ""
 
 
 class OutputType(enum.Enum):
@@ -526,15 +528,29 @@ class RodChain:
 
 @dataclass(frozen=True, eq=False)
 class WorldSettings:
-    """What the world file says: ``gravity`` (3,), namespace, and limits of the loop."""
+    """What the world file says: ``gravity`` (3,), namespace, and limits of the loop.
+
+    ``prefix`` stands before every namespace of the scene (``--ns``); ``topic`` has it already.
+    """
 
     namespace: str = "/ambf/env/"
+    prefix: str = ""
     topic: str = "/ambf/env/World"
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.8]))
     max_substeps: int = 10
     shaders: ShaderFiles | None = None
     skybox: dict[str, Path] | None = None
     extra: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def frame_prefix(self) -> str:
+        """What frames of this scene begin with on ROS: empty, or such as ``left/``."""
+        return "".join(f"{part}/" for part in self.prefix.split("/") if part)
+
+    @property
+    def root(self) -> str:
+        """What topics beside those of objects begin with on ROS: ``/``, or such as ``/left/``."""
+        return "/" + self.frame_prefix
 
 
 class ArmKind(enum.Enum):

@@ -142,7 +142,9 @@ class Painter:
     def _draw_own(self, program: Program, batch: Batch, rows: NDArray[np.int64]) -> None:
         """Draw with a scene file's program, which knows no instances."""
         view, brushes = self._view, self._brushes
-        legacy.bind_picture(program, legacy.Fixed(view.view, view.projection, brushes.lights))
+        if program not in self._ready:
+            legacy.bind_picture(program, legacy.Fixed(view.view, view.projection, brushes.lights))
+            self._ready.add(program)
         legacy.bind_surface(program, batch.surface, brushes.textures, brushes.lights)
         for row in rows:
             model_view = self._seen.instances["model_view"][row].T.astype(float)

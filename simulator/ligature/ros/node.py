@@ -52,7 +52,7 @@ class Node:
         name = node_name(scene.world.topic)
         require_free(f"/{name}")
         start_node(name)
-        prefix, self._outbox = scene.world.topic.rpartition("/ambf/")[0] + "/", Outbox(self._ring)
+        self._outbox = Outbox(self._ring)
         self._reception = Reception(scene, self._outbox, self._wake)
         self._world = conversion.WorldTemplate()
         self._publishers: list[Publisher] = []
@@ -61,7 +61,7 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
-        self._arms = ArmsNode(scene, self._block, self._outbox, prefix, challenge)
+        self._arms = ArmsNode(scene, self._block, self._outbox, challenge)
         arms = ", ".join(arm.name for arm in scene.arms) or "none"
         self.told = f"{2 * len(outlets)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block)

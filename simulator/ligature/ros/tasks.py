@@ -56,7 +56,7 @@ class TaskNode:
         name = f"{node_name(scene.world.topic)}_tasks"
         require_free(f"/{name}")
         start_node(name)
-        root = f"{scene.world.topic.rpartition('/ambf/')[0]}/ligature/tasks/{task}"
+        root = f"{scene.world.root}ligature/tasks/{task}"
         self._score = rospy.Publisher(f"{root}/score", DiagnosticStatus, queue_size=QUEUE, latch=True)
         self._measures = rospy.Publisher(f"{root}/measures", DiagnosticStatus, queue_size=QUEUE)
         self._passages = rospy.Publisher(f"{root}/passages", PointStamped, queue_size=QUEUE)

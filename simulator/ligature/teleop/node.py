@@ -80,7 +80,7 @@ class Teleop:
         self._present = not any("present" in spec.buttons.values() for spec in config.devices.values())
         self._warned: dict[str, Status] = {}
         self._next_readings = 0.0
-        self.frames = Frames()
+        self.frames = Frames(config.prefix.lstrip("/"))
         self._hear_frames()
         specs = {name: config.devices[name] for name in config.pairs}
         self.seat = Seat(config.pairs, camera_scale=config.camera_scale, waiting=config.waiting)
@@ -147,7 +147,8 @@ class Teleop:
     def _on_tf(self, message: Any) -> None:
         for each in message.transforms:
             T = pose_of(np.array(pose_numbers(each)))
-            self.frames.put(each.header.frame_id.lstrip("/"), each.child_frame_id.lstrip("/"), T)
+            rank = 0 if self.frames.has_prefix(each.child_frame_id) else 2  # may be another simulator's on this master
+            self.frames.put(each.header.frame_id, each.child_frame_id, T, rank)
 
     def _on_base(self, base: str, message: Any) -> None:
         self.frames.put(message.header.frame_id, base, pose_of(np.array(pose_numbers(message))), 1)

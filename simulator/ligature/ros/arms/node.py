@@ -45,12 +45,14 @@ QUEUE = 10
 class ArmsNode:
     """The arms of a scene on ROS.
 
-    Topics begin with ``prefix``, which ends in a slash; with ``challenge`` they are there a second time, under the
-    names of the suturing challenge's own node.
+    Topics and frames begin with the prefix of the scene; with ``challenge`` topics are there a second time, under
+    the names of the suturing challenge's own node.
     """
 
-    def __init__(self, scene: Scene, block: Block, outbox: Outbox, prefix: str, challenge: bool) -> None:
+    def __init__(self, scene: Scene, block: Block, outbox: Outbox, challenge: bool) -> None:
         self._block, self._outbox = block, outbox
+        prefix = scene.world.root
+        self._frame_prefix = scene.world.frame_prefix
         self._base_body = [arm.base for arm in scene.arms]
         self._outlets: list[ArmOutlet] = []
         self.refused = 0
@@ -64,8 +66,8 @@ class ArmsNode:
         self._tf = Publisher("/tf", TFMessage) if self._outlets else None
         if self._outlets:
             self._console = Console(prefix, self._outlets, self.push)
-            self._setup_joints = SetupJoints(prefix, self._outlets)
-        self._challenge = ChallengeFace(prefix, scene, self._outlets, self.push) if challenge else None
+            self._setup_joints = SetupJoints(scene.world, self._outlets)
+        self._challenge = ChallengeFace(scene, self._outlets, self.push) if challenge else None
 
     @property
     def outlets(self) -> list[ArmOutlet]:
@@ -132,12 +134,12 @@ class ArmsNode:
             return
         frames = []
         for outlet, body in zip(self._outlets, self._base_body, strict=True):
-            record, name = state["arm"][outlet.index], outlet.description.name
+            record, name = state["arm"][outlet.index], f"{self._frame_prefix}{outlet.description.name}"
             parent = record["reference"].decode("utf-8", "replace") or outlet.base_frame
             frames.append(_transform(parent, name, record["measured_cp"], stamp))
             if outlet.description.kind is not ArmKind.MTM:
                 pose = state["body_pose"][body] if body >= 0 else matrix_pose7(outlet.T_base)
-                frames.append(_transform("world", outlet.base_frame, pose, stamp))
+                frames.append(_transform(f"{self._frame_prefix}world", outlet.base_frame, pose, stamp))
         self._tf.publish(TFMessage(frames))
 
     # --- commands ---------------------------------------------------------------------------
