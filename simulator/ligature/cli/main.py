@@ -165,6 +165,16 @@ def bench(
     raise typer.Exit(run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False)))
 
 
+@app.command("compile")
+def compile_kernels(
+    scenes: Annotated[Optional[list[Path]], typer.Argument(help="Launch files; else scenes of the repository.")] = None,  # noqa: UP045
+) -> None:
+    """Compile ahead what scenes need, which their first start would do else; several at a time."""
+    from ligature.cli.compile import compile_ahead
+
+    raise typer.Exit(compile_ahead(scenes or [], Console(highlight=False, soft_wrap=True)))
+
+
 @app.command()
 def render(
     launch: Launch,
