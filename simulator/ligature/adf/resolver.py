@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
-from ligature.adf.nodes import Scalar, Sequence, parse
+from ligature.adf.nodes import Node, Scalar, Sequence, parse
 
 MAX_BYTES = 256 * 1024 * 1024
 """Largest file that is read unless the caller says otherwise."""
@@ -182,6 +182,6 @@ def _named_files(launch: Path) -> list[Path]:
     named = []
     for key in _LAUNCH_KEYS:
         value = top.entries[key][1] if key in top.entries else None
-        items = value.items if isinstance(value, Sequence) else [value]
+        items: abc.Sequence[Node | None] = value.items if isinstance(value, Sequence) else [value]
         named += [item.text for item in items if isinstance(item, Scalar) and item.text and "\0" not in item.text]
     return [Path(os.path.normpath(os.path.join(launch.parent, text))) for text in named if len(text) <= MAX_PATH]

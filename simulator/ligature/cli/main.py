@@ -147,9 +147,11 @@ def check(
     strict: Annotated[bool, typer.Option(help="Refuse what AMBF refuses.")] = False,
     root: Roots = None,
     verbose: Annotated[bool, typer.Option("-v", help="Show keys without effect too.")] = False,
+    models: Models = None,
 ) -> None:
-    """Tell every problem of a scene as file:line:column; exit status 1 on errors."""
-    raise typer.Exit(run_check(files, root or [], strict, verbose, Console(highlight=False, soft_wrap=True)))
+    """Report every problem of a scene as file:line:column; exit status 1 on errors."""
+    console = Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_check(files, root or [], strict, verbose, console, indices(models)))
 
 
 @app.command()
