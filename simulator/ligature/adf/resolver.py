@@ -118,7 +118,7 @@ class Resolver:
             ) from error
 
     def _wider_root(self, path: Path) -> Path:
-        """The smallest folder around a root and ``path``; that of ``path`` alone where it would be all of a disk or home."""
+        """The smallest folder around a root and ``path``; the path's own where that would be all of a disk or home."""
         around = (Path(os.path.commonpath([root, path])) for root in self.roots)
         narrow = [folder for folder in around if not _too_wide(folder)]
         return max(narrow, key=lambda folder: len(folder.parts), default=path.parent)
@@ -182,6 +182,6 @@ def _named_files(launch: Path) -> list[Path]:
     named = []
     for key in _LAUNCH_KEYS:
         value = top.entries[key][1] if key in top.entries else None
-        items: abc.Sequence[Node | None] = value.items if isinstance(value, Sequence) else [value]
+        items: list[Node | None] = [*value.items] if isinstance(value, Sequence) else [value]
         named += [item.text for item in items if isinstance(item, Scalar) and item.text and "\0" not in item.text]
     return [Path(os.path.normpath(os.path.join(launch.parent, text))) for text in named if len(text) <= MAX_PATH]

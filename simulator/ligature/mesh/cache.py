@@ -69,9 +69,9 @@ def _writable(wanted: Path) -> Path:
 
 
 def _private_folder() -> Path:
-    """The user's own folder among the temporary ones, kept for the next start; one of this process where it is not theirs.
+    """The user's own folder among the temporary ones, kept for the next start.
 
-    What lies in it is run as code, so another user's is not taken.
+    What lies in it is run as code: where somebody else made it, this process gets one for itself.
     """
     if hasattr(os, "getuid"):
         folder = Path(tempfile.gettempdir()) / f"ligature-{os.getuid()}"

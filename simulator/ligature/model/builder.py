@@ -232,7 +232,7 @@ class SceneBuilder:
         return local
 
     def _note_unusable(self, document: Document, model: Model) -> None:
-        """Remember the listed bodies that an error took from ``document``, so that what names them is no further error."""
+        """Remember the listed bodies that an error took away, so that what names them is no further error."""
         usable = {element.key for element in document.elements("bodies")}
         listed = document.top.node.get("bodies")
         for item in listed.items if isinstance(listed, Sequence) else []:
