@@ -47,7 +47,7 @@ $(STAMPS)/package: setup.py $(STAMPS)/messages
 
 # the kernels compile once, here rather than at the first start
 $(STAMPS)/compiled: $(STAMPS)/package
-	@.venv/bin/ligature compile
+	@$(STEP) "compiling the simulator's kernels for this machine, 1 to 2 minutes" .venv/bin/ligature compile
 	@touch $@
 
 # the simulator runs without these; what apt does not offer is named, and its tests are skipped
