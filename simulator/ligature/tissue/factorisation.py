@@ -1,0 +1,218 @@
+"""Factors a symmetric positive definite matrix of grid nodes once and solves with it at every step.
+
+Nodes are ordered by nested dissection of their lattice indices (George, SIAM J. Numer. Anal. 10, 1973, 345): planes of
+the lattice split the grid in two until the pieces are small. Each separator or piece is a block of the ordering;
+blocks are eliminated from the leaves of the tree to its root (the multifrontal method: Liu, SIAM Review 34, 1992,
+82), each by A = [[P, Bᵀ], [B, S]] → D = P⁻¹, U = B D, S - U Bᵀ. A solve then is products of dense blocks with vectors
+alone: x₂ -= U b₁ up the tree, x₁ = D b₁ - Uᵀ x₂ down. The loops run in one thread, in one order, without
+reductions that a compiler could reorder, so that the bits depend on the input alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from ligature.tissue.compiled import kernel
+from ligature.tissue.dense import invert, subtract_product
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LEAF = 12
+"""Nodes of a piece that is not split any more; measured by `tests/bench/tissue.py`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Nodes eliminated together (w,), the later nodes that they touch (m,), and the blocks below in the tree."""
+
+    own: Integers
+    later: Integers
+    children: tuple[int, ...]
+
+
+def dissect(site: Integers, leaf: int = LEAF) -> list[tuple[Integers, tuple[int, ...]]]:
+    """Nested dissection of nodes at lattice indices ``site`` (n, 3): blocks of nodes with their children, leaves first.
+
+    A plane of nodes separates the two sides of it, since cells reach from one plane to the next only.
+    """
+    blocks: list[tuple[Integers, tuple[int, ...]]] = []
+
+    def split(nodes: Integers) -> int:
+        low, high = site[nodes].min(axis=0), site[nodes].max(axis=0)
+        extent = high - low
+        axis = int(np.argmax(extent))
+        if len(nodes) <= leaf or extent[axis] < 2:
+            blocks.append((nodes, ()))
+            return len(blocks) - 1
+        along = site[nodes, axis]
+        counts = np.bincount(along - low[axis])
+        below = np.cumsum(counts) - counts
+        above = len(nodes) - below - counts
+        inner = np.arange(1, extent[axis])
+        # The smaller the separator and the more equal its sides, the less work.
+        cost = np.abs(below - above)[inner] + 4 * counts[inner]
+        plane = low[axis] + int(inner[np.argmin(cost)])
+        children = tuple(split(part) for part in (nodes[along < plane], nodes[along > plane]) if len(part))
+        blocks.append((nodes[along == plane], children))
+        return len(blocks) - 1
+
+    if len(site):
+        split(np.arange(len(site)))
+    return blocks
+
+
+def analyse(site: Integers, neighbours: csr_matrix, leaf: int = LEAF) -> list[Block]:
+    """Blocks in the order of elimination, with what each touches: ``neighbours`` (n, n) has a value where nodes do."""
+    order = dissect(site, leaf)
+    rank = np.empty(len(site), dtype=np.int64)
+    for number, (own, _) in enumerate(order):
+        rank[own] = number
+    blocks: list[Block] = []
+    for number, (own, children) in enumerate(order):
+        touched = [neighbours[own].indices.astype(np.int64), *(blocks[c].later for c in children)]
+        later = np.unique(np.concatenate(touched))
+        later = later[rank[later] > number]
+        # By rank, so that what comes from a child lies in few runs.
+        blocks.append(Block(own, later[np.lexsort((later, rank[later]))], children))
+    return blocks
+
+
+class Factor:
+    """The factor of a matrix with 3 x 3 blocks, one for each pair of nodes.
+
+    Parameters
+    ----------
+    A
+        Symmetric positive definite, (3 n, 3 n), unknowns x, y, z of a node together.
+    site
+        Lattice indices of the nodes, (n, 3).
+
+    Raises
+    ------
+    ValueError
+        When A is not positive definite.
+    """
+
+    def __init__(self, A: csr_matrix, site: Integers, leaf: int = LEAF) -> None:
+        n = len(site)
+        pattern = csr_matrix((np.ones(A.nnz), A.indices // 3, A.indptr), shape=(3 * n, n))
+        joined = csr_matrix(pattern[::3] + pattern[1::3] + pattern[2::3])
+        blocks = analyse(site, joined, leaf)
+        self.size = 3 * n
+        self._blocks = blocks
+        dofs = [(_dofs(b.own), _dofs(b.later)) for b in blocks]
+        width = np.array([len(own) for own, _ in dofs], dtype=np.int64)
+        height = np.array([len(later) for _, later in dofs], dtype=np.int64)
+        self._extent = np.stack([width, height], axis=1)
+        self._index = np.concatenate([np.concatenate(pair) for pair in dofs]) if blocks else np.zeros(0, np.int64)
+        self._down = np.zeros(int((width * width).sum() + (height * width).sum()))
+        self._up = np.zeros(int((height * width).sum()))
+        self._work = np.zeros(2 * int((width + height).max(initial=0)))
+        self._factor(A, dofs)
+
+    @property
+    def nonzeros(self) -> int:
+        """Values that a solve reads in its two passes."""
+        return len(self._down) + len(self._up)
+
+    def _factor(self, A: csr_matrix, dofs: list[tuple[Integers, Integers]]) -> None:
+        place = np.zeros(self.size, dtype=np.int64)
+        updates: dict[int, Array] = {}
+        down = up = 0
+        for number, (own, later) in enumerate(dofs):
+            w, m = len(own), len(later)
+            front = np.concatenate([own, later])
+            place[front] = np.arange(w + m)
+            F = np.zeros((w + m, w + m))
+            rows = A[own]
+            row = np.repeat(np.arange(w), np.diff(rows.indptr))
+            # What is eliminated already has no place in this front.
+            known = np.isin(rows.indices, front, kind="table")
+            F[row[known], place[rows.indices[known]]] = rows.data[known]
+            F[w:, :w] = F[:w, w:].T
+            for child in self._blocks[number].children:
+                at = place[dofs[child][1]]
+                F[np.ix_(at, at)] += updates.pop(child)
+            D, U = np.empty((w, w)), np.zeros((m, w))
+            if not invert(np.ascontiguousarray(F[:w, :w]), D):
+                raise ValueError("the matrix of the tissue is not positive definite; check its material and supports")
+            B, S = np.ascontiguousarray(F[w:, :w]), np.ascontiguousarray(F[w:, w:])
+            subtract_product(-B, D, U)
+            subtract_product(U, np.ascontiguousarray(B.T), S)
+            updates[number] = S
+            self._down[down : down + w * w] = D.ravel()
+            self._down[down + w * w : down + w * w + m * w] = U.ravel()
+            self._up[up : up + m * w] = U.T.ravel()
+            down += w * w + m * w
+            up += m * w
+
+    def solve(self, b: Array) -> Array:
+        """Solve A x = b for b (3 n,); returns x as a new array."""
+        x = np.array(b, dtype=np.float64)
+        solve_in_place(self._extent, self._index, self._down, self._up, self._work, x)
+        return x
+
+
+def _dofs(nodes: Integers) -> Integers:
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
+
+
+@kernel
+def solve_in_place(extent, index, down, up, work, x):
+    """Replace ``x`` by the solution; the arrays are those of `Factor`."""
+    half = work.shape[0] // 2
+    u, b = work[:half], work[half:]
+    at = 0
+    start = 0
+    for block in range(extent.shape[0]):
+        w, m = extent[block, 0], extent[block, 1]
+        for i in range(m):
+            u[i] = 0.0
+        j = 0
+        while j + 4 <= w:
+            p, q, r, s = x[index[at + j]], x[index[at + j + 1]], x[index[at + j + 2]], x[index[at + j + 3]]
+            k = start + j * m
+            for i in range(m):
+                u[i] += p * up[k + i] + q * up[k + m + i] + r * up[k + 2 * m + i] + s * up[k + 3 * m + i]
+            j += 4
+        while j < w:
+            p = x[index[at + j]]
+            k = start + j * m
+            for i in range(m):
+                u[i] += p * up[k + i]
+            j += 1
+        for i in range(m):
+            x[index[at + w + i]] -= u[i]
+        at += w + m
+        start += m * w
+    start = down.shape[0]
+    for block in range(extent.shape[0] - 1, -1, -1):
+        w, m = extent[block, 0], extent[block, 1]
+        at -= w + m
+        start -= w * w + m * w
+        for j in range(w):
+            b[j] = x[index[at + j]]
+            u[j] = 0.0
+        # The rows of D, then those of U with the values above them.
+        for j in range(m):
+            b[w + j] = -x[index[at + w + j]]
+        j = 0
+        while j + 4 <= w + m:
+            p, q, r, s = b[j], b[j + 1], b[j + 2], b[j + 3]
+            k = start + j * w
+            for i in range(w):
+                u[i] += p * down[k + i] + q * down[k + w + i] + r * down[k + 2 * w + i] + s * down[k + 3 * w + i]
+            j += 4
+        while j < w + m:
+            p = b[j]
+            k = start + j * w
+            for i in range(w):
+                u[i] += p * down[k + i]
+            j += 1
+        for j in range(w):
+            x[index[at + j]] = u[j]

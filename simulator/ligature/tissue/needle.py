@@ -1,0 +1,450 @@
+"""A rigid needle in tissue: what holds it at the nodes of its paths and at its tip, solved with its own motion.
+
+Each row is a direction e at a point of the needle, with a bristle between the needle and the point of tissue there: the
+force λ = stretch / c within limits. All rows of a needle, its motion and the tissue's compliance C are solved at
+once. With J the rows' directions and moments about the centre of mass, and the elastic rows E apart from
+those at their limits L,
+
+    (c + C_EE) λ_E = e₀ + J_E δ - C_EL λ_L,    H δ = g - Jᵀ λ,
+
+so the tissue looks like a 6 x 6 stiffness to the needle. Which rows are at their limits is found by
+repetition, starting from the last tick. World axes, SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.tissue.compiled import inlined, kernel
+from ligature.tissue.dense import cholesky, solve_cholesky
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+MOST_ROWS = 160
+MOST_PASSES = 12
+"""Repetitions for the limits at most."""
+
+AXIAL, ACROSS, TIP, ENTRY, ENTRY_ACROSS, SLIDE, RUB = 0, 1, 2, 3, 4, 5, 6
+"""Rows: friction along a node, hold across it, cutting at the tip, pressure of the tip on the surface along it and across
+it, pressure and friction of a tip that slides over the surface."""
+
+OUTSIDE, TOUCHES, SLIDES, CUTS, TENTS, OPEN = 0, 1, 2, 3, 4, 5
+"""Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, in an old path."""
+
+HYSTERESIS = 2e-4
+"""Length in metres by which a tip may stand before a node and still be held by it."""
+
+CAPTURE = 1e-3
+"""Distance in metres from an old path, or from its opening, at which a tip follows it."""
+
+
+class Rows(NamedTuple):
+    """Scratch of a needle's tick: up to M rows."""
+
+    kind: Integers  # (M,)
+    point: Integers  # (M,) of the interface
+    e: Array  # (M, 3)
+    J: Array  # (M, 6)
+    rest: Array  # (M,) stretch without motion of the needle and without its forces
+    soft: Array  # (M,) c above
+    low: Array  # (M,)
+    high: Array  # (M,)
+    side: Integers  # (M,) 0 elastic, 1 at the upper, -1 at the lower limit
+    force: Array  # (M,)
+    C: Array  # (M, M)
+    A: Array  # (M, M)
+    X: Array  # (7, M)
+    index: Integers  # (M,)
+    H: Array  # (6, 6)
+    g: Array  # (6,)
+
+
+class Held(NamedTuple):
+    """What a needle's passages keep from tick to tick, by point of the interface."""
+
+    engaged: Integers  # (N,)
+    anchor: Array  # (N,) length from the tip that friction holds
+    sigma: Array  # (N,) length from the tip to the node
+    share: Array  # (N,) length of needle that the node holds
+    offset: Array  # (N, 3) by which the needle may pass beside the node without force
+    torn: Array  # (N, 3) by which the tissue has torn since the last step
+    side: Integers  # (N, 3) of the rows in the last tick
+    across: Array  # (N, 3) direction of the last force across
+    tip_side: Integers  # (3,)
+    passing: Integers  # (P,) 1 for the paths that the needle is in, -1 from their exits
+    tip: Integers  # (3,) where it is, its path, its point of contact
+    limit: Array  # (1,) force at which the tip gets further
+    room: Array  # (1,) length of the path at which the far surface stands
+    normal: Array  # (3,) of the surface at the contact, outwards
+    pressed: Array  # (1,) force of the sliding tip on it
+    load: Array  # (4,) forces along the needle: of the tip, of friction; across, in all; length inside
+
+
+def rows(capacity: int = MOST_ROWS) -> Rows:
+    """Scratch for ``capacity`` rows."""
+    M, z = capacity, np.zeros
+    i = lambda: np.zeros(M, np.int64)  # noqa: E731
+    return Rows(
+        i(), i(), z((M, 3)), z((M, 6)), z(M), z(M), z(M), z(M), i(), z(M), z((M, M)), z((M, M)), z((7, M)), i(),
+        z((6, 6)), z(6),
+    )  # fmt: skip
+
+
+def held(capacity: int, paths: int) -> Held:
+    """A needle that is outside."""
+    N, z = capacity, np.zeros
+    return Held(
+        np.zeros(N, np.int64), z(N), z(N), z(N), z((N, 3)), z((N, 3)), np.zeros((N, 3), np.int64), z((N, 3)),
+        np.zeros(3, np.int64), np.zeros(paths, np.int64), np.array([OUTSIDE, -1, -1]), z(1), z(1), z(3), z(1), z(4),
+    )  # fmt: skip
+
+
+@inlined
+def _along(shape, sigma):
+    """Point, tangent towards the tip and normal of the needle, ``sigma`` behind its tip: nine numbers.
+
+    ``shape`` is tip (3), tangent (3), normal to the centre of its arc (3), curvature, length, centre of mass (3).
+    """
+    k = shape[9]
+    angle = k * sigma
+    s, c = math.sin(angle), math.cos(angle)
+    if abs(angle) < 1e-4:
+        back, aside = sigma * (1.0 - angle * angle / 6.0), 0.5 * sigma * angle
+    else:
+        back, aside = s / k, (1.0 - c) / k
+    return (
+        shape[0] - shape[3] * back + shape[6] * aside,
+        shape[1] - shape[4] * back + shape[7] * aside,
+        shape[2] - shape[5] * back + shape[8] * aside,
+        shape[3] * c - shape[6] * s, shape[4] * c - shape[7] * s, shape[5] * c - shape[8] * s,
+        shape[6] * c + shape[3] * s, shape[7] * c + shape[4] * s, shape[8] * c + shape[5] * s,
+    )  # fmt: skip
+
+
+@inlined
+def _behind(shape, x, y, z):
+    """Length from the tip back to the point of the needle nearest to (x, y, z)."""
+    k = shape[9]
+    rx, ry, rz = x - shape[0], y - shape[1], z - shape[2]
+    back = -(rx * shape[3] + ry * shape[4] + rz * shape[5])
+    aside = rx * shape[6] + ry * shape[7] + rz * shape[8]
+    if k < 1e-6:
+        return back
+    angle = math.atan2(back, 1.0 / k - aside)
+    # More than half a turn lies behind the tip rather than before it.
+    if angle < -0.25 * math.pi and 2.0 * math.pi + angle < k * shape[10] + 0.25 * math.pi:
+        angle += 2.0 * math.pi
+    return angle / k
+
+
+@kernel
+def engage(points, paths, held, shape):
+    """Which nodes of its paths hold the needle, and for how much of its length."""
+    inside = 0.0
+    for p in range(paths.count.shape[0]):
+        sense = held.passing[p]
+        if sense == 0:
+            continue
+        count = paths.count[p]
+        first, last = -1, -1
+        for k in range(count):
+            i = paths.node[p, k]
+            y = points.at[i]
+            sigma = _behind(shape, y[0], y[1], y[2])
+            margin = HYSTERESIS if held.engaged[i] else 0.0
+            within = -margin <= sigma <= shape[10] + margin
+            if within and not held.engaged[i]:
+                qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, sigma)
+                dx, dy, dz = qx - y[0], qy - y[1], qz - y[2]
+                within = dx * dx + dy * dy + dz * dz < CAPTURE * CAPTURE
+                if within:
+                    held.anchor[i] = sigma
+                    held.offset[i, 0], held.offset[i, 1], held.offset[i, 2] = dx, dy, dz
+                    for a in range(3):
+                        held.side[i, a], held.torn[i, a], held.across[i, a] = 0, 0.0, 0.0
+            held.engaged[i] = 1 if within else 0
+            held.sigma[i] = sigma
+            if not within:
+                for a in range(3):
+                    points.force[i, a] = 0.0
+            else:
+                first = k if first < 0 else first
+                last = k
+        for k in range(count):
+            i = paths.node[p, k]
+            if not held.engaged[i]:
+                continue
+            s, sigma = paths.s[p, k], held.sigma[i]
+            tail = shape[10] - sigma
+            before = min(s, tail if sense > 0 else sigma)
+            after = min(paths.length[p] - s, sigma if sense > 0 else tail)
+            if k > first:
+                before = 0.5 * (s - paths.s[p, k - 1])
+            if k < last:
+                after = 0.5 * (paths.s[p, k + 1] - s)
+            held.share[i] = max(before, 0.0) + max(after, 0.0)
+            inside += held.share[i]
+    held.load[3] = inside
+
+
+@inlined
+def _set_row(rows, m, kind, point, ex, ey, ez, rx, ry, rz):
+    e, J = rows.e[m], rows.J[m]
+    e[0], e[1], e[2] = ex, ey, ez
+    J[0], J[1], J[2] = ex, ey, ez
+    J[3], J[4], J[5] = ry * ez - rz * ey, rz * ex - rx * ez, rx * ey - ry * ex
+    rows.kind[m], rows.point[m] = kind, point
+
+
+@inlined
+def _base(points, held, own_contact, i, s, a):
+    """Coordinate ``a`` of point ``i`` at the end of this tick without the needle's own forces."""
+    y = points.start[i, a] + s * points.move[i, a]
+    for j in range(points.status.shape[0]):
+        if points.status[j] == 0:
+            continue
+        mine = held.engaged[j] == 1 or j == own_contact
+        for b in range(3):
+            f = -points.mean[j, b] if mine else points.force[j, b] - points.mean[j, b]
+            y += points.C[i, j, a, b] * f
+    return y
+
+
+@kernel
+def gather(points, paths, held, rows, shape, tip_friction, s):
+    """Make the rows of a tick; returns how many."""
+    m = 0
+    where, tip_path, contact = held.tip[0], held.tip[1], held.tip[2]
+    for i in range(points.status.shape[0]):
+        if held.engaged[i] == 0:
+            continue
+        qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, held.sigma[i])
+        rx, ry, rz = qx - shape[11], qy - shape[12], qz - shape[13]
+        bx, by, bz = _base(points, held, contact, i, s, 0), _base(points, held, contact, i, s, 1), _base(points, held, contact, i, s, 2)
+        dx, dy, dz = qx - bx, qy - by, qz - bz
+        # Along: what friction holds, and how the tissue moves by itself.
+        at = points.at[i]
+        slid = tx * (at[0] - bx) + ty * (at[1] - by) + tz * (at[2] - bz)
+        _set_row(rows, m, AXIAL, i, tx, ty, tz, rx, ry, rz)
+        rows.rest[m] = held.sigma[i] - held.anchor[i] + slid
+        limit = points.friction[i] * held.share[i]
+        rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = -limit, limit, points.soft[i], held.side[i, 0]
+        m += 1
+        # Across: the first direction is that of the last force, so that its limit is that of the whole.
+        fx, fy, fz = held.across[i, 0], held.across[i, 1], held.across[i, 2]
+        along = fx * tx + fy * ty + fz * tz
+        fx, fy, fz = fx - along * tx, fy - along * ty, fz - along * tz
+        size = math.sqrt(fx * fx + fy * fy + fz * fz)
+        if size > 1e-9:
+            nx, ny, nz = fx / size, fy / size, fz / size
+        ox, oy, oz = held.offset[i, 0] + held.torn[i, 0], held.offset[i, 1] + held.torn[i, 1], held.offset[i, 2] + held.torn[i, 2]
+        limit = points.strength[i] * held.share[i]
+        for turn in range(2):
+            if turn == 1:
+                nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
+            _set_row(rows, m, ACROSS, i, nx, ny, nz, rx, ry, rz)
+            rows.rest[m] = nx * (dx - ox) + ny * (dy - oy) + nz * (dz - oz)
+            rows.low[m], rows.high[m], rows.soft[m] = -limit, limit, points.soft[i]
+            rows.side[m] = held.side[i, 1 + turn]
+            m += 1
+    tx, ty, tz, nx, ny, nz = shape[3], shape[4], shape[5], shape[6], shape[7], shape[8]
+    rx, ry, rz = shape[0] - shape[11], shape[1] - shape[12], shape[2] - shape[13]
+    if where == CUTS or where == TENTS:
+        lead = -1
+        for k in range(paths.count[tip_path]):
+            if held.engaged[paths.node[tip_path, k]]:
+                lead = k
+        if lead >= 0:
+            i = paths.node[tip_path, lead]
+            at = points.at[i]
+            _set_row(rows, m, TIP, i, tx, ty, tz, rx, ry, rz)
+            slid = 0.0
+            for a in range(3):
+                slid += shape[3 + a] * (at[a] - _base(points, held, contact, i, s, a))
+            rows.rest[m] = paths.s[tip_path, lead] + held.sigma[i] - paths.cut[tip_path] + slid
+            rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = 0.0, held.limit[0], points.soft[i], held.tip_side[0]
+            m += 1
+    elif where == TOUCHES or where == SLIDES:
+        i = contact
+        dx = shape[0] - _base(points, held, contact, i, s, 0)
+        dy = shape[1] - _base(points, held, contact, i, s, 1)
+        dz = shape[2] - _base(points, held, contact, i, s, 2)
+        kind, other = ENTRY, ENTRY_ACROSS
+        low, high, bound = 0.0, held.limit[0], held.limit[0]
+        if where == SLIDES:
+            kind, other = SLIDE, RUB
+            tx, ty, tz = -held.normal[0], -held.normal[1], -held.normal[2]
+            high, bound = 1e9, tip_friction * held.pressed[0]
+            # Across the normal: along the tip's way, and the third.
+            along = shape[3] * tx + shape[4] * ty + shape[5] * tz
+            nx, ny, nz = shape[3] - along * tx, shape[4] - along * ty, shape[5] - along * tz
+            size = math.sqrt(nx * nx + ny * ny + nz * nz)
+            nx, ny, nz = nx / size, ny / size, nz / size
+        _set_row(rows, m, kind, i, tx, ty, tz, rx, ry, rz)
+        rows.rest[m] = tx * dx + ty * dy + tz * dz
+        rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = low, high, points.soft[i], held.tip_side[0]
+        m += 1
+        dx, dy, dz = dx - held.offset[i, 0], dy - held.offset[i, 1], dz - held.offset[i, 2]
+        for turn in range(2):
+            if turn == 1:
+                nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
+            _set_row(rows, m, other, i, nx, ny, nz, rx, ry, rz)
+            rows.rest[m] = nx * dx + ny * dy + nz * dz
+            rows.low[m], rows.high[m], rows.soft[m] = -bound, bound, points.soft[i]
+            rows.side[m] = held.tip_side[1 + turn]
+            m += 1
+    for a in range(m):
+        e = rows.e[a]
+        for b in range(a + 1):
+            C, f = points.C[rows.point[a], rows.point[b]], rows.e[b]
+            value = 0.0
+            for i in range(3):
+                value += e[i] * (C[i, 0] * f[0] + C[i, 1] * f[1] + C[i, 2] * f[2])
+            rows.C[a, b] = value
+            rows.C[b, a] = value
+    return m
+
+
+@kernel
+def solve_rows(rows, m, H, g, delta):
+    """Forces of the rows and motion ``delta`` (6,) of the needle; returns the repetitions, negative where it failed."""
+    for turn in range(MOST_PASSES):
+        n = 0
+        for a in range(m):
+            if rows.side[a] == 0:
+                rows.index[n] = a
+                n += 1
+            else:
+                rows.force[a] = rows.high[a] if rows.side[a] > 0 else rows.low[a]
+        for i in range(6):
+            rows.g[i] = g[i]
+            for j in range(6):
+                rows.H[i, j] = H[i, j]
+        for a in range(m):
+            if rows.side[a] != 0:
+                for i in range(6):
+                    rows.g[i] -= rows.J[a, i] * rows.force[a]
+        for p in range(n):
+            a = rows.index[p]
+            b = rows.rest[a]
+            for c in range(m):
+                if rows.side[c] != 0:
+                    b -= rows.C[a, c] * rows.force[c]
+            rows.X[6, p] = b
+            for i in range(6):
+                rows.X[i, p] = rows.J[a, i]
+            for q in range(p + 1):
+                rows.A[p, q] = rows.C[a, rows.index[q]]
+            rows.A[p, p] += rows.soft[a]
+        if not cholesky(rows.A, n):
+            return -1
+        for c in range(7):
+            X = rows.X[c]
+            for p in range(n):
+                total = X[p]
+                for q in range(p):
+                    total -= rows.A[p, q] * X[q]
+                X[p] = total / rows.A[p, p]
+        for i in range(6):
+            for p in range(n):
+                rows.g[i] -= rows.X[i, p] * rows.X[6, p]
+            for j in range(i + 1):
+                total = 0.0
+                for p in range(n):
+                    total += rows.X[i, p] * rows.X[j, p]
+                rows.H[i, j] += total
+        if not cholesky(rows.H, 6):
+            return -1
+        for i in range(6):
+            delta[i] = rows.g[i]
+        solve_cholesky(rows.H, 6, delta)
+        for p in range(n - 1, -1, -1):
+            total = rows.X[6, p]
+            for i in range(6):
+                total += rows.X[i, p] * delta[i]
+            for q in range(p + 1, n):
+                total -= rows.A[q, p] * rows.force[rows.index[q]]
+            rows.force[rows.index[p]] = total / rows.A[p, p]
+        changed = False
+        for a in range(m):
+            side = rows.side[a]
+            if side == 0:
+                if rows.force[a] > rows.high[a]:
+                    rows.side[a], changed = 1, True
+                elif rows.force[a] < rows.low[a]:
+                    rows.side[a], changed = -1, True
+            elif turn < MOST_PASSES - 3:
+                # At its limit as long as the stretch there would ask for more; in the last passes none comes back.
+                bristle = _stretch(rows, m, a, delta) / rows.soft[a]
+                if (side > 0 and bristle < rows.high[a]) or (side < 0 and bristle > rows.low[a]):
+                    rows.side[a], changed = 0, True
+        if not changed:
+            return turn + 1
+    return MOST_PASSES
+
+
+@inlined
+def _stretch(rows, m, a, delta):
+    stretch = rows.rest[a]
+    for i in range(6):
+        stretch += rows.J[a, i] * delta[i]
+    for c in range(m):
+        stretch -= rows.C[a, c] * rows.force[c]
+    return stretch
+
+
+@kernel
+def conclude(points, paths, held, rows, m, delta):
+    """Keep what the rows leave behind: forces on the tissue, anchors, tears, what was cut; True if the tip got through."""
+    through = False
+    held.load[0], held.load[1], held.load[2] = 0.0, 0.0, 0.0
+    for i in range(points.status.shape[0]):
+        if held.engaged[i] or i == held.tip[2]:
+            for a in range(3):
+                points.force[i, a], held.across[i, a] = 0.0, 0.0
+    done = -1
+    turn = 0
+    for a in range(m):
+        i, kind, force = rows.point[a], rows.kind[a], rows.force[a]
+        rows.force[a] = min(max(force, rows.low[a]), rows.high[a])
+        force = rows.force[a]
+        excess = 0.0
+        if rows.side[a] != 0:
+            excess = _stretch(rows, m, a, delta) - force * rows.soft[a]
+        for b in range(3):
+            points.force[i, b] += force * rows.e[a, b]
+        turn = 0 if i != done or kind == AXIAL else turn + 1
+        done = i
+        if kind == AXIAL:
+            held.anchor[i] += excess
+            held.side[i, 0] = rows.side[a]
+            held.load[1] += force
+            turn = 0
+        elif kind == ACROSS:
+            held.side[i, turn] = rows.side[a]
+            held.load[2] += abs(force)
+            for b in range(3):
+                held.across[i, b] += force * rows.e[a, b]
+                held.torn[i, b] += excess * rows.e[a, b]
+        elif kind == TIP:
+            held.tip_side[0] = rows.side[a]
+            held.load[0] = force
+            if rows.side[a] > 0:
+                paths.cut[held.tip[1]] += excess
+                through = True
+        elif kind == ENTRY or kind == SLIDE:
+            turn = 0
+            held.tip_side[0] = rows.side[a]
+            held.load[0] = force
+            held.pressed[0] = force
+            through = kind == ENTRY and rows.side[a] > 0
+        else:
+            held.tip_side[turn] = rows.side[a]
+            for b in range(3):
+                held.offset[i, b] += excess * rows.e[a, b]
+    return through

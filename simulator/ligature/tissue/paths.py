@@ -1,0 +1,60 @@
+"""Paths that needles have cut: material points in order, from where the tip entered to where it came.
+
+A path keeps the way open: what follows, the rest of the needle, its thread or another needle, feels friction alone
+up to where the path was cut.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+MOST_PATHS, MOST_NODES = 16, 32
+"""Paths of a block, and nodes of a path, at most."""
+
+
+class Paths(NamedTuple):
+    """P paths of up to K nodes."""
+
+    count: Integers  # (P,) nodes; 0 for a path that is not in use
+    node: Integers  # (P, K) points of the interface, in order from the entry
+    s: Array  # (P, K) length of the path up to the node, m
+    cut: Array  # (P,) length up to which it is cut
+    length: Array  # (P,) length to the exit; infinite before there is one
+
+
+def paths() -> Paths:
+    """Room for paths, none yet."""
+    P, K = MOST_PATHS, MOST_NODES
+    return Paths(
+        np.zeros(P, np.int64), np.zeros((P, K), np.int64), np.zeros((P, K)), np.zeros(P), np.full(P, np.inf)
+    )
+
+
+def begin_path(paths: Paths, point: int) -> int:
+    """Begin a path at a point of the surface; returns its index.
+
+    Raises
+    ------
+    RuntimeError
+        When all paths are in use.
+    """
+    unused = np.flatnonzero(paths.count == 0)
+    if not len(unused):
+        raise RuntimeError(f"all {len(paths.count)} paths through the tissue are in use")
+    path = int(unused[0])
+    paths.count[path], paths.node[path, 0], paths.s[path, 0] = 1, point, 0.0
+    paths.cut[path], paths.length[path] = 0.0, np.inf
+    return path
+
+
+def extend_path(paths: Paths, path: int, point: int, s: float) -> None:
+    """Append a node at the length ``s``."""
+    k = int(paths.count[path])
+    paths.node[path, k], paths.s[path, k] = point, s
+    paths.count[path] = k + 1

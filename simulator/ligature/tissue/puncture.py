@@ -1,0 +1,396 @@
+"""A needle and the tissue around it: where its tip is, what holds it, which way it cuts.
+
+The tip presses a point of the surface until the force along it reaches the puncture force; then it is inside and cuts,
+against the cutting force, while friction grows with the length inside. The far surface bulges until it takes the exit
+force beyond cutting; then the way is open and friction alone remains, also in every later pass. A
+tip at less than the least angle to the surface slides over it instead. World axes, SI units.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.tissue import needle as states
+from ligature.tissue.interface import Interface
+from ligature.tissue.location import cross_surface, locate
+from ligature.tissue.material import TissueMaterial
+from ligature.tissue.needle import conclude, engage, gather, held, rows, solve_rows
+from ligature.tissue.paths import MOST_NODES, MOST_PATHS, Paths, begin_path, extend_path
+
+Array = NDArray[np.float64]
+
+SPACING = 1.6e-3
+"""Length of a path between its nodes, m."""
+
+HARD = 1e-5
+"""Least compliance of a bristle, m/N."""
+
+FADE = 0.05
+"""Time in seconds in which tissue takes the shape of a needle that passes beside a node."""
+
+TIP_FRICTION = 0.2
+"""Coulomb coefficient of a tip that slides over the surface."""
+
+
+class NeedleInTissue:
+    """One needle of a block of tissue.
+
+    Parameters
+    ----------
+    interface
+        The points of the tissue.
+    paths
+        Its paths.
+    curvature
+        Of the needle's arc, 1/m; 0 for a straight needle.
+    length
+        Of the needle from tip to tail, m.
+    radius
+        Of its wire, m.
+    """
+
+    def __init__(self, interface: Interface, paths: Paths, curvature: float, length: float, radius: float) -> None:
+        if not (length > 0.0 and radius > 0.0 and curvature >= 0.0):
+            raise ValueError(f"needle of length {length}, radius {radius}, curvature {curvature} is impossible")
+        self._interface, self._paths, self.radius = interface, paths, radius
+        self._held = held(len(interface.points.status), MOST_PATHS)
+        self._rows = rows()
+        self._shape = np.zeros(14)
+        self._shape[9], self._shape[10] = curvature, length
+        self._delta = np.zeros(6)
+        self._weights8, self._weights4, self._normal = np.zeros(8), np.zeros(4), np.zeros(3)
+        self._before = np.full(3, np.nan)
+
+    # --- the tick -----------------------------------------------------------------------------
+
+    def couple(
+        self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array
+    ) -> tuple[Array, Array]:
+        """Solve for the needle's motion in this tick, together with the tissue.
+
+        Parameters
+        ----------
+        tip, tangent, normal
+            Where the tip is, the direction in which it points, and the direction from it to the centre of its
+            arc, (3,) each.
+        centre
+            The centre of mass, (3,).
+        H, g
+            The needle's own equations, H δ = g, for its displacement and turn δ (6,) about the centre of mass in this
+            tick: for a free needle the spatial mass over dt², and momentum over dt with the forces on it.
+
+        Returns
+        -------
+        The motion δ (6,), and the force and moment (6,) of the tissue on the needle.
+
+        Raises
+        ------
+        FloatingPointError
+            When the needle's equations are singular or not finite.
+        """
+        h, p = self._held, self._interface.points
+        self._shape[:9], self._shape[11:] = np.concatenate([tip, tangent, normal]), centre
+        if h.tip[0] == states.OUTSIDE:
+            self._look_for_surface()
+        engage(p, self._paths, h, self._shape)
+        self._follow_tip()
+        self._set_limit()
+        m = gather(p, self._paths, h, self._rows, self._shape, TIP_FRICTION, self._interface.fraction)
+        if solve_rows(self._rows, m, H, g, self._delta) < 0 or not np.isfinite(self._delta).all():
+            raise FloatingPointError("the equations of the needle in tissue have no finite solution")
+        through = conclude(p, self._paths, h, self._rows, m, self._delta)
+        if through:
+            self._get_through()
+        elif h.tip[0] in (states.TOUCHES, states.SLIDES) and h.tip_side[0] < 0:
+            self._let_go()
+        self._before[:] = tip
+        wrench = np.zeros(6)
+        for a in range(m):
+            wrench -= self._rows.force[a] * self._rows.J[a]
+        return self._delta.copy(), wrench
+
+    def _look_for_surface(self) -> None:
+        """Begin a contact where the tip came through the surface in the last tick."""
+        tip, tangent = self._shape[:3], self._shape[3:6]
+        way = tip - self._before
+        size = float(np.sqrt((way**2).sum()))
+        if not (size > 0.0 and float((way * tangent).sum()) > 0.0):
+            return
+        self._meet(self._before, way / size, size)
+
+    def _meet(self, start: Array, direction: Array, reach: float) -> None:
+        x, grid = self._interface.elastic.x, self._interface.elastic.grid
+        face, _ = cross_surface(x, grid.faces, start, direction, reach, -1.0, self._weights4, self._normal)
+        if face < 0:
+            return
+        h = self._held
+        crossing = self._weights4 @ x[grid.faces[face]]
+        path, sense = self._opening(crossing)
+        if path >= 0:
+            h.passing[path], h.tip[1] = sense, path
+            h.tip[0] = states.OPEN if np.isfinite(self._paths.length[path]) else states.CUTS
+            return
+        point = self._interface.add(grid.faces[face], self._weights4)
+        self._equip(point, int(grid.face_cell[face]))
+        self._interface.points.soft[point] = HARD
+        h.offset[point], h.torn[point], h.tip_side[:] = 0.0, 0.0, 0
+        h.normal[:], h.pressed[0], h.tip[2] = self._normal, 0.0, point
+        h.tip[0] = states.TOUCHES if self._steep() else states.SLIDES
+
+    def _steep(self) -> bool:
+        sine = -float((self._shape[3:6] * self._held.normal).sum())
+        return sine >= float(np.sin(self._material_of(self._held.tip[2]).least_angle))
+
+    def _opening(self, at: Array) -> tuple[int, int]:
+        """Path that opens within reach of a point of the surface, and 1 at its entry, -1 at its exit."""
+        best, found = states.CAPTURE, (-1, 0)
+        for path in np.flatnonzero(self._paths.count).tolist():
+            if self._held.passing[path]:
+                continue
+            ends = [(0, 1)]
+            if np.isfinite(self._paths.length[path]):
+                ends.append((int(self._paths.count[path]) - 1, -1))
+            for k, sense in ends:
+                away = float(np.linalg.norm(self._interface.points.at[self._paths.node[path, k]] - at))
+                if away < best:
+                    best, found = away, (path, sense)
+        return found
+
+    def _follow_tip(self) -> None:
+        """Bring where the tip is up to date with the nodes that hold the needle."""
+        h, paths = self._held, self._paths
+        for path in np.flatnonzero(h.passing).tolist():
+            nodes = paths.node[path, : paths.count[path]]
+            if not h.engaged[nodes].any():
+                h.passing[path] = 0
+                if h.tip[1] == path:
+                    h.tip[0], h.tip[1] = states.OUTSIDE, self._last_exit()
+        path = int(h.tip[1])
+        if path < 0 or not h.passing[path] or h.tip[0] in (states.TOUCHES, states.SLIDES):
+            return
+        if np.isfinite(paths.length[path]):
+            end = paths.node[path, paths.count[path] - 1 if h.passing[path] > 0 else 0]
+            out = h.engaged[end] and h.sigma[end] >= 0.0
+            h.tip[0] = states.OUTSIDE if out else states.OPEN
+
+    def _last_exit(self) -> int:
+        """The path that the tip left last of those that the needle is still in, or -1."""
+        h, paths = self._held, self._paths
+        found, best = -1, np.inf
+        for path in np.flatnonzero(h.passing).tolist():
+            end = paths.node[path, paths.count[path] - 1 if h.passing[path] > 0 else 0]
+            if 0.0 <= h.sigma[end] < best:
+                found, best = path, float(h.sigma[end])
+        return found
+
+    def _set_limit(self) -> None:
+        """Force at which the tip gets further."""
+        h, paths = self._held, self._paths
+        where = int(h.tip[0])
+        if where == states.TOUCHES:
+            h.limit[0] = self._material_of(h.tip[2]).puncture_force
+        elif where in (states.CUTS, states.TENTS):
+            lead = paths.node[h.tip[1], paths.count[h.tip[1]] - 1]
+            material = self._material_of(lead)
+            if paths.cut[h.tip[1]] >= h.room[0]:
+                h.tip[0] = states.TENTS
+            h.limit[0] = material.cutting_force
+            if h.tip[0] == states.TENTS:
+                h.limit[0] += material.exit_force
+
+    def _get_through(self) -> None:
+        """The tip's force reached its limit: it enters, cuts on, or leaves."""
+        h, paths = self._held, self._paths
+        if h.tip[0] == states.TOUCHES:
+            point = int(h.tip[2])
+            path = begin_path(paths, point)
+            h.passing[path], h.tip[:] = 1, [states.CUTS, path, -1]
+            h.engaged[point], h.anchor[point], h.sigma[point], h.share[point] = 1, 0.0, 0.0, 0.0
+            self._equip(point, self._cell_of[point])
+            self._find_far_surface()
+        elif h.tip[0] == states.TENTS:
+            path = int(h.tip[1])
+            paths.length[path] = max(float(h.room[0]), float(paths.s[path, paths.count[path] - 1]) + 1e-6)
+            h.tip[0] = states.OUTSIDE
+            self._lay_exit(path)
+
+    def _let_go(self) -> None:
+        """The tip has left the surface."""
+        self._interface.release(int(self._held.tip[2]))
+        self._held.tip[0], self._held.tip[2] = states.OUTSIDE, -1
+
+    # --- the tissue step ----------------------------------------------------------------------
+
+    def follow(self) -> None:
+        """Lay and move nodes; after the tissue has moved."""
+        h = self._held
+        h.offset[:] *= np.exp(-self._interface.elastic.h / FADE)
+        self._tear()
+        if h.tip[0] in (states.CUTS, states.TENTS):
+            self._lay_node()
+            self._find_far_surface()
+        elif h.tip[0] in (states.TOUCHES, states.SLIDES):
+            self._slide()
+        elif h.tip[0] == states.OUTSIDE and not np.isnan(self._before).any():
+            self._look_inside()
+
+    def _tip_now(self) -> Array:
+        """The tip after the last tick."""
+        theta, r = self._delta[3:], self._shape[:3] - self._shape[11:14]
+        return self._shape[:3] + self._delta[:3] + np.cross(theta, r)
+
+    def _lay_node(self) -> None:
+        h, paths, points = self._held, self._paths, self._interface.points
+        path = int(h.tip[1])
+        k = int(paths.count[path]) - 1
+        lead = int(paths.node[path, k])
+        s = float(paths.s[path, k] + h.sigma[lead])
+        if not h.engaged[lead] or s < paths.s[path, k] + SPACING or k + 2 >= MOST_NODES or h.tip[0] == states.TENTS:
+            return
+        cell = self._locate(self._shape[:3])
+        if cell < 0:
+            return
+        point = self._add(cell)
+        extend_path(paths, path, point, s)
+        h.engaged[point], h.anchor[point], h.sigma[point] = 1, 0.0, 0.0
+        h.offset[point] = self._shape[:3] - points.at[point]
+        h.torn[point], h.side[point], h.across[point] = 0.0, 0, 0.0
+
+    def _lay_exit(self, path: int) -> None:
+        h, x, grid = self._held, self._interface.elastic.x, self._interface.elastic.grid
+        lead = int(self._paths.node[path, self._paths.count[path] - 1])
+        tip, tangent = self._shape[:3], self._shape[3:6]
+        back = min(max(float(h.sigma[lead]), 0.0), 1e-3)
+        face, _ = cross_surface(
+            x, grid.faces, tip - back * tangent, tangent, back + 5e-3, 1.0, self._weights4, self._normal
+        )
+        s = float(self._paths.length[path])
+        if face < 0 or s - self._paths.s[path, self._paths.count[path] - 1] < 0.25 * SPACING:
+            return
+        point = self._interface.add(grid.faces[face], self._weights4)
+        self._equip(point, int(grid.face_cell[face]))
+        extend_path(self._paths, path, point, s)
+        h.engaged[point], h.anchor[point], h.sigma[point] = 1, 0.0, 0.0
+        h.offset[point] = tip - self._interface.points.at[point]
+        h.torn[point], h.side[point], h.across[point] = 0.0, 0, 0.0
+
+    def _find_far_surface(self) -> None:
+        """Length of the path at which the line ahead of the tip leaves the tissue."""
+        h, x, grid = self._held, self._interface.elastic.x, self._interface.elastic.grid
+        path = int(h.tip[1])
+        k = int(self._paths.count[path]) - 1
+        lead = int(self._paths.node[path, k])
+        sigma = max(float(h.sigma[lead]), 0.0)
+        back = min(sigma, 2e-3)
+        tip, tangent = self._shape[:3], self._shape[3:6]
+        face, ahead = cross_surface(
+            x, grid.faces, tip - back * tangent, tangent, 0.2, 1.0, self._weights4, self._normal
+        )
+        h.room[0] = self._paths.s[path, k] + sigma - back + ahead if face >= 0 else np.inf
+
+    def _slide(self) -> None:
+        """Follow a tip that slides over the surface; the angle decides whether it does."""
+        h, x, grid = self._held, self._interface.elastic.x, self._interface.elastic.grid
+        point = int(h.tip[2])
+        outside = self._shape[:3] + 3e-3 * h.normal
+        face, _ = cross_surface(x, grid.faces, outside, -h.normal, 6e-3, -1.0, self._weights4, self._normal)
+        if face < 0:
+            self._let_go()
+            return
+        h.normal[:] = self._normal
+        if h.tip[0] == states.SLIDES:
+            # A point on the normal through the tip keeps the pressure; its place across starts anew.
+            self._interface.place(point, grid.faces[face], self._weights4)
+            h.offset[point] = 0.0
+            self._cell_of[point] = int(grid.face_cell[face])
+        steep = states.TOUCHES if self._steep() else states.SLIDES
+        if steep != h.tip[0]:
+            h.tip[0], h.tip_side[:] = steep, 0
+
+    def _look_inside(self) -> None:
+        """Begin a contact with tissue that has come over the tip."""
+        h, tip, tangent = self._held, self._shape[:3], self._shape[3:6]
+        near = h.engaged.astype(bool) & (np.abs(h.sigma) < 3e-3)
+        if near.any() or self._locate(tip) < 0:
+            return
+        self._meet(tip - 2e-3 * tangent, tangent, 2e-3)
+
+    def _tear(self) -> None:
+        """Move nodes in the material by what has torn."""
+        h, p = self._held, self._interface.points
+        for i in np.flatnonzero((h.torn != 0.0).any(axis=1)).tolist():
+            cell = self._locate(p.start[i] + h.torn[i])
+            if cell >= 0:
+                self._interface.place(i, self._interface.elastic.grid.cells[cell], self._weights8)
+                self._cell_of[i] = cell
+                h.torn[i] = 0.0
+
+    def _locate(self, at: Array) -> int:
+        elastic = self._interface.elastic
+        return int(locate(elastic.x, elastic.grid.cells, np.ascontiguousarray(at), 1e-6, self._weights8))
+
+    def _add(self, cell: int) -> int:
+        point = self._interface.add(self._interface.elastic.grid.cells[cell], self._weights8)
+        self._equip(point, cell)
+        return point
+
+    def _equip(self, point: int, cell: int) -> None:
+        """Give a point the properties of its cell's material, and the compliance that the grid leaves out."""
+        self._cell_of[point] = cell
+        material, p = self._material_of(point), self._interface.points
+        p.friction[point], p.strength[point] = material.friction, material.strength
+        # Around a slender inclusion of radius r tissue yields (ln(d / r) + 0.19) / (4 π G d) under a force on the
+        # length d; specs derive it from Kelvin's solution. The grid has a part of it.
+        target = (np.log(SPACING / self.radius) + 0.19) / (4.0 * np.pi * material.shear * SPACING)
+        p.soft[point] = max(target - float(np.trace(p.C[point, point])) / 3.0, HARD)
+
+    @property
+    def _cell_of(self) -> NDArray[np.int64]:
+        return self._interface.cell_of
+
+    def _material_of(self, point: int) -> TissueMaterial:
+        elastic = self._interface.elastic
+        return elastic.materials[int(elastic.grid.layer[self._cell_of[point]])]
+
+    # --- state --------------------------------------------------------------------------------
+
+    @property
+    def where(self) -> int:
+        """Where the tip is, one of the states of `ligature.tissue.needle`."""
+        return int(self._held.tip[0])
+
+    @property
+    def depth(self) -> float:
+        """Insertion depth: length of needle inside the tissue, m."""
+        return float(self._held.load[3])
+
+    @property
+    def tip_force(self) -> float:
+        """Force of the tip on the tissue along itself, N."""
+        return float(self._held.load[0])
+
+    @property
+    def friction(self) -> float:
+        """Force of the shaft on the tissue along itself, N."""
+        return float(self._held.load[1])
+
+    def reset(self) -> None:
+        """Take the needle out without a trace."""
+        for array in self._held:
+            array[:] = 0
+        self._held.tip[:] = [states.OUTSIDE, -1, -1]
+        self._before[:] = np.nan
+        self._delta[:] = 0.0
+
+    def snapshot(self) -> dict[str, Array]:
+        """Everything that lasts from tick to tick."""
+        kept = {name: array.copy() for name, array in zip(self._held._fields, self._held, strict=True)}
+        return {**kept, "before": self._before.copy(), "delta": self._delta.copy(), "shape": self._shape.copy()}
+
+    def restore(self, snapshot: dict[str, Array]) -> None:
+        """Continue from `snapshot`."""
+        for name, array in zip(self._held._fields, self._held, strict=True):
+            array[:] = snapshot[name]
+        self._before[:], self._delta[:], self._shape[:] = snapshot["before"], snapshot["delta"], snapshot["shape"]
+
