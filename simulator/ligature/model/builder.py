@@ -6,7 +6,7 @@ that cannot be built is reported and left out; the rest goes on.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -189,7 +189,7 @@ class SceneBuilder:
             roots=self.resolver.roots,
         )
 
-    def _report_ties(self, joints: Sequence[Joint]) -> None:
+    def _report_ties(self, joints: Iterable[Joint]) -> None:
         """Joints between two elements of rods: a rod is tied to bodies."""
         for joint in joints:
             message = f"joint '{joint.identity.key}' joins two elements of rods; it is left out"

@@ -102,9 +102,7 @@ class TissueBlock:
         kept = {name: getattr(self.elastic, name).copy() for name in ("x", "v", "frames")}
         kept["lip_force"] = self.lips.force.copy()
         kept.update({f"point_{name}": array for name, array in self.interface.snapshot().items()})
-        kept.update(
-            {f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)}
-        )
+        kept.update({f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)})
         for number, needle in enumerate(self.needles):
             kept.update({f"needle_{number}_{name}": array for name, array in needle.snapshot().items()})
         return kept

@@ -137,7 +137,8 @@ class Interface:
         return self.tick == self.ticks
 
     def push(self, d: Array) -> None:
-        """Add to the displacements ``d`` (n, 3) of a step what the points' mean forces do, and forget those that left."""
+        """Add to the displacements ``d`` (n, 3) of a step what the points' mean forces do, and forget those that
+        left."""
         p = self.points
         self.tick = 0
         used = np.flatnonzero(p.status)

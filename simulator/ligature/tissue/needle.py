@@ -30,11 +30,12 @@ MOST_PASSES = 12
 """Repetitions for the limits at most."""
 
 AXIAL, ACROSS, TIP, ENTRY, ENTRY_ACROSS, SLIDE, RUB = 0, 1, 2, 3, 4, 5, 6
-"""Rows: friction along a node, hold across it, cutting at the tip, pressure of the tip on the surface along it and across
-it, pressure and friction of a tip that slides over the surface."""
+"""Rows: friction along a node, hold across it, cutting at the tip, pressure of the tip on the surface along it and
+across it, pressure and friction of a tip that slides over the surface."""
 
 OUTSIDE, TOUCHES, SLIDES, CUTS, TENTS, OPEN = 0, 1, 2, 3, 4, 5
-"""Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, in an old path."""
+"""Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, in an old
+path."""
 
 HYSTERESIS = 2e-4
 """Length in metres by which a tip may stand before a node and still be held by it."""
@@ -225,7 +226,11 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
             continue
         qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, held.sigma[i])
         rx, ry, rz = qx - shape[11], qy - shape[12], qz - shape[13]
-        bx, by, bz = _base(points, held, contact, i, s, 0), _base(points, held, contact, i, s, 1), _base(points, held, contact, i, s, 2)
+        bx, by, bz = (
+            _base(points, held, contact, i, s, 0),
+            _base(points, held, contact, i, s, 1),
+            _base(points, held, contact, i, s, 2),
+        )
         dx, dy, dz = qx - bx, qy - by, qz - bz
         # Along: what friction holds, and how the tissue moves by itself.
         at = points.at[i]
@@ -242,7 +247,11 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
         size = math.sqrt(fx * fx + fy * fy + fz * fz)
         if size > 1e-9:
             nx, ny, nz = fx / size, fy / size, fz / size
-        ox, oy, oz = held.offset[i, 0] + held.torn[i, 0], held.offset[i, 1] + held.torn[i, 1], held.offset[i, 2] + held.torn[i, 2]
+        ox, oy, oz = (
+            held.offset[i, 0] + held.torn[i, 0],
+            held.offset[i, 1] + held.torn[i, 1],
+            held.offset[i, 2] + held.torn[i, 2],
+        )
         limit = points.strength[i] * held.share[i]
         for turn in range(2):
             if turn == 1:
@@ -400,7 +409,8 @@ def _stretch(rows, m, a, delta):
 
 @kernel
 def conclude(points, paths, held, rows, m, delta):
-    """Keep what the rows leave behind: forces on the tissue, anchors, tears, what was cut; True if the tip got through."""
+    """Keep what the rows leave behind: forces on the tissue, anchors, tears, what was cut; True if the tip got
+    through."""
     through = False
     held.load[0], held.load[1], held.load[2] = 0.0, 0.0, 0.0
     for i in range(points.status.shape[0]):

@@ -31,9 +31,7 @@ class Paths(NamedTuple):
 def paths() -> Paths:
     """Room for paths, none yet."""
     P, K = MOST_PATHS, MOST_NODES
-    return Paths(
-        np.zeros(P, np.int64), np.zeros((P, K), np.int64), np.zeros((P, K)), np.zeros(P), np.full(P, np.inf)
-    )
+    return Paths(np.zeros(P, np.int64), np.zeros((P, K), np.int64), np.zeros((P, K)), np.zeros(P), np.full(P, np.inf))
 
 
 def begin_path(paths: Paths, point: int) -> int:

@@ -393,4 +393,3 @@ class NeedleInTissue:
         for name, array in zip(self._held._fields, self._held, strict=True):
             array[:] = snapshot[name]
         self._before[:], self._delta[:], self._shape[:] = snapshot["before"], snapshot["delta"], snapshot["shape"]
-
