@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from ligature.suture.compiled import cache_folder
+from ligature.kernels import cache_folder
 from ligature.suture.warm import compile_kernels
 
 

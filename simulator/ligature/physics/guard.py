@@ -6,10 +6,10 @@ Reads states only, so that physics has the same bits with it. World axes, SI uni
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
+from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Body, Joint, JointType, Scene
 from ligature.model.state import StateRecord
@@ -35,7 +35,7 @@ UNEQUAL = 1e4
 """Ratio of masses within a tree from which it is a likely cause."""
 
 
-@njit(cache=True)
+@compiled
 def _suspect(twist: Array, gyration: Array, mass: Array, rigid: Flags, before: Array, leap: float) -> int:
     """The body to report, -1 for none.
 

@@ -110,7 +110,7 @@ def _weigh(
             load[p, a] += load[r, a]
 
 
-@njit(cache=True)
+@compiled
 def _below(twist: Array, rows: Integers, velocity: Array, limit: float) -> bool:
     """Whether ``rows`` of ``twist`` (r, 6) and all of ``velocity`` (a,) are finite and below ``limit``."""
     sound = True

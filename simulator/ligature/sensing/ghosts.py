@@ -126,7 +126,7 @@ def _pairs_to_ask(
     return found
 
 
-@njit(cache=True)
+@compiled
 def _moved(before: Array, now: Array, reach: float) -> float:
     """Bound of the way that any point within ``reach`` of the origin went between two poses (7,)."""
     way, turn = 0.0, 0.0

@@ -6,7 +6,7 @@ limit that is given. World axes, SI units.
 
 from __future__ import annotations
 
-from ligature.suture.compiled import inlined
+from ligature.kernels import inlined
 from ligature.suture.coupling import SLIPS
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
 

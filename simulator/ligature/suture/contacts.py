@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import SLIPS
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from ligature.suture.compiled import inlined, kernel
+from ligature.kernels import inlined, kernel
 from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
 
 SLIPS, STICKS, YIELDS = 0, 1, 2

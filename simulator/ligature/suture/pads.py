@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.rotations import cross, matrix_of, multiply, rotate, rotate_back, rotation_vector
 from ligature.suture.tables import opener
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
+from ligature.kernels import inlined, kernel
 from ligature.suture.chain import factor, solve
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
 from ligature.suture.holding import add_holds, settle_holds
 from ligature.suture.rotations import (

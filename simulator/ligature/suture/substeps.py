@@ -7,9 +7,9 @@ axes, SI units.
 
 from __future__ import annotations
 
+from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture.bonds import place_bonds
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.contacts import detect
 from ligature.suture.holding import add_hold_impulses, begin_again, begin_holds
 from ligature.suture.placing import sound

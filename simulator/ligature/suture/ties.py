@@ -8,8 +8,8 @@ axes, SI units.
 
 from __future__ import annotations
 
+from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6, solve, solve_within
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import push
 from ligature.suture.rotations import cross, rotate
 

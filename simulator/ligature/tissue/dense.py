@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ligature.tissue.compiled import kernel
+from ligature.kernels import kernel
 
 
 @kernel
