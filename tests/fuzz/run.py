@@ -143,7 +143,9 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         folder.mkdir(exist_ok=True)
         self.connection, theirs = context.Pipe()
-        self.process: BaseProcess = context.Process(target=work, args=(theirs, str(folder), trial, attempt), daemon=True)
+        self.process: BaseProcess = context.Process(
+            target=work, args=(theirs, str(folder), trial, attempt), daemon=True
+        )
         self.process.start()
         theirs.close()
         self.number: int | None = None
@@ -194,9 +196,7 @@ def run(
     return outcome
 
 
-def _listen(
-    worker: _Worker, todo: list[tuple[int, int]], outcome: Outcome, limit: float, campaign: Campaign
-) -> str:
+def _listen(worker: _Worker, todo: list[tuple[int, int]], outcome: Outcome, limit: float, campaign: Campaign) -> str:
     """Take what a worker says; returns why it must be stopped, or nothing."""
     try:
         while worker.connection.poll():
@@ -223,9 +223,7 @@ def _count(number: int, verdict: str, outcome: Outcome, campaign: Campaign) -> N
         _keep(number, verdict, outcome, campaign)
 
 
-def _fail(
-    worker: _Worker, reason: str, todo: list[tuple[int, int]], outcome: Outcome, campaign: Campaign
-) -> None:
+def _fail(worker: _Worker, reason: str, todo: list[tuple[int, int]], outcome: Outcome, campaign: Campaign) -> None:
     """Note that a worker was lost, and put back what it had not begun."""
     if worker.number is None:
         raise RuntimeError(f"a worker did not start: {reason}")

@@ -122,7 +122,9 @@ class _Author:
 
     def _write(self) -> None:
         world: Block = {"lights": [], "cameras": [], "namespace": "/ambf/env/"}
-        world["gravity"] = _xyz(self.rng.choice(((0.0, 0.0, -9.81), (0.0, 0.0, -9.81), (0.0, 0.0, 0.0), (0.0, 3.0, -9.0))))
+        world["gravity"] = _xyz(
+            self.rng.choice(((0.0, 0.0, -9.81), (0.0, 0.0, -9.81), (0.0, 0.0, 0.0), (0.0, 3.0, -9.0)))
+        )
         names = [f"model{i}.yaml" for i in range(len(self.models))]
         launch = {"world config": "world.yaml", "color config": "colours.yaml", "input devices config": "devices.yaml"}
         launch["multibody configs"] = names
@@ -148,7 +150,9 @@ class _Author:
             size = rng.uniform(0.02, 0.2)
             block["inertia"] = {k: block["mass"] * size**2 * rng.uniform(0.2, 1.0) for k in ("ix", "iy", "iz")}
         if rng.random() < 0.3:
-            block["inertial offset"] = _pose(_vector(rng, 0.05), (0.0, 0.0, 0.0) if rng.random() < 0.5 else _vector(rng, 1.0))
+            block["inertial offset"] = _pose(
+                _vector(rng, 0.05), (0.0, 0.0, 0.0) if rng.random() < 0.5 else _vector(rng, 1.0)
+            )
         if rng.random() < 0.2:
             block["friction"] = {"static": rng.choice((0.0, 0.5, 1.0, 5.0)), "rolling": rng.choice((0.0, 0.01, 0.1))}
         if rng.random() < 0.2:
@@ -162,7 +166,9 @@ class _Author:
         if rng.random() < 0.15:
             block["collision groups"] = rng.sample(range(5), rng.randint(1, 2))
         if rng.random() < 0.2:
-            block["controller"] = {half: {"P": _log(rng, 1, 100), "I": 0, "D": rng.uniform(0, 10)} for half in ("linear", "angular")}
+            block["controller"] = {
+                half: {"P": _log(rng, 1, 100), "I": 0, "D": rng.uniform(0, 10)} for half in ("linear", "angular")
+            }
             if rng.random() < 0.5:
                 block["controller output type"] = rng.choice(("VELOCITY", "FORCE"))
         if rng.random() < 0.1:
@@ -184,12 +190,19 @@ class _Author:
             items = []
             for _ in range(rng.randint(1, 4)):
                 shape, geometry = self._primitive(False)
-                items.append({"shape": shape, "geometry": geometry, "offset": _pose(_vector(rng, 0.05), _vector(rng, 1.0))})
+                items.append(
+                    {"shape": shape, "geometry": geometry, "offset": _pose(_vector(rng, 0.05), _vector(rng, 1.0))}
+                )
             return {"compound collision shape": items}
         if kind == "mesh":
             name = rng.choice(("cube.obj", "cube.obj", "tetrahedron.obj", "plate.obj", "triangle.stl"))
             type_ = rng.choice(("CONVEX_HULL", "CONVEX_HULL", "TRIMESH", "POINT_CLOUD", "CONVEX_MESH"))
-            return {"mesh": name, "collision mesh": name, "collision mesh type": type_, "scale": rng.choice((0.02, 0.05, 0.1))}
+            return {
+                "mesh": name,
+                "collision mesh": name,
+                "collision mesh type": type_,
+                "scale": rng.choice((0.02, 0.05, 0.1)),
+            }
         return {}
 
     def _primitive(self, plane: bool) -> tuple[str, Block]:
@@ -201,7 +214,9 @@ class _Author:
             "SPHERE": {"radius": radius},
             "PLANE": {"normal": _xyz((0.0, 0.0, 1.0)), "offset": -1.0},
         }
-        return kind, geometry.get(kind, {"radius": radius, "height": radius * rng.uniform(0.5, 10.0), "axis": rng.choice("XYZ")})
+        return kind, geometry.get(
+            kind, {"radius": radius, "height": radius * rng.uniform(0.5, 10.0), "axis": rng.choice("XYZ")}
+        )
 
     def _tree(self, tree: int) -> None:
         """A root and what hangs on it, every body where its joint says at zero."""
@@ -212,7 +227,9 @@ class _Author:
         members = [self._body(model, T, tree, 0.0 if rng.random() < 0.5 else None)]
         for _ in range(rng.choice((0, 0, 1, 2, 3, 6))):
             parent = rng.choice(members)
-            child = self._body(rng.randrange(parent.model, len(self.models)), np.eye(4), tree, 0.0 if rng.random() < 0.05 else None)
+            child = self._body(
+                rng.randrange(parent.model, len(self.models)), np.eye(4), tree, 0.0 if rng.random() < 0.05 else None
+            )
             joint = self._joint_block(parent, child)
             child.T = parent.T @ _child_at_zero(parent.block, child.block, joint)
             child.block["location"] = _pose(child.T[:3, 3], matrix_rpy(child.T[:3, :3]))
@@ -278,7 +295,9 @@ class _Author:
             }
             if kind == "six dof spring":
                 for key, scale in (("stiffness", 10.0), ("damping", 0.1)):
-                    joint[key] = {half: _xyz([scale * rng.random() for _ in range(3)]) for half in ("linear", "angular")}
+                    joint[key] = {
+                        half: _xyz([scale * rng.random() for _ in range(3)]) for half in ("linear", "angular")
+                    }
         elif kind != "fixed" and (length or rng.random() < 0.7):
             joint["joint limits"] = {"low": -span * rng.random(), "high": span * rng.random()}
 
@@ -337,7 +356,10 @@ class _Author:
             for key in ("mesh", "collision mesh", "collision mesh type", "scale", "compound collision shape",
                         "collision offset", "inertial offset", "inertia"):  # fmt: skip
                 body.block.pop(key, None)
-            body.block |= {"collision shape": "CAPSULE", "collision geometry": {"radius": 0.001, "height": length, "axis": "Z"}}
+            body.block |= {
+                "collision shape": "CAPSULE",
+                "collision geometry": {"radius": 0.001, "height": length, "axis": "Z"},
+            }
             chain.append(body)
         for a, b in zip(chain, chain[1:], strict=False):
             bend = rng.choice((1e-4, 1e-2, 1.0))
@@ -371,11 +393,17 @@ class _Author:
                 key = f"{kind[:-1].upper()} {i}"
                 if key in self.models[body.model]:
                     continue
-                block: Block = {"name": f"{kind[:2]}{i}", "parent": body.key, "location": _pose(_vector(rng, 0.1), _vector(rng, 1.0))}
+                block: Block = {
+                    "name": f"{kind[:2]}{i}",
+                    "parent": body.key,
+                    "location": _pose(_vector(rng, 0.1), _vector(rng, 1.0)),
+                }
                 if kind == "sensors":
                     block["type"] = rng.choice(("Proximity", "Resistance", "Contact"))
                     block["range"] = rng.choice((0.01, 0.5, 5.0))
-                    block["array"] = [{"offset": _xyz(_vector(rng, 0.1)), "direction": _xyz(self._direction())} for _ in range(3)]
+                    block["array"] = [
+                        {"offset": _xyz(_vector(rng, 0.1)), "direction": _xyz(self._direction())} for _ in range(3)
+                    ]
                     block |= {"friction": {"static": 1.0, "damping": 0.1, "dynamic": 0.5}, "contact stiffness": 1.0}
                 elif kind == "actuators":
                     block["type"] = "Constraint"
@@ -402,7 +430,13 @@ class _Author:
     def _exaggerate(self) -> None:
         """Replace one number of the scene by a tiny, huge or negative one, or a reference by a strange one."""
         rng = self.rng
-        changes: list[Callable[[], str]] = [self._odd_number, self._odd_number, self._odd_number, self._odd_key, self._odd_reference]
+        changes: list[Callable[[], str]] = [
+            self._odd_number,
+            self._odd_number,
+            self._odd_number,
+            self._odd_key,
+            self._odd_reference,
+        ]
         self.case.extreme.append(rng.choice(changes)())
 
     def _odd_number(self) -> str:
@@ -482,7 +516,9 @@ def _scaled(T: Array, parent: Block, child: Block, joint: Block, T_parent: Array
     scales = parent.get("scale", 1.0), child.get("scale", 1.0)
     if scales == (1.0, 1.0):
         return T
-    pivots = [np.array(tuple(joint[k].values())) * s for k, s in zip(("parent pivot", "child pivot"), scales, strict=True)]
+    pivots = [
+        np.array(tuple(joint[k].values())) * s for k, s in zip(("parent pivot", "child pivot"), scales, strict=True)
+    ]
     R = T[:3, :3]
     on_parent = (inverse(T_parent) @ np.append(pivots[0], 1.0))[:3]
     on_child = (inverse(T_child) @ np.append(pivots[1], 1.0))[:3]

@@ -48,7 +48,9 @@ def _run(loaded: Scene, case: Case, strict: bool) -> None:
             simulation.step(STRIDE)
             for name in simulation.state.dtype.names or ():
                 if simulation.state[name].dtype.kind == "f":
-                    assert np.isfinite(simulation.state[name]).all(), f"'{name}' is not finite after {tick + STRIDE} ticks"
+                    assert np.isfinite(simulation.state[name]).all(), (
+                        f"'{name}' is not finite after {tick + STRIDE} ticks"
+                    )
             speeds = np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1)
             fastest = int(speeds.argmax())
             key = loaded.bodies[fastest].identity.key

@@ -58,8 +58,8 @@ FIGURES = np.dtype(
 """Figures of the running loop; times in seconds, ``physics_beat`` on the monotonic clock.
 
 ``frames`` are pictures drawn for clients, ``frame_seconds`` is how long the last round of them took. ``recording`` is 1
-while a recording goes on that was asked for during the run. ``alarms`` counts bodies that moved as no command asks for or
-diverged; ``alarm`` is the newest, in UTF-8.
+while a recording goes on that was asked for during the run. ``alarms`` counts bodies that moved as no command asks
+for, or diverged; ``alarm`` is the newest, in UTF-8.
 """
 
 _STATE_AT = 4096

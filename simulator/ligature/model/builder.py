@@ -139,9 +139,7 @@ class SceneBuilder:
         """The scene of everything added."""
         self._arrivals.report_orphans()
         self.diagnostics += self._arrivals.diagnostics
-        rods, between = without_ties_between(
-            rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints
-        )
+        rods, between = without_ties_between(rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints)
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
         self._report_ties(between)

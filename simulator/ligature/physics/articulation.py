@@ -191,9 +191,7 @@ def _append(
         if inner.static or outer.static or not axis.sprung:
             return _effective(outer, inertia, axis, T_outer_frame)
         frames = (T_inner_frame, T_outer_frame)
-        return moved_inertia(
-            (inner.mass, outer.mass), (inertia_of(inner), inertia), frames, steps, steps.index(axis)
-        )
+        return moved_inertia((inner.mass, outer.mass), (inertia_of(inner), inertia), frames, steps, steps.index(axis))
 
     for axis in steps[:-1]:
         plan.masses.append(LIGHT * max(outer.mass, 1e-6))

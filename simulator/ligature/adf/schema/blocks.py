@@ -103,7 +103,14 @@ LOOKS = (
 COLLISION = (
     Key("collision shape", C, doc="single collision primitive; comes first", choices=SHAPES),
     *geometry("collision geometry", "dimensions of `collision shape`"),
-    Key("collision offset", POSE, None, "m, rad", "pose of the primitive in B; inertial offset when absent", most=FARTHEST),
+    Key(
+        "collision offset",
+        POSE,
+        None,
+        "m, rad",
+        "pose of the primitive in B; inertial offset when absent",
+        most=FARTHEST,
+    ),
     *_compound("compound collision shape", "several collision primitives"),
     Key("collision mesh", P, doc="collision mesh in the low-resolution folder; '' is none"),
     Key(
