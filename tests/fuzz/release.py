@@ -252,10 +252,10 @@ class Trial:
         for goal in self._goals():
             self._move(goal)
         self._release()
-        had, floor = self._speed(), self._floor()
+        had, floor, controlled = self._speed(), self._floor(), self.fastest
         height = max(float(self._handle.pose[2]) - floor, 0.0)
         limit = float(np.sqrt(had**2 + 2.0 * 9.81 * height)) + STORED
-        led, self.fastest = self.fastest, 0.0
+        self.fastest = 0.0
         others = 0.0
         end, last = self.sim.time + after, None
         faults: list[str] = []
@@ -270,7 +270,7 @@ class Trial:
             faults.append("the state is not finite")
         if self.fastest > limit:
             faults.append(f"it was {self.fastest:.2f} m/s fast, at most {limit:.2f} is explained")
-        if others > max(10.0 * (limit + led), 10.0):
+        if others > max(10.0 * (limit + controlled), 10.0):
             faults.append(f"another body was {others:.1f} m/s fast")
         low, high = self._box()
         if (pose[:3] < low).any() or (pose[:3] > high).any():

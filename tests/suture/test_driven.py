@@ -55,7 +55,7 @@ def test_a_needle_that_is_let_go_hangs_on_its_thread_again(sim: Simulation) -> N
     assert needle.pose[2] < 0.75
 
 
-def test_a_needle_that_was_led_through_a_hole_and_out_again_falls_with_its_own_mass() -> None:
+def test_a_needle_controlled_through_a_hole_and_out_again_falls_with_its_own_mass() -> None:
     """While it is commanded in a hole nothing moves it; that must not last, or its thread throws it at 20 m/s."""
     sim = Simulation(load(SCENES / "suturing" / "launch.yaml", models=[0, 1]))
     needle = sim.bodies["Needle"]
