@@ -7,6 +7,7 @@ STAMPS := build/stamps
 SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
 SCENES ?= 10000
+RELEASES ?= 100
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
@@ -80,6 +81,7 @@ test-slow: developers
 fuzz: developers
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
 	$(PYTHON) -m tests.fuzz.run --scenes $(SCENES)
+	$(PYTHON) -m tests.fuzz.release --trials $(RELEASES)
 	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q $(shell grep -rl "from hypothesis" tests --include="test_*.py")
 
 bench: developers

@@ -132,6 +132,8 @@ class BodyControl:
             ticks = max(1, round(KICK_SECONDS / self._dt))
             self._kick = (self._kick * self._kick_ticks + _difference(target, known) / self._dt) / ticks
             self._kick_ticks = ticks
+            if self.type is not CommandType.POSITION:
+                self._last = None  # of an earlier pursuit: its slope would be a blow
         self.type, self.target = type_, target
 
     def apply(self) -> None:

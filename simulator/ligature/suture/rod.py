@@ -147,6 +147,7 @@ class Rod:
         self._apart: list[int] = []
         self._movable: list[tuple[int, int]] = []
         self._pushed: list[tuple[int, int]] = []
+        self._pulled: dict[int, tuple[Array, float, Array]] = {}
         self._tied = [tie.body for tie in description.ties]
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
@@ -306,9 +307,20 @@ class Rod:
         self._passages, self._passage_table, self._owner = held, table_of(held), owner
 
     def pull_partner(self, body: int, acceleration: Array, mass: float, inertia: Array) -> None:
-        """Let a movable partner fall with ``acceleration`` (3,), and resist with ``mass`` and ``inertia`` (3,)."""
+        """Let a movable partner fall with ``acceleration`` (3,), and resist with ``mass`` and ``inertia`` (3,).
+
+        It does so in the coming tick: what pulls at it or holds it is another from tick to tick.
+        """
         i, nodes = self.node_of[body], self._nodes
+        self._pulled.setdefault(i, (nodes.gravity[i].copy(), float(nodes.mass[i]), nodes.inertia[i].copy()))
         nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = acceleration, mass, inertia
+
+    def _end_pulls(self) -> None:
+        """Let partners resist forces as before `pull_partner`."""
+        nodes = self._nodes
+        for i, (gravity, mass, inertia) in self._pulled.items():
+            nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = gravity, mass, inertia
+        self._pulled.clear()
 
     def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
         """Let an element fall with ``acceleration`` (3,) from now on."""
@@ -445,6 +457,7 @@ class Rod:
             self._self_skip, self._stiffness, self.impulse, self.tension, MAX_SPEED, self.dt,
         )  # fmt: skip
         self.newton_steps, self.settled_soundly = int(self._counts[2]), bool(self._counts[4])
+        self._end_pulls()
         self._touches = (c, a, b) if self._counts[3] else (b, c, a)
 
     def impulse_on(self, body: int) -> Array:
