@@ -80,6 +80,10 @@ class Mesh:
         return np.vstack([p.vertices for p in self.parts]) if self.parts else np.zeros((0, 3))
 
 
+LOOK = "look"
+"""Code of the findings that matter only where the mesh is drawn."""
+
+
 class Findings:
     """Collects what is odd about a file, each message once, at most `MAX_FINDINGS`."""
 
@@ -87,11 +91,17 @@ class Findings:
         self._found: dict[tuple[Path, str], Diagnostic] = {}
 
     def add(
-        self, path: Path, message: str, line: int = 1, hint: str = "", severity: Severity = Severity.WARNING
+        self,
+        path: Path,
+        message: str,
+        line: int = 1,
+        hint: str = "",
+        severity: Severity = Severity.WARNING,
+        code: str = "mesh",
     ) -> None:
         """Remember ``message`` about a line of ``path``, unless the same was said of an earlier line."""
         if len(self._found) < MAX_FINDINGS:
-            self._found.setdefault((path, message), Diagnostic(severity, message, Mark(path, line, 1), hint, "mesh"))
+            self._found.setdefault((path, message), Diagnostic(severity, message, Mark(path, line, 1), hint, code))
 
     def all(self) -> tuple[Diagnostic, ...]:
         """The findings in the order they were made."""

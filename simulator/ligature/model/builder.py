@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
+from ligature.adf.nodes import Scalar, Sequence
 from ligature.model import attached, proxies, trees
 from ligature.model.arms import find_arms
 from ligature.model.frames import pose_matrix
@@ -19,6 +20,7 @@ from ligature.model.geometry import FileContext, GeometryError, shader_files
 from ligature.model.holes import find_holes
 from ligature.model.jaws import find_jaws
 from ligature.model.lookup import candidates
+from ligature.model.lost import LostBodies
 from ligature.model.naming import Names, merged
 from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
@@ -71,6 +73,7 @@ class SceneBuilder:
         self._silent_files: list[list[int]] = []
         self._linked: list[tuple[int, int]] = []
         self._no_rod: set[int] = set()
+        self._lost = LostBodies()
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
@@ -137,6 +140,7 @@ class SceneBuilder:
     def finish(self) -> Scene:
         """The scene of everything added."""
         self._arrivals.report_orphans()
+        self._lost.name_what_goes_along(self.diagnostics)
         self.diagnostics += self._arrivals.diagnostics
         rods = rod_chains(self.bodies, self.joints, frozenset(self._no_rod))
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
@@ -209,12 +213,14 @@ class SceneBuilder:
         own = document.top.has("gravity")
         gravity = np.array(document.top.vector("gravity")) if own else self.world.gravity
         local = []
+        self._note_unusable(document, model)
         for element in document.elements("bodies"):
             identity = self._identity("body", element, model.namespace, model.index)
             try:
                 body = body_of(element, len(self.bodies), identity, context, gravity, shaders)
             except GeometryError as error:
                 self._names["body"].identifiers.pop()
+                self._lost.add(identity.identifier, len(self.diagnostics))
                 self.report(error.diagnostic)
                 continue
             self.bodies.append(body)
@@ -224,6 +230,18 @@ class SceneBuilder:
                 self._no_rod.add(body.index)
             local.append(body.index)
         return local
+
+    def _note_unusable(self, document: Document, model: Model) -> None:
+        """Remember the listed bodies that an error took away, so that what names them is no further error."""
+        usable = {element.key for element in document.elements("bodies")}
+        listed = document.top.node.get("bodies")
+        for item in listed.items if isinstance(listed, Sequence) else []:
+            if not isinstance(item, Scalar) or item.text in usable:
+                continue
+            for place, finding in enumerate(self.diagnostics):
+                if finding.severity >= Severity.ERROR and f"body '{item.text}'" in finding.message:
+                    self._lost.add(model.namespace + item.text, place)
+                    break
 
     def _add_sutures(self, document: Document, model: Model, local: list[int]) -> None:
         own = document.top.has("gravity")
@@ -348,6 +366,8 @@ class SceneBuilder:
             if len(found) == 1:
                 return local[found[0]] if pool is local_names else found[0]
             ambiguous += [pool[i] for i in found]
+        if not ambiguous and self._lost.took_along(f"{element.kind} '{element.key}'", (text, namespace + text)):
+            return None
         reason = f"is ambiguous ({', '.join(ambiguous[:3])}, …)" if ambiguous else "does not exist"
         message = f"{element.kind} '{element.key}' is left out: its {key} '{text}' {reason}"
         self.report(

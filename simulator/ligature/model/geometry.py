@@ -16,6 +16,7 @@ from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
 from ligature.mesh import ConvexPart, collision_parts, load_mesh
 from ligature.mesh.load import EXTENSIONS
+from ligature.mesh.mesh import LOOK
 from ligature.model.frames import Array, frame, inverse, pose_matrix, rpy_matrix
 from ligature.model.scene import (
     Box,
@@ -235,7 +236,8 @@ def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[
     except AdfError as error:
         raise GeometryError(error.diagnostics[0]) from error
     for diagnostic in mesh.diagnostics:
-        context.report(diagnostic)
+        if diagnostic.code != LOOK:  # this mesh is never drawn
+            context.report(diagnostic)
     identity = np.eye(4)
     shapes: list[Shape] = []
     for piece in pieces:
