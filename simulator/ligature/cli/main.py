@@ -147,9 +147,11 @@ def check(
     strict: Annotated[bool, typer.Option(help="Refuse what AMBF refuses.")] = False,
     root: Roots = None,
     verbose: Annotated[bool, typer.Option("-v", help="Show keys without effect too.")] = False,
+    models: Models = None,
 ) -> None:
-    """Tell every problem of a scene as file:line:column; exit status 1 on errors."""
-    raise typer.Exit(run_check(files, root or [], strict, verbose, Console(highlight=False, soft_wrap=True)))
+    """Report every problem of a scene as file:line:column; exit status 1 on errors."""
+    console = Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_check(files, root or [], strict, verbose, console, indices(models)))
 
 
 @app.command()
@@ -163,6 +165,16 @@ def bench(
 ) -> None:
     """Measure the physics of a scene: ticks per second, real-time factor, times by phase, memory."""
     raise typer.Exit(run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False)))
+
+
+@app.command("compile")
+def compile_kernels(
+    scenes: Annotated[Optional[list[Path]], typer.Argument(help="Launch files; else scenes of the repository.")] = None,  # noqa: UP045
+) -> None:
+    """Compile ahead what scenes need, which their first start would do else; several at a time."""
+    from ligature.cli.compile import compile_ahead
+
+    raise typer.Exit(compile_ahead(scenes or [], Console(highlight=False, soft_wrap=True)))
 
 
 @app.command()

@@ -12,9 +12,9 @@ from collections.abc import Iterable
 
 import numpy as np
 import pybullet
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.commands import CommandType
 from ligature.model.scene import Joint, JointType, OutputType
 from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
@@ -52,7 +52,7 @@ MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 
 
-@njit(cache=True)
+@compiled
 def outputs(
     mode: Integers, force_output: Flags, turns: Flags, sprung: Flags, p: Array, i: Array, d: Array,
     stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, fastest: Array, hardest: Array,

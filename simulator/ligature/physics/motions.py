@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import pybullet
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.poses import compose
 from ligature.physics.articulation import Tree
 
@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 _TURNS, _SLIDES = int(pybullet.JOINT_REVOLUTE), int(pybullet.JOINT_PRISMATIC)
 
 
-@njit(cache=True)
+@compiled
 def _follow(
     begin: int, end: int, rows: Integers, fixed: Array, joints: Array, frame: Array, speed: Array, pose: Array,
     twist: Array,
@@ -62,7 +62,7 @@ def _follow(
         _carried(v, pose[r, 0] - f[0], pose[r, 1] - f[1], pose[r, 2] - f[2], twist[r])
 
 
-@njit(cache=True)
+@compiled
 def _turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float, float]:
     """The vector p, given in the frame ``pose``, in world axes."""
     x, y, z, w = pose[3], pose[4], pose[5], pose[6]
@@ -70,7 +70,7 @@ def _turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float,
     return px + 2.0 * (y * cz - z * cy), py + 2.0 * (z * cx - x * cz), pz + 2.0 * (x * cy - y * cx)
 
 
-@njit(cache=True)
+@compiled
 def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     """The velocity ``twist`` (6,) at a point that lies r off."""
     wx, wy, wz = twist[3], twist[4], twist[5]
@@ -80,7 +80,7 @@ def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     out[3], out[4], out[5] = wx, wy, wz
 
 
-@njit(cache=True)
+@compiled
 def _weigh(
     begin: int, end: int, rows: Integers, fixed: Array, frame: Array, pose: Array, force: Array, load: Array,
     effort: Array,

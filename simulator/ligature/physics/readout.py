@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pybullet
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.poses import compose_rows
 from ligature.model.scene import JointType, Scene
 from ligature.model.state import StateRecord
@@ -24,7 +24,7 @@ _REPORTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.LINEAR_SPRING, J
 """Joints whose position is reported; all others report 0 (ADF specification §15.5)."""
 
 
-@njit(cache=True)
+@compiled
 def _write_joints(
     joints: Integers, axes: Integers, turns: Flags, feedback: Flags, q: Array, qd: Array, tau: Array,
     position: Array, velocity: Array, effort: Array,

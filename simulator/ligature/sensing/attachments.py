@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
 from ligature.model.scene import Attachment, Scene
@@ -20,7 +20,7 @@ from ligature.model.scene import Attachment, Scene
 KINDS = ("ghost", "camera", "light")
 
 
-@njit(cache=True)
+@compiled
 def _update(
     body_pose: NDArray[np.float64],
     local: NDArray[np.float64],

@@ -7,9 +7,9 @@ World axes, metres. A body overlaps a ghost when one of its contact distances to
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
 from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
@@ -28,7 +28,7 @@ STILL = 1e-6
 """Change of a pose (metres, quaternion) below which a pair is not asked about again."""
 
 
-@njit(cache=True)
+@compiled
 def _elements_inside(
     kinds: NDArray[np.int64],
     sizes: Array,
@@ -73,7 +73,7 @@ def _elements_inside(
                     break
 
 
-@njit(cache=True)
+@compiled
 def _invert(pose: Array, out: Array) -> None:
     """The inverse of a pose (7,)."""
     turn_back, origin = np.zeros(7), np.zeros(7)
@@ -82,7 +82,7 @@ def _invert(pose: Array, out: Array) -> None:
     compose(turn_back, origin, out)
 
 
-@njit(cache=True)
+@compiled
 def _pairs_to_ask(
     ghost_world: Array,
     body_pose: Array,
