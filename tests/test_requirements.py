@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -23,6 +24,7 @@ def listed(name: str) -> set[str]:
     return {re.split(r"[=<>\[]", line)[0].lower().replace("_", "-") for line in lines if line}
 
 
+@cache
 def imported(folder: str) -> set[str]:
     """The modules that files below ``folder`` import from elsewhere, by their first name."""
     found: set[str] = set()
@@ -36,15 +38,22 @@ def imported(folder: str) -> set[str]:
     return found - set(sys.stdlib_module_names) - OURS - BLENDER - own
 
 
+@cache
+def installed() -> dict[str, list[str]]:
+    """Packages by the modules that they bring, of this environment."""
+    return dict(packages_distributions())
+
+
 def suppliers(module: str) -> set[str]:
     """Packages of either list that may supply ``module``: by what is installed, and by Debian's custom."""
-    installed = {name.lower().replace("_", "-") for name in packages_distributions().get(module, [])}
-    return installed | {module.lower(), f"python3-{module.replace('_', '-')}"}
+    named = {name.lower().replace("_", "-") for name in installed().get(module, [])}
+    return named | {module.lower(), f"python3-{module.replace('_', '-')}"}
 
 
 def test_what_the_simulator_imports_is_in_the_lists_for_running() -> None:
     lists = listed("requirements.txt") | listed("debian-packages.txt")
-    lacking = {m for m in imported("simulator") | imported("scenes") - OPTIONAL if not suppliers(m) & lists} - OPTIONAL
+    modules = (imported("simulator") | imported("scenes")) - OPTIONAL
+    lacking = {module for module in modules if not suppliers(module) & lists}
     # numba's own part, and the server that viser is made of
     assert lacking <= {"llvmlite", "websockets"}, lacking
 
