@@ -176,8 +176,18 @@ class _Assembly:
     # --- loops ------------------------------------------------------------------------------
 
     def _closes(self, joint: Joint) -> bool:
+        """Whether a joint can close a loop; report one that cannot."""
         ends = (joint.parent, joint.child)
-        return all(end in self.tree_of for end in ends) and not all(self.bodies[end].static for end in ends)
+        if all(end in self.tree_of for end in ends) and not all(self.bodies[end].static for end in ends):
+            return True
+        one, two = (self.bodies[end].identity.identifier for end in ends)
+        if all(end in self.tree_of for end in ends):
+            why, hint = f"neither '{one}' nor '{two}' has a mass", "give one a mass, or remove the joint"
+        else:
+            why, hint = f"'{one}' or '{two}' is an element of a rod", "opt out with 'ligature rod: false'"
+        message = f"joint '{joint.identity.key}' has no effect: {why}"
+        self.diagnostics.append(Diagnostic(Severity.INFO, message, joint.identity.mark, hint, "loop"))
+        return False
 
     def _chain(self, joint: Joint) -> Chain:
         return chain_of(joint, forward=not self.bodies[joint.child].static)

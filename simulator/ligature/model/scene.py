@@ -607,9 +607,10 @@ class Scene:
 
     ``articulations`` cover every non-rod body once (a lone body is an articulation of one link);
     ``loops`` are the joints that close a kinematic loop or that an articulation cannot express and
-    that constraints must hold; ``rods`` are the recognised sutures, ``arms`` the recognised
-    manipulators, ``jaws`` what can grasp. ``diagnostics`` are all the findings of reading and resolving,
-    in order. ``roots`` are the folders below which a scene file may have other files opened.
+    that constraints must hold, as ``closures`` say; ``start`` is where all of them start; ``rods``
+    are the recognised sutures, ``arms`` the recognised manipulators, ``jaws`` what can grasp.
+    ``diagnostics`` are all the findings of reading and resolving, in order. ``roots`` are the folders
+    below which a scene file may have other files opened.
     """
 
     name: str
