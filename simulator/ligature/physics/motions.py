@@ -208,11 +208,20 @@ class Motions:
         """A tree was put elsewhere."""
         for known in (self._bases, self._paces, self._jointed, self._linked):
             known.discard(tree)
+        if tree in self._still:
+            self._read_still(tree)
+
+    def _read_still(self, tree: int) -> None:
+        """Read a base that stays where it is now: Bullet turns it by a last bit in every tick, so later is elsewhere."""
+        self.base(tree)
+        self.pace(tree)
 
     def forget_all(self) -> None:
         """Everything was put elsewhere."""
         for known in (self._bases, self._paces, self._jointed, self._linked):
             known.clear()
+        for tree in sorted(self._still):
+            self._read_still(tree)
 
     def base(self, tree: int) -> None:
         """Bring the pose of the base up to date."""

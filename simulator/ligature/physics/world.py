@@ -123,6 +123,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
         self._setup_queries()
         self._setup_grips()
+        self._motions.forget_all()
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
