@@ -212,7 +212,7 @@ class Motions:
             self._read_still(tree)
 
     def _read_still(self, tree: int) -> None:
-        """Read a base that stays where it is now: Bullet turns it by a last bit in every tick, so later is elsewhere."""
+        """Read a base that stays, now: Bullet turns it by a last bit in every tick."""
         self.base(tree)
         self.pace(tree)
 
