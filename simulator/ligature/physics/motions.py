@@ -168,6 +168,8 @@ class Motions:
         self._uids = [tree.uid for tree in trees]
         self._still = {k for k, tree in enumerate(trees) if tree.static}
         self._rigid = {k for k, tree in enumerate(trees) if not tree.axes}
+        self._going = [k for k in range(len(trees)) if k not in self._still]
+        self._turning = [k for k in range(len(trees)) if k not in self._rigid]
         self._bases: set[int] = set()
         self._paces: set[int] = set()
         self._jointed: set[int] = set()
@@ -268,8 +270,9 @@ class Motions:
 
     def sound(self, limit: float) -> bool:
         """Whether the velocities of all bases and joints are finite and below ``limit``."""
-        for tree in range(len(self._uids)):
+        for tree in self._going:
             self.pace(tree)
+        for tree in self._turning:
             self.joints(tree)
         return bool(_below(self.twist, self._bases_at, self.velocity, limit))
 
