@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -284,8 +285,8 @@ def test_forward_and_inverse_kinematics_on_demand(ready: PsmArm) -> None:
 def test_a_recalled_arm_goes_on_as_the_other_did(ready: PsmArm) -> None:
     ready.move_jp([0.5, 0.2, 0.15, 0, 0, 0])
     advance(ready, 0.3)
-    kept = ready.snapshot()
-    plant = ready.joints.plant.snapshot()
+    kept = copy.deepcopy(ready.snapshot())
+    plant = copy.deepcopy(ready.joints.plant.snapshot())
     advance(ready, 0.5)
     first = ready.measured_js().position
     ready.restore(kept)

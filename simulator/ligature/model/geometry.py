@@ -242,7 +242,7 @@ def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[
     shapes: list[Shape] = []
     for piece in pieces:
         if not isinstance(piece, ConvexPart):
-            shapes.append(TriMesh(piece.vertices, piece.faces))
+            shapes.append(TriMesh(piece.vertices, piece.faces, str(path)))
         elif len(piece.vertices) == 1:
             shapes.append(Sphere(_point_radius(element)))
         else:

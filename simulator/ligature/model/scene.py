@@ -86,10 +86,11 @@ class Hull:
 
 @dataclass(frozen=True, eq=False)
 class TriMesh:
-    """Triangle mesh: ``vertices`` (n, 3), ``faces`` (m, 3) of int32 indices."""
+    """Triangle mesh: ``vertices`` (n, 3), ``faces`` (m, 3) of int32 indices; ``source`` is its file, for messages."""
 
     vertices: Array
     faces: NDArray[np.int32]
+    source: str = ""
 
 
 Shape = Box | Sphere | Cylinder | Capsule | Cone | Plane | Hull | TriMesh

@@ -168,6 +168,8 @@ class Motions:
         self._uids = [tree.uid for tree in trees]
         self._still = {k for k, tree in enumerate(trees) if tree.static}
         self._rigid = {k for k, tree in enumerate(trees) if not tree.axes}
+        self._going = [k for k in range(len(trees)) if k not in self._still]
+        self._turning = [k for k in range(len(trees)) if k not in self._rigid]
         self._bases: set[int] = set()
         self._paces: set[int] = set()
         self._jointed: set[int] = set()
@@ -208,11 +210,20 @@ class Motions:
         """A tree was put elsewhere."""
         for known in (self._bases, self._paces, self._jointed, self._linked):
             known.discard(tree)
+        if tree in self._still:
+            self._read_still(tree)
+
+    def _read_still(self, tree: int) -> None:
+        """Read a base that stays, now: Bullet turns it by a last bit in every tick."""
+        self.base(tree)
+        self.pace(tree)
 
     def forget_all(self) -> None:
         """Everything was put elsewhere."""
         for known in (self._bases, self._paces, self._jointed, self._linked):
             known.clear()
+        for tree in sorted(self._still):
+            self._read_still(tree)
 
     def base(self, tree: int) -> None:
         """Bring the pose of the base up to date."""
@@ -259,8 +270,9 @@ class Motions:
 
     def sound(self, limit: float) -> bool:
         """Whether the velocities of all bases and joints are finite and below ``limit``."""
-        for tree in range(len(self._uids)):
+        for tree in self._going:
             self.pace(tree)
+        for tree in self._turning:
             self.joints(tree)
         return bool(_below(self.twist, self._bases_at, self.velocity, limit))
 

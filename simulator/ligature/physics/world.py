@@ -129,6 +129,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         self._parting = Parting(self.client, self.dt)
         self._setup_queries()
         self._setup_grips()
+        self._motions.forget_all()
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""

@@ -203,6 +203,7 @@ class Rod:
         self.grips, self._pads, self._near = [], (), None
         self._bonds = self._gather_bonds()
         self.tension[:], self.impulse[:] = 0.0, 0.0
+        self.newton_steps, self.settled_soundly = 0, True
         self._clear_touches()
 
     def _clear_touches(self) -> None:
