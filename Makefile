@@ -4,6 +4,8 @@ PYTHON := .venv/bin/python
 STAMPS := build/stamps
 SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
+COMMANDS ?= 1000000
+KILLS ?= 200
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
@@ -63,6 +65,8 @@ test-slow: setup
 
 fuzz: setup
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
+	$(PYTHON) -m tests.fuzz.commands --commands $(COMMANDS)
+	$(PYTHON) -m tests.fuzz.kills --kills $(KILLS)
 	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q $(shell grep -rl "from hypothesis" tests --include="test_*.py")
 
 bench: setup

@@ -32,13 +32,14 @@ from ligature.model.commands import (
     WatchContacts,
     check,
     check_object,
+    object_of,
     objects_of,
 )
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
 from ligature.model.scene import Body, Camera, Joint, Scene
 from ligature.model.state import MAX_TOUCHES, StateRecord, new_state
-from ligature.physics import World
+from ligature.physics import World, failure
 from ligature.sensing.actuators import Actuators
 from ligature.sensing.attachments import Attachments
 from ligature.sensing.contacts import Contacts
@@ -275,10 +276,31 @@ class Simulation:
         """Take a command; it acts from the next tick on.
 
         Raises ValueError, and changes nothing, for numbers that are not finite or too many, and for an object that the
-        scene does not have. What an arm refuses becomes its warning, what goes wrong in it its FAULT.
+        scene does not have. What an arm refuses becomes its warning, what goes wrong in it its FAULT. What goes wrong
+        in another object clears its command and is among `problems`.
         """
         check(command)
         check_object(command, self._objects)
+        try:
+            self._carry_out(command)
+        except Exception as error:  # no command ends a run
+            self.problems.append(failure(self._name_of(command), error))
+            if isinstance(command, BodyCommand):
+                self._world.release(command.body)
+
+    def _name_of(self, command: Command) -> str:
+        """The object that a command is for, in words."""
+        item = object_of(command)
+        if item is None:
+            return type(command).__name__
+        kind, index = item
+        described = {
+            "body": self.scene.bodies, "actuator": self.scene.actuators, "camera": self.scene.cameras,
+            "light": self.scene.lights,
+        }.get(kind)  # fmt: skip
+        return f"{kind} '{described[index].identity.identifier if described else self.scene.arms[index].name}'"
+
+    def _carry_out(self, command: Command) -> None:
         if isinstance(command, BodyCommand):
             self._world.set_command(command)
         elif isinstance(command, ActuatorCommand):
