@@ -37,7 +37,7 @@ from ligature.model.commands import (
 )
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
-from ligature.model.scene import Body, Camera, Joint, Scene
+from ligature.model.scene import Actuator, Body, Camera, Joint, Light, Scene
 from ligature.model.state import MAX_TOUCHES, StateRecord, new_state
 from ligature.physics import World, failure
 from ligature.sensing.actuators import Actuators
@@ -294,11 +294,13 @@ class Simulation:
         if item is None:
             return type(command).__name__
         kind, index = item
-        described = {
-            "body": self.scene.bodies, "actuator": self.scene.actuators, "camera": self.scene.cameras,
+        items: dict[str, Sequence[Body] | Sequence[Actuator] | Sequence[Camera] | Sequence[Light]] = {
+            "body": self.scene.bodies,
+            "actuator": self.scene.actuators,
+            "camera": self.scene.cameras,
             "light": self.scene.lights,
-        }.get(kind)  # fmt: skip
-        return f"{kind} '{described[index].identity.identifier if described else self.scene.arms[index].name}'"
+        }
+        return f"{kind} '{items[kind][index].identity.identifier if kind in items else self.scene.arms[index].name}'"
 
     def _carry_out(self, command: Command) -> None:
         if isinstance(command, BodyCommand):
