@@ -144,6 +144,7 @@ class Node:
         figures = self._block.figures
         figures["malformed"] = self._reception.refused + self._arms.refused + oversized.count
         self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
+        self._diagnostics.faults = self._arms.faults
         self._world.loop_hz = float(figures["loop_hz"][0])
         self._diagnostics.publish(now)
         return self._block.age < PHYSICS_SILENCE
