@@ -82,6 +82,7 @@ def megabytes(pid: int) -> float:
     return int(fields[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+@pytest.mark.slow
 def test_nothing_that_a_client_sends_ends_the_run_or_fills_its_memory(
     simulator: Program, node: Any, listen: Callable[..., Any], publish: Callable[..., Any]
 ) -> None:
@@ -107,6 +108,7 @@ def test_nothing_that_a_client_sends_ends_the_run_or_fills_its_memory(
     assert "bytes is refused; at most" in simulator.output
 
 
+@pytest.mark.slow
 def test_a_ratio_that_no_trajectory_bears_and_homing_leave_the_run_alive(
     simulator: Program, listen: Callable[..., Any], publish: Callable[..., Any]
 ) -> None:
