@@ -57,7 +57,8 @@ def announced(buffer: io.BytesIO) -> int | None:
 def read_bounded(connection: Any, b: io.BytesIO, msg_queue: list[Any], sock: Any) -> None:
     """Take the messages that are complete in ``b`` into ``msg_queue``, and pass over those that are too long.
 
-    rospy calls it after every look at the socket, as the method ``read_messages`` of a ``connection`` from a publisher.
+    One that arrives whole behind another, within one look at the socket (64 KiB), is taken all the same.
+    rospy calls it after every such look, as the method ``read_messages`` of a ``connection`` from a publisher.
     """
     while True:
         _skip(connection, b)
