@@ -8,6 +8,8 @@ SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
 SCENES ?= 10000
 RELEASES ?= 100
+COMMANDS ?= 1000000
+KILLS ?= 200
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
@@ -82,6 +84,8 @@ fuzz: developers
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
 	$(PYTHON) -m tests.fuzz.run --scenes $(SCENES)
 	$(PYTHON) -m tests.fuzz.release --trials $(RELEASES)
+	$(PYTHON) -m tests.fuzz.commands --commands $(COMMANDS)
+	$(PYTHON) -m tests.fuzz.kills --kills $(KILLS)
 	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q $(shell grep -rl "from hypothesis" tests --include="test_*.py")
 
 bench: developers

@@ -34,10 +34,10 @@ from ligature.model.commands import (
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
 from ligature.model.messages import Message, handle
-from ligature.model.scene import Body, Camera, Joint, Scene
+from ligature.model.scene import Actuator, Body, Camera, Joint, Light, Scene
 from ligature.model.state import StateRecord, new_state
 from ligature.model.subsystem import Subsystem
-from ligature.physics import Controllers, World
+from ligature.physics import Controllers, World, failure
 from ligature.physics.guard import Guard
 from ligature.robots.commands import ArmCommand
 from ligature.sensing.actuators import Actuators
@@ -302,11 +302,30 @@ class Simulation:
         """Take a command; it acts from the next tick on.
 
         Raises ValueError, and changes nothing, for invalid values, and for an object that the scene does not have.
-        What an arm rejects becomes its warning, what goes wrong in it its FAULT.
+        What an arm rejects becomes its warning, what goes wrong in it its FAULT. What goes wrong in another object
+        clears its command and is among `problems`.
         """
         command.check()
         command.check_indices(self._counts)
-        handle(self._handlers, command)
+        try:
+            handle(self._handlers, command)
+        except Exception as error:  # no command ends a run
+            self.problems.append(failure(self._name_of(command), error))
+            if isinstance(command, BodyCommand):
+                self._world.release(command.body)
+
+    def _name_of(self, command: Command) -> str:
+        """The object of a command, for messages."""
+        if command.object is None:
+            return type(command).__name__
+        kind, index = command.object
+        items: dict[str, Sequence[Body] | Sequence[Actuator] | Sequence[Camera] | Sequence[Light]] = {
+            "body": self.scene.bodies,
+            "actuator": self.scene.actuators,
+            "camera": self.scene.cameras,
+            "light": self.scene.lights,
+        }
+        return f"{kind} '{items[kind][index].identity.identifier if kind in items else self.scene.arms[index].name}'"
 
     def _actuate(self, command: ActuatorCommand) -> None:
         problem = self._actuators.apply(command, self.state["body_pose"][0])

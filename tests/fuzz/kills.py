@@ -13,6 +13,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import uuid
 from collections.abc import Iterator
@@ -29,8 +30,14 @@ FLAGS = ("-p", "200", "--cameras", "--cockpit-at", "127.0.0.1:{port}", "--task",
 LIMIT = 2.0
 """Seconds after the first signal in which every process must have ended."""
 
-LONGEST = 9.0
-"""Seconds that a run lives at most; on a machine that is alone it is complete after four."""
+STAGES = ("loading", "starting one", "physics ready", "ros ready", "first state", "")
+"""What a run has said when the time until its end begins; nothing stands for its start."""
+
+LONGEST = 1.5
+"""Seconds from there to the end of a run at most: until it has reached the next stage or two."""
+
+START = 90.0
+"""Seconds that a run is given to reach its stage."""
 
 _MARK = "LIGATURE_KILLS"
 """Environment variable by which the processes of one run are found, also those whose parent is gone."""
@@ -38,15 +45,18 @@ _MARK = "LIGATURE_KILLS"
 
 @dataclass(frozen=True)
 class Kill:
-    """How one run ended: seconds that it lived, processes it had, seconds until the last one had gone."""
+    """How one run ended: stage that it had reached, seconds that it lived, processes it had, seconds until the last one had gone."""
 
+    stage: str
     lived: float
     processes: int
     ended: float
     left: tuple[str, ...]
 
     def __str__(self) -> str:
-        said = f"after {self.lived:.2f} s: {self.processes} processes ended in {self.ended:.2f} s"
+        said = (
+            f"after {self.lived:.2f} s, behind '{self.stage}': {self.processes} processes ended in {self.ended:.2f} s"
+        )
         return said + (f"; LEFT: {', '.join(self.left)}" if self.left else "")
 
 
@@ -61,10 +71,12 @@ def kill(number: int, scene: Path = SCENE) -> Kill:
     flags = [flag.format(port=ports[1]) for flag in FLAGS]
     program = subprocess.Popen(
         [str(Path(sys.executable).parent / "ligature"), "run", str(scene), *flags], env=env,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=end_with_parent,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=end_with_parent,
     )  # fmt: skip
-    lived = rng.uniform(0.0, LONGEST)
-    time.sleep(lived)
+    started, stage = time.monotonic(), STAGES[number % len(STAGES)]
+    _wait_for(program, stage)
+    time.sleep(rng.uniform(0.0, LONGEST))
+    lived = time.monotonic() - started
     found = _marked(mark)
     begin = time.monotonic()
     for _ in range(3):
@@ -78,7 +90,22 @@ def kill(number: int, scene: Path = SCENE) -> Kill:
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
     program.wait()
-    return Kill(lived, len(found), ended, tuple(left.values()))
+    return Kill(stage, lived, len(found), ended, tuple(left.values()))
+
+
+def _wait_for(program: subprocess.Popen[bytes], stage: str) -> None:
+    """Wait until the run has said ``stage``; goes on taking what it says."""
+    reached = threading.Event()
+
+    def take() -> None:
+        assert program.stdout is not None
+        for line in program.stdout:
+            if stage.encode() in line:
+                reached.set()
+
+    threading.Thread(target=take, daemon=True).start()
+    if stage and not reached.wait(START):
+        raise TimeoutError(f"the run did not say '{stage}' within {START:g} s")
 
 
 @contextmanager

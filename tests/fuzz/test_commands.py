@@ -8,7 +8,7 @@ import ligature
 import pytest
 from ligature.bus.codec import CodecError, encode
 from ligature.bus.events import LOG_BYTES, MOST_BYTES, SLOTS, EventLog
-from ligature.model.commands import ActuatorCommand, Command, Release, Reset
+from ligature.model.commands import ActuatorCommand, BodyCommand, Command, CommandType, Release, Reset
 from ligature.model.scene import Scene
 from ligature.robots.commands import VERBS, Hold, MoveJp, StateCommand, TrajectorySetRatio
 from ligature.robots.operating_state import State
@@ -136,3 +136,46 @@ def test_events_of_any_text_keep_to_their_slot(text: str) -> None:
         assert text.startswith(first.value) and len(first.value) >= min(len(text), (MOST_BYTES - 40) // 12)
         assert second.value == number
     assert log.lost == 0
+
+
+@pytest.mark.parametrize("part", ["BodyControl.set", "BodyControl.apply"])
+def test_what_the_controller_of_a_body_raises_clears_its_command_and_is_told(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch, part: str
+) -> None:
+    simulation = Simulation(scene)
+    body = next(b for b in scene.bodies if b.mass > 0.0 and not b.static and not b.joints)
+    command = BodyCommand(body.index, CommandType.FORCE, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("broken " * 1000)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"ligature.physics.bodies.{part}", broken)
+        simulation.apply(command)
+        simulation.step(3)
+    told = [str(problem) for problem in simulation.problems]
+    assert len(told) == 1
+    assert body.identity.identifier in told[0] and "ZeroDivisionError: broken" in told[0] and len(told[0]) < 600
+    simulation.step(3)
+    assert len(simulation.problems) == 1
+    simulation.close()
+
+
+def test_what_the_joints_of_a_tree_raise_lets_them_go_limp_and_is_told_once(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation = Simulation(scene)
+    arm = next(iter(simulation.arms.values()))
+    arm.adopt()
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("broken on purpose")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("ligature.physics.control.TreeControl.apply", broken)
+        simulation.step(2)
+    assert {problem.code for problem in simulation.problems} == {"failed"}
+    count = len(simulation.problems)
+    simulation.step(2)
+    assert len(simulation.problems) == count
+    simulation.close()

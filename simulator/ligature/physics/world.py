@@ -52,11 +52,20 @@ NEAR = 0.002
 IMMOVABLE = 1e6
 """Mass in kg, and inertia, that no thread or tissue moves in a tick."""
 
+MOST_CHARACTERS = 300
+"""Most characters of an exception in a finding."""
+
 MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
 
 _KEPT = ("_held_up", "_gripped", "_passing", "clamped", "_impulses", "_next_handle", "_told_owned")
 """Attributes that last from tick to tick as they are."""
+
+
+def failure(what: str, error: Exception) -> Diagnostic:
+    """The finding that ``what`` failed with an exception, and that its command is cleared therefore."""
+    text = f"{what} failed, and its command is cleared: {type(error).__name__}: {str(error)[:MOST_CHARACTERS]}"
+    return Diagnostic(Severity.ERROR, text, code="failed")
 
 
 class Controllers(Subsystem):
@@ -189,14 +198,28 @@ class World(Subsystem, BulletQueries, BulletGrips):
         self._impulses.clear()
         for control in self._jointed:
             if control.active:
-                control.apply()
+                try:
+                    control.apply()
+                except Exception as error:  # no command ends a run
+                    self._clear(control.tree.root, error)
         for place, linear, angular in self._damped:
             place.slow_down(linear, angular)
         for lift in self._lifts:
             lift.push()
         self._carry_burdens()
-        for control_ in self._body_controls.values():
-            control_.apply()
+        for body, control_ in list(self._body_controls.items()):
+            try:
+                control_.apply()
+            except Exception as error:
+                self._clear(body, error)
+
+    def _clear(self, body: int, error: Exception) -> None:
+        """Clear the commands of a body, or of all joints of the tree of a root, whose controller failed."""
+        self.report(failure(f"the controller of '{self.scene.bodies[body].identity.identifier}'", error))
+        self.release(body)
+        for tree in self._controls:
+            if tree.tree.root == body:
+                tree.let_go(np.arange(len(tree.links)))
 
     def step(self, tick: int = 0) -> None:
         """Advance Bullet by one tick, and put back what diverged in it."""

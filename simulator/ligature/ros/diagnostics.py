@@ -13,13 +13,17 @@ SLOW = 0.95
 
 
 class Diagnostics:
-    """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take."""
+    """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take.
+
+    ``faults`` are the arms in FAULT, each with the reason.
+    """
 
     def __init__(self, block: Block) -> None:
         self._block = block
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
         self._next = 0.0
         self.missed = 0
+        self.faults: dict[str, str] = {}
 
     def publish(self, now: float) -> None:
         """Publish when a second has passed; ``now`` on the monotonic clock."""
@@ -55,6 +59,12 @@ class Diagnostics:
             "camera frame time (ms)": f"{1e3 * figures['frame_seconds']:.1f}",
         }
         status.values = [KeyValue(key=k, value=v) for k, v in rows.items()]
-        array = DiagnosticArray(status=[status])
+        faults = [
+            DiagnosticStatus(
+                level=DiagnosticStatus.ERROR, name=f"ligature: {arm}", hardware_id="ligature", message=f"FAULT: {why}"
+            )
+            for arm, why in self.faults.items()
+        ]
+        array = DiagnosticArray(status=[status, *faults])
         array.header.stamp = rospy.Time.now()
         self._publisher.publish(array)

@@ -23,6 +23,7 @@ from ligature.model.state import new_state
 from ligature.ros import conversion, names
 from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
+from ligature.ros.intake import oversized
 from ligature.ros.master import MasterWatch, node_name, require_free
 from ligature.ros.parameters import Parameters
 from ligature.ros.publisher import Publisher
@@ -141,8 +142,9 @@ class Node:
         self._ring.beat()
         self._reception.watch(now)
         figures = self._block.figures
-        figures["malformed"] = self._reception.refused + self._arms.refused
+        figures["malformed"] = self._reception.refused + self._arms.refused + oversized.count
         self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
+        self._diagnostics.faults = self._arms.faults
         self._world.loop_hz = float(figures["loop_hz"][0])
         self._diagnostics.publish(now)
         return self._block.age < PHYSICS_SILENCE

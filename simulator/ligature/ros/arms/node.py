@@ -79,6 +79,11 @@ class ArmsNode:
         """Messages that slow clients missed."""
         return sum(outlet.dropped for outlet in self._outlets)
 
+    @property
+    def faults(self) -> dict[str, str]:
+        """The arms in FAULT by name, each with what it said last."""
+        return {outlet.description.name: outlet.events.error for outlet in self._outlets if outlet.events.failed}
+
     def start(self, state: Any) -> None:
         """Tell the operating states that a running simulation has already; events before this are old."""
         self._block.events.skip()
