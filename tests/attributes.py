@@ -106,7 +106,7 @@ CACHES: dict[str, str] = {
         ("Ghosts._seen_ghost", "Ghosts._seen_body", "Ghosts._room", "Ghosts._inside", "Ghosts._ask", "Ghosts.sensed"),
         "saves asking again; `sense` fills it from the state",
     ),
-    "Attachments.world": "`sense` fills it from the state",
+    "Mounts.world": "`sense` fills it from the state",
     "Contacts.events": "`sense` fills it from the state",
     "ArmSet._records": "what of the state record is up to date",
     "Axes._setpoint": "of an arm whose drives are off it is read from the joints",

@@ -139,7 +139,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
 
 
 def _words(error: Exception) -> str:
-    """What an exception says, and of which kind it is unless the arm itself raised it."""
+    """What an exception states, and of which kind it is unless the arm itself raised it."""
     return str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
 
 
@@ -152,8 +152,8 @@ def _psm(scene: Scene, world: World, description: ArmDescription, problems: list
         mark = scene.bodies[description.base].identity.mark
         problems.append(Diagnostic(Severity.WARNING, f"{description.name}: {problem}", mark, code="arm"))
     joints = Axes(
-        kinematics.joint_names, _travel(scene, description.joints), psm_arm.FASTEST, psm_arm.HARDEST,
-        world.drive(description.joints, psm_arm.SERVO_FASTEST, psm_arm.SERVO_HARDEST),
+        kinematics.joint_names, _travel(scene, description.joints), psm_arm.MAX_VELOCITY, psm_arm.MAX_ACCELERATION,
+        world.drive(description.joints, psm_arm.SERVO_MAX_VELOCITY, psm_arm.SERVO_MAX_DECELERATION),
     )  # fmt: skip
     arm = PsmArm(description.name, kinematics, joints, _jaw(world, description, kinematics.instrument))
     parts = [scene.joints[joint].child for joint in description.joints[-1:]]
@@ -174,7 +174,7 @@ def _jaw(world: World, description: ArmDescription, tool: Instrument) -> Axes | 
         return None
     plant = JawPlant(world, description.jaw)
     limits = np.array(tool.jaw, dtype=float).reshape(2, 1)
-    return Axes(("jaw",), limits, [psm_arm.JAW_FASTEST], [psm_arm.JAW_HARDEST], plant)
+    return Axes(("jaw",), limits, [psm_arm.JAW_MAX_VELOCITY], [psm_arm.JAW_MAX_ACCELERATION], plant)
 
 
 class JawPlant:
@@ -182,7 +182,10 @@ class JawPlant:
 
     def __init__(self, world: World, fingers: Sequence[int]) -> None:
         self._drive = world.drive(
-            fingers, np.full(2, psm_arm.SERVO_FASTEST[-1]), np.full(2, psm_arm.SERVO_HARDEST[-1]), JAW_STIFFNESS
+            fingers,
+            np.full(2, psm_arm.SERVO_MAX_VELOCITY[-1]),
+            np.full(2, psm_arm.SERVO_MAX_DECELERATION[-1]),
+            JAW_STIFFNESS,
         )
 
     def read(self) -> Array:
@@ -238,10 +241,10 @@ def _ecm(scene: Scene, world: World, description: ArmDescription, problems: list
     if description.joints:
         travel = _travel(scene, description.joints)
         limits = np.array([np.maximum(limits[0], travel[0]), np.minimum(limits[1], travel[1])])
-        plant: Any = world.drive(description.joints, ecm_arm.SERVO_FASTEST, ecm_arm.SERVO_HARDEST)
+        plant: Any = world.drive(description.joints, ecm_arm.SERVO_MAX_VELOCITY, ecm_arm.SERVO_MAX_DECELERATION)
     else:
         plant = CameraPlant(scene, world, description.tip, kinematics, ecm_arm.HOME)
-    joints = Axes(kinematics.joint_names, limits, ecm_arm.FASTEST, ecm_arm.HARDEST, plant)
+    joints = Axes(kinematics.joint_names, limits, ecm_arm.MAX_VELOCITY, ecm_arm.MAX_ACCELERATION, plant)
     return EcmArm(description.name, kinematics, joints)
 
 
@@ -302,7 +305,7 @@ def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list
     limits = np.array([kinematics.lower, kinematics.upper])
     start = np.clip(mtm_arm.HOME, limits[0], limits[1])
     plant = IdealPlant(limits[0], limits[1], mtm_arm.INERTIA, mtm_arm.DAMPING, start)
-    joints = Axes(kinematics.joint_names, limits, mtm_arm.FASTEST, mtm_arm.HARDEST, plant)
+    joints = Axes(kinematics.joint_names, limits, mtm_arm.MAX_VELOCITY, mtm_arm.MAX_ACCELERATION, plant)
     ends = mtm_arm.GRIPPER_LIMITS
     fingers = IdealPlant(ends[0], ends[1], np.full(1, 1e-3), np.full(1, 1e-2), np.zeros(1))
     gripper = Axes(("gripper",), ends, np.full(1, 20.0), np.full(1, 200.0), fingers)

@@ -41,9 +41,9 @@ from ligature.physics import Controllers, World, failure
 from ligature.physics.guard import Guard
 from ligature.robots.commands import ArmCommand
 from ligature.sensing.actuators import Actuators
-from ligature.sensing.attachments import Attachments
 from ligature.sensing.contacts import Contacts
 from ligature.sensing.ghosts import Ghosts
+from ligature.sensing.mounts import Mounts
 from ligature.sensing.rays import Rays
 from ligature.sensing.touches import Touches
 from ligature.suture import Insertion, Suture
@@ -213,7 +213,7 @@ class Simulation:
         self._watched = 0
         self._world = World(scene, dt)
         self._suture = Suture(scene, self._world, dt)
-        self._attachments = Attachments(scene)
+        self._mounts = Mounts(scene)
         self._rays = Rays(scene, self._world)
         self._touches = Touches(self._world)
         self.arms = ArmSet(scene, self._world, dt)
@@ -224,7 +224,7 @@ class Simulation:
             "control": (self.arms, self._actuators, self._rays, Controllers(self._world)),
             "suture": (self._suture, self.grasps),
             "bodies": (self._world,),
-            "sensing": (self._touches, self._attachments, Ghosts(scene, self._world), Contacts(scene, self._world)),
+            "sensing": (self._touches, self._mounts, Ghosts(scene, self._world), Contacts(scene, self._world)),
         }
         """What a tick does, phase by phase: all subsystems in the order of their steps."""
         self._subsystems = [subsystem for phase in self._tick.values() for subsystem in phase]
@@ -233,8 +233,8 @@ class Simulation:
         self._handlers: dict[type[Message], Callable[[Any], None]] = {
             BodyCommand: self._world.set_command,
             ActuatorCommand: self._actuate,
-            PlaceCommand: lambda c: self._attachments.place(c.kind, c.index, c.pose),
-            ParentCommand: lambda c: self._attachments.adopt(c.kind, c.index, c.parent),
+            PlaceCommand: lambda c: self._mounts.place(c.kind, c.index, c.pose),
+            ParentCommand: lambda c: self._mounts.adopt(c.kind, c.index, c.parent),
             ArmCommand: self.arms.apply,
             WatchContacts: lambda c: self._touches.watch(c.enabled),
             Release: self._release,
@@ -360,7 +360,7 @@ class Simulation:
         ``bodies_only`` leaves ghosts, cameras and lights where they are.
         """
         for subsystem in reversed(self._subsystems):
-            if not (bodies_only and subsystem is self._attachments):
+            if not (bodies_only and subsystem is self._mounts):
                 subsystem.reset()
         self._clock.restart()
         self._write_state()

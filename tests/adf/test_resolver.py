@@ -57,7 +57,7 @@ def test_a_large_file_is_refused(lab: Path) -> None:
         Resolver([lab]).read_bytes(lab / "big.obj", limit=10)
 
 
-def test_a_missing_file_and_a_folder_say_which(lab: Path) -> None:
+def test_a_missing_file_and_a_folder_state_which(lab: Path) -> None:
     with pytest.raises(ResolutionError, match="does not exist"):
         Resolver([lab]).read_bytes(lab / "none.yaml")
     with pytest.raises(ResolutionError, match="is a folder"):
@@ -69,7 +69,7 @@ def test_the_search_path_adds_roots(lab: Path, monkeypatch: pytest.MonkeyPatch) 
     assert Resolver.for_file(lab / "ADF" / "m.yaml").exists(lab.parent / "secret.txt")
 
 
-def test_bytes_that_are_no_text_say_where(lab: Path) -> None:
+def test_bytes_that_are_no_text_state_where(lab: Path) -> None:
     (lab / "bad.yaml").write_bytes(b"name: \xff\xfe")
     with pytest.raises(ResolutionError, match=r"is not UTF-8 text \(byte 6\)"):
         Resolver([lab]).read_text(lab / "bad.yaml")

@@ -220,7 +220,7 @@ def test_springs_and_dampers_of_joints_that_nothing_drives(load: Callable[..., t
     assert "gains of the actuators are left out: 'm'" in output
 
 
-def test_a_damped_hinge_slows_down_as_its_damper_says(load: Callable[..., tuple[Scene, str]]) -> None:
+def test_a_damped_hinge_slows_down_as_its_damper_states(load: Callable[..., tuple[Scene, str]]) -> None:
     """A wheel whose centre of mass is a little off swings out: the envelope decays with b / 2 I."""
     scene, _ = load(
         '<body name="w" euler="0 0.3 0"><joint name="spin" axis="0 1 0" damping="0.01"/>'
@@ -329,7 +329,7 @@ def test_contact_masks_become_collision_groups_where_they_can() -> None:
     assert groups == {1: (0,), 2: (1,), 3: (0, 1)} and not result.notes
     result = converted(f'<body name="a"><freejoint/>{geom.format(1)}{geom.format(2)}</body>')
     assert result.notes == [
-        "contype and conaffinity differ in a way that collision groups cannot say; everything collides"
+        "contype and conaffinity differ in a way that collision groups cannot state; everything collides"
     ]
 
 

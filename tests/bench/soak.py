@@ -52,7 +52,7 @@ def resident_bytes() -> int:
 
 
 class Operator:
-    """Commands both arms through the bus and looks at what the bus says of them."""
+    """Commands both arms through the bus and looks at what the bus states of them."""
 
     def __init__(self, simulation: Simulation, block: Block) -> None:
         names = list(simulation.arms)

@@ -27,7 +27,7 @@ from ligature.robots.fitting import psm_kinematics
 from ligature.tasks.throws import NeedleArc
 from numpy.typing import NDArray
 
-from tests.ros.drivers import PATIENCE, Driver, Paddle, Pen, apart, patiently, until, wait_for_listener
+from tests.ros.drivers import TIMEOUT, Driver, Paddle, Pen, apart, patiently, until, wait_for_listener
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
@@ -274,7 +274,7 @@ class Operator(suture.Surgeon):
         """
         hand, arm = self.hands[name], self.psms[name]
         ideal, asked = hand.ideal(), (np.inf, np.inf)
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         while max(asked) > 1e-3 and time.monotonic() < end:
             asked = apart(arm.setpoint(), ideal)
             time.sleep(0.01)
@@ -442,7 +442,7 @@ class Operator(suture.Surgeon):
         for what, (act, word) in cases.items():
             took = self.fault(act, word)
             self.note("hold after a fault, ms", took)
-            self.done(f"{what}: the arm holds after {took:.0f} ms, and the status says '{self.pen.status('PSM1')}'")
+            self.done(f"{what}: the arm holds after {took:.0f} ms, and the status states '{self.pen.status('PSM1')}'")
             self.pen.driver.muted, self.pen.driver.says = False, None
             time.sleep(0.1)
             self.pen.squeeze(True, grey=True)

@@ -62,14 +62,14 @@ def test_bad_numbers_are_counted_and_named(scene: Scene, ring: Ring, bad: float)
     assert box.rejected == 1 and "command must " in box.last_rejection
 
 
-def test_an_object_that_is_not_there_is_rejected(scene: Scene, ring: Ring) -> None:
+def test_an_object_that_is_missing_is_rejected(scene: Scene, ring: Ring) -> None:
     box = Mailbox(scene, {"ros": ring})
     push(ring, force(len(scene.bodies), 1.0))
     assert box.take() == []
     assert f"the scene has no body number {len(scene.bodies)}" in box.last_rejection
 
 
-def test_a_parent_that_is_not_there_is_rejected(scene: Scene, ring: Ring) -> None:
+def test_a_parent_that_is_missing_is_rejected(scene: Scene, ring: Ring) -> None:
     box = Mailbox(scene, {"ros": ring})
     push(ring, ParentCommand("camera", 0, len(scene.bodies)), ParentCommand("camera", 0, None))
     assert box.take() == [ParentCommand("camera", 0, None)]

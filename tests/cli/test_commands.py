@@ -33,7 +33,7 @@ def test_check_names_file_line_and_column(tmp_path: Path) -> None:
     assert "Traceback" not in done.stdout + done.stderr
 
 
-def test_check_of_a_missing_file_says_so(tmp_path: Path) -> None:
+def test_check_of_a_missing_file_reports_it(tmp_path: Path) -> None:
     done = ligature("check", tmp_path / "none.yaml")
     assert done.returncode == 1 and "does not exist" in done.stdout
 
@@ -50,12 +50,12 @@ def test_bench_of_a_bad_file_ends_with_two(tmp_path: Path) -> None:
     assert done.returncode == 2 and "does not exist" in " ".join(done.stdout.split())  # rich wraps long paths
 
 
-def test_a_list_of_indices_that_is_none_is_told() -> None:
+def test_a_list_of_indices_that_is_none_is_reported() -> None:
     done = ligature("bench", SMALL, "-l", "1,x")
     assert done.returncode == 2 and "'1,x' is not a list of whole numbers" in done.stdout + done.stderr
 
 
-def test_run_of_a_bad_file_ends_and_says_why(tmp_path: Path) -> None:
+def test_run_of_a_bad_file_ends_and_states_why(tmp_path: Path) -> None:
     bad = tmp_path / "bad.yaml"
     bad.write_text("bodies: [")
     done = ligature("run", bad)
@@ -81,7 +81,7 @@ def test_decompose_writes_one_material_per_hull(tmp_path: Path) -> None:
     assert f"{hulls} hulls" in done.stdout
 
 
-def test_decompose_of_nonsense_says_where(tmp_path: Path) -> None:
+def test_decompose_of_nonsense_states_where(tmp_path: Path) -> None:
     (tmp_path / "bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
     done = ligature("decompose", tmp_path / "bad.obj")
     assert done.returncode == 1 and "bad.obj:2:1: error: a face names vertex 2, but 1 are defined" in done.stdout

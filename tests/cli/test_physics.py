@@ -1,4 +1,4 @@
-"""The loop of the physics process: it obeys the clock of a client and outlives whatever commands say."""
+"""The loop of the physics process: it obeys the clock of a client and survives whatever commands state."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_readers_see_what_the_loop_wrote(run: Run) -> None:
     reader.close()
 
 
-def test_figures_tell_rate_and_rejections_once_a_second(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_report_rate_and_rejections_once_a_second(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     bad = BodyCommand(0, CommandType.FORCE, (float("nan"),) * 6)
     run.push(bad, bad, Reset())
     run.turn_for(1.1)

@@ -1,4 +1,4 @@
-"""Parts of a run are recorded on demand: simulated again they end in the same bits, and what fails is told."""
+"""Parts of a run are recorded on demand: simulated again they end in the same bits, and what fails is reported."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ HOME = (0.1, 0.1, 0.12, 0.0, 0.0, 0.0)
 
 
 class Run:
-    """The physics of a run in this process, with a page's ring and what is told to it."""
+    """The physics of a run in this process, with a page's ring and what is asked to it."""
 
     def __init__(self, **options: Any) -> None:
         self.options = RunOptions(str(SCENE), MODELS, rate=500.0, speed=20.0, **options)
@@ -144,7 +144,7 @@ def test_a_paused_run_is_recorded_too(start: Callable[..., Run]) -> None:
 
 
 @pytest.mark.parametrize("what", ["exists", "folder", "name", "no page"])
-def test_what_cannot_be_recorded_is_told_and_the_run_goes_on(
+def test_what_cannot_be_recorded_is_reported_and_the_run_goes_on(
     start: Callable[..., Run], what: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run = start() if what == "no page" else start(cockpit="127.0.0.1:0")
@@ -188,7 +188,7 @@ def test_a_disk_that_fills_up_ends_the_recording_and_not_the_run(start: Callable
     assert again(Path("recordings/next.record"))[0] == 0
 
 
-def test_a_journal_without_room_is_told_when_a_recording_is_asked_for(
+def test_a_journal_without_room_is_reported_when_a_recording_is_asked_for(
     start: Callable[..., Run], capsys: pytest.CaptureFixture[str]
 ) -> None:
     run = start(cockpit="127.0.0.1:0")

@@ -75,7 +75,7 @@ def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) ->
     assert "the run ended otherwise" in text
 
 
-def test_a_file_that_is_missing_or_cut_off_is_told(recorded: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_missing_or_cut_off_is_reported(recorded: Path, tmp_path: Path) -> None:
     assert said(tmp_path / "none.record") == (1, f"{tmp_path / 'none.record'}: No such file or directory\n")
     cut = tmp_path / "cut.record"
     cut.write_bytes(recorded.read_bytes()[:-10])

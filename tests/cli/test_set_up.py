@@ -20,7 +20,7 @@ def step(folder: Path, *words: str) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-def test_a_long_step_says_what_it_does_for_how_long_and_what_it_wrote_last(tmp_path: Path) -> None:
+def test_a_long_step_states_what_it_does_for_how_long_and_what_it_wrote_last(tmp_path: Path) -> None:
     output, _ = step(tmp_path, "sh", "-c", "echo unpacking; sleep 9").communicate(timeout=60)
     lines = output.splitlines()
     assert lines[0] == "doing something, about 9 s"
@@ -45,7 +45,7 @@ def test_ctrl_c_ends_a_step_and_its_program(tmp_path: Path) -> None:
     assert not Path("/proc", (tmp_path / "pid").read_text().strip()).exists()
 
 
-def test_the_smoke_of_a_bare_machine_says_why_it_cannot_be_tried(tmp_path: Path) -> None:
+def test_the_smoke_of_a_bare_machine_states_why_it_cannot_be_tried(tmp_path: Path) -> None:
     """Without its tools on the path, or without root."""
     (tmp_path / "bin").mkdir()
     for name in ("bash", "dirname", "id"):

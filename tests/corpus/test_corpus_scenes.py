@@ -66,7 +66,7 @@ def test_arms_list_their_joints_in_command_order(scene: Scene) -> None:
 
 
 def test_every_body_starts_at_its_location_or_is_reported(corpus: Path) -> None:
-    """Positions of joints come from the locations; where those and a joint disagree, or a loop closes, it is said."""
+    """Positions of joints come from the locations; where those and a joint disagree, or a loop closes, it is stated."""
     compared = 0
     for file in sorted((corpus / "suturing_scene").rglob("*.yaml")) + sorted((corpus / "multibodies").rglob("*.yaml")):
         if file.name.startswith("launch"):
@@ -90,7 +90,7 @@ def test_every_body_starts_at_its_location_or_is_reported(corpus: Path) -> None:
     assert compared
 
 
-def test_grippers_start_as_open_as_their_locations_say(corpus: Path) -> None:
+def test_grippers_start_as_open_as_their_locations_state(corpus: Path) -> None:
     file = corpus / "multibodies/descriptions/multi-bodies/grippers/resistive/gripper1/gripperB.yaml"
     simulation = ligature.Simulation(ligature.load(file, roots=[corpus]))
     assert simulation.joints["JOINT Cylinder-LeftL1"].position == pytest.approx(1.048, abs=2e-3)

@@ -72,7 +72,7 @@ _NUMBER = re.compile(r"[\d.e+-]+")
 
 
 class Failure(AssertionError):
-    """What should not have happened, with the seed and the commands that led there."""
+    """What should not have happened, with the seed and the commands that driven there."""
 
 
 class Generator:

@@ -31,7 +31,7 @@ LIMIT = 2.0
 """Seconds after the first signal in which every process must have ended."""
 
 STAGES = ("loading", "starting one", "physics ready", "ros ready", "first state", "")
-"""What a run has said when the time until its end begins; nothing stands for its start."""
+"""What a run has stated when the time until its end begins; nothing stands for its start."""
 
 LONGEST = 1.5
 """Seconds from there to the end of a run at most: until it has reached the next stage or two."""
@@ -94,7 +94,7 @@ def kill(number: int, scene: Path = SCENE) -> Kill:
 
 
 def _wait_for(program: subprocess.Popen[bytes], stage: str) -> None:
-    """Wait until the run has said ``stage``; goes on taking what it says."""
+    """Wait until the run has stated ``stage``; goes on taking what it states."""
     reached = threading.Event()
 
     def take() -> None:
@@ -105,7 +105,7 @@ def _wait_for(program: subprocess.Popen[bytes], stage: str) -> None:
 
     threading.Thread(target=take, daemon=True).start()
     if stage and not reached.wait(START):
-        raise TimeoutError(f"the run did not say '{stage}' within {START:g} s")
+        raise TimeoutError(f"the run did not state '{stage}' within {START:g} s")
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """Runs mutants, or generated scenes, in worker processes: ``python -m tests.fuzz.run --mutants 100000 --jobs 2``.
 
 A mutant must end, within a time limit, accepted or with findings that name their place; a scene, with
-``--scenes 10000``, must run a second as `tests.fuzz.simulate` says. Any other exception, a hang or a crash of the
+``--scenes 10000``, must run a second as `tests.fuzz.simulate` states. Any other exception, a hang or a crash of the
 process is a failure; its files are kept in ``build/fuzz``. Mutant and scene N are the same in every run, so that
 ``--first N --mutants 1`` repeats one.
 """
@@ -116,7 +116,7 @@ SCENES = Campaign(try_scene, scene_files, "scene", lambda number: "scene")
 
 
 def work(connection: Connection, folder: str, trial: Trial, attempt: Attempt | None) -> None:
-    """Run the cases of each received range; tells the number of each before it starts, then how it ended."""
+    """Run the cases of each received range; reports the number of each before it starts, then how it ended."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
@@ -174,7 +174,7 @@ def run(
 ) -> Outcome:
     """Run ``cases`` cases of a campaign from number ``first`` on in ``jobs`` processes.
 
-    ``attempt`` says what a mutant goes through; it must be importable; None stands for
+    ``attempt`` states what a mutant goes through; it must be importable; None stands for
     `tests.fuzz.attempt.attempt`, which only the workers import.
     """
     outcome = Outcome()
@@ -197,7 +197,7 @@ def run(
 
 
 def _listen(worker: _Worker, todo: list[tuple[int, int]], outcome: Outcome, limit: float, campaign: Campaign) -> str:
-    """Take what a worker says; returns why it must be stopped, or nothing."""
+    """Take what a worker states; returns why it must be stopped, or nothing."""
     try:
         while worker.connection.poll():
             what, number, verdict = worker.connection.recv()

@@ -19,7 +19,7 @@ FAST = 50.0
 
 
 def simulate(folder: Path, number: int) -> str:
-    """Write scene ``number`` to ``folder`` and run it; returns ``clean``, ``errors`` or ``refused``, by what check says.
+    """Write scene ``number`` to ``folder`` and run it; returns ``clean``, ``errors`` or ``refused``, by what check states.
 
     Raises AssertionError for what must not happen: errors without place, states that are not finite, divergence, and
     bodies above `FAST` in a scene without errors, unless it is sent commands or a loop does not close at its start.

@@ -35,7 +35,7 @@ def test_no_command_whatever_raises_in_a_step_or_leaves_a_number_that_is_not_fin
     assert set(VERBS) == {verb for _, verb, _ in run.seen if verb in VERBS}
 
 
-def test_the_generator_tells_what_was_not_met_and_finds_what_raises(
+def test_the_generator_reports_what_was_not_met_and_finds_what_raises(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kinds = {"PSM", "ECM"}
@@ -73,7 +73,7 @@ def test_what_an_arm_raises_becomes_its_fault_and_the_others_go_on(
             simulation.step(10)
         told = [value for arm, name, value in simulation.arms.events() if (arm, name) == (0, "error")]
         assert told and all("ZeroDivisionError: broken on purpose" in text for text in told)
-        assert len(told) == 1, "a fault is told once"
+        assert len(told) == 1, "a fault is reported once"
         assert first.operating_state.state is State.FAULT
         assert all(other.operating_state.state is State.ENABLED for other in others)
         first.disable()
@@ -139,7 +139,7 @@ def test_events_of_any_text_keep_to_their_slot(text: str) -> None:
 
 
 @pytest.mark.parametrize("part", ["BodyControl.set", "BodyControl.apply"])
-def test_what_the_controller_of_a_body_raises_clears_its_command_and_is_told(
+def test_what_the_controller_of_a_body_raises_clears_its_command_and_is_reported(
     scene: Scene, monkeypatch: pytest.MonkeyPatch, part: str
 ) -> None:
     simulation = Simulation(scene)
@@ -161,7 +161,7 @@ def test_what_the_controller_of_a_body_raises_clears_its_command_and_is_told(
     simulation.close()
 
 
-def test_what_the_joints_of_a_tree_raise_lets_them_go_limp_and_is_told_once(
+def test_what_the_joints_of_a_tree_raise_lets_them_go_limp_and_is_reported_once(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     simulation = Simulation(scene)

@@ -1,4 +1,4 @@
-"""Two thousand mutants, eighty scenes, and that the harness would tell; `make fuzz` runs many more."""
+"""Two thousand mutants, eighty scenes, and that the harness would report; `make fuzz` runs many more."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def hang(seed: Seed, folder: Path, number: int) -> str:
     ("attempt", "reason"),
     [(surprise, "failure: KeyError"), (die, "crash (status -6)"), (hang, "hang (more than 1 s)")],
 )
-def test_the_harness_tells_failures_and_goes_on(
+def test_the_harness_reports_failures_and_goes_on(
     attempt: harness.Attempt, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(harness, "KEPT", tmp_path)

@@ -90,7 +90,7 @@ def test_a_flat_moving_mesh_is_its_outline() -> None:
     assert len(convex_pieces(vertices[:6], faces[:4])[0]) == 5
 
 
-def test_when_coacd_hangs_the_hull_stands_in_and_a_warning_says_so(
+def test_when_coacd_hangs_the_hull_stands_in_and_a_warning_reports_it(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(module, "HANG_LIMIT", 0.001)

@@ -94,7 +94,7 @@ SPACES = st.sampled_from(["", "/", "/ambf/env/", "/ambf/env/psm1/", "/ambf/env/p
 
 @st.composite
 def model(draw: Any) -> dict[str, Any]:
-    """A model file whose names are hard to tell apart, with references of every kind."""
+    """A model file whose names are hard to report apart, with references of every kind."""
     keys = draw(st.lists(WORDS, min_size=1, max_size=5))
     space = draw(SPACES)
     made: dict[str, Any] = {"namespace": space, "bodies": keys, "joints": [], "cameras": [], "sensors": []}

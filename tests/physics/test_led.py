@@ -1,4 +1,4 @@
-"""A body led by poses or twists pushes as firmly as a needle of half a kilogram, however light it is."""
+"""A body kinematically controlled or twists pushes as firmly as a needle of half a kilogram, however light it is."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_released_it_falls_by_its_own_weight(sim: Simulation) -> None:
     assert sim.bodies["Ball"].twist[2] == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_snapshot_of_a_led_body_continues_with_the_same_bits(sim: Simulation) -> None:
+def test_a_snapshot_of_a_driven_body_continues_with_the_same_bits(sim: Simulation) -> None:
     led(sim, 0.05)
     sim.step(300)
     snapshot = sim.snapshot()

@@ -148,7 +148,9 @@ def test_a_body_that_its_joint_holds_elsewhere_is_reported(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("low", "expected"), [(-1.0, 0.6), (0.8, 0.8)])
-def test_a_joint_starts_where_the_locations_say_within_its_limits(low: float, expected: float, tmp_path: Path) -> None:
+def test_a_joint_starts_where_the_locations_state_within_its_limits(
+    low: float, expected: float, tmp_path: Path
+) -> None:
     ends = "parent: A, child: B, parent pivot: {x: 0, y: 0, z: 0}, child pivot: {x: 0, y: 0, z: 0}"
     axes = "parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}"
     (tmp_path / "model.yaml").write_text(

@@ -130,7 +130,7 @@ def test_a_renderer_draws_on_when_others_are_released_or_dropped(
     assert (drawing(Renderer(loaded)) == before).all()
 
 
-def test_a_closed_simulation_says_that_it_takes_no_more_pictures(scene: Path) -> None:
+def test_a_closed_simulation_states_that_it_takes_no_more_pictures(scene: Path) -> None:
     simulation = Simulation(ligature.load(scene))
     camera = simulation.cameras["C"]
     camera.capture()

@@ -1,4 +1,4 @@
-"""Shaders of scene files: every name that authors use, what they compute, and what is said of broken ones."""
+"""Shaders of scene files: every name that authors use, what they compute, and what is stated of broken ones."""
 
 from __future__ import annotations
 

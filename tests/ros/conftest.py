@@ -78,12 +78,12 @@ class Program:
                         found[name.rpartition(".")[2]] = int(pid)
         return found
 
-    def end(self, patience: float = 5.0) -> int:
+    def end(self, timeout: float = 5.0) -> int:
         """Ctrl-C; returns the exit status."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(patience)
+            return self.process.wait(timeout)
         except subprocess.TimeoutExpired:
             for pid in (self.process.pid, *self.children().values()):  # a node that stays keeps its name
                 with suppress(ProcessLookupError):

@@ -142,7 +142,7 @@ def test_the_end_of_the_physics_process_ends_the_run_with_a_message(start: Calla
     assert "the physics process ended with status -9; the run is over" in program.output
 
 
-def test_no_process_outlives_a_killed_supervisor(start: Callable[..., Program]) -> None:
+def test_no_process_survives_a_killed_supervisor(start: Callable[..., Program]) -> None:
     program = start(BIN / "ligature", "run", SMALL, "-p", "200")
     program.wait_for("first state published")
     pids = program.children()

@@ -20,7 +20,7 @@ def first(start: Callable[..., Program]) -> Iterator[Program]:
     assert "starting it again" not in program.output
 
 
-def test_a_second_simulator_of_the_same_world_ends_and_says_what_to_do(
+def test_a_second_simulator_of_the_same_world_ends_and_states_what_to_do(
     start: Callable[..., Program], listen: Callable[..., Any]
 ) -> None:
     from ambf_msgs.msg import WorldState
@@ -44,7 +44,7 @@ def test_a_simulator_with_a_prefix_lives_beside_it(start: Callable[..., Program]
     assert second.end() == 0
 
 
-def test_frames_of_two_simulators_are_told_apart(start: Callable[..., Program], listen: Callable[..., Any]) -> None:
+def test_frames_of_two_simulators_are_distinguished(start: Callable[..., Program], listen: Callable[..., Any]) -> None:
     from geometry_msgs.msg import PoseStamped
     from sensor_msgs.msg import CameraInfo
     from tf2_msgs.msg import TFMessage

@@ -150,7 +150,7 @@ def test_what_is_pressed_on_the_hand_arrives_at_the_master(
     assert felt.wait(lambda m: abs(m.wrench.force.z) < 0.05)
 
 
-def test_an_arm_that_another_node_moves_holds_and_says_so(
+def test_an_arm_that_another_node_moves_holds_and_reports_it(
     component: Any, arms: dict[str, Any], publish: Callable[..., Any]
 ) -> None:
     from sensor_msgs.msg import Joy

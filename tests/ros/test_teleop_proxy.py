@@ -12,7 +12,7 @@ from ligature.model.frames import pose7_matrix
 
 from tests.model.test_proxies import write_scene
 from tests.ros.conftest import BIN
-from tests.ros.drivers import PATIENCE, Pen, apart, until
+from tests.ros.drivers import TIMEOUT, Pen, apart, until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300)]
 
@@ -45,7 +45,7 @@ def test_a_pen_drives_its_proxy_which_holds_when_the_pen_falls_silent(
         joints = np.array([-0.3, 0.0])
         until(lambda: np.abs(np.array(state.messages[-1].joint_positions) - joints).max() < 0.03, "the grip closes")
         pen.muted = True
-        status.wait(lambda m: "silent" in m.data, PATIENCE)
+        status.wait(lambda m: "silent" in m.data, TIMEOUT)
         held = pose()
         count = len(state.messages)
         until(lambda: len(state.messages) > count + 100, "no states")

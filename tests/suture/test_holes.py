@@ -50,7 +50,7 @@ class Tissued:
         b = self.scene.bodies[body]
         return np.zeros((6, 6)) if b.static else np.diag(np.r_[np.full(3, 1.0 / b.mass), 1.0 / b.inertia])
 
-    def burden(self, body):
+    def attached_load(self, body):
         return 0.0, np.zeros(3), self.wrench
 
     @property

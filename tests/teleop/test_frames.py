@@ -1,4 +1,4 @@
-"""Frames of arms: what different tellers say fits together."""
+"""Frames of arms: what different tellers state fits together."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
 
 MAX_BYTES = 256 * 1024 * 1024
-"""Largest file that is read unless the caller says otherwise."""
+"""Largest file that is read unless the caller sets otherwise."""
 
 MAX_PATH, MAX_NAME = 4000, 255
 """Longest path in characters and longest file name in bytes that file systems take."""
@@ -31,7 +31,7 @@ MAX_LAUNCH_FILES, MAX_LAUNCH_BYTES = 200, 1024 * 1024
 
 
 class ResolutionError(AdfError):
-    """A path that may not be opened or does not exist; ``diagnostic`` says why."""
+    """A path that may not be opened or does not exist; ``diagnostic`` states why."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(diagnostic)

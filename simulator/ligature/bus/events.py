@@ -29,7 +29,8 @@ LOG_BYTES = _HEADER + SLOTS * SLOT_BYTES
 
 @dataclass(frozen=True)
 class BusEvent:
-    """Something that happened to the arm with number ``arm``, or to the `RUN`; ``name`` is the topic that tells it."""
+    """Something that happened to the arm with number ``arm``, or to the `RUN`; ``name`` is the topic that reports
+    it."""
 
     arm: int
     name: str

@@ -44,7 +44,7 @@ class Mailbox:
                     self.reject(error)
                     continue
                 self._put(box, name, message)
-            self._bury(box, name, ring)
+            self._release_client(box, name, ring)
         return box.messages()
 
     def reject(self, error: ValueError) -> None:
@@ -58,7 +58,7 @@ class Mailbox:
             owned.discard(message.object) if message.releases else owned.add(message.object)
         self.coalesced += box.put(message)
 
-    def _bury(self, box: Newest, producer: str, ring: Ring) -> None:
+    def _release_client(self, box: Newest, producer: str, ring: Ring) -> None:
         """Release what a dead front end commanded."""
         if self._owned[producer] and ring.silence > SILENCE:
             for item in sorted(self._owned[producer]):

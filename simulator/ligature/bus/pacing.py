@@ -41,7 +41,7 @@ class Throttle(Message, code=6):
         return not self.enabled
 
 
-SLOWEST, FASTEST = 0.01, 100.0
+MIN_SPEED, MAX_SPEED = 0.01, 100.0
 """Bounds of simulated over wall time that may be asked for."""
 
 
@@ -49,7 +49,7 @@ SLOWEST, FASTEST = 0.01, 100.0
 class Pace(Message, code=10):
     """Simulated over wall time from now on."""
 
-    speed: float = wire(Real(SLOWEST, FASTEST), "the speed")
+    speed: float = wire(Real(MIN_SPEED, MAX_SPEED), "the speed")
 
 
 class Pacer:
@@ -98,7 +98,7 @@ class Pacer:
         return max(self._next - now, 0.0)
 
     def done(self, now: float) -> None:
-        """An update was run, after `wait` had told that it may."""
+        """An update was run, after `wait` had reported that it may."""
         if self._throttled:
             self._budget -= 1
             return

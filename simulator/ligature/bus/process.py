@@ -1,6 +1,6 @@
-"""What every process of a run does: end with its parent, tell its parent how it is.
+"""What every process of a run does: end with its parent, inform its parent.
 
-A process tells by lines on standard output: ``@event text``; everything else is a log line.
+A process reports by lines on standard output: ``@event text``; everything else is a log line.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ def end_with_parent() -> None:
         sys.exit(0)
 
 
-def stand_behind(nice: int) -> None:
+def lower_priority(nice: int) -> None:
     """Take the processor only where others leave it; runs between fork and exec too.
 
     Linux shares the processor among sessions first where its automatic groups are on, as on most desktops: within a
-    session of its own a process is alone, and nice to nobody, unless the group is told too.
+    session of its own a process is alone, and nice to nobody, unless the group's priority is lowered too.
     """
     os.nice(nice)
     for _ in range(_GROUP_TRIES):
@@ -50,6 +50,6 @@ def stand_behind(nice: int) -> None:
 
 
 def tell(event: str, text: str = "") -> None:
-    """Tell the parent about ``event``."""
+    """Report the parent about ``event``."""
     sys.stdout.write(f"@{event} {text}\n")
     sys.stdout.flush()

@@ -2,8 +2,8 @@
 
 The same scene and commands give the same bits, so that a record is all that a run was. A file has one line of JSON,
 then frames: update (u8), length (u4), a command as `ligature.bus.codec` packs it; the last has the length `END` and
-says the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too, and
-a frame of the length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
+states the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too,
+and a frame of the length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _CHUNK = 1 << 20
 
 
 class RecordError(ValueError):
-    """A file that is no whole record; the message says why, and where."""
+    """A file that is no whole record; the message states why, and where."""
 
 
 @dataclass(frozen=True)

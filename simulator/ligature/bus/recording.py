@@ -22,7 +22,8 @@ class Recording(Message, code=11):
 
 
 def file_name(text: str) -> str:
-    """The file that a person means by ``text``, a name without folders; raises ValueError that says what is allowed."""
+    """The file that a person means by ``text``, a name without folders; raises ValueError that states what is
+    allowed."""
     name = text.strip()
     if "/" in name or name.startswith(".") or not name.isprintable():
         raise ValueError(f"'{text[:40]}' is no name of a recording; write letters and digits, without folders")

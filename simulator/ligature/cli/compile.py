@@ -41,7 +41,7 @@ def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
 
 
 def _start(scene: Path, console: Console) -> tuple[subprocess.Popen[str], threading.Thread]:
-    """A process that runs ``scene``, and the thread that shows what it says."""
+    """A process that runs ``scene``, and the thread that shows what it prints."""
     command = [sys.executable, "-m", "ligature.cli.compile", str(scene)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8")
 

@@ -13,7 +13,7 @@ from ligature.cli.options import RunOptions
 from ligature.model.scene import Scene
 from ligature.model.state import state_dtype
 
-SCENE_PATIENCE = 10.0
+SCENE_TIMEOUT = 10.0
 """Seconds to wait for the end of the run, for which the physics process gives the reasons."""
 
 
@@ -29,7 +29,7 @@ def join_run() -> tuple[RunOptions, Scene, Stop]:
         scene = options.load()
         Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set).close()
     except ligature.SceneError:
-        stop.wait(SCENE_PATIENCE)
+        stop.wait(SCENE_TIMEOUT)
         sys.exit(2)
     except BusError as error:
         tell("warning", str(error))
@@ -40,5 +40,5 @@ def join_run() -> tuple[RunOptions, Scene, Stop]:
 def give_up(stop: Stop, error: Exception) -> NoReturn:
     """End the run for a reason that its user has to put right."""
     tell("fatal", str(error))
-    stop.wait(SCENE_PATIENCE)
+    stop.wait(SCENE_TIMEOUT)
     sys.exit(2)

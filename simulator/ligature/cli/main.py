@@ -78,7 +78,7 @@ def run(
     cameras: Annotated[
         Optional[bool],  # noqa: UP045
         typer.Option(
-            "--cameras/--no-cameras", help="Publish pictures of all cameras, or of none; else as the scene says."
+            "--cameras/--no-cameras", help="Publish pictures of all cameras, or of none; else as the scene states."
         ),
     ] = None,
     window: Annotated[bool, typer.Option("--window", help="Show the scene in a window.")] = False,
@@ -246,7 +246,7 @@ def decompose(
 @app.command()
 def fmt(
     files: Annotated[list[Path], typer.Argument(help="Scene files of any kind.")],
-    check: Annotated[bool, typer.Option(help="Only tell files that are not in canonical form.")] = False,
+    check: Annotated[bool, typer.Option(help="Only report files that are not in canonical form.")] = False,
     lossy: Annotated[bool, typer.Option(help="Write files too whose comments or spare blocks are lost.")] = False,
 ) -> None:
     """Write scene files in canonical form: keys in the schema's order, numbers and vectors in one style."""
@@ -257,7 +257,7 @@ def fmt(
 
 @app.command()
 def diff(before: Path, after: Path) -> None:
-    """Tell what two scene files say differently, object by object; exit status 1 when they differ."""
+    """Report what two scene files state differently, object by object; exit status 1 when they differ."""
     from ligature.cli.documents import diff as run_diff
 
     raise typer.Exit(run_diff(before, after, Console(highlight=False, soft_wrap=True)))
@@ -281,7 +281,7 @@ def convert(
     out: Annotated[Path, typer.Option("-o", help="The model file to write.")],
     namespace: Annotated[str, typer.Option(help="Namespace of the model.")] = "/ambf/env/",
 ) -> None:
-    """Turn a URDF or MJCF robot into an ADF model with its meshes; tells what ADF cannot express."""
+    """Turn a URDF or MJCF robot into an ADF model with its meshes; reports what ADF cannot express."""
     from ligature.cli.convert import convert as run_convert
 
     raise typer.Exit(run_convert(source, out, namespace, Console(highlight=False, soft_wrap=True)))
@@ -347,25 +347,25 @@ def score(
     task: Annotated[str, typer.Argument(help="pose_estimation, insertion or suture.", callback=task_name)],
     file: Annotated[Optional[Path], typer.Argument(help="A bag or a run's record; else the run that goes on.")] = None,  # noqa: UP045
     scene: Annotated[Optional[Path], typer.Option(help="Launch file; of a record, instead of its own.")] = None,  # noqa: UP045
-    patience: Annotated[float, typer.Option(help="Seconds to wait for a report.", min=1)] = 3600.0,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for a report.", min=1)] = 3600.0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Tell how well a task was done; exit status 0 done, 1 not done, 2 not judged."""
+    """Report how well a task was done; exit status 0 done, 1 not done, 2 not judged."""
     from ligature.cli.score import score as run_score
 
-    raise typer.Exit(run_score(task, file, scene, patience, json, Console(highlight=False, soft_wrap=True)))
+    raise typer.Exit(run_score(task, file, scene, timeout, json, Console(highlight=False, soft_wrap=True)))
 
 
 @app.command()
 def teleop(
     config: Annotated[Path, typer.Argument(help="Teleoperation file, or a launch file with input devices.")],
-    record: Annotated[Optional[Path], typer.Option(help="File to write what devices say to.")] = None,  # noqa: UP045
+    record: Annotated[Optional[Path], typer.Option(help="File to write what devices state to.")] = None,  # noqa: UP045
     replay: Annotated[Optional[Path], typer.Option(help="Recorded file that speaks for the devices.")] = None,  # noqa: UP045
     calibrate: Annotated[Optional[str], typer.Option(help="Device to calibrate.")] = None,  # noqa: UP045
-    check: Annotated[bool, typer.Option("--check", help="Only read the file, and tell who leads whom.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Only read the file, and print who drives whom.")] = False,
     devices: Annotated[Optional[str], typer.Option("-i", help="Indices of a launch file's input devices.")] = None,  # noqa: UP045
 ) -> None:
-    """Lead arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""
+    """Drive arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""
     from ligature.cli.teleop import teleop as run_teleop
 
     console = Console(highlight=False, soft_wrap=True)

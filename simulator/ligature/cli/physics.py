@@ -104,7 +104,7 @@ class Loop:
         self._recorder.end(self._updates + 1)
 
     def turn(self) -> None:
-        """Sleep, take commands, and run an update when it is due; the commands may say that it is not."""
+        """Sleep, take commands, and run an update when it is due; the commands may state that it is not."""
         self._block.beat()
         nap = self._pacer.wait(time.monotonic())
         if nap > 0.0:

@@ -1,4 +1,4 @@
-"""The supervisor: starts the processes of a run, tells how they are, restarts or ends them."""
+"""The supervisor: starts the processes of a run, reports how they are, restarts or ends them."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from rich.console import Console
 from rich.markup import escape
 
 from ligature.bus.block import remove, remove_leftovers
-from ligature.bus.process import end_with_parent, stand_behind
+from ligature.bus.process import end_with_parent, lower_priority
 from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
 from ligature.cli import master
 from ligature.cli.options import RunOptions
 
-MASTER_PATIENCE = 15.0
+MASTER_TIMEOUT = 15.0
 LAST_TIMEOUT = 1.8
 """Seconds after a signal at which the supervisor itself ends, should whoever reads its output no longer do so."""
 
@@ -39,8 +39,9 @@ _ENVIRONMENT = {
 _DRAWING = ("window", "render", "cockpit")
 """Processes that a run can do without; status 0 means that they have nothing to draw, or nowhere."""
 
-_BEHIND = 10
-"""How far the processes that draw stand behind: software would leave no processor time to physics otherwise."""
+_DRAWING_NICE = 10
+"""How far the processes that draw have a lower scheduling priority: software would leave no processor time to physics
+otherwise."""
 
 _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
@@ -83,7 +84,7 @@ class Child:
         """In the new process, in its session, before it is the program."""
         end_with_parent()
         if self._nice:
-            stand_behind(self._nice)
+            lower_priority(self._nice)
 
     def _listen(self, process: subprocess.Popen[str]) -> None:
         assert process.stdout is not None
@@ -95,12 +96,12 @@ class Child:
                 self._events.put((self.name, "log", line.rstrip("\n")))
         self._events.put((self.name, "ended", str(process.wait())))
 
-    def end(self, patience: float) -> None:
-        """Ask the process to end; kill it after ``patience`` seconds."""
+    def end(self, timeout: float) -> None:
+        """Ask the process to end; kill it after ``timeout`` seconds."""
         if self.process.poll() is None:
             self.process.terminate()
         try:
-            self.process.wait(max(patience, 0.0))
+            self.process.wait(max(timeout, 0.0))
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -159,8 +160,8 @@ class Supervisor:
                     "tasks", [sys.executable, "-m", "ligature.cli.tasks_process", text], self._events, self._env
                 )
 
-    def _start_drawing(self, name: str, module: str, nice: int = _BEHIND) -> None:
-        """Start a process that draws, behind all others unless told; without a ROS master the run is over."""
+    def _start_drawing(self, name: str, module: str, nice: int = _DRAWING_NICE) -> None:
+        """Start a process that draws, with a lower priority unless set otherwise; without a ROS master the run is over."""
         if "ros" in self._children or not self._options.ros:
             command = [sys.executable, "-m", module, self._options.to_text()]
             self._children[name] = Child(name, command, self._events, self._env, nice)
@@ -177,7 +178,7 @@ class Supervisor:
             return False
         self._say(f"no ROS master answers at {uri}: starting one")
         child = self._children["master"] = Child("master", master.command(uri), self._events, self._env)
-        deadline = time.monotonic() + MASTER_PATIENCE
+        deadline = time.monotonic() + MASTER_TIMEOUT
         while time.monotonic() < deadline and not self._stopping and child.process.poll() is None:
             if master.master_answers(uri):
                 return True
@@ -192,7 +193,8 @@ class Supervisor:
             if process == "physics" and self._options.window:
                 self._start_drawing("window", "ligature.cli.window_process")
             if process == "physics" and self._options.cockpit:
-                # an arm is led from the page, which has its pictures drawn by a process that stands behind
+                # an arm is driven from the page, which has its pictures drawn by a process that has a lower scheduling
+                # priority
                 self._start_drawing("cockpit", "ligature.cli.cockpit_process", 0)
             if self._options.ros:
                 self._progress.update("connecting to ROS")

@@ -42,7 +42,7 @@ def teleop(
 
 
 def _configuration(file: Path, devices: tuple[int, ...] | None) -> TeleopConfig:
-    """That of a teleoperation file, or what the input devices of a launch file say."""
+    """That of a teleoperation file, or what the input devices of a launch file state."""
     text = file.read_text("utf-8")
     if "multibody configs" in text:
         from ligature.teleop.launch import of_launch_file

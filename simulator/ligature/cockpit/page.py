@@ -48,7 +48,7 @@ def badge(word: str, colour: str) -> str:
 
 
 class Header:
-    """The line that says what is shown, how fast it runs, and who operates."""
+    """The line that states what is shown, how fast it runs, and who operates."""
 
     def __init__(self, server: ViserServer, scene: str) -> None:
         self._scene = scene

@@ -157,7 +157,7 @@ class TeleopControls:
 
 
 def obey_teleop(remote: Remote, word: str, value: Any) -> bool:
-    """Carry out what `TeleopControls` said; False when the word is none of its."""
+    """Carry out an order of `TeleopControls`; False when the word is none of its."""
     if word == "teleop":
         remote.enable(value == "Enable")
     elif word == "pedal":

@@ -50,7 +50,7 @@ class Facing(NamedTuple):
 
 
 class Fingers:
-    """Both fingers of ``jaw``; index 0 or 1 tells which."""
+    """Both fingers of ``jaw``; by index 0 or 1."""
 
     def __init__(self, jaw: Jaw, world: World) -> None:
         self.jaw, self._world = jaw, world

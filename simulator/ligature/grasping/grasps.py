@@ -168,7 +168,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             if faces is not None:
                 between.append((body, faces))
         for body in [body for body in passing if not fingers.near(body)]:
-            self._let_pass(index, body, False)
+            self._disable_collision(index, body, False)
         thread = pinches.within(self._rods, box)
         self._near[index] = bool(between or passing or thread)
         if not between:
@@ -194,7 +194,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._grips[index] = grip
         self._take(index, grip)
         self._world.hold_up(body, True, gripped=True)
-        self._rods.weigh(self._world)
+        self._rods.update_masses(self._world)
         self._keep(index, grip)
 
     def _pinch(self, index: int) -> bool:
@@ -205,7 +205,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             pinch = pinches.begin(number, self._rods, self._world, fingers, friction)
             if pinch is not None:
                 self._pinches[index] = pinch
-                self._world.clamped.update(jaw.fingers)
+                self._world.stopped_fingers.update(jaw.fingers)
                 self._keep_thread(index, pinch)
                 return True
         return False
@@ -222,8 +222,8 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def _end_thread(self, index: int, pinch: pinches.Pinch) -> None:
         """Let a thread go."""
         self._pinches[index] = self._pads[index] = None
-        self._world.clamped -= set(self._scene.jaws[index].fingers)
-        self._rods.spare(pinch.rod, self._scene.jaws[index].fingers, None)
+        self._world.stopped_fingers -= set(self._scene.jaws[index].fingers)
+        self._rods.exclude(pinch.rod, self._scene.jaws[index].fingers, None)
         self._fingers[index].let()
         self._tell_rod(pinch.rod)
 
@@ -242,12 +242,12 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
 
     def _take(self, index: int, grip: _Grip) -> None:
         """Put the law in the place of Bullet's contacts and motors."""
-        self._let_pass(index, grip.body, True)
+        self._disable_collision(index, grip.body, True)
         self._fingers[index].stop(grip.positions, (0.0, 0.0))
 
-    def _let_pass(self, index: int, body: int, passes: bool) -> None:
+    def _disable_collision(self, index: int, body: int, passes: bool) -> None:
         for finger in self._scene.jaws[index].fingers:
-            self._world.let_pass(finger, body, passes)
+            self._world.disable_collision(finger, body, passes)
         self._passing[index] = sorted({*self._passing[index], body} if passes else {*self._passing[index]} - {body})
 
     def _keep(self, index: int, grip: _Grip) -> None:
@@ -285,14 +285,14 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._grips[index] = None
         self._fingers[index].let()
         self._world.hold_up(grip.body, False, gripped=True)
-        self._rods.weigh(self._world)
+        self._rods.update_masses(self._world)
         self._near[index] = True
 
     def _hold(self) -> None:
         """Exchange impulses between held bodies and what holds them."""
         by_body: dict[int, list[Grip]] = {}
         if self._clamps.lose(slipped=True):
-            self._rods.weigh(self._world)
+            self._rods.update_masses(self._world)
         for clamp in self._clamps.grips:
             by_body.setdefault(clamp.body, []).append(clamp)
         for index, grip in enumerate(self._grips):
@@ -314,7 +314,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             if pinch is not None and body is None:
                 self._end_thread(index, pinch)
         if self._clamps.lose(body):
-            self._rods.weigh(self._world)
+            self._rods.update_masses(self._world)
 
     def write_state(self, state: StateRecord) -> None:
         """Write what every jaw holds into a state record."""

@@ -1,6 +1,6 @@
 """Convex decomposition of concave meshes with CoACD: for ADF collision meshes, and for moving triangle meshes.
 
-The ADF form is one OBJ file with one material per convex piece, which is how the format says that
+The ADF form is one OBJ file with one material per convex piece, which is how the format states that
 a collision mesh is made of hulls (ADF specification §12.5). Metres. Method: Wei et al.,
 "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and Tree Search", 2022.
 """
@@ -47,7 +47,7 @@ _log = logging.getLogger(__name__)
 
 
 class DecompositionError(ValueError):
-    """A mesh that cannot be decomposed; the message says why."""
+    """A mesh that cannot be decomposed; the message states why."""
 
 
 @dataclass(frozen=True, eq=False)

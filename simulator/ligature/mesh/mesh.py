@@ -23,11 +23,11 @@ MAX_PARTS = 4096
 """Most materials of one file, each of which may become a collision hull."""
 
 MAX_FINDINGS = 50
-"""Most findings kept of one file; the first ones tell what is wrong with the rest."""
+"""Most findings kept of one file; the first ones report what is wrong with the rest."""
 
 
 class MeshError(AdfError):
-    """A mesh file that cannot be used; ``diagnostics`` say where and why."""
+    """A mesh file that cannot be used; ``diagnostics`` state where and why."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Findings:
         severity: Severity = Severity.WARNING,
         code: str = "mesh",
     ) -> None:
-        """Remember ``message`` about a line of ``path``, unless the same was said of an earlier line."""
+        """Remember ``message`` about a line of ``path``, unless the same was stated of an earlier line."""
         if len(self._found) < MAX_FINDINGS:
             self._found.setdefault((path, message), Diagnostic(severity, message, Mark(path, line, 1), hint, code))
 

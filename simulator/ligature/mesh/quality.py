@@ -17,7 +17,7 @@ SAMPLES = 4000
 """Points on each surface from which distances are measured."""
 
 _NUDGE = 1e-6
-"""Step outwards, over the extent, that tells whether a face of a hull is covered by another hull."""
+"""Step outwards, over the extent, that decides whether a face of a hull is covered by another hull."""
 
 
 def volume_error(vertices: Array, faces: Faces, hulls: Sequence[Array]) -> float | None:

@@ -1,6 +1,6 @@
 """Where joints start, and how loops close: the coordinates that best agree with where the files place the bodies.
 
-A joint starts where its bodies' ``location`` says (ADF specification §15.3 solved for the position); loops are then
+A joint starts where its bodies' ``location`` states (ADF specification §15.3 solved for the position); loops are then
 assembled by Gauss-Newton steps of least change over the joints and free bases that take part. I is a body's inertial
 frame, A and B are a joint's frames (§15.2); metres, radians.
 """
@@ -22,9 +22,9 @@ from ligature.model.scene import Articulation, Body, Closure, Joint, JointType, 
 Array = NDArray[np.float64]
 
 PLACED_M, PLACED_RAD = 0.01, 0.05
-"""How far a location may be off its joint to still say where the joint starts.
+"""How far a location may be off its joint to still state where the joint starts.
 
-Files with three digits are off by up to 2 mm and 0.003 rad; those whose locations say nothing by decimetres.
+Files with three digits are off by up to 2 mm and 0.003 rad; those whose locations state nothing by decimetres.
 """
 
 ROUNDING = 1e-3
@@ -105,7 +105,7 @@ def _angle(R: Array) -> float:
 def assemble(
     bodies: Sequence[Body], joints: list[Joint], forest: Sequence[Articulation], loops: Sequence[int]
 ) -> tuple[Start, tuple[Closure, ...], list[Diagnostic]]:
-    """Where the trees of a scene start, how its loops are held, and what does not stand where its file says.
+    """Where the trees of a scene start, how its loops are held, and what does not stand where its file states.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class _Assembly:
     # --- joints of trees --------------------------------------------------------------------
 
     def _place(self, joint: Joint, outer: int, exact: bool) -> None:
-        """Start a joint where the locations say; report the body that cannot be there."""
+        """Start a joint where the locations state; report the body that cannot be there."""
         D = self._located(joint)
         values, metres, radians = joint_coordinates(joint, D)
         axes = axes_of(joint) or ()

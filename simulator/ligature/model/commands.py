@@ -2,7 +2,7 @@
 
 Indices are those of the `Scene`. Poses are x y z qx qy qz qw. A command is a persistent target: it
 holds until the next one for the same object or until a `Release`. SI units, world axes unless a
-field says otherwise. The commands of CRTK arms are in `ligature.robots.commands`.
+field states otherwise. The commands of CRTK arms are in `ligature.robots.commands`.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ SKYBOX_FACES = ("right", "left", "top", "bottom", "front", "back")
 
 
 class SceneError(AdfError):
-    """A scene that cannot run at all; ``diagnostics`` say why."""
+    """A scene that cannot run at all; ``diagnostics`` state why."""
 
 
 def load(
@@ -61,8 +61,8 @@ def load(
     namespace_prefix
         Put before every namespace; what files refer to is settled before, so that it never changes that.
     arms
-        Which bodies are arms, as the launch key ``ligature arms`` would say (`ligature.model.arms`), instead of
-        what the file says and what is found.
+        Which bodies are arms, as the launch key ``ligature arms`` would state (`ligature.model.arms`), instead of
+        what the file states and what is found.
     devices
         Indices of the input devices of a launch file whose proxies are to be there.
 
@@ -262,7 +262,7 @@ def _add_devices(
 def _proxy(
     element: Element, document: Document, builder: SceneBuilder, resolver: Resolver, shaders: ShaderFiles | None
 ) -> int:
-    """Create the proxy of an input device; the index of its root link, -1 when it cannot be had."""
+    """Create the proxy of an input device; the index of its root link, -1 when it is unavailable."""
     mark = element.mark_of("simulated multibody")
     try:
         path = resolver.resolve(element.text("simulated multibody"), document.path.parent, mark)

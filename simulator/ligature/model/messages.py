@@ -142,7 +142,7 @@ class Real(Field):
 
 @dataclass(frozen=True)
 class Numbers(Field):
-    """Finite numbers of magnitude up to ``bound``; as many as ``length`` says, None for any number.
+    """Finite numbers of magnitude up to ``bound``; as many as ``length`` states, None for any number.
 
     ``optional`` numbers may be absent, which is None.
     """

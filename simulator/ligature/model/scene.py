@@ -151,7 +151,7 @@ class Identity:
     ``identifier`` is the qualified identifier with its remap suffix, for example
     ``/ambf/env/phantom/BODY Needle``; ``topic`` is the ROS name below which its topics live, for
     example ``/ambf/env/phantom/Needle``; ``name`` is the bare name without blanks; ``namespace`` is what
-    the files say, without the prefix of the scene.
+    the files state, without the prefix of the scene.
     """
 
     key: str
@@ -202,7 +202,7 @@ class Body:
     model over world). ``joints`` are the active descendant joints in command-vector order (ADF
     specification §11), ``children`` the matching child bodies. ``no_collision_with`` holds the
     bodies whose contacts with this one are switched off by joints, files or groups. ``needle`` is what
-    the file says of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
+    the file states of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
     """
 
     index: int
@@ -318,7 +318,7 @@ class Attachment:
 class Ghost:
     """A volume that senses what overlaps it and never produces a contact force (§16).
 
-    ``hole`` is what the file says of `ligature.model.holes`, None for nothing.
+    ``hole`` is what the file states of `ligature.model.holes`, None for nothing.
     """
 
     index: int
@@ -447,7 +447,7 @@ class Light:
 class InputDevice:
     """An input device of the launch file (§8), as written; teleoperation gives it a meaning.
 
-    ``proxy`` is the body that its hand leads, the root link of its proxy; -1 when that was not asked for.
+    ``proxy`` is the body that its hand drives, the root link of its proxy; -1 when that was not asked for.
     """
 
     key: str
@@ -529,7 +529,7 @@ class RodChain:
 
 @dataclass(frozen=True, eq=False)
 class WorldSettings:
-    """What the world file says: ``gravity`` (3,), namespace, and limits of the loop.
+    """What the world file states: ``gravity`` (3,), namespace, and limits of the loop.
 
     ``prefix`` stands before every namespace of the scene (``--ns``); ``topic`` has it already.
     """
@@ -608,7 +608,7 @@ class Scene:
 
     ``articulations`` cover every non-rod body once (a lone body is an articulation of one link);
     ``loops`` are the joints that close a kinematic loop or that an articulation cannot express and
-    that constraints must hold, as ``closures`` say; ``start`` is where all of them start; ``rods``
+    that constraints must hold, as ``closures`` state; ``start`` is where all of them start; ``rods``
     are the recognised sutures, ``arms`` the recognised manipulators, ``jaws`` what can grasp.
     ``diagnostics`` are all the findings of reading and resolving, in order. ``roots`` are the folders
     below which a scene file may have other files opened.

@@ -58,7 +58,8 @@ PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 @compiled
 def outputs(
     mode: Integers, force_output: Flags, turns: Flags, sprung: Flags, p: Array, i: Array, d: Array,
-    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, fastest: Array, hardest: Array,
+    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, max_velocity: Array,
+    max_deceleration: Array,
     position: Array, velocity: Array, dt: float,
     integral: Array, last_error: Array, kick: Array, kick_ticks: Integers, motor: Array, effort: Array,
 ) -> None:  # fmt: skip
@@ -82,8 +83,8 @@ def outputs(
             last_error[k] = error
         elif mode[k] == SERVO:
             error = target[k] - position[k]
-            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * hardest[k] * abs(error)))
-            motor[k] = min(max(pace[k] + np.copysign(closing, error), -fastest[k]), fastest[k])
+            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * max_deceleration[k] * abs(error)))
+            motor[k] = min(max(pace[k] + np.copysign(closing, error), -max_velocity[k]), max_velocity[k])
         elif mode[k] == VELOCITY:
             motor[k] = target[k]
         elif mode[k] == FORCE:
@@ -120,9 +121,9 @@ class TreeControl:
         self.mode = np.full(n, FREE)
         self.target = np.zeros(n)
         self._pace = np.zeros(n)
-        self._fastest = np.full(n, np.inf)
-        self._hardest = np.full(n, np.inf)
-        self._give = np.zeros(n)
+        self._max_velocity = np.full(n, np.inf)
+        self._max_deceleration = np.full(n, np.inf)
+        self._yield_stiffness = np.zeros(n)
         self.owned = np.zeros(n, dtype=bool)
         self._integral = np.zeros(n)
         self._last_error = np.zeros(n)
@@ -202,18 +203,29 @@ class TreeControl:
             self._kick_ticks[row] = ticks
 
     def servo(
-        self, rows: Integers, position: Array, velocity: Array, fastest: Array, hardest: Array, give: Array
+        self,
+        rows: Integers,
+        position: Array,
+        velocity: Array,
+        max_velocity: Array,
+        max_deceleration: Array,
+        yield_stiffness: Array,
     ) -> None:
         """Have the axes ``rows`` (k,) follow set-points that move with ``velocity``.
 
-        They do so at most at the speed ``fastest``, and brake with ``hardest``, so that a step does not overshoot.
-        ``give`` (k,) is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is as strong as the motor.
+        They do so at most at the speed ``max_velocity``, and brake with ``max_deceleration``, so that a step does not
+        overshoot. ``yield_stiffness`` (k,) is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is
+        as strong as the motor.
         """
         self.owned[rows] = True
         self.target[rows] = position
         self._pace[rows] = velocity
         if (self.mode[rows] != SERVO).any():
-            self._fastest[rows], self._hardest[rows], self._give[rows] = fastest, hardest, give
+            self._max_velocity[rows], self._max_deceleration[rows], self._yield_stiffness[rows] = (
+                max_velocity,
+                max_deceleration,
+                yield_stiffness,
+            )
             self._enter(rows, SERVO)
 
     def push(self, rows: Integers, effort: Array) -> None:
@@ -269,7 +281,7 @@ class TreeControl:
         """Effort that the command of one joint asks for, were the joint stopped where it is.
 
         A motor with a set-point pulls in proportion to its following error, with ``stiffness`` (N·m/rad, N/m)
-        unless it was told how it gives; one with a velocity pulls with all its strength.
+        unless it has a yield stiffness; one with a velocity pulls with all its strength.
         """
         row = self.row[joint]
         mode, behind = self.mode[row], self._way(row, self.target[row] - self.position[row])
@@ -278,7 +290,7 @@ class TreeControl:
         if mode == VELOCITY:
             return float(np.sign(self.target[row]) * self._strength[row])
         if mode == SERVO:
-            return float((self._give[row] or stiffness) * behind)
+            return float((self._yield_stiffness[row] or stiffness) * behind)
         if mode == POSITION:
             return float(self._effort[row] if self._force_output[row] else stiffness * behind)
         return 0.0
@@ -317,12 +329,13 @@ class TreeControl:
         self._motions.joints(self._index)
         outputs(
             self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
-            self._damping, self._rest, self.target, self._pace, self._fastest, self._hardest, self.position,
+            self._damping, self._rest, self.target, self._pace, self._max_velocity,
+            self._max_deceleration, self.position,
             self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor,
             self._effort,
         )  # fmt: skip
         if self._laden:
-            self._motions.weigh(self._index)
+            self._motions.apply_gravity(self._index)
         for row, (low, high, _) in self._slowed.items():
             wanted = np.sign(self.target[row]) * FREE_SPEED if self.mode[row] == FORCE else self._motor[row]
             self._motor[row] = min(max(wanted, low), high)
@@ -348,13 +361,13 @@ class TreeControl:
 
     def _strengths(self) -> list[float]:
         """Largest effort of each driven motor; one that gives pulls in proportion to its following error."""
-        if not (self._giving or self._slowed):
+        if not (self._yields or self._slowed):
             return self._driven_strength
         rows = self._driven
-        spring = self._give[rows] * np.abs(self.target[rows] - self.position[rows])
+        spring = self._yield_stiffness[rows] * np.abs(self.target[rows] - self.position[rows])
         strength = self._strength[rows]
-        giving = np.minimum(spring + GIVING_FRICTION, strength)
-        limits = np.where(self._give[rows] > 0.0, giving, strength)
+        yielding = np.minimum(spring + GIVING_FRICTION, strength)
+        limits = np.where(self._yield_stiffness[rows] > 0.0, yielding, strength)
         for i, row in enumerate(rows):
             if row in self._slowed:
                 low, high, most = self._slowed[row]
@@ -381,7 +394,7 @@ class TreeControl:
         self._driven_links = [self.links[row] for row in self._driven]
         self._driven_strength = self._strength[self._driven].tolist()
         self._pushed_links = [self.links[row] for row in self._pushed]
-        self._giving = bool((self._give[self._driven] > 0.0).any())
+        self._yields = bool((self._yield_stiffness[self._driven] > 0.0).any())
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
@@ -394,7 +407,7 @@ class TreeControl:
 
     def follow(self, before: TreeControl) -> None:
         """Take the commands of ``before``, the same axes in an earlier world, as if they came now."""
-        for name in ("target", "_pace", "_fastest", "_hardest", "_give", "owned"):
+        for name in ("target", "_pace", "_max_velocity", "_max_deceleration", "_yield_stiffness", "owned"):
             getattr(self, name)[:] = getattr(before, name)
         aimed = before.mode == POSITION
         self.mode[~aimed] = before.mode[~aimed]
@@ -404,7 +417,8 @@ class TreeControl:
 
 
 _KEPT = (
-    "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_fastest", "_hardest", "_give",
+    "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",
+    "_yield_stiffness",
     "owned", "_stops", "_slowed",
 )  # fmt: skip
 """Attributes of a `TreeControl` that last from tick to tick."""

@@ -43,13 +43,13 @@ def _suspect(twist: Array, gyration: Array, mass: Array, rigid: Flags, before: A
     of the last call and takes that of this one. A body leaps when the energy of all bodies grew with its own: what
     another one hits does not.
     """
-    worst, fastest, gained = -1, FASTEST * FASTEST, 0.0
+    worst, max_velocity, gained = -1, FASTEST * FASTEST, 0.0
     leaper, farthest, share = -1, leap, 0.0
     for i in range(mass.shape[0]):
         v = twist[i, 0] * twist[i, 0] + twist[i, 1] * twist[i, 1] + twist[i, 2] * twist[i, 2]
         w = twist[i, 3] * twist[i, 3] + twist[i, 4] * twist[i, 4] + twist[i, 5] * twist[i, 5]
-        if v > fastest and mass[i] > 0.0:
-            worst, fastest = i, v
+        if v > max_velocity and mass[i] > 0.0:
+            worst, max_velocity = i, v
         now = v + gyration[i] * w
         gained += mass[i] * (now - before[i])
         # nearly all bodies are slow: no root is taken of theirs
@@ -78,7 +78,7 @@ class Guard:
         self._reported: set[int] = set()
 
     def reset(self) -> None:
-        """Bodies were put elsewhere: they start from the motion that the state tells."""
+        """Bodies were put elsewhere: they start from the motion that the state has."""
         _suspect(self._twist, self._gyration, self._mass, self._rigid, self._before, np.inf)
 
     def check(self, seconds: float) -> Diagnostic | None:

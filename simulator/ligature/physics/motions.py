@@ -81,7 +81,7 @@ def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
 
 
 @compiled
-def _weigh(
+def _apply_gravity(
     begin: int, end: int, rows: Integers, fixed: Array, frame: Array, pose: Array, force: Array, load: Array,
     effort: Array,
 ) -> None:  # fmt: skip
@@ -134,12 +134,12 @@ class Motions:
         (r, 7) and (r, 6) of all rows.
     position, velocity, effort
         (a,) of all single axes of all trees.
-    told
+    reported
         Efforts of axes, by index, for which Bullet's motor is not the drive: what is reported instead.
     push
         (a,) efforts that the controllers apply in the coming tick.
     force
-        (r, 3) forces at the centres of mass, for `weigh`.
+        (r, 3) forces at the centres of mass, for `apply_gravity`.
     reaction
         (a, 6) force and moment that the joints of these axes carry, where Bullet measures them.
     """
@@ -189,10 +189,11 @@ class Motions:
         """Row of a link; -1 is the base."""
         return int(self._begin[tree] + 1 + link)
 
-    def weigh(self, tree: int) -> None:
+    def apply_gravity(self, tree: int) -> None:
         """Add what `force` does to the joints of a tree to `push`."""
         self.links(tree)
-        _weigh(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._frame, self.pose, self.force,
+        _apply_gravity(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._frame,
+            self.pose, self.force,
                self._load, self.push)  # fmt: skip
 
     def measure(self, tree: int) -> None:

@@ -155,7 +155,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
                 control = self._body_controls[command.body] = BodyControl(self.place_of[command.body], self.dt)
             before = self.driven(command.body)
             control.set(command.type, np.array(command.target, dtype=float))
-            self._led_anew(command.body, before)
+            self._update_commanded(command.body, before)
         types = command.joint_types
         for i, (joint, value) in enumerate(zip(body.joints, command.joint_values, strict=False)):
             tree = self._tree_of_joint.get(joint)
@@ -166,15 +166,17 @@ class World(Subsystem, BulletQueries, BulletGrips):
                 tree.command(self.scene.joints[joint], type_, value)
 
     def _tell_owned(self, body: Body) -> None:
-        """Say once for each body that an arm owns its joints."""
+        """State once for each body that an arm owns its joints."""
         if body.index not in self._told_owned:
             self._told_owned.add(body.index)
             message = f"joint commands to '{body.identity.identifier}' have no effect: its arm is enabled"
             self.report(Diagnostic(Severity.WARNING, message, hint="disable the arm", code="owned"))
 
-    def drive(self, joints: Sequence[int], fastest: Array, hardest: Array, give: float = 0.0) -> Drive:
+    def drive(
+        self, joints: Sequence[int], max_velocity: Array, max_deceleration: Array, yield_stiffness: float = 0.0
+    ) -> Drive:
         """The drive of ``joints``, all of one tree; see `Drive`."""
-        return Drive(self, joints, fastest, hardest, give)
+        return Drive(self, joints, max_velocity, max_deceleration, yield_stiffness)
 
     def control_of(self, joint: int) -> TreeControl:
         """The controllers of the tree that a joint belongs to; another one after a snapshot."""
@@ -186,7 +188,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         if before:
             self._parting.begin()
         self._body_controls.pop(body, None)
-        self._led_anew(body, before)
+        self._update_commanded(body, before)
         for joint in self.scene.bodies[body].joints:
             if joint in self._tree_of_joint:
                 self._tree_of_joint[joint].release(joint)
@@ -206,7 +208,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
             place.slow_down(linear, angular)
         for lift in self._lifts:
             lift.push()
-        self._carry_burdens()
+        self._apply_attached_loads()
         for body, control_ in list(self._body_controls.items()):
             try:
                 control_.apply()
@@ -279,7 +281,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
     def driven(self, body: int) -> bool:
         """Whether a command sets the velocity of a body, so that a thread, however light the body, does not."""
         control = self._body_controls.get(body)
-        return body in self.clamped or (control is not None and control.sets_velocity)
+        return body in self.stopped_fingers or (control is not None and control.sets_velocity)
 
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,).
@@ -288,7 +290,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         """
         total, given = self._impulses.get(body), np.concatenate([impulse, moment])
         self._impulses[body] = given if total is None else total + given
-        if body in self.clamped or not self.driven(body):
+        if body in self.stopped_fingers or not self.driven(body):
             self.place_of[body].load((given / self.dt).tolist())
 
     def mobility(self, body: int) -> Array:
@@ -296,7 +298,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         tree = next(tree for tree in self.trees if body in tree.link_of)
         return mobility(self.scene, tree, body, self.dt)
 
-    def burden(self, body: int) -> tuple[float, Array, Array]:
+    def attached_load(self, body: int) -> tuple[float, Array, Array]:
         """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
         if self.driven(body):
             return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)

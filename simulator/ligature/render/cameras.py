@@ -36,7 +36,7 @@ class Studio:
 
     @property
     def renderer(self) -> Renderer:
-        """The renderer; raises `RenderUnavailable` where no OpenGL can be had, RuntimeError after `close`."""
+        """The renderer; raises `RenderUnavailable` where no OpenGL is available, RuntimeError after `close`."""
         if self._closed:
             raise RuntimeError("the simulation is closed: its cameras take no more pictures")
         if self._renderer is None:

@@ -6,7 +6,7 @@ import moderngl
 
 
 class RenderUnavailable(RuntimeError):
-    """No OpenGL can be had on this machine; the message says what to install."""
+    """No OpenGL is available on this machine; the message states what to install."""
 
 
 def create_context() -> moderngl.Context:

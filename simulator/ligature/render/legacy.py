@@ -48,7 +48,7 @@ DIFFUSE_UNIT, _FIRST_FREE_UNIT = _UNITS["diffuseMap"], 11
 
 
 class ShaderError(AdfError):
-    """Shaders of a scene file that cannot be used; ``diagnostics`` say where and why."""
+    """Shaders of a scene file that cannot be used; ``diagnostics`` state where and why."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def compiled(context: moderngl.Context, files: ShaderFiles, resolver: Resolver) 
 
 
 def findings(log: str, files: ShaderFiles) -> list[Diagnostic]:
-    """What the driver's ``log`` says, by file and line; a program that does not link is blamed on both files."""
+    """What the driver's ``log`` states, by file and line; a program that does not link is blamed on both files."""
     path = files.fragment if "fragment_shader\n" in log else files.vertex
     found = [(int(m[1]), int(m[2]), m[3]) for m in _MESA.finditer(log)]
     found += [(int(m[1]), 1, m[2]) for pattern in (_NVIDIA, _OTHERS) for m in pattern.finditer(log)]
@@ -192,7 +192,7 @@ ABSENT_LIGHT: dict[str, Any] = {
     "halfVector": (0.0, 0.0, 1.0, 0.0), "spotDirection": (0.0, 0.0, -1.0), "spotExponent": 0.0, "spotCutoff": 180.0,
     "spotCosCutoff": -1.0, "constantAttenuation": 1.0, "linearAttenuation": 0.0, "quadraticAttenuation": 0.0,
 }  # fmt: skip
-"""A light that is not there: initial values (OpenGL 2.1, table 2.10), black, so that it adds nothing to any sum."""
+"""A light that is missing: initial values (OpenGL 2.1, table 2.10), black, so that it adds nothing to any sum."""
 
 _INITIAL: dict[str, Any] = {
     "Fog.color": (0.0,) * 4, "Fog.density": 1.0, "Fog.start": 0.0, "Fog.end": 1.0, "Fog.scale": 1.0,

@@ -123,7 +123,7 @@ def _mix(
 
 @compiled
 def _is_rise(standing: NDArray[np.bool_], y: int, x: int, falls: bool) -> bool:
-    """Whether a run of one pixel only joins two longer runs across it, which say better how the line goes."""
+    """Whether a run of one pixel only joins two longer runs across it, which state better how the line goes."""
     height = len(standing)
     above, below = (x - 1, x) if falls else (x, x - 1)
     return y > 0 and standing[y - 1, above] and y + 2 < height and standing[y + 2, below]

@@ -96,7 +96,7 @@ class Painter:
     def paint(self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None) -> None:
         """Draw ``passes``: the opaque from near to far, then the transparent from far to near.
 
-        Middles tell what is near: a table's nearest point is often nearer than all that lies on it.
+        Middles decide what is near: a table's nearest point is often nearer than all that lies on it.
         """
         context, seen = self._context, self._seen
         context.enable_only(moderngl.DEPTH_TEST)

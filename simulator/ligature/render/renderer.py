@@ -166,7 +166,7 @@ class Renderer:
     def points(self, depth: NDArray[np.float32], view: CameraView, shaders: ShaderFiles) -> NDArray[np.float32] | None:
         """What ``depth compute shaders`` make of linear ``depth`` (h, w): the x, y, z (h, w, 3) that they write.
 
-        None when the shaders cannot be used, which `problems` then says.
+        None when the shaders cannot be used, which `problems` then states.
         """
         with self._context:
             program = self._brushes.own(shaders)

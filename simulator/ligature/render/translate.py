@@ -1,7 +1,7 @@
 """Translates GLSL 1.10 and 1.20, as AMBF and CHAI3D users write it, to the core profile of OpenGL 3.3.
 
 Text in, text out: fixed-function names become declarations of their own, so that a core profile
-compiles them; lines keep their numbers. Which uniforms then have to be filled says `legacy`.
+compiles them; lines keep their numbers. Which uniforms then have to be filled states `legacy`.
 """
 
 from __future__ import annotations

@@ -155,7 +155,7 @@ class Arm(Device):
         self._require_joints("servo_jv")
         speed = self.joints.checked(velocity, "servo_jv")
         self._stop_for(self.joints)
-        self.joints.stream_velocity(np.clip(speed, -self.joints.fastest, self.joints.fastest))
+        self.joints.stream_velocity(np.clip(speed, -self.joints.max_velocity, self.joints.max_velocity))
 
     def servo_jf(self, effort: ArrayLike) -> None:
         """Drive the joints with efforts (n,)."""
@@ -270,7 +270,7 @@ class Arm(Device):
         self.joints.servo(q)
 
     def move_cp(self, pose: ArrayLike) -> None:
-        """Move to a tip pose, on the joint trajectory that leads there."""
+        """Move to a tip pose, on the joint trajectory that ends there."""
         self._require_cartesian("move_cp")
         self._start_move(self.joints, self._solve(pose, "move_cp"))
 
@@ -291,7 +291,7 @@ class Arm(Device):
         q = self.joints.setpoint[0]
         speed = self._joint_velocity(q, turned(self.kinematics.forward(q)[:3, :3].T, wanted))
         self._stop_for(self.joints)
-        excess = float(np.max(np.abs(speed) / self.joints.fastest))
+        excess = float(np.max(np.abs(speed) / self.joints.max_velocity))
         self.joints.stream_velocity(speed / max(excess, 1.0))
 
     def _joint_velocity(self, q: Array, twist: Array) -> Array:
@@ -324,7 +324,7 @@ class Arm(Device):
             self.body_servo_cf(np.zeros(6) if wrench is None else wrench)
 
     def _push_with(self, what: str, push: Any) -> None:
-        """Have the joints push as ``what`` says, anew each tick."""
+        """Have the joints push as ``what`` states, anew each tick."""
         self._require_cartesian(what)
         self._stop_for(self.joints)
         self._pushing = what, push
@@ -352,7 +352,7 @@ class Arm(Device):
         return numbers
 
     def set_base_frame(self, pose: ArrayLike, reference: str) -> None:
-        """Say where the base stands in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
+        """State where the base stands in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
         self._T_reference_base = pose_matrix_of(pose, "set_base_frame")
         self.reference = reference
         self.emit("base_frame", reference)

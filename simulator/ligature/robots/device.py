@@ -21,7 +21,7 @@ POWER_UP_SECONDS = 0.2
 SHORTEST_BUSY = 0.05
 """Seconds that a move is busy at least, so that clients see it begin (interface reference §5.2 rule 3)."""
 
-FOLLOWING_PATIENCE = 1.0
+FOLLOWING_TIMEOUT = 1.0
 """Seconds that a following error beyond its bound is suffered before the arm stops with a fault."""
 
 
@@ -34,7 +34,7 @@ MOST_EVENTS = 500
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a device; ``name`` is the topic that tells it, ``value`` what it says."""
+    """Something that happened to a device; ``name`` is the topic that reports it, ``value`` what it states."""
 
     device: str
     name: str
@@ -269,7 +269,7 @@ class Device:
         error = np.abs(q - self.joints.setpoint[0])
         worst = int(np.argmax(error / self._following_bound))
         self._astray = self._astray + seconds if error[worst] > self._following_bound[worst] else 0.0
-        if self._astray > FOLLOWING_PATIENCE:
+        if self._astray > FOLLOWING_TIMEOUT:
             self.fault(f"joint {self.joints.names[worst]} is {error[worst]:.3g} away from its set-point")
 
     # --- snapshots --------------------------------------------------------------------------

@@ -114,7 +114,7 @@ class Answers:
         self.residual = np.zeros(m)
 
     def result(self) -> InverseResult:
-        """What they say."""
+        """Their readings."""
         if not self.shape:
             return InverseResult(self.q[0], self.code[0], self.joint[0], self.residual[0])
         shape = self.shape

@@ -32,15 +32,17 @@ class JointTrajectory:
         When ruckig finds no trajectory: it calculates none of more than `LONGEST` seconds.
     """
 
-    def __init__(self, position: Array, velocity: Array, goal: Array, fastest: Array, hardest: Array) -> None:
-        self._asked = position.copy(), velocity.copy(), goal.copy(), fastest.copy(), hardest.copy()
+    def __init__(
+        self, position: Array, velocity: Array, goal: Array, max_velocity: Array, max_acceleration: Array
+    ) -> None:
+        self._asked = position.copy(), velocity.copy(), goal.copy(), max_velocity.copy(), max_acceleration.copy()
         n = len(goal)
         request = InputParameter(n)
         request.current_position, request.current_velocity = position.tolist(), velocity.tolist()
         request.current_acceleration = [0.0] * n
         request.target_position = goal.tolist()
         request.target_velocity = request.target_acceleration = [0.0] * n
-        request.max_velocity, request.max_acceleration = fastest.tolist(), hardest.tolist()
+        request.max_velocity, request.max_acceleration = max_velocity.tolist(), max_acceleration.tolist()
         request.max_jerk = [float("inf")] * n
         self._trajectory = Trajectory(n)
         try:

@@ -47,7 +47,7 @@ oversized = Oversized()
 
 
 def announced(buffer: io.BytesIO) -> int | None:
-    """Length of the message at the start of ``buffer``, as it was announced; None when that is not there yet."""
+    """Length of the message at the start of ``buffer``, as it was announced; None when that is not known yet."""
     if buffer.tell() < _LENGTH.size:
         return None
     (size,) = _LENGTH.unpack_from(buffer.getbuffer())

@@ -121,7 +121,7 @@ class Node:
         self._woken.set()
 
     def _adopt(self, command: ParentCommand) -> None:
-        """A camera or light gets another parent; its messages say so."""
+        """A camera or light gets another parent; its messages report it."""
         self._outbox.push(command)
         template = self._placed.get((command.kind, command.index))
         if template is not None:

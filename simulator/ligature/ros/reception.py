@@ -48,7 +48,7 @@ class Reception:
     """Subscribes command topics and hands what comes in to ``outbox``.
 
     ``on_command(key, at_once)`` is called when an object begins to be commanded, and with ``at_once`` when a
-    command made it tell more of itself.
+    command made it report more of itself.
     """
 
     def __init__(self, scene: Scene, outbox: Outbox, on_command: Callable[[Key, bool], None]) -> None:

@@ -43,7 +43,7 @@ QUEUE = 10
 
 
 class TaskNode:
-    """Judges one attempt after the other at ``task``; ``say`` is told what a person may want to read.
+    """Judges one attempt after the other at ``task``; ``say`` receives lines for a person.
 
     Raises `ligature.tasks.MissingBodies`, and `ligature.ros.master.NameTaken`.
     """

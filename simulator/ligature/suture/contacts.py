@@ -97,7 +97,7 @@ def _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt):
         sweep = shapes.sweep[c]
         for e in range(n):
             box = work.box[e]
-            # A light taut element is thrown farther in a tick than its motion tells.
+            # A light taut element is thrown farther in a tick than its motion shows.
             thrown = min(abs(tension[e]) * dt * dt / nodes.mass[first + e], THROWN * nodes.radius[first + e])
             margin = sweep + thrown
             outside = False

@@ -31,7 +31,7 @@ from ligature.suture.tracking import follow_needle, follow_rod, look_for_needle,
 Array = NDArray[np.float64]
 
 LEAST_FRICTION, LEAST_STRENGTH, LEAST_STIFFNESS = 0.3, 3.0, 4000.0
-"""Friction (N), sideways strength (N) and stiffness (N/m) of tissue whose file says nothing.
+"""Friction (N), sideways strength (N) and stiffness (N/m) of tissue whose file states nothing.
 
 Masses in scenes of AMBF are often a thousand times those of real needles and threads; such a needle would
 fall out of real tissue. So its tissue bears its weight: the following multiples of it. A thread of a kilogram that
@@ -193,7 +193,7 @@ class Holes:
         """Motion of a needle, and what will pull at it in this tick, for whoever solves for it."""
         body, bodies = self._scene.bodies[self._needles[line]], self._bodies
         self._lines.pose[line], self._twist[line] = bodies.motion(body.index)
-        mass, inertia, self._pull[line] = bodies.burden(body.index)
+        mass, inertia, self._pull[line] = bodies.attached_load(body.index)
         self._mass[line], self._inertia[line] = body.mass + mass, body.inertia + inertia
         self._pull[line, :3] += body.mass * body.gravity
         owner = int(self._lines.owner[line])
@@ -294,12 +294,12 @@ def _sites(scene: Scene, bodies: HeldBodies) -> arrays.Sites:
 def _lines(scene: Scene, rods: list[Rod]) -> arrays.Lines:
     """Needles and rods as arrays, with the law that each hole has for each of them."""
     lines = arrays.lines(len(scene.needles) + len(rods), len(scene.holes))
-    tied = {tie.body: owner for owner, rod in enumerate(rods) for tie in rod.description.ties}
+    attached = {attachment.body: owner for owner, rod in enumerate(rods) for attachment in rod.description.attachments}
     for line, needle in enumerate(scene.needles):
         arc = needle.arc
         lines.centre[line], lines.x[line], lines.y[line] = arc.centre, arc.x, arc.y
         lines.radius[line], lines.begin[line], lines.end[line] = arc.radius, arc.begin, arc.end
-        owner = tied.get(needle.body, -1)
+        owner = attached.get(needle.body, -1)
         lines.owner[line] = owner
         lines.node[line] = rods[owner].node_of[needle.body] if owner >= 0 else 0
         weight = _weight(scene, [needle.body]) + (_rod_weight(rods[owner]) if owner >= 0 else 0.0)
@@ -307,8 +307,8 @@ def _lines(scene: Scene, rods: list[Rod]) -> arrays.Lines:
             _set_law(lines, line, hole, weight, arc.radius)
     for owner, rod in enumerate(rods):
         line = len(scene.needles) + owner
-        tied_needles = [needle.body for needle in scene.needles if tied.get(needle.body) == owner]
-        weight = _rod_weight(rod) + _weight(scene, tied_needles)
+        attached_needles = [needle.body for needle in scene.needles if attached.get(needle.body) == owner]
+        weight = _rod_weight(rod) + _weight(scene, attached_needles)
         for hole in scene.holes:
             _set_law(lines, line, hole, weight, 0.0)
     return lines

@@ -20,7 +20,7 @@ from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.bonds import PINCH
 from ligature.suture.colliders import Colliders
-from ligature.suture.description import RodDescription, Tie, frame_quaternions
+from ligature.suture.description import Attachment, RodDescription, frame_quaternions
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.substeps import run_tick
@@ -115,14 +115,16 @@ class Rod:
         self._pads: tuple[Pads, ...] = ()
         n = len(description.mass)
         known = {partner.body: partner for partner in partners}
-        for tie in description.ties:
-            if tie.body not in known:
-                raise ValueError(f"rod '{description.name}' is tied to body {tie.body}, which is no partner of it")
+        for attachment in description.attachments:
+            if attachment.body not in known:
+                raise ValueError(
+                    f"rod '{description.name}' is tied to body {attachment.body}, which is no partner of it"
+                )
         head, tail, others = _ends(description)
         self._first = 1 if head else 0
         self._own = slice(self._first, self._first + n)
         self._chain = n + self._first + (1 if tail else 0)
-        ends = {tie.body: node for tie, node in ((head, 0), (tail, self._chain - 1)) if tie}
+        ends = {attachment.body: node for attachment, node in ((head, 0), (tail, self._chain - 1)) if attachment}
         rest = [partner for partner in partners if partner.body not in ends]
         self.node_of = {**ends, **{p.body: self._chain + k for k, p in enumerate(rest)}}
         self._total = self._chain + len(rest)
@@ -139,7 +141,7 @@ class Rod:
         self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
-        self._permanent = [self._grip_of(tie) for tie in others]
+        self._permanent = [self._grip_of(attachment) for attachment in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
         self._fixed = {p.body: p.fixed for p in partners}
         self._near: list[int] | None = None
@@ -148,7 +150,7 @@ class Rod:
         self._movable: list[tuple[int, int]] = []
         self._pushed: list[tuple[int, int]] = []
         self._pulled: dict[int, tuple[Array, float, Array]] = {}
-        self._tied = [tie.body for tie in description.ties]
+        self._attached = [attachment.body for attachment in description.attachments]
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
@@ -178,14 +180,14 @@ class Rod:
                 )
         return nodes
 
-    def _grip_of(self, tie: Tie) -> Grip:
+    def _grip_of(self, attachment: Attachment) -> Grip:
         """A tie in the middle of the rod, as three points that stay together."""
-        arm = 0.5 * float(np.linalg.norm(np.diff(self.description.ends[tie.element], axis=0)))
+        arm = 0.5 * float(np.linalg.norm(np.diff(self.description.ends[attachment.element], axis=0)))
         corners = arm * np.array([[1.0, 0.0, 0.0], [-0.5, 0.866, 0.0], [-0.5, -0.866, 0.0]])
         return Grip(
-            tie.element,
-            tie.body,
-            np.stack([corners @ T[:3, :3].T + T[:3, 3] for T in (tie.T_element_a, tie.T_body_b)], axis=1),
+            attachment.element,
+            attachment.body,
+            np.stack([corners @ T[:3, :3].T + T[:3, 3] for T in (attachment.T_element_a, attachment.T_body_b)], axis=1),
         )
 
     # --- state ------------------------------------------------------------------------------
@@ -277,7 +279,7 @@ class Rod:
 
     def hangs_on(self, body: int) -> bool:
         """Whether ``body`` and nothing else holds the rod."""
-        return {*self._tied, *(grip.body for grip in self.grips)} == {body}
+        return {*self._attached, *(grip.body for grip in self.grips)} == {body}
 
     def carry(self, T: Array) -> None:
         """Move the whole rod by ``T`` (4, 4) in world axes, and leave it at rest, its contacts forgotten."""
@@ -353,11 +355,11 @@ class Rod:
         return self._corners
 
     def place(self, body: int, pose: Array, twist: Array) -> None:
-        """Tell where a partner's inertial frame is, (7,), and how it moves, (6,), at the start of the tick."""
+        """Report where a partner's inertial frame is, (7,), and how it moves, (6,), at the start of the tick."""
         i, nodes = self.node_of[body], self._nodes
         nodes.x[i], nodes.q[i], nodes.v[i], nodes.w[i] = pose[:3], pose[3:], twist[:3], twist[3:]
 
-    def weigh(self, partner: Partner, mass: float, inertia: Array, held: bool) -> None:
+    def set_mass(self, partner: Partner, mass: float, inertia: Array, held: bool) -> None:
         """Let a partner resist forces with ``mass`` and principal moments ``inertia`` (3,) from now on."""
         i, nodes = self.node_of[partner.body], self._nodes
         nodes.mass[i], nodes.inertia[i] = mass, inertia
@@ -381,7 +383,7 @@ class Rod:
             self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
         rows = [(colliders.row_of[body], self.node_of[body]) for body in near]
         self._met = np.array(rows, dtype=np.int64).reshape(-1, 2)
-        holding = sorted({*self._tied, *(g.body for g in self.grips), *(p.body for p in self._pads)})
+        holding = sorted({*self._attached, *(g.body for g in self.grips), *(p.body for p in self._pads)})
         self._apart = [body for body in holding if body not in near]
         partners = [(body, self.node_of[body]) for body in (*near, *self._apart)]
         self._movable = [(body, node) for body, node in partners if not self._fixed[body]]
@@ -396,7 +398,7 @@ class Rod:
         partner = next(p for p in self.partners if p.body == body)
         T_b = inverse(partner.T_body_inertial) @ T_body_b
         none = np.zeros(3)
-        self.grips.append(self._grip_of(Tie(element, body, T_a, T_b, none, none, none, none, none)))
+        self.grips.append(self._grip_of(Attachment(element, body, T_a, T_b, none, none, none, none, none)))
         self._near = None
         self._bonds = self._gather_bonds()
 
@@ -414,7 +416,7 @@ class Rod:
         self._bonds = self._gather_bonds()
 
     def _gather_bonds(self) -> tuple[NDArray[np.int64], Array]:
-        """Nodes and kinds (g, 3) and points (g, 3, 2, 3) of all bonds; pinches last."""
+        """Nodes and kinds (g, 3) and points (g, 3, 2, 3) of all bonds; grasps last."""
         held = (*self._permanent, *self.grips)
         nodes = [(self._first + g.element, self.node_of[g.body], 0) for g in held]
         nodes += [(self._first, self.node_of[p.body], 1) for p in self._pads for _ in p.points]
@@ -422,7 +424,7 @@ class Rod:
         return np.array(nodes, dtype=np.int64).reshape(-1, 3), points.reshape(-1, 3, 2, 3)
 
     def _find_pinched(self) -> None:
-        """Give every pinch the element nearest to its point."""
+        """Give every grasp the element nearest to its point."""
         grips, points = self._bonds
         rows = np.flatnonzero(grips[:, 2])
         for row in rows:
@@ -485,28 +487,30 @@ def _pinch_rows(pads: Pads) -> list[Array]:
     return rows
 
 
-def _ends(description: RodDescription) -> tuple[Tie | None, Tie | None, list[Tie]]:
+def _ends(description: RodDescription) -> tuple[Attachment | None, Attachment | None, list[Attachment]]:
     """The ties that become the chain's first and last node, and the others."""
-    head = next((t for t in description.ties if t.element == 0), None)
+    head = next((t for t in description.attachments if t.element == 0), None)
     last = len(description.mass) - 1
-    tail = next((t for t in description.ties if t.element == last and (head is None or t.body != head.body)), None)
-    return head, tail, [t for t in description.ties if t is not head and t is not tail]
+    tail = next(
+        (t for t in description.attachments if t.element == last and (head is None or t.body != head.body)), None
+    )
+    return head, tail, [t for t in description.attachments if t is not head and t is not tail]
 
 
-def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> layout.Joints:
+def _joints(description: RodDescription, head: Attachment | None, tail: Attachment | None) -> layout.Joints:
     """Joint arrays of the whole chain, those of the ties at its ends included."""
     pivots, frames = list(description.pivots), list(description.frames)
-    give = list(description.give)
+    compliance = list(description.compliance)
     rows = {
         "stiffness": list(description.joint_stiffness), "damping": list(description.joint_damping),
         "rest": list(description.rest), "low": list(description.low), "high": list(description.high),
     }  # fmt: skip
-    stiffest = float(min(description.give))
+    stiffest = float(min(description.compliance))
     if head is not None:
         a, b = head.T_body_b, head.T_element_a
         pivots.insert(0, np.array([a[:3, 3], b[:3, 3]]))
         frames.insert(0, np.array([a[:3, :3], b[:3, :3]]))
-        give.insert(0, stiffest)
+        compliance.insert(0, stiffest)
         seen = {"stiffness": head.stiffness, "damping": head.damping, "rest": -head.rest,
                 "low": -head.high, "high": -head.low}  # fmt: skip
         for name, values in rows.items():
@@ -515,7 +519,7 @@ def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> 
         a, b = tail.T_element_a, tail.T_body_b
         pivots.append(np.array([a[:3, 3], b[:3, 3]]))
         frames.append(np.array([a[:3, :3], b[:3, :3]]))
-        give.append(stiffest)
+        compliance.append(stiffest)
         for name, values in rows.items():
             values.append(getattr(tail, name))
     n = len(pivots)
@@ -527,7 +531,7 @@ def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> 
     span = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1).sum()
     bending = np.where(locked, 0.0, arrays["stiffness"]).max(axis=1)
     return layout.Joints(
-        pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), give=np.array(give),
+        pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), compliance=np.array(compliance),
         **arrays, stop=np.maximum(100.0 * bending, 100.0 * weight * span),
         angle=np.zeros((n, 3)), load=np.zeros((n, 6)),
     )  # fmt: skip

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 NEXT_TO_PADS = 3
 """Elements next to the one between pads that do not touch the fingers."""
 
-NEXT_TO_TIE = 3
+NEXT_TO_ATTACHMENT = 3
 """Elements next to a tie that do not touch the tied body, in which they begin."""
 
 
@@ -49,13 +49,13 @@ class Rods:
     def _rod(self, scene: Scene, description: RodDescription, dt: float) -> Rod:
         elements = len(description.mass)
         shapes = self._colliders.shapes(elements)
-        tied = [tie.body for tie in description.ties]
-        bodies = sorted({*tied, *self._colliders.bodies})
+        attached = [attachment.body for attachment in description.attachments]
+        bodies = sorted({*attached, *self._colliders.bodies})
         free = {a.links[0].body for a in scene.articulations if len(a.links) == 1}
         rod = Rod(description, [_partner(scene, b, b in free) for b in bodies], shapes, dt)
-        for tie in description.ties:
-            beside = np.abs(np.arange(elements) - tie.element) < NEXT_TO_TIE
-            shapes.skip[self._colliders.parts_of(tie.body)] |= beside
+        for attachment in description.attachments:
+            beside = np.abs(np.arange(elements) - attachment.element) < NEXT_TO_ATTACHMENT
+            shapes.skip[self._colliders.parts_of(attachment.body)] |= beside
         for e, element in enumerate(description.bodies):
             for other in scene.bodies[element].no_collision_with:
                 shapes.skip[self._colliders.parts_of(other), e] = True
@@ -107,7 +107,7 @@ class Rods:
         """Number of the element that a body is in its rod."""
         return self._of_body[body][1]
 
-    def spare(self, number: int, bodies: Sequence[int], element: int | None) -> None:
+    def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
         """Let the elements around ``element`` of a rod pass through ``bodies``; None ends that."""
         rod = self.rods[number]
         beside = np.abs(np.arange(len(rod.positions)) - element) < NEXT_TO_PADS if element is not None else False
@@ -115,14 +115,14 @@ class Rods:
             parts = self._colliders.parts_of(body)
             rod.skip[parts] = self._skip[number][parts] | beside
 
-    def weigh(self, masses: Masses) -> None:
+    def update_masses(self, masses: Masses) -> None:
         """Take over how the bodies that may meet a rod resist forces now, and whether they are held or fall."""
         for rod in self.rods:
             for partner in rod.partners:
                 held = masses.is_held(partner.body)
                 mass, inertia = masses.mass_of(partner.body) if held else (partner.mass, partner.inertia)
                 if not partner.fixed:
-                    rod.weigh(partner, mass, inertia, held)
+                    rod.set_mass(partner, mass, inertia, held)
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists and tension of the elements of every rod into a state record."""

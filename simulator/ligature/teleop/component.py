@@ -1,6 +1,6 @@
 """A pair on ROS as the dVRK's teleoperation component: ``MTMR_PSM1/…`` (interface reference §5.4).
 
-Besides the topics of the dVRK there is ``status``, which says in words what a pair does or what stands in its way.
+Besides the topics of the dVRK there is ``status``, which states in words what a pair does or what stands in its way.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from ligature.teleop.devices.device import Device, Reading
 
 Array = NDArray[np.float64]
 
-PATIENCE = 5.0
+TIMEOUT = 5.0
 SETTLED = 0.3
 """Seconds over which the median of a device that rests is taken."""
 
@@ -28,9 +28,9 @@ class Ear:
         self.device: Device | None = None
 
     def rest(self) -> tuple[Array, float | None]:
-        """Where the handle is, (3,), and its grip; raises `Unclear` when the device says nothing sensible."""
+        """Where the handle is, (3,), and its grip; raises `Unclear` when the device sends nothing sensible."""
         self.readings.clear()
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         while time.monotonic() < end:
             time.sleep(SETTLED)
             if self.device is not None:
@@ -40,7 +40,7 @@ class Ear:
             if len(places):
                 grips = [reading.grip for reading in list(self.readings) if reading.grip is not None]
                 return np.median(places, axis=0), float(np.median(grips)) if grips else None
-        raise Unclear(f"the device said nothing for {PATIENCE:g} s, or no poses; is its driver running?")
+        raise Unclear(f"the device sent nothing for {TIMEOUT:g} s, or no poses; is its driver running?")
 
 
 def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], show: Callable[[str], None]) -> str:

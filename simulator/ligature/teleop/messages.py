@@ -15,7 +15,7 @@ import rospy
 
 
 class MissingPackage(RuntimeError):
-    """The package of a message type is not installed; the message says which."""
+    """The package of a message type is not installed; the message states which."""
 
 
 def message_class(type_: str, what: str) -> Any:

@@ -67,7 +67,7 @@ class Teleop:
     config
         Devices, pairs, camera.
     recorder
-        Writes down what devices and pedals say.
+        Writes down what devices and pedals state.
     replay
         Speaks for the devices, which are not opened then, as soon as the arms are ready.
     """
@@ -161,7 +161,7 @@ class Teleop:
         self._wake.set()
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Drive until ``stop`` says so, or a replay has ended."""
+        """Drive until ``stop`` is set, or a replay has ended."""
         last = time.monotonic()
         while not stop() and not (self._replay is not None and self._replay.finished):
             self._wake.wait(PERIOD)

@@ -27,7 +27,7 @@ MOST_SCALE = 1.0
 
 
 class Pair:
-    """A leader that may drive a follower; ``wanted`` says that it should, as far as the pair is selected."""
+    """A leader that may drive a follower; ``wanted`` states that it should, as far as the pair is selected."""
 
     def __init__(
         self, leader: Leader, arm: Arm | Proxy, seat: Seat, handset: Handset, device: Device | None, topics: PairTopics
@@ -59,7 +59,7 @@ class Pair:
             self._enter(ALIGNING, "aligning")
 
     def advance(self, now: float, tip: Tip | None, idle: str) -> None:
-        """Take the next step; ``idle`` says why nobody may drive now, and is empty when all may."""
+        """Take the next step; ``idle`` states why nobody may drive now, and is empty when all may."""
         why = "" if self.wanted and self.selected else "not selected" if self.wanted else "disabled"
         if why or idle:
             self._enter(DISABLED, why or idle)

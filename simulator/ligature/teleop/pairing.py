@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 class Settings:
     """How a leader moves its follower.
 
-    ``scale`` is follower metres for a leader metre. ``align`` says whether the leader is brought to the follower's
+    ``scale`` is follower metres for a leader metre. ``align`` states whether the leader is brought to the follower's
     orientation before it drives; otherwise the difference at the start is kept. ``max_velocity`` (m/s) and
     ``max_angular_velocity`` (rad/s) bound the follower's goal, ``workspace`` two opposite corners of where it may be
     in the camera's frame. ``jaw`` are the angles of a closed and of an open grip. A leader that is silent for

@@ -23,7 +23,7 @@ from ligature.teleop.pairing import Tip
 Array = NDArray[np.float64]
 
 KEEP = 0.05
-"""Seconds after which the last command is said again: a body that nobody commands is let go."""
+"""Seconds after which the last command is sent again: a body that nobody commands is let go."""
 
 
 class Proxy:
@@ -87,7 +87,7 @@ class Proxy:
         self._grip = float(np.clip(angle, *GRIP))
 
     def keep(self) -> None:
-        """Say the last command again when it was said long ago, so that the proxy holds."""
+        """Send the last command again when it was sent long ago, so that the proxy holds."""
         if self._goal is not None and time.monotonic() - self._sent > KEEP:
             self._send()
 

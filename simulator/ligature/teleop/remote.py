@@ -19,7 +19,7 @@ PEDALS = ("clutch", "camera")
 
 @dataclass
 class PairTold:
-    """What a pair says of itself."""
+    """What a pair states of itself."""
 
     leader: str
     follower: str

@@ -26,7 +26,7 @@ class Conflict(ValueError):
 class Leader:
     """A device: the followers it may drive, the one that it drives, and its newest sample.
 
-    ``clutched`` says whether its own clutch is pressed, ``allowed`` whether it may drive (its arms are ready),
+    ``clutched`` states whether its own clutch is pressed, ``allowed`` whether it may drive (its arms are ready),
     ``used`` is the sample that it drove with last.
     """
 

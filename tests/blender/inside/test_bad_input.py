@@ -21,7 +21,7 @@ def snapshot(folder):
 
 
 def fails(operator, words, **arguments):
-    """Runs an operator that must report an error which says ``words``; returns the report."""
+    """Runs an operator that must report an error which states ``words``; returns the report."""
     before = scene_print()
     with pytest.raises(RuntimeError, match=words) as told:
         operator(**arguments)

@@ -71,7 +71,7 @@ def test_a_concave_collision_mesh_is_measured_as_it_is():
     assert quality.measure(part) == pytest.approx((1, 0.0, 0.0), abs=1e-5)
 
 
-def test_the_operator_reports_the_figures_and_what_is_written_says_when_they_are_old():
+def test_the_operator_reports_the_figures_and_what_is_written_states_when_they_are_old():
     part = ell()
     making.add_hull(part, ELL)
     select(part)

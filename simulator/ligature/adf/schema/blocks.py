@@ -68,7 +68,7 @@ COLOUR = (
 
 
 def geometry(block: str, doc: str) -> tuple[Key, ...]:
-    """Dimensions of a primitive shape; which of them it must have says `SHAPE_KEYS`."""
+    """Dimensions of a primitive shape; which of them it must have states `SHAPE_KEYS`."""
     return (
         Key(block, MAP, doc=doc),
         *each("xyz", N, f"{block}.{{}}", unit="m", doc="full edge of a box along {}", most=FARTHEST),

@@ -1,4 +1,4 @@
-"""What one row of the schema says: a key's path, type, unit, default, choices, meaning and what becomes of it."""
+"""What one row of the schema states: a key's path, type, unit, default, choices, meaning and what becomes of it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The arms under the names that the suturing challenge's own CRTK node gives them: ``/CRTK/psm1/…`` and the like.
 
-That node (interface reference §4.7) knows no operating states: its arms move when told to, and closing a jaw on
+That node (interface reference §4.7) knows no operating states: its arms move when asked to, and closing a jaw on
 something takes hold of it by the actuator of the tool. Radians, metres; frames as in §4.7.
 """
 

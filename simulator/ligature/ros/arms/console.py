@@ -62,13 +62,13 @@ class Console:
             self._listen(f"{root}/home", Empty, lambda _: self._all("home"))
             self._listen(f"{root}/set_volume", Float64, lambda m: self._volume.publish(m.data))
             self._listen(f"{root}/beep", Float64MultiArray, lambda m: rospy.loginfo(f"beep {list(m.data)}"))
-            self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"says: {m.data}"))
+            self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"states: {m.data}"))
 
     def _listen(self, topic: str, type_: type, take: Callable[[Any], None]) -> None:
         rospy.Subscriber(topic, type_, take, queue_size=QUEUE)
 
     def _pedals(self, prefix: str, console: str) -> None:
-        """Pedals are pressed by ``emulate_…`` messages, and told under their new and old names."""
+        """Pedals are pressed by ``emulate_…`` messages, and reported under their new and old names."""
         for pedal in PEDALS:
             names = (f"{console}/{pedal}", f"{prefix}{ALIASES[pedal]}")
             self._listen(f"{console}/emulate_{pedal}", Joy, _relay([_latched(name, Joy) for name in names]))
@@ -101,7 +101,7 @@ def _press(message: Any) -> Joy:
 
 
 class SetupJoints:
-    """Where the bases of the arms stand: fixed in a scene, told as the set-up joints of the cart tell it."""
+    """Where the bases of the arms stand: fixed in a scene, published as the set-up joints of the cart."""
 
     def __init__(self, world: WorldSettings, outlets: Sequence[ArmOutlet]) -> None:
         self._outlets = [outlet for outlet in outlets if outlet.description.kind is not ArmKind.MTM]

@@ -1,4 +1,4 @@
-"""What an arm tells when it happens: latched topics, each with its newest message."""
+"""What an arm reports when it happens: latched topics, each with its newest message."""
 
 from __future__ import annotations
 

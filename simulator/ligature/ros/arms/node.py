@@ -37,7 +37,7 @@ HEARTBEAT = 0.7
 """Seconds between two publications of an operating state that does not change."""
 
 STALE = 0.1
-"""Seconds after which a state counts as that of a resting simulation, and is told with the time of now."""
+"""Seconds after which a state counts as that of a resting simulation, and is reported with the time of now."""
 
 QUEUE = 10
 
@@ -81,11 +81,11 @@ class ArmsNode:
 
     @property
     def faults(self) -> dict[str, str]:
-        """The arms in FAULT by name, each with what it said last."""
+        """The arms in FAULT by name, each with its newest error."""
         return {outlet.description.name: outlet.events.error for outlet in self._outlets if outlet.events.failed}
 
     def start(self, state: Any) -> None:
-        """Tell the operating states that a running simulation has already; events before this are old."""
+        """Report the operating states that a running simulation has already; events before this are old."""
         self._block.events.skip()
         for outlet, record in zip(self._outlets, state["arm"], strict=True):
             outlet.follow(record)
@@ -102,7 +102,7 @@ class ArmsNode:
         """Readings, then events; returns how many readings were sent.
 
         ``state`` is an element of the node's state record, which ``refresh`` reads anew. Whoever hears that a move has
-        ended finds readings that are no older than its end: the bus holds a state before it tells the state's events.
+        ended finds readings that are no older than its end: the bus holds a state before it reports the state's events.
         """
         self._due = max(self._due + PERIOD, now + PERIOD / 5)
         self._count += 1

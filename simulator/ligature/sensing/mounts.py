@@ -41,7 +41,7 @@ def _update(
             compose(world[parent - n_bodies], local[i], world[i])
 
 
-class Attachments(Subsystem):
+class Mounts(Subsystem):
     """The attached objects of a scene, ghosts first, then cameras, then lights.
 
     ``local`` and ``world`` are (n, 7) arrays over all of them; `of` gives the slice of one kind.
@@ -51,12 +51,12 @@ class Attachments(Subsystem):
         counts = [len(scene.ghosts), len(scene.cameras), len(scene.lights)]
         starts = np.concatenate([[0], np.cumsum(counts)])
         self._slices = {kind: slice(int(starts[i]), int(starts[i + 1])) for i, kind in enumerate(KINDS)}
-        attachments = [item.attachment for items in (scene.ghosts, scene.cameras, scene.lights) for item in items]
+        mounts = [item.attachment for items in (scene.ghosts, scene.cameras, scene.lights) for item in items]
         self._n_bodies = len(scene.bodies)
-        self._parents = np.array([self._parent_index(a) for a in attachments], dtype=np.int64)
+        self._parents = np.array([self._parent_index(a) for a in mounts], dtype=np.int64)
         self._initial_parents = self._parents.copy()
         self._order = self._parents_first()
-        self._initial = np.array([matrix_pose7(a.T_parent_object) for a in attachments]).reshape(-1, 7)
+        self._initial = np.array([matrix_pose7(a.T_parent_object) for a in mounts]).reshape(-1, 7)
         self.local = self._initial.copy()
         self.world = self._initial.copy()
 
@@ -79,7 +79,7 @@ class Attachments(Subsystem):
         self._order = self._parents_first()
 
     def reset(self) -> None:
-        """Put every object back to where the scene says, on the parent that it says."""
+        """Put every object back to where the scene states, on the parent that it states."""
         self.local[:] = self._initial
         self._parents[:] = self._initial_parents
         self._order = self._parents_first()
