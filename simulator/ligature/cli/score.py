@@ -79,7 +79,7 @@ def _in_bag(task: str, file: Path, scene: Path | None) -> Figures:
     from ligature.ros.bags import judge
 
     if scene is None:
-        raise ValueError("a bag holds poses, no bodies; name their launch file with '--scene'")
+        raise ValueError("a bag holds poses, no bodies; name the launch file with '--scene'")
     found, attempt = judge(file, ligature.load(str(scene)), task)
     measures = attempt.monitor.measures().report()
     return found.report(), {name: measures[name] for name in measures if name in ("time", "passages") or "path" in name}

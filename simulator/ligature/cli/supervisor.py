@@ -161,7 +161,8 @@ class Supervisor:
                 )
 
     def _start_drawing(self, name: str, module: str, nice: int = _DRAWING_NICE) -> None:
-        """Start a process that draws, with a lower priority unless set otherwise; without a ROS master the run is over."""
+        """Start a process that draws, with a lower priority unless set otherwise; without a ROS master the run is
+        over."""
         if "ros" in self._children or not self._options.ros:
             command = [sys.executable, "-m", module, self._options.to_text()]
             self._children[name] = Child(name, command, self._events, self._env, nice)
