@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 from ligature import Simulation
-from ligature.model.commands import ActuatorCommand, ArmCommand, BodyCommand, CommandType, PlaceCommand, WatchContacts
+from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, PlaceCommand, WatchContacts
 from ligature.model.scene import Scene
+from ligature.robots.commands import Adopt, MoveJr, ServoJr
 
 EVERY = 7
 """Ticks between two commands."""
@@ -49,10 +50,10 @@ class Driver:
                 simulation.apply(BodyCommand(body.index, CommandType.FORCE, wrench))
         elif kind == 5 and scene.arms:
             arm = int(rng.integers(len(scene.arms)))
-            simulation.apply(ArmCommand(arm, "state_command", text="adopt"))
+            simulation.apply(Adopt(arm))
             n = simulation.arms[scene.arms[arm].name].joints.n
-            verb = ("servo_jr", "move_jr")[rng.integers(2)]
-            simulation.apply(ArmCommand(arm, verb, tuple(rng.uniform(-0.02, 0.02, n).tolist())))
+            move = (ServoJr, MoveJr)[rng.integers(2)]
+            simulation.apply(move(arm, tuple(rng.uniform(-0.02, 0.02, n).tolist())))
         elif kind == 6 and scene.actuators:
             actuator, body = int(rng.integers(len(scene.actuators))), scene.bodies[rng.integers(len(scene.bodies))]
             simulation.apply(ActuatorCommand(actuator, bool(rng.integers(3)), body.identity.identifier))
