@@ -58,7 +58,7 @@ MOST_CHARACTERS = 300
 MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
 
-_KEPT = ("_held_up", "_gripped", "_passing", "clamped", "_impulses", "_next_handle", "_told_owned")
+_KEPT = ("_held_up", "_gripped", "_passing", "stopped_fingers", "_impulses", "_next_handle", "_told_owned")
 """Attributes that last from tick to tick as they are."""
 
 
