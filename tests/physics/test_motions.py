@@ -74,7 +74,7 @@ def test_forces_on_links_reach_the_joints_by_virtual_work(simulate: Callable[[st
     slope = [(work(q + 1e-6 * step) - work(q - 1e-6 * step)) / 2e-6 for step in np.eye(3)]
     work(q)
     motions.push[:] = 0.0
-    motions.weigh(0)
+    motions.apply_gravity(0)
     np.testing.assert_allclose(motions.push, slope, atol=1e-7)
     assert np.abs(slope).min() > 0.01
     simulation.close()

@@ -66,7 +66,7 @@ def test_a_needle_controlled_through_a_hole_and_out_again_falls_with_its_own_mas
         inserted += len(sim.insertions)
     assert inserted and not sim.insertions
     needle.release()
-    rod = sim._rods.rods[0]
+    rod = sim._suture.rods.rods[0]
     sim.step()
     assert rod.nodes.mass[rod.node_of[needle.body.index]] == needle.body.mass
     fastest = 0.0

@@ -69,11 +69,11 @@ def test_same_start_gives_the_same_bits(kit):
 def test_rod_continues_from_its_memory_with_the_same_bits(kit):
     bench, rod = _messy(kit)
     bench.step(150)
-    kept = rod.memory()
+    kept = rod.snapshot()
     pose, twist = ({b: v.copy() for b, v in d.items()} for d in (bench.pose, bench.twist))
     bench.step(100)
     expected = rod.positions.tobytes()
-    rod.recall(kept)
+    rod.restore(kept)
     bench.pose, bench.twist = pose, twist
     bench.colliders.restart()
     bench.step(100)
