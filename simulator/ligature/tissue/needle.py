@@ -33,8 +33,9 @@ AXIAL, ACROSS, TIP, ENTRY, ENTRY_ACROSS, SLIDE, RUB = 0, 1, 2, 3, 4, 5, 6
 """Rows: friction along a node, hold across it, cutting at the tip, pressure of the tip on the surface along it and across
 it, pressure and friction of a tip that slides over the surface."""
 
-OUTSIDE, TOUCHES, SLIDES, CUTS, TENTS, OPEN = 0, 1, 2, 3, 4, 5
-"""Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, in an old path."""
+OUTSIDE, TOUCHES, SLIDES, CUTS, TENTS, LEAVES, OPEN = 0, 1, 2, 3, 4, 5, 6
+"""Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, breaking through
+it, in an old path."""
 
 HYSTERESIS = 2e-4
 """Length in metres by which a tip may stand before a node and still be held by it."""
@@ -68,6 +69,7 @@ class Held(NamedTuple):
     """What a needle's passages keep from tick to tick, by point of the interface."""
 
     engaged: Integers  # (N,)
+    left: Integers  # (N,) the tail has passed it, and no thread has taken it over yet
     anchor: Array  # (N,) length from the tip that friction holds
     sigma: Array  # (N,) length from the tip to the node
     share: Array  # (N,) length of needle that the node holds
@@ -99,7 +101,7 @@ def held(capacity: int, paths: int) -> Held:
     """A needle that is outside."""
     N, z = capacity, np.zeros
     return Held(
-        np.zeros(N, np.int64), z(N), z(N), z(N), z((N, 3)), z((N, 3)), np.zeros((N, 3), np.int64), z((N, 3)),
+        np.zeros(N, np.int64), np.zeros(N, np.int64), z(N), z(N), z(N), z((N, 3)), z((N, 3)), np.zeros((N, 3), np.int64), z((N, 3)),
         np.zeros(3, np.int64), np.zeros(paths, np.int64), np.array([OUTSIDE, -1, -1]), z(1), z(1), z(3), z(1), z(4),
     )  # fmt: skip
 
@@ -167,6 +169,8 @@ def engage(points, paths, held, shape):
                     held.offset[i, 0], held.offset[i, 1], held.offset[i, 2] = dx, dy, dz
                     for a in range(3):
                         held.side[i, a], held.torn[i, a], held.across[i, a] = 0, 0.0, 0.0
+            if held.engaged[i] and sigma > shape[10] + margin:
+                held.left[i] = 1
             held.engaged[i] = 1 if within else 0
             held.sigma[i] = sigma
             if not within:
@@ -254,7 +258,7 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
             m += 1
     tx, ty, tz, nx, ny, nz = shape[3], shape[4], shape[5], shape[6], shape[7], shape[8]
     rx, ry, rz = shape[0] - shape[11], shape[1] - shape[12], shape[2] - shape[13]
-    if where == CUTS or where == TENTS:
+    if where == CUTS or where == TENTS or where == LEAVES:
         lead = -1
         for k in range(paths.count[tip_path]):
             if held.engaged[paths.node[tip_path, k]]:

@@ -58,3 +58,15 @@ def extend_path(paths: Paths, path: int, point: int, s: float) -> None:
     k = int(paths.count[path])
     paths.node[path, k], paths.s[path, k] = point, s
     paths.count[path] = k + 1
+
+
+def remove_node(paths: Paths, point: int) -> None:
+    """Take a point out of the path that it belongs to; a path without nodes is not in use any more."""
+    for path in np.flatnonzero(paths.count).tolist():
+        n = int(paths.count[path])
+        at = np.flatnonzero(paths.node[path, :n] == point)
+        if len(at):
+            k = int(at[0])
+            for array in (paths.node, paths.s):
+                array[path, k : n - 1] = array[path, k + 1 : n]
+            paths.count[path] = n - 1

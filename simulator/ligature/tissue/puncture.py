@@ -12,22 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.tissue import needle as states
-from ligature.tissue.interface import Interface
+from ligature.tissue.interface import HARD, SPACING, USED, Interface
 from ligature.tissue.location import cross_surface, locate
-from ligature.tissue.material import TissueMaterial
 from ligature.tissue.needle import conclude, engage, gather, held, rows, solve_rows
 from ligature.tissue.paths import MOST_NODES, MOST_PATHS, Paths, begin_path, extend_path
+from ligature.tissue.tearing import tear
 
 Array = NDArray[np.float64]
 
-SPACING = 1.6e-3
-"""Length of a path between its nodes, m."""
-
-HARD = 1e-5
-"""Least compliance of a bristle, m/N."""
+LEFT = 1e-3
+"""Force in newtons below which a tip that leaves is out."""
 
 FADE = 0.05
 """Time in seconds in which tissue takes the shape of a needle that passes beside a node."""
+
+DROP = 6e-3
+"""Time in seconds in which the force of a tip that got through falls to what resists it next."""
+
+AROUND = 5e-3
+"""Distance in metres within which the surface says at which angle a tip meets it, not the dent that the tip makes."""
 
 TIP_FRICTION = 0.2
 """Coulomb coefficient of a tip that slides over the surface."""
@@ -65,7 +68,7 @@ class NeedleInTissue:
     # --- the tick -----------------------------------------------------------------------------
 
     def couple(
-        self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array
+        self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array, dt: float = 1e-3
     ) -> tuple[Array, Array]:
         """Solve for the needle's motion in this tick, together with the tissue.
 
@@ -79,6 +82,8 @@ class NeedleInTissue:
         H, g
             The needle's own equations, H δ = g, for its displacement and turn δ (6,) about the centre of mass in this
             tick: for a free needle the spatial mass over dt², and momentum over dt with the forces on it.
+        dt
+            Length of the tick, s.
 
         Returns
         -------
@@ -95,7 +100,7 @@ class NeedleInTissue:
             self._look_for_surface()
         engage(p, self._paths, h, self._shape)
         self._follow_tip()
-        self._set_limit()
+        self._set_limit(dt)
         m = gather(p, self._paths, h, self._rows, self._shape, TIP_FRICTION, self._interface.fraction)
         if solve_rows(self._rows, m, H, g, self._delta) < 0 or not np.isfinite(self._delta).all():
             raise FloatingPointError("the equations of the needle in tissue have no finite solution")
@@ -132,15 +137,24 @@ class NeedleInTissue:
             h.tip[0] = states.OPEN if np.isfinite(self._paths.length[path]) else states.CUTS
             return
         point = self._interface.add(grid.faces[face], self._weights4)
-        self._equip(point, int(grid.face_cell[face]))
+        self._interface.equip(point, int(grid.face_cell[face]), self.radius)
         self._interface.points.soft[point] = HARD
         h.offset[point], h.torn[point], h.tip_side[:] = 0.0, 0.0, 0
-        h.normal[:], h.pressed[0], h.tip[2] = self._normal, 0.0, point
+        h.normal[:], h.pressed[0], h.tip[2] = self._normal_around(crossing), 0.0, point
         h.tip[0] = states.TOUCHES if self._steep() else states.SLIDES
 
     def _steep(self) -> bool:
         sine = -float((self._shape[3:6] * self._held.normal).sum())
-        return sine >= float(np.sin(self._material_of(self._held.tip[2]).least_angle))
+        return sine >= float(np.sin(self._interface.material_of(self._held.tip[2]).least_angle))
+
+    def _normal_around(self, at: Array) -> Array:
+        """Outward normal of the surface near a point of it, (3,)."""
+        corner = self._interface.elastic.x[self._interface.elastic.grid.faces]
+        area = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+        away = ((corner.mean(axis=1) - at) ** 2).sum(axis=1)
+        facing = (area * self._normal).sum(axis=1) > 0.0
+        total = (area * (facing * np.exp(-away / AROUND**2))[:, None]).sum(axis=0)
+        return total / np.sqrt((total**2).sum())
 
     def _opening(self, at: Array) -> tuple[int, int]:
         """Path that opens within reach of a point of the surface, and 1 at its entry, -1 at its exit."""
@@ -184,20 +198,23 @@ class NeedleInTissue:
                 found, best = path, float(h.sigma[end])
         return found
 
-    def _set_limit(self) -> None:
-        """Force at which the tip gets further."""
+    def _set_limit(self, dt: float) -> None:
+        """Force at which the tip gets further: what resists it, or what is left of what it has just broken."""
         h, paths = self._held, self._paths
-        where = int(h.tip[0])
-        if where == states.TOUCHES:
-            h.limit[0] = self._material_of(h.tip[2]).puncture_force
-        elif where in (states.CUTS, states.TENTS):
-            lead = paths.node[h.tip[1], paths.count[h.tip[1]] - 1]
-            material = self._material_of(lead)
-            if paths.cut[h.tip[1]] >= h.room[0]:
+        if h.tip[0] == states.TOUCHES:
+            h.limit[0] = self._interface.material_of(h.tip[2]).puncture_force
+        elif h.tip[0] in (states.CUTS, states.TENTS):
+            path = int(h.tip[1])
+            if paths.cut[path] >= h.room[0]:
                 h.tip[0] = states.TENTS
-            h.limit[0] = material.cutting_force
-            if h.tip[0] == states.TENTS:
-                h.limit[0] += material.exit_force
+            material = self._interface.material_of(paths.node[path, paths.count[path] - 1])
+            resists = material.cutting_force + (material.exit_force if h.tip[0] == states.TENTS else 0.0)
+            h.limit[0] = max(resists, h.limit[0] * float(np.exp(-dt / DROP)))
+        elif h.tip[0] == states.LEAVES:
+            h.limit[0] *= float(np.exp(-dt / DROP))
+            if h.limit[0] < LEFT:
+                h.tip[0] = states.OUTSIDE
+                self._lay_exit(int(h.tip[1]))
 
     def _get_through(self) -> None:
         """The tip's force reached its limit: it enters, cuts on, or leaves."""
@@ -207,18 +224,21 @@ class NeedleInTissue:
             path = begin_path(paths, point)
             h.passing[path], h.tip[:] = 1, [states.CUTS, path, -1]
             h.engaged[point], h.anchor[point], h.sigma[point], h.share[point] = 1, 0.0, 0.0, 0.0
-            self._equip(point, self._cell_of[point])
+            self._interface.equip(point, self._interface.cell_of[point], self.radius)
             self._find_far_surface()
         elif h.tip[0] == states.TENTS:
-            path = int(h.tip[1])
-            paths.length[path] = max(float(h.room[0]), float(paths.s[path, paths.count[path] - 1]) + 1e-6)
-            h.tip[0] = states.OUTSIDE
-            self._lay_exit(path)
+            h.tip[0] = states.LEAVES
 
     def _let_go(self) -> None:
         """The tip has left the surface."""
         self._interface.release(int(self._held.tip[2]))
         self._held.tip[0], self._held.tip[2] = states.OUTSIDE, -1
+
+    def take_left_behind(self) -> list[tuple[int, float]]:
+        """Points that the tail has passed since the last call, and how far beyond it they are, m."""
+        left = np.flatnonzero(self._held.left).tolist()
+        self._held.left[:] = 0
+        return [(i, float(self._held.sigma[i] - self._shape[10])) for i in left]
 
     # --- the tissue step ----------------------------------------------------------------------
 
@@ -226,7 +246,8 @@ class NeedleInTissue:
         """Lay and move nodes; after the tissue has moved."""
         h = self._held
         h.offset[:] *= np.exp(-self._interface.elastic.h / FADE)
-        self._tear()
+        tear(self._interface, self._paths, h.torn)
+        h.engaged[self._interface.points.status != USED] = 0
         if h.tip[0] in (states.CUTS, states.TENTS):
             self._lay_node()
             self._find_far_surface()
@@ -258,22 +279,22 @@ class NeedleInTissue:
         h.torn[point], h.side[point], h.across[point] = 0.0, 0, 0.0
 
     def _lay_exit(self, path: int) -> None:
-        h, x, grid = self._held, self._interface.elastic.x, self._interface.elastic.grid
-        lead = int(self._paths.node[path, self._paths.count[path] - 1])
-        tip, tangent = self._shape[:3], self._shape[3:6]
-        back = min(max(float(h.sigma[lead]), 0.0), 1e-3)
-        face, _ = cross_surface(
-            x, grid.faces, tip - back * tangent, tangent, back + 5e-3, 1.0, self._weights4, self._normal
+        """End a path where the needle comes through the far surface; `engage` finds how far it has."""
+        x, grid, paths = self._interface.elastic.x, self._interface.elastic.grid, self._paths
+        k = int(paths.count[path]) - 1
+        behind = max(float(self._held.sigma[paths.node[path, k]]), 0.0)
+        start = self._shape[:3] - behind * self._shape[3:6]
+        face, ahead = cross_surface(
+            x, grid.faces, start, self._shape[3:6], behind + 5e-3, 1.0, self._weights4, self._normal
         )
-        s = float(self._paths.length[path])
-        if face < 0 or s - self._paths.s[path, self._paths.count[path] - 1] < 0.25 * SPACING:
+        s = float(paths.s[path, k]) + (ahead if face >= 0 else 0.0)
+        paths.length[path] = max(s, 1e-6)
+        if face < 0 or ahead < 0.25 * SPACING:
             return
         point = self._interface.add(grid.faces[face], self._weights4)
-        self._equip(point, int(grid.face_cell[face]))
-        extend_path(self._paths, path, point, s)
-        h.engaged[point], h.anchor[point], h.sigma[point] = 1, 0.0, 0.0
-        h.offset[point] = tip - self._interface.points.at[point]
-        h.torn[point], h.side[point], h.across[point] = 0.0, 0, 0.0
+        self._interface.equip(point, int(grid.face_cell[face]), self.radius)
+        extend_path(paths, path, point, s)
+        self._held.engaged[point] = 0
 
     def _find_far_surface(self) -> None:
         """Length of the path at which the line ahead of the tip leaves the tissue."""
@@ -298,12 +319,12 @@ class NeedleInTissue:
         if face < 0:
             self._let_go()
             return
-        h.normal[:] = self._normal
+        h.normal[:] = self._normal_around(self._weights4 @ x[grid.faces[face]])
         if h.tip[0] == states.SLIDES:
             # A point on the normal through the tip keeps the pressure; its place across starts anew.
             self._interface.place(point, grid.faces[face], self._weights4)
             h.offset[point] = 0.0
-            self._cell_of[point] = int(grid.face_cell[face])
+            self._interface.cell_of[point] = int(grid.face_cell[face])
         steep = states.TOUCHES if self._steep() else states.SLIDES
         if steep != h.tip[0]:
             h.tip[0], h.tip_side[:] = steep, 0
@@ -316,42 +337,14 @@ class NeedleInTissue:
             return
         self._meet(tip - 2e-3 * tangent, tangent, 2e-3)
 
-    def _tear(self) -> None:
-        """Move nodes in the material by what has torn."""
-        h, p = self._held, self._interface.points
-        for i in np.flatnonzero((h.torn != 0.0).any(axis=1)).tolist():
-            cell = self._locate(p.start[i] + h.torn[i])
-            if cell >= 0:
-                self._interface.place(i, self._interface.elastic.grid.cells[cell], self._weights8)
-                self._cell_of[i] = cell
-                h.torn[i] = 0.0
-
     def _locate(self, at: Array) -> int:
         elastic = self._interface.elastic
         return int(locate(elastic.x, elastic.grid.cells, np.ascontiguousarray(at), 1e-6, self._weights8))
 
     def _add(self, cell: int) -> int:
         point = self._interface.add(self._interface.elastic.grid.cells[cell], self._weights8)
-        self._equip(point, cell)
+        self._interface.equip(point, cell, self.radius)
         return point
-
-    def _equip(self, point: int, cell: int) -> None:
-        """Give a point the properties of its cell's material, and the compliance that the grid leaves out."""
-        self._cell_of[point] = cell
-        material, p = self._material_of(point), self._interface.points
-        p.friction[point], p.strength[point] = material.friction, material.strength
-        # Around a slender inclusion of radius r tissue yields (ln(d / r) + 0.19) / (4 π G d) under a force on the
-        # length d; specs derive it from Kelvin's solution. The grid has a part of it.
-        target = (np.log(SPACING / self.radius) + 0.19) / (4.0 * np.pi * material.shear * SPACING)
-        p.soft[point] = max(target - float(np.trace(p.C[point, point])) / 3.0, HARD)
-
-    @property
-    def _cell_of(self) -> NDArray[np.int64]:
-        return self._interface.cell_of
-
-    def _material_of(self, point: int) -> TissueMaterial:
-        elastic = self._interface.elastic
-        return elastic.materials[int(elastic.grid.layer[self._cell_of[point]])]
 
     # --- state --------------------------------------------------------------------------------
 
