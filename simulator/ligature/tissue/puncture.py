@@ -354,6 +354,11 @@ class NeedleInTissue:
         return int(self._held.tip[0])
 
     @property
+    def passages(self) -> int:
+        """Nodes of paths that hold the needle."""
+        return int(self._held.engaged.sum())
+
+    @property
     def depth(self) -> float:
         """Insertion depth: length of needle inside the tissue, m."""
         return float(self._held.load[3])

@@ -65,6 +65,7 @@ class ThreadInTissue:
         self._side = np.zeros((n, 2), dtype=np.int64)
         self._points = np.zeros((0, 3))
         self._rows: dict[int, tuple[Array, ...]] = {}
+        self._tangents: dict[int, Array] = {}
         self._settles = 0
 
     # --- the tick -----------------------------------------------------------------------------
@@ -121,19 +122,33 @@ class ThreadInTissue:
         self._interface.points.force[i] = 0.0
 
     def _share_out(self) -> None:
-        """Length of path that each node stands for."""
+        """Length of path that each node stands for, and the direction of the path there."""
+        self._tangents.clear()
         for path in np.flatnonzero(self._paths.count).tolist():
             n = int(self._paths.count[path])
             nodes, s = self._paths.node[path, :n], self._paths.s[path, :n]
             kept = np.flatnonzero(self.engaged[nodes])
             if not len(kept):
                 continue
+            self._direct(nodes[kept])
             # Up to the path's ends where the thread leaves, half-way to the neighbours inside.
             edges = np.concatenate([[0.0], 0.5 * (s[kept][1:] + s[kept][:-1]), [0.0]])
             length = self._paths.length[path] if np.isfinite(self._paths.length[path]) else self._paths.cut[path]
             edges[0] = 0.0 if kept[0] == 0 else s[kept[0]]
             edges[-1] = max(float(length), float(s[kept[-1]])) if kept[-1] == n - 1 else s[kept[-1]]
             self._share[nodes[kept]] = np.diff(edges)
+
+    def _direct(self, nodes: Integers) -> None:
+        """Direction of a path at its nodes towards the thread's last point: a thread may turn sharply where it enters."""
+        if len(nodes) < 2:
+            return
+        at = self._interface.points.at[nodes]
+        turned = 1.0 if self._at[nodes[-1]] > self._at[nodes[0]] else -1.0
+        edge = np.diff(at, axis=0)
+        edge *= turned / np.sqrt((edge**2).sum(axis=1))[:, None]
+        total = np.concatenate([edge[:1], edge[1:] + edge[:-1], edge[-1:]])
+        total /= np.sqrt((total**2).sum(axis=1))[:, None]
+        self._tangents.update(zip(nodes.tolist(), total, strict=True))
 
     def _row(self, i: int, nodes: Integers) -> tuple[Array, ...]:
         """Directions (3, 3), stretch at the start, compliance in those directions, limits along and across, place."""
@@ -143,7 +158,7 @@ class ThreadInTissue:
         k = int(np.clip(np.searchsorted(begin, self._at[i], side="right") - 1, 0, len(begin) - 2))
         share = (self._at[i] - begin[k]) / (begin[k + 1] - begin[k])
         start = points[k] + share * (points[k + 1] - points[k])
-        tangent = (points[k + 1] - points[k]) / (begin[k + 1] - begin[k])
+        tangent = self._tangents.get(i, (points[k + 1] - points[k]) / (begin[k + 1] - begin[k]))
         whole = p.C[i, nodes].sum(axis=0)
         whole = 0.5 * (whole + whole.T)
         base = p.start[i] + interface.fraction * p.move[i] - whole @ p.mean[i]
