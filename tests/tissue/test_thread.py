@@ -154,7 +154,10 @@ def _stitch(block, x, middle, gap):
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     thread.insert(block.lay_path(np.array(right)[::-1], 1e-4), length[5])
     thread.insert(block.lay_path(np.array(left)[::-1], 1e-4), length[11])
-    return String(block, thread, points, stiffness=3e4)
+    fine = np.column_stack(
+        [np.interp(np.arange(0.0, len(points) - 0.99, 0.5), np.arange(len(points)), column) for column in points.T]
+    )
+    return String(block, thread, fine, stiffness=3e4)
 
 
 def test_stitches_close_a_wound_and_cut_threads_let_it_open_again(kit):
@@ -166,7 +169,7 @@ def test_stitches_close_a_wound_and_cut_threads_let_it_open_again(kit):
     for tick in range(360):
         for string in strings:
             # Two hands draw the ends past each other over the wound.
-            drawn = np.array([0.0, 1.1e-2 * min(1.0, tick / 300), 0.0])
+            drawn = np.array([0.0, 1.7e-2 * min(1.0, tick / 300), 0.0])
             above = np.array([string.x[0, 0], middle, 0.0088])
             string.held = {0: above - drawn, len(string.x) - 1: above + drawn}
             string.tick()

@@ -11,8 +11,8 @@ from ligature.tissue.elastic import STEP, ElasticGrid
 from ligature.tissue.grid import Grid
 from ligature.tissue.interface import Interface
 from ligature.tissue.lips import Lips
-from ligature.tissue.material import TissueMaterial
 from ligature.tissue.location import locate
+from ligature.tissue.material import TissueMaterial
 from ligature.tissue.paths import begin_path, extend_path, paths
 from ligature.tissue.puncture import NeedleInTissue
 from ligature.tissue.thread import ThreadInTissue
@@ -112,7 +112,7 @@ class TissueBlock:
         self.lips.close(d)
         self.elastic.advance(d)
         self._begin()
-        for line in (*self.needles, *self.threads):
+        for _, line in self._lines():
             line.follow()
 
     def _begin(self) -> None:
@@ -135,7 +135,7 @@ class TissueBlock:
         for array in self.paths:
             array[:] = 0
         self.paths.length[:] = np.inf
-        for line in (*self.needles, *self.threads):
+        for _, line in self._lines():
             line.reset()
         self._begin()
 
@@ -144,9 +144,7 @@ class TissueBlock:
         kept = {name: getattr(self.elastic, name).copy() for name in ("x", "v", "frames")}
         kept["lip_force"] = self.lips.force.copy()
         kept.update({f"point_{name}": array for name, array in self.interface.snapshot().items()})
-        kept.update(
-            {f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)}
-        )
+        kept.update({f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)})
         for prefix, line in self._lines():
             kept.update({prefix + name: array for name, array in line.snapshot().items()})
         return kept

@@ -52,6 +52,9 @@ class Points(NamedTuple):
     soft: Array  # (N,) local compliance of the bristle, m/N
     friction: Array  # (N,) N for each metre of needle
     strength: Array  # (N,) N for each metre of needle or thread
+    puncture: Array  # (N,) force at which a tip enters, N
+    cutting: Array  # (N,) and gets further
+    exit: Array  # (N,) beyond that, and leaves
 
 
 def points(capacity: int = CAPACITY) -> Points:
@@ -59,7 +62,7 @@ def points(capacity: int = CAPACITY) -> Points:
     N, z = capacity, np.zeros
     return Points(
         np.zeros(N, np.int64), np.zeros((N, 8), np.int64), z((N, 8)), z((N, 3)), z((N, 3)), z((N, 3)), z((N, 3)),
-        z((N, 3)), z((N, 3)), z((N, N, 3, 3)), z(N), z(N), z(N),
+        z((N, 3)), z((N, 3)), z((N, N, 3, 3)), z(N), z(N), z(N), z(N), z(N), z(N),
     )  # fmt: skip
 
 
@@ -143,6 +146,7 @@ class Interface:
         self.cell_of[i] = cell
         material, p = self.material_of(i), self.points
         p.friction[i], p.strength[i] = material.friction, material.strength
+        p.puncture[i], p.cutting[i], p.exit[i] = material.puncture_force, material.cutting_force, material.exit_force
         target = (np.log(SPACING / radius) + 0.19) / (4.0 * np.pi * material.shear * SPACING)
         p.soft[i] = max(target - float(np.trace(p.C[i, i])) / 3.0, HARD)
 
@@ -160,7 +164,7 @@ class Interface:
         return self.tick == self.ticks
 
     def push(self, d: Array) -> None:
-        """Add to the displacements ``d`` (n, 3) of a step what the points' mean forces do, and forget those that left."""
+        """Add to a step's displacements ``d`` (n, 3) what the points' mean forces do, and forget those that left."""
         p = self.points
         self.tick = 0
         used = np.flatnonzero(p.status)

@@ -21,7 +21,7 @@ MOST_PATHS, MOST_NODES = 16, 32
 class Paths(NamedTuple):
     """P paths of up to K nodes."""
 
-    count: Integers  # (P,) nodes; 0 for a path that is not in use
+    count: Integers  # type: ignore[assignment]  # (P,) nodes; 0 for a path that is not in use
     node: Integers  # (P, K) points of the interface, in order from the entry
     s: Array  # (P, K) length of the path up to the node, m
     cut: Array  # (P,) length up to which it is cut
@@ -31,9 +31,7 @@ class Paths(NamedTuple):
 def paths() -> Paths:
     """Room for paths, none yet."""
     P, K = MOST_PATHS, MOST_NODES
-    return Paths(
-        np.zeros(P, np.int64), np.zeros((P, K), np.int64), np.zeros((P, K)), np.zeros(P), np.full(P, np.inf)
-    )
+    return Paths(np.zeros(P, np.int64), np.zeros((P, K), np.int64), np.zeros((P, K)), np.zeros(P), np.full(P, np.inf))
 
 
 def begin_path(paths: Paths, point: int) -> int:

@@ -8,20 +8,19 @@ tip at less than the least angle to the surface slides over it instead. World ax
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.tissue import needle as states
 from ligature.tissue.interface import HARD, SPACING, USED, Interface
 from ligature.tissue.location import cross_surface, locate
-from ligature.tissue.needle import conclude, engage, gather, held, rows, solve_rows
+from ligature.tissue.needle import couple, held, rows
 from ligature.tissue.paths import MOST_NODES, MOST_PATHS, Paths, begin_path, extend_path
 from ligature.tissue.tearing import tear
 
 Array = NDArray[np.float64]
-
-LEFT = 1e-3
-"""Force in newtons below which a tip that leaves is out."""
 
 FADE = 0.05
 """Time in seconds in which tissue takes the shape of a needle that passes beside a node."""
@@ -61,7 +60,7 @@ class NeedleInTissue:
         self._rows = rows()
         self._shape = np.zeros(14)
         self._shape[9], self._shape[10] = curvature, length
-        self._delta = np.zeros(6)
+        self._delta, self._wrench = np.zeros(6), np.zeros(6)
         self._weights8, self._weights4, self._normal = np.zeros(8), np.zeros(4), np.zeros(3)
         self._before = np.full(3, np.nan)
 
@@ -95,25 +94,23 @@ class NeedleInTissue:
             When the needle's equations are singular or not finite.
         """
         h, p = self._held, self._interface.points
-        self._shape[:9], self._shape[11:] = np.concatenate([tip, tangent, normal]), centre
+        self._shape[:3], self._shape[3:6], self._shape[6:9], self._shape[11:] = tip, tangent, normal, centre
         if h.tip[0] == states.OUTSIDE:
             self._look_for_surface()
-        engage(p, self._paths, h, self._shape)
-        self._follow_tip()
-        self._set_limit(dt)
-        m = gather(p, self._paths, h, self._rows, self._shape, TIP_FRICTION, self._interface.fraction)
-        if solve_rows(self._rows, m, H, g, self._delta) < 0 or not np.isfinite(self._delta).all():
+        left, fate = couple(
+            p, self._paths, h, self._rows, self._shape, TIP_FRICTION, self._interface.fraction, dt, DROP, H, g,
+            self._delta, self._wrench,
+        )  # fmt: skip
+        if fate < 0 or not math.isfinite(self._delta.sum()):
             raise FloatingPointError("the equations of the needle in tissue have no finite solution")
-        through = conclude(p, self._paths, h, self._rows, m, self._delta)
-        if through:
+        if left >= 0:
+            self._lay_exit(left)
+        if fate > 0:
             self._get_through()
         elif h.tip[0] in (states.TOUCHES, states.SLIDES) and h.tip_side[0] < 0:
             self._let_go()
         self._before[:] = tip
-        wrench = np.zeros(6)
-        for a in range(m):
-            wrench -= self._rows.force[a] * self._rows.J[a]
-        return self._delta.copy(), wrench
+        return self._delta.copy(), self._wrench.copy()
 
     def _look_for_surface(self) -> None:
         """Begin a contact where the tip came through the surface in the last tick."""
@@ -154,7 +151,7 @@ class NeedleInTissue:
         away = ((corner.mean(axis=1) - at) ** 2).sum(axis=1)
         facing = (area * self._normal).sum(axis=1) > 0.0
         total = (area * (facing * np.exp(-away / AROUND**2))[:, None]).sum(axis=0)
-        return total / np.sqrt((total**2).sum())
+        return np.asarray(total / np.sqrt((total**2).sum()))
 
     def _opening(self, at: Array) -> tuple[int, int]:
         """Path that opens within reach of a point of the surface, and 1 at its entry, -1 at its exit."""
@@ -170,51 +167,6 @@ class NeedleInTissue:
                 if away < best:
                     best, found = away, (path, sense)
         return found
-
-    def _follow_tip(self) -> None:
-        """Bring where the tip is up to date with the nodes that hold the needle."""
-        h, paths = self._held, self._paths
-        for path in np.flatnonzero(h.passing).tolist():
-            nodes = paths.node[path, : paths.count[path]]
-            if not h.engaged[nodes].any():
-                h.passing[path] = 0
-                if h.tip[1] == path:
-                    h.tip[0], h.tip[1] = states.OUTSIDE, self._last_exit()
-        path = int(h.tip[1])
-        if path < 0 or not h.passing[path] or h.tip[0] in (states.TOUCHES, states.SLIDES):
-            return
-        if np.isfinite(paths.length[path]):
-            end = paths.node[path, paths.count[path] - 1 if h.passing[path] > 0 else 0]
-            out = h.engaged[end] and h.sigma[end] >= 0.0
-            h.tip[0] = states.OUTSIDE if out else states.OPEN
-
-    def _last_exit(self) -> int:
-        """The path that the tip left last of those that the needle is still in, or -1."""
-        h, paths = self._held, self._paths
-        found, best = -1, np.inf
-        for path in np.flatnonzero(h.passing).tolist():
-            end = paths.node[path, paths.count[path] - 1 if h.passing[path] > 0 else 0]
-            if 0.0 <= h.sigma[end] < best:
-                found, best = path, float(h.sigma[end])
-        return found
-
-    def _set_limit(self, dt: float) -> None:
-        """Force at which the tip gets further: what resists it, or what is left of what it has just broken."""
-        h, paths = self._held, self._paths
-        if h.tip[0] == states.TOUCHES:
-            h.limit[0] = self._interface.material_of(h.tip[2]).puncture_force
-        elif h.tip[0] in (states.CUTS, states.TENTS):
-            path = int(h.tip[1])
-            if paths.cut[path] >= h.room[0]:
-                h.tip[0] = states.TENTS
-            material = self._interface.material_of(paths.node[path, paths.count[path] - 1])
-            resists = material.cutting_force + (material.exit_force if h.tip[0] == states.TENTS else 0.0)
-            h.limit[0] = max(resists, h.limit[0] * float(np.exp(-dt / DROP)))
-        elif h.tip[0] == states.LEAVES:
-            h.limit[0] *= float(np.exp(-dt / DROP))
-            if h.limit[0] < LEFT:
-                h.tip[0] = states.OUTSIDE
-                self._lay_exit(int(h.tip[1]))
 
     def _get_through(self) -> None:
         """The tip's force reached its limit: it enters, cuts on, or leaves."""
@@ -391,4 +343,3 @@ class NeedleInTissue:
         for name, array in zip(self._held._fields, self._held, strict=True):
             array[:] = snapshot[name]
         self._before[:], self._delta[:], self._shape[:] = snapshot["before"], snapshot["delta"], snapshot["shape"]
-

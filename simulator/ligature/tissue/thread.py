@@ -8,7 +8,7 @@ joint solve. The force is limited along by friction and across by the tissue's s
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +108,7 @@ class ThreadInTissue:
             away = ((points[:-1] + part[:, None] * edge - y) ** 2).sum(axis=1)
             along = begin[:-1] + part * size
             # The nearest of those that lie near its last place: a thread may pass a node more than once.
-            near = np.abs(along - self._at[i]) < 4.0 * CAPTURE
+            near = np.abs(along - self._at[i]) < CAPTURE
             if not near.any():
                 self._drop(i)
                 continue
@@ -139,7 +139,7 @@ class ThreadInTissue:
             self._share[nodes[kept]] = np.diff(edges)
 
     def _direct(self, nodes: Integers) -> None:
-        """Direction of a path at its nodes towards the thread's last point: a thread may turn sharply where it enters."""
+        """Direction of a path at its nodes towards the thread's last point; a thread may turn where it enters."""
         if len(nodes) < 2:
             return
         at = self._interface.points.at[nodes]
@@ -201,7 +201,7 @@ class ThreadInTissue:
         return out
 
     def settle(self, points: Array) -> Springs | None:
-        """Take the thread's points (n, 3) as solved with the springs; other springs where limits were mistaken, or None.
+        """Take the thread's points (n, 3) as solved with the springs; new springs where limits were mistaken, or None.
 
         After None the forces stand, the anchors have followed, and what has torn is known.
         """
@@ -255,7 +255,7 @@ class ThreadInTissue:
         for name, array in self._state().items():
             array[:] = snapshot[name]
 
-    def _state(self) -> dict[str, Array]:
+    def _state(self) -> dict[str, NDArray[Any]]:
         return {
             "engaged": self.engaged, "at": self._at, "anchor": self._anchor, "torn": self._torn, "side": self._side,
         }  # fmt: skip
