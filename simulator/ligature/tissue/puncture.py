@@ -208,11 +208,6 @@ class NeedleInTissue:
         elif h.tip[0] == states.OUTSIDE and not np.isnan(self._before).any():
             self._look_inside()
 
-    def _tip_now(self) -> Array:
-        """The tip after the last tick."""
-        theta, r = self._delta[3:], self._shape[:3] - self._shape[11:14]
-        return self._shape[:3] + self._delta[:3] + np.cross(theta, r)
-
     def _lay_node(self) -> None:
         h, paths, points = self._held, self._paths, self._interface.points
         path = int(h.tip[1])
