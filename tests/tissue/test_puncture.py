@@ -69,7 +69,7 @@ def test_second_peak_stands_at_the_far_surface_and_leaves_friction_alone(through
     limit = MATERIAL.cutting_force + MATERIAL.exit_force
     peak = out - 3 + int(np.argmax(force[out - 3 : out + 2]))
     assert force[peak] == pytest.approx(limit + MATERIAL.friction * depth[tents[-1]], rel=0.01)
-    assert (where[out + 30 :] == states.OUTSIDE).all()
+    assert (where[out + 40 :] == states.OUTSIDE).all()
     assert force[-1] == pytest.approx(MATERIAL.friction * depth[-1], rel=0.01)
     assert depth[-1] == pytest.approx(0.01, rel=0.1)
 

@@ -37,10 +37,10 @@ OUTSIDE, TOUCHES, SLIDES, CUTS, TENTS, LEAVES, OPEN = 0, 1, 2, 3, 4, 5, 6
 """Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, breaking through
 it, in an old path."""
 
-HYSTERESIS = 2e-4
+HYSTERESIS = 5e-4
 """Length in metres by which a tip may stand before a node and still be held by it."""
 
-LEFT = 1e-3
+LEFT = 5e-3
 """Force in newtons below which a tip that leaves is out."""
 
 CAPTURE = 1e-3

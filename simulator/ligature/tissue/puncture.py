@@ -132,6 +132,8 @@ class NeedleInTissue:
         if path >= 0:
             h.passing[path], h.tip[1] = sense, path
             h.tip[0] = states.OPEN if np.isfinite(self._paths.length[path]) else states.CUTS
+            end = int(self._paths.node[path, 0 if sense > 0 else self._paths.count[path] - 1])
+            self._hold(end)
             return
         point = self._interface.add(grid.faces[face], self._weights4)
         self._interface.equip(point, int(grid.face_cell[face]), self.radius)
@@ -209,7 +211,7 @@ class NeedleInTissue:
             self._look_inside()
 
     def _lay_node(self) -> None:
-        h, paths, points = self._held, self._paths, self._interface.points
+        h, paths = self._held, self._paths
         path = int(h.tip[1])
         k = int(paths.count[path]) - 1
         lead = int(paths.node[path, k])
@@ -221,8 +223,13 @@ class NeedleInTissue:
             return
         point = self._add(cell)
         extend_path(paths, path, point, s)
+        self._hold(point)
+
+    def _hold(self, point: int) -> None:
+        """Let a node where the tip is hold the needle from now on."""
+        h = self._held
         h.engaged[point], h.anchor[point], h.sigma[point] = 1, 0.0, 0.0
-        h.offset[point] = self._shape[:3] - points.at[point]
+        h.offset[point] = self._shape[:3] - self._interface.points.at[point]
         h.torn[point], h.side[point], h.across[point] = 0.0, 0, 0.0
 
     def _lay_exit(self, path: int) -> None:
