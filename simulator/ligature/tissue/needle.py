@@ -43,6 +43,9 @@ HYSTERESIS = 5e-4
 LEFT = 5e-3
 """Force in newtons below which a tip that leaves is out."""
 
+LEAST_SHARE = 8e-4
+"""Length in metres for which a node holds across at least."""
+
 CAPTURE = 1e-3
 """Distance in metres from an old path, or from its opening, at which a tip follows it."""
 
@@ -304,7 +307,8 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
             nx, ny, nz = fx / size, fy / size, fz / size
         offset, torn = held.offset[i], held.torn[i]
         ox, oy, oz = offset[0] + torn[0], offset[1] + torn[1], offset[2] + torn[2]
-        limit = points.strength[i] * held.share[i]
+        # A node that has just been passed stands for no length yet; it tears no sooner than half of the others.
+        limit = points.strength[i] * max(held.share[i], LEAST_SHARE)
         for turn in range(2):
             if turn == 1:
                 nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx

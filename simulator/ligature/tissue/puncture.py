@@ -179,6 +179,8 @@ class NeedleInTissue:
             h.passing[path], h.tip[:] = 1, [states.CUTS, path, -1]
             h.engaged[point], h.anchor[point], h.sigma[point], h.share[point] = 1, 0.0, 0.0, 0.0
             self._interface.equip(point, self._interface.cell_of[point], self.radius)
+            # The bristle takes over the force that is left, so that the tip does not leap by what it yields.
+            paths.cut[path] = -float(h.limit[0] * self._interface.points.soft[point])
             self._find_far_surface()
         elif h.tip[0] == states.TENTS:
             h.tip[0] = states.LEAVES
