@@ -1,75 +1,102 @@
 # Ligature: `make run` and `make test` do everything themselves; the second time they cost nothing.
 
 PYTHON := .venv/bin/python
+PIP    := .venv/bin/pip --disable-pip-version-check install --progress-bar off
+STEP   := sh .ci/step.sh
 STAMPS := build/stamps
 SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
+SCENES ?= 10000
+RELEASES ?= 100
+COMMANDS ?= 1000000
+KILLS ?= 200
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
-.PHONY: run demo film test test-slow setup lint types check-imports unit fuzz bench soak docs addon test-blender blender-module clean
+.PHONY: run demo film test test-slow setup developers lint types check-imports unit fuzz bench contact-sheet soak docs addon test-blender blender-module clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
 
-test: setup lint unit
+test: developers lint unit
 
+# what running needs, and nothing else
 setup: $(STAMPS)/compiled
 
-$(STAMPS)/debian: debian-packages.txt debian-packages-tests.txt
+# what `make test` and its likes need beside
+developers: setup $(STAMPS)/debian-tests $(STAMPS)/python-tests
+
+$(STAMPS)/debian: debian-packages.txt
 	@mkdir -p $(STAMPS)
+	@echo "The first start sets everything up, in 3 to 10 minutes: Debian packages, Python packages, ROS messages, compilation."
 	@sh .ci/install_debian_packages.sh debian-packages.txt
-	@sh .ci/install_debian_packages.sh debian-packages-tests.txt || echo "going on without them: their tests are skipped"
 	@touch $@
 
 .venv/pyvenv.cfg: $(STAMPS)/debian
-	/usr/bin/python3 -m venv --system-site-packages .venv
+	@$(STEP) "creating the Python environment .venv, about 10 s" /usr/bin/python3 -m venv --system-site-packages .venv
 
-$(STAMPS)/python: requirements.txt requirements-dev.txt .venv/pyvenv.cfg
-	.venv/bin/pip install --quiet --disable-pip-version-check -r requirements.txt -r requirements-dev.txt
+$(STAMPS)/python: requirements.txt .venv/pyvenv.cfg
+	@$(STEP) "installing the Python packages of requirements.txt, about a minute" $(PIP) -r requirements.txt
 	@touch $@
 
 $(STAMPS)/messages: $(wildcard ros_msgs/*/msg/*.msg ros_msgs/*/srv/*.srv) ros_msgs/generate.sh $(STAMPS)/python
-	rm -rf build/python && mkdir -p build/python
-	ros_msgs/generate.sh build/python
-	echo "$(CURDIR)/build/python" > $$($(PYTHON) -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')/ligature-messages.pth
+	@rm -rf build/python && mkdir -p build/python
+	@$(STEP) "generating the ROS messages, about 10 s" ros_msgs/generate.sh build/python
+	@echo "$(CURDIR)/build/python" > $$($(PYTHON) -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')/ligature-messages.pth
 	@touch $@
 
 $(STAMPS)/package: setup.py $(STAMPS)/messages
-	.venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@$(STEP) "installing the simulator into .venv, about 10 s" $(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
 
-# the rod solver compiles once, here rather than at the first start
+# the kernels compile once, here rather than at the first start
 $(STAMPS)/compiled: $(STAMPS)/package
-	.venv/bin/ligature bench scenes/suturing_small/launch.yaml --seconds 0.1 >/dev/null
+	@$(STEP) "compiling the simulator's kernels for this machine, 1 to 2 minutes" .venv/bin/ligature compile
 	@touch $@
 
-lint: setup
+# the simulator runs without these; what apt does not offer is named, and its tests are skipped
+$(STAMPS)/debian-tests: debian-packages-tests.txt $(STAMPS)/debian
+	@sh .ci/install_debian_packages.sh debian-packages-tests.txt --optional || echo "going on without them: their tests are skipped"
+	@touch $@
+
+$(STAMPS)/python-tests: requirements-dev.txt $(STAMPS)/python
+	@$(STEP) "installing the Python packages of requirements-dev.txt, about a minute" $(PIP) -r requirements.txt -r requirements-dev.txt
+	@touch $@
+
+lint: developers
 	.venv/bin/ruff format --check simulator tests scenes examples blender_addon
 	.venv/bin/ruff check simulator tests scenes examples blender_addon
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
-unit: setup blender-module
+unit: developers blender-module
 	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python $(PYTHON) -m pytest -m "not slow" tests
 
 # the newest Blender as a Python module, beside the binary; without network the rest is tested without it
-blender-module: setup
+blender-module: developers
 	@sh .ci/fetch_blender_module.sh $(NEWEST_BPY) build/bpy-$(NEWEST_BPY) 240
 
 # what takes long, or watches real time so closely that other work on the machine disturbs it
-test-slow: setup
+test-slow: developers
 	$(PYTHON) -m pytest -m slow tests
 
-fuzz: setup
+fuzz: developers
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
+	$(PYTHON) -m tests.fuzz.run --scenes $(SCENES)
+	$(PYTHON) -m tests.fuzz.release --trials $(RELEASES)
+	$(PYTHON) -m tests.fuzz.commands --commands $(COMMANDS)
+	$(PYTHON) -m tests.fuzz.kills --kills $(KILLS)
 	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q $(shell grep -rl "from hypothesis" tests --include="test_*.py")
 
-bench: setup
+bench: developers
 	$(PYTHON) -m tests.bench.run
 
+# every scene drawn with and without shaders of its own, in build/contact_sheet.png
+contact-sheet: setup
+	$(PYTHON) -m tests.bench.contact_sheet
+
 # two simulated hours of servo on both arms, as fast as the machine allows
-soak: setup
+soak: developers
 	$(PYTHON) -m tests.bench.soak
 
 demo: setup
@@ -88,12 +115,12 @@ film: setup
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md
 
-addon: setup
+addon: developers
 	$(PYTHON) blender_addon/pack.py dist
 
 # all tests of the extension: in the Blender binary, with a window, and in Blender modules from the package index.
 # A module that cannot be had is told here and skipped there; the next run asks for it again.
-test-blender: setup
+test-blender: developers
 	@for version in $(BPY); do sh .ci/fetch_blender_module.sh $$version build/bpy-$$version; done
 	BLENDER_MODULES="$(BPY:%=build/bpy-%/bin/python)" $(PYTHON) -m pytest --durations=12 tests/blender
 

@@ -232,7 +232,7 @@ def _is_launch(path):
     try:
         return re.search(rb"^(multibody configs|world config)\s*:", path.read_bytes(), re.MULTILINE) is not None
     except OSError:
-        return False  # the reader tells it better
+        return False  # the reader reports it better
 
 
 def chosen_collection(context, name=""):

@@ -1,6 +1,6 @@
 """Draws what has no mesh: joint axes and limits, six-DOF boxes, springs, inertia, rays of sensors.
 
-Lines are worked out when something changed, and drawn from then on; colours tell what a line is.
+Lines are worked out when something changed, and drawn from then on; colours show what a line is.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def lines_of(scene: bpy.types.Scene) -> dict[str, list[Array]]:
         try:
             T = rest_pose(obj)
         except ValueError:
-            continue  # Check Scene tells it
+            continue  # Check Scene reports it
         maker = {"JOINT": _joint, "SENSOR": _sensor, "INERTIAL": _inertia, "SUTURE": _suture}[obj.adf.role]
         for colour, line in maker(obj):
             lines[colour].append(line @ T[:3, :3].T + T[:3, 3])

@@ -1,4 +1,4 @@
-"""Reads where Blender's objects stand, and says it in the keys of the format.
+"""Reads where Blender's objects stand, and states it in the keys of the format.
 
 World poses are composed from the objects' own transforms and parents, so that hidden objects and
 excluded collections count like all others. Pure arithmetic lives in `ligature.authoring`.
@@ -140,9 +140,9 @@ def tidy(values) -> tuple[float, ...]:
 
 
 def state_of(obj: bpy.types.Object) -> dict[str, list]:
-    """What the object's transform, children and data say, by the group of keys that it decides.
+    """What the object's transform, children and data state, by the group of keys that it decides.
 
-    Compared with the state just after the import it tells which keys keep the file's own text.
+    Compared with the state just after the import it shows which keys keep the file's own text.
     """
     role = obj.adf.role
     state: dict[str, list] = {}
@@ -183,7 +183,7 @@ def _flat(matrix: np.ndarray) -> list[float]:
 
 
 def unchanged(obj: bpy.types.Object, group: str, state: dict[str, list]) -> bool:
-    """Whether a group of keys says what it said when the object was imported."""
+    """Whether a group of keys states what it stated when the object was imported."""
     if not obj.adf.imported:
         return False
     before, now = json.loads(obj.adf.imported).get(group), state.get(group)
@@ -335,7 +335,7 @@ def _camera(obj: bpy.types.Object, state: dict, file_values: dict) -> dict:
 
 
 def _distance(file_values: dict) -> float:
-    """How far the file's camera looks; one metre when it says nothing."""
+    """How far the file's camera looks; one metre when it states nothing."""
     a, b = (np.array(file_values.get(name, (0.0, 0.0, 0.0))) for name in ("location", "look at"))
     return float(np.linalg.norm(a - b)) or 1.0
 

@@ -1,6 +1,6 @@
 """How well collision shapes stand for a body's mesh: figures kept with the body, and deviations to colour the mesh by.
 
-Metres, in the body's frame. Volume error and Hausdorff distance are what `ligature.mesh.quality` tells, worked out
+Metres, in the body's frame. Volume error and Hausdorff distance are what `ligature.mesh.quality` reports, worked out
 with Blender's own trees instead of compiled code.
 """
 
@@ -27,7 +27,7 @@ SAMPLES = 4000
 """Points on each surface from which distances are measured."""
 
 NUDGE = 1e-6
-"""Step outwards, over the extent, that tells whether one solid covers a face of another."""
+"""Step outwards, over the extent, that decides whether one solid covers a face of another."""
 
 FINENESS = 1.0 / 32.0
 """Longest edge of the triangles that are coloured, over the extent of the mesh."""
@@ -163,7 +163,7 @@ def solids_of(body: bpy.types.Object) -> list[Solid]:
 
 def _primitive(shape, T: np.ndarray) -> Solid:
     if shape.kind == "PLANE":
-        raise ValueError("a plane has no end, so that no figure tells how well it fits")
+        raise ValueError("a plane has no end, so that no figure measures how well it fits")
     vertices, polygons = shape_mesh(shape)
     faces = np.array([(face[0], b, c) for face in polygons for b, c in zip(face[1:], face[2:])])  # noqa: B905
     solid = _solid(vertices @ T[:3, :3].T + T[:3, 3], faces, True)

@@ -50,7 +50,7 @@ def import_file(
 ) -> Import:
     """Bring one world, model, input-devices or colours file in; raises `AdfError` when it cannot be read at all.
 
-    ``reader`` is for a file whose kind is known; by itself it is told by its keys.
+    ``reader`` is for a file whose kind is known; otherwise its keys show the kind.
     """
     resolver = Resolver.for_file(path, roots)
     document = reader(path, resolver)

@@ -31,7 +31,7 @@ def _namespace(collection: bpy.types.Collection | None) -> str:
 def reference(obj: bpy.types.Object, other: bpy.types.Object, given: str = "") -> str:
     """How the file of ``obj`` names another object: with its namespace when it is of a file that has another one.
 
-    ``given`` is what the file or the user says; it stays where it means that object and none of the own file.
+    ``given`` is what the file or the user states; it stays where it means that object and none of the own file.
     """
     here, there = file_of(obj), file_of(other)
     if here is None or there is None or there is here:

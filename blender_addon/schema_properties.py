@@ -1,7 +1,7 @@
 """Property groups made from the format's schema: one group a kind, one property a key.
 
 A key counts as given in the file when its property is set; *Unset* in a property's context menu takes
-it back to the default. Keys that a transform or a child object says (`PLACED`) have no property.
+it back to the default. Keys that a transform or a child object states (`PLACED`) have no property.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PLACED = {
     "light": ("location", "direction", "parent", "cutoff angle"),
     "launch": ("world config", "input devices config", "color config", "multibody configs"),
 }  # fmt: skip
-"""Keys, with those below them, that Blender's own data says."""
+"""Keys, with those below them, that Blender's own data states."""
 
 _NUMBERS = (Type.NUMBER, Type.NUMBER_OR_MAP)
 _WHOLE = (Type.INTEGER, Type.UNSIGNED)

@@ -29,7 +29,7 @@ def steps(file: h5py.File, camera: str = "cameraL", arm: str = "PSM1") -> Iterat
 
 
 def main() -> int:
-    """Tell what is in a dataset."""
+    """Report what is in a dataset."""
     with h5py.File(sys.argv[1], "r") as file:
         print(f"{file.attrs['format']}, scene '{file.attrs['scene']}', {file.attrs['rate']:g} samples a second")
         for name, episode in file.items():

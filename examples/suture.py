@@ -50,7 +50,7 @@ Array = np.ndarray
 
 
 class Failure(RuntimeError):
-    """The suture cannot go on; the text says what went wrong."""
+    """The suture cannot go on; the text states what went wrong."""
 
 
 class Surgeon:

@@ -5,7 +5,7 @@ The two arms are those of `suturing_small`. With the extension enabled (docs/ble
     blender -b --factory-startup --python scenes/author_blender_suturing.py -- scenes/blender_suturing
 
 to write the files again; the results are committed and a test compares. Everything is done by operators, in the
-order of the tutorial: each step is a function, and its first line tells what it does. Metres and radians.
+order of the tutorial: each step is a function, and its first line states what it does. Metres and radians.
 """
 
 from __future__ import annotations

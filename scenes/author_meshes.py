@@ -29,7 +29,7 @@ MATERIALS = {
     "block": "Kd 0.85 0.45 0.08\nKs 0.15 0.15 0.15\nNs 20\nPr 0.6\n",
     "foam": "Kd 0.80 0.62 0.50\nKs 0.05 0.05 0.05\nNs 8\nPr 0.95\n",
 }
-"""What things are made of, as MTL says it."""
+"""What things are made of, as MTL states it."""
 
 
 def moved(solid: Solid, T: Array) -> Solid:

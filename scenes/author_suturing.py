@@ -144,7 +144,7 @@ def phantom() -> dict[str, Any]:
 
 
 def ghosts() -> dict[str, Any]:
-    """A flat volume in the opening of each hole, which tells what is in it."""
+    """A flat volume in the opening of each hole, which senses what is in it."""
     size = {"x": 2 * OPENING, "y": 2 * OPENING, "z": 0.0004}
     names = [f"ghost{name}" for name in holes()]
     document: dict[str, Any] = {"ghost objects": [f"GHOST {name}" for name in names], "namespace": "/ambf/env/phantom/"}

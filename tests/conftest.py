@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
+CORPUS = Path(os.environ.get("LIGATURE_CORPUS", ROOT.parent / "shared" / "corpus"))
 np.seterr(divide="raise", over="raise", invalid="raise")
 
 # a change is judged on the same examples every time; `make fuzz` looks for new ones

@@ -1,4 +1,4 @@
-"""Arms in the physics: they go where they are told, without load exactly, and contact shows in what is measured."""
+"""Arms in the physics: they go where they are reported, without load exactly, and contact shows in what is measured."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
-from ligature.model.commands import ArmCommand, BodyCommand, CommandType
+from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import inverse, pose7_matrix, rpy_matrix
 from ligature.model.scene import ArmKind
 from ligature.robots.arm import Arm
+from ligature.robots.commands import MoveJp, ServoJp
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENE = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -120,8 +121,10 @@ def test_moves_keep_to_the_limits_of_velocity_and_acceleration(sim):
             sim.step(1)
             velocities.append(arm.setpoint_js().velocity)
         speeds = np.array(velocities)
-        assert (np.abs(speeds).max(axis=0) <= ratio * arm.joints.fastest * (1 + 1e-9)).all()
-        assert (np.abs(np.diff(speeds, axis=0)).max(axis=0) <= ratio * arm.joints.hardest * sim.dt * (1 + 1e-6)).all()
+        assert (np.abs(speeds).max(axis=0) <= ratio * arm.joints.max_velocity * (1 + 1e-9)).all()
+        assert (
+            np.abs(np.diff(speeds, axis=0)).max(axis=0) <= ratio * arm.joints.max_acceleration * sim.dt * (1 + 1e-6)
+        ).all()
 
 
 def test_what_stands_in_the_way_shows_in_measured_values_and_not_in_set_points():
@@ -223,8 +226,8 @@ def test_a_moving_set_point_is_followed_within_milliseconds(whole: Simulation, p
         psm.servo_jp(READY + 0.2 * np.sin(2 * np.pi * 0.5 * k * 1e-3) * np.array([1, 1, 0, 1, 1, 1]))
         whole.step()
         worst = max(worst, float(np.abs(psm.measured_js().position - psm.setpoint_js().position).max()))
-    fastest = 0.2 * 2 * np.pi * 0.5
-    assert worst < fastest * 0.012
+    max_velocity = 0.2 * 2 * np.pi * 0.5
+    assert worst < max_velocity * 0.012
 
 
 def test_joint_commands_of_others_have_no_effect_while_the_arm_is_enabled(whole: Simulation, psm: Arm) -> None:
@@ -258,7 +261,7 @@ def test_a_disabled_arm_is_limp_and_reports_where_it_is(whole: Simulation, psm: 
     assert psm.setpoint_js().position == pytest.approx(psm.measured_js().position)
 
 
-def test_a_closing_jaw_presses_by_how_far_it_was_told_to_close(whole: Simulation, psm: Arm) -> None:
+def test_a_closing_jaw_presses_by_how_far_it_was_asked_to_close(whole: Simulation, psm: Arm) -> None:
     psm.jaw.servo_jp([0.0])
     whole.step(300)
     loose = psm.jaw.measured_js()
@@ -294,14 +297,14 @@ def test_a_reset_ends_moves_and_arms_stay_where_it_puts_them(whole: Simulation, 
 
 def test_commands_that_travelled_do_what_calls_do_and_refusals_become_warnings(whole: Simulation, psm: Arm) -> None:
     psm.events.clear()
-    whole.apply(ArmCommand(0, "move_jp", (0.1, 0, 0.12, 0, 0, 0)))
+    whole.apply(MoveJp(0, (0.1, 0, 0.12, 0, 0, 0)))
     assert psm.is_busy
-    whole.apply(ArmCommand(0, "move_jp", (0.1,) * 4))
+    whole.apply(MoveJp(0, (0.1,) * 4))
     told = [(event.name, event.value) for event in psm.events]
     assert ("goal_reached", False) in told
     assert any(name == "warning" and "move_jp takes 6 numbers" in value for name, value in told)
     with pytest.raises(ValueError, match="finite"):
-        whole.apply(ArmCommand(0, "servo_jp", (float("nan"),) * 6))
+        whole.apply(ServoJp(0, (float("nan"),) * 6))
 
 
 def test_a_snapshot_in_the_middle_of_moves_continues_bit_for_bit(whole: Simulation, psm: Arm) -> None:

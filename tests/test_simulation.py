@@ -62,7 +62,7 @@ def test_bodies_are_found_by_topic_identifier_or_part(sim: Simulation) -> None:
         sim.bodies["Thread_"]
 
 
-def test_joints_go_where_they_are_told(sim: Simulation) -> None:
+def test_joints_go_where_they_are_reported(sim: Simulation) -> None:
     base = sim.bodies["psm1/baselink"]
     base.command_joints(GOAL)
     sim.step(2500)
@@ -161,7 +161,7 @@ def test_an_actuator_holds_the_needle_and_lets_it_go(sim: Simulation) -> None:
     assert needle.pose[2] < 0.72
 
 
-def test_an_actuator_that_cannot_find_its_body_says_so(sim: Simulation) -> None:
+def test_an_actuator_that_cannot_find_its_body_reports_it(sim: Simulation) -> None:
     sim.apply(ActuatorCommand(0, True, "BODY Nothing"))
     assert "no body is called 'BODY Nothing', or several are" in str(sim.problems[-1])
     assert not sim.state["actuator_active"][0, 0]

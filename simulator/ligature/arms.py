@@ -5,21 +5,22 @@ World axes, metres, radians.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
-from ligature.model.commands import ArmCommand
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.scene import ArmDescription, ArmKind, Scene
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem
 from ligature.physics import World
 from ligature.robots import ecm_arm, mtm_arm, psm_arm
 from ligature.robots.arm import Arm
 from ligature.robots.axes import Axes
-from ligature.robots.dispatch import carry_out
+from ligature.robots.commands import ArmCommand
 from ligature.robots.ecm import Ecm
 from ligature.robots.ecm_arm import EcmArm
 from ligature.robots.fitting import (
@@ -46,18 +47,17 @@ WATCH_PERIOD = 5
 """Ticks between two looks at following errors."""
 
 
-class ArmSet(Mapping[str, Arm]):
+class ArmSet(Subsystem, Mapping[str, Arm]):
     """The arms of a running scene by name."""
 
-    def __init__(self, scene: Scene, world: World) -> None:
-        self._world = world
+    def __init__(self, scene: Scene, world: World, dt: float = 1e-3) -> None:
+        self._world, self._dt = world, dt
         self.problems: list[Diagnostic] = []
         self._arms: list[Arm] = []
         for description in scene.arms:
             self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
         self._by_name = {arm.name: arm for arm in self._arms}
         self._records = [ArmRecord(arm) for arm in self._arms]
-        self._ticks = 0
 
     def __getitem__(self, name: str) -> Arm:
         if name not in self._by_name:
@@ -72,34 +72,47 @@ class ArmSet(Mapping[str, Arm]):
         return len(self._arms)
 
     def apply(self, command: ArmCommand) -> None:
-        """Carry out a command; what the arm refuses becomes its warning."""
+        """Carry out a command; what the arm refuses becomes its warning, whatever else it raises its FAULT."""
         arm = self._arms[command.arm]
         try:
-            carry_out(arm, command)
+            command.carry_out(arm)
         except Refused as error:
             arm.emit("warning", str(error))
-            if "move_" in command.verb:
+            if command.moves:
                 arm.emit("goal_reached", False)
+        except Exception as error:  # no command ends a run
+            arm.fault(f"{command.verb} failed: {_words(error)}")
+
+    def _guarded(self, what: str, arm: Arm, act: Callable[..., None], *arguments: Any) -> None:
+        """Have an arm do something; whatever it raises becomes its FAULT, and the other arms go on."""
+        try:
+            act(*arguments)
+        except Exception as error:
+            arm.fault(f"{what} failed: {_words(error)}")
 
     def release(self, index: int) -> None:
         """Whoever commanded an arm is gone: it stays where it is."""
         arm = self._arms[index]
         if arm.is_enabled and arm.is_homed:
-            arm.hold()
+            self._guarded("hold", arm, arm.hold)
 
-    def tick(self, dt: float) -> None:
-        """Advance all arms by ``dt`` seconds."""
-        self._ticks += 1
+    def step(self, tick: int) -> None:
+        """Advance all arms by a tick."""
         for arm in self._arms:
-            arm.tick(dt)
-        if self._ticks % WATCH_PERIOD == 0:
+            self._guarded("the motion", arm, arm.tick, self._dt)
+        if (tick + 1) % WATCH_PERIOD == 0:
             for arm in self._arms:
-                arm.watch(WATCH_PERIOD * dt)
+                self._guarded("the watch over following errors", arm, arm.watch, WATCH_PERIOD * self._dt)
 
-    def write(self, records: NDArray[np.void]) -> None:
-        """Write the state of all arms, ``records`` (arms,)."""
-        for arm_record, record in zip(self._records, records, strict=True):
-            arm_record.write(record)
+    def write_state(self, state: StateRecord) -> None:
+        """Write the state of all arms."""
+        for arm, arm_record, record in zip(self._arms, self._records, state["arm"][0], strict=True):
+            self._guarded("the reading", arm, arm_record.write, record)
+
+    def take_problems(self) -> list[Diagnostic]:
+        """What was found since the last call."""
+        found, self.problems = self.problems, []
+        return found
 
     def events(self) -> list[tuple[int, str, Any]]:
         """What happened since the last call: number of the arm, name and value."""
@@ -112,17 +125,22 @@ class ArmSet(Mapping[str, Arm]):
     def reset(self) -> None:
         """The scene was put back to its start: moves end, and arms hold where they are now."""
         for arm in self._arms:
-            arm.settle()
+            self._guarded("the reset", arm, arm.settle)
 
-    def memory(self) -> list[dict[str, Any]]:
-        """For snapshots."""
-        return [{"ticks": self._ticks}, *(arm.memory() for arm in self._arms)]
+    def snapshot(self) -> list[dict[str, Any]]:
+        """Everything that lasts from tick to tick."""
+        return [arm.snapshot() for arm in self._arms]
 
-    def recall(self, memory: Sequence[dict[str, Any]]) -> None:
-        """Continue from `memory`."""
-        self._ticks = memory[0]["ticks"]
-        for arm, kept in zip(self._arms, memory[1:], strict=True):
-            arm.recall(kept)
+    def restore(self, snapshot: Sequence[dict[str, Any]]) -> None:
+        """Continue from `snapshot`."""
+        for arm, state in zip(self._arms, snapshot, strict=True):
+            arm.restore(state)
+        self._records = [ArmRecord(arm) for arm in self._arms]
+
+
+def _words(error: Exception) -> str:
+    """What an exception states, and of which kind it is unless the arm itself raised it."""
+    return str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
 
 
 # --- building -------------------------------------------------------------------------------
@@ -134,8 +152,8 @@ def _psm(scene: Scene, world: World, description: ArmDescription, problems: list
         mark = scene.bodies[description.base].identity.mark
         problems.append(Diagnostic(Severity.WARNING, f"{description.name}: {problem}", mark, code="arm"))
     joints = Axes(
-        kinematics.joint_names, _travel(scene, description.joints), psm_arm.FASTEST, psm_arm.HARDEST,
-        world.drive(description.joints, psm_arm.SERVO_FASTEST, psm_arm.SERVO_HARDEST),
+        kinematics.joint_names, _travel(scene, description.joints), psm_arm.MAX_VELOCITY, psm_arm.MAX_ACCELERATION,
+        world.drive(description.joints, psm_arm.SERVO_MAX_VELOCITY, psm_arm.SERVO_MAX_DECELERATION),
     )  # fmt: skip
     arm = PsmArm(description.name, kinematics, joints, _jaw(world, description, kinematics.instrument))
     parts = [scene.joints[joint].child for joint in description.joints[-1:]]
@@ -156,7 +174,7 @@ def _jaw(world: World, description: ArmDescription, tool: Instrument) -> Axes | 
         return None
     plant = JawPlant(world, description.jaw)
     limits = np.array(tool.jaw, dtype=float).reshape(2, 1)
-    return Axes(("jaw",), limits, [psm_arm.JAW_FASTEST], [psm_arm.JAW_HARDEST], plant)
+    return Axes(("jaw",), limits, [psm_arm.JAW_MAX_VELOCITY], [psm_arm.JAW_MAX_ACCELERATION], plant)
 
 
 class JawPlant:
@@ -164,7 +182,10 @@ class JawPlant:
 
     def __init__(self, world: World, fingers: Sequence[int]) -> None:
         self._drive = world.drive(
-            fingers, np.full(2, psm_arm.SERVO_FASTEST[-1]), np.full(2, psm_arm.SERVO_HARDEST[-1]), JAW_STIFFNESS
+            fingers,
+            np.full(2, psm_arm.SERVO_MAX_VELOCITY[-1]),
+            np.full(2, psm_arm.SERVO_MAX_DECELERATION[-1]),
+            JAW_STIFFNESS,
         )
 
     def read(self) -> Array:
@@ -191,10 +212,10 @@ class JawPlant:
     def reset(self) -> None:
         """Nothing: the fingers belong to the physics."""
 
-    def memory(self) -> None:
+    def snapshot(self) -> None:
         """Nothing: it is part of the physics."""
 
-    def recall(self, memory: None) -> None:
+    def restore(self, snapshot: None) -> None:
         """Nothing."""
 
 
@@ -220,10 +241,10 @@ def _ecm(scene: Scene, world: World, description: ArmDescription, problems: list
     if description.joints:
         travel = _travel(scene, description.joints)
         limits = np.array([np.maximum(limits[0], travel[0]), np.minimum(limits[1], travel[1])])
-        plant: Any = world.drive(description.joints, ecm_arm.SERVO_FASTEST, ecm_arm.SERVO_HARDEST)
+        plant: Any = world.drive(description.joints, ecm_arm.SERVO_MAX_VELOCITY, ecm_arm.SERVO_MAX_DECELERATION)
     else:
         plant = CameraPlant(scene, world, description.tip, kinematics, ecm_arm.HOME)
-    joints = Axes(kinematics.joint_names, limits, ecm_arm.FASTEST, ecm_arm.HARDEST, plant)
+    joints = Axes(kinematics.joint_names, limits, ecm_arm.MAX_VELOCITY, ecm_arm.MAX_ACCELERATION, plant)
     return EcmArm(description.name, kinematics, joints)
 
 
@@ -269,13 +290,13 @@ class CameraPlant:
         self._state[:] = 0.0
         self._state[0] = self._start
 
-    def memory(self) -> Array:
+    def snapshot(self) -> Array:
         """The joint values that the camera's pose stands for."""
         return self._state.copy()
 
-    def recall(self, memory: Array) -> None:
-        """Continue from `memory`."""
-        self._state[:] = memory
+    def restore(self, snapshot: Array) -> None:
+        """Continue from `snapshot`."""
+        self._state[:] = snapshot
 
 
 def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list[Diagnostic]) -> Arm:
@@ -284,12 +305,12 @@ def _mtm(scene: Scene, world: World, description: ArmDescription, problems: list
     limits = np.array([kinematics.lower, kinematics.upper])
     start = np.clip(mtm_arm.HOME, limits[0], limits[1])
     plant = IdealPlant(limits[0], limits[1], mtm_arm.INERTIA, mtm_arm.DAMPING, start)
-    joints = Axes(kinematics.joint_names, limits, mtm_arm.FASTEST, mtm_arm.HARDEST, plant)
+    joints = Axes(kinematics.joint_names, limits, mtm_arm.MAX_VELOCITY, mtm_arm.MAX_ACCELERATION, plant)
     ends = mtm_arm.GRIPPER_LIMITS
     fingers = IdealPlant(ends[0], ends[1], np.full(1, 1e-3), np.full(1, 1e-2), np.zeros(1))
     gripper = Axes(("gripper",), ends, np.full(1, 20.0), np.full(1, 200.0), fingers)
     arm = MtmArm(description.name, kinematics, joints, gripper)
-    arm.set_base_frame(console_pose(side), "HRSV")
+    arm.set_base_frame(console_pose(side), f"{scene.world.frame_prefix}HRSV")
     arm.set_tip_wrench(lambda: np.zeros(6))
     return arm
 

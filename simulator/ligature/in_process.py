@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ligature import simulation
 
 if TYPE_CHECKING:
-    from ligature.render.cameras import CameraHandle
+    from ligature.render.cameras import CameraHandle, Studio
 
 
 class Simulation(simulation.Simulation):
@@ -17,9 +17,18 @@ class Simulation(simulation.Simulation):
     OpenGL is loaded when ``cameras`` is used for the first time, and a context is made at the first picture.
     """
 
+    _studio: Studio | None = None
+
     @cached_property
     def cameras(self) -> simulation.Handles[CameraHandle]:
         """Cameras of the scene by name; raises ImportError where OpenGL's Python package is missing."""
-        from ligature.render.cameras import camera_handles
+        from ligature.render.cameras import Studio, camera_handles
 
-        return camera_handles(self)
+        self._studio = Studio(self)
+        return camera_handles(self._studio)
+
+    def close(self) -> None:
+        """Give the physics engine and OpenGL back; neither steps nor pictures are to be had after this."""
+        if self._studio is not None:
+            self._studio.close()
+        super().close()

@@ -9,8 +9,8 @@ from __future__ import annotations
 import copy
 import hashlib
 import time as clock
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -21,7 +21,6 @@ from ligature.arms import ArmSet
 from ligature.grasping import Clamps, Grasps, Holder
 from ligature.model.commands import (
     ActuatorCommand,
-    ArmCommand,
     BodyCommand,
     Command,
     CommandType,
@@ -30,19 +29,24 @@ from ligature.model.commands import (
     Release,
     Reset,
     WatchContacts,
-    check,
+    object_counts,
 )
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import find_by_text
-from ligature.model.scene import Body, Camera, Joint, Scene
-from ligature.model.state import MAX_TOUCHES, StateRecord, new_state
-from ligature.physics import World
+from ligature.model.messages import Message, handle
+from ligature.model.scene import Actuator, Body, Camera, Joint, Light, Scene
+from ligature.model.state import StateRecord, new_state
+from ligature.model.subsystem import Subsystem
+from ligature.physics import Controllers, World, failure
+from ligature.physics.guard import Guard
+from ligature.robots.commands import ArmCommand
 from ligature.sensing.actuators import Actuators
-from ligature.sensing.attachments import Attachments
 from ligature.sensing.contacts import Contacts
 from ligature.sensing.ghosts import Ghosts
+from ligature.sensing.mounts import Mounts
 from ligature.sensing.rays import Rays
-from ligature.suture import Holes, Insertion, Rods
+from ligature.sensing.touches import Touches
+from ligature.suture import Insertion, Suture
 
 Array = NDArray[np.float64]
 Handle = TypeVar("Handle")
@@ -50,8 +54,9 @@ Handle = TypeVar("Handle")
 PHASES = ("control", "suture", "bodies", "sensing", "state")
 """What the time of a tick is spent on, in order."""
 
-LOOK_TICKS = 16
-"""Ticks between two looks at contacts that are watched."""
+
+GUARD_TICKS = 10
+"""Ticks between two looks at bodies that are too fast: one takes 5 µs."""
 
 
 class Stopwatch:
@@ -70,9 +75,10 @@ class Stopwatch:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """All that is needed to continue bit for bit: opaque, made by `Simulation.snapshot`."""
+    """All that is needed to continue bit for bit, in any process: opaque, made by `Simulation.snapshot`."""
 
     parts: Mapping[str, Any]
+    state: StateRecord
 
 
 class Handles(Mapping[str, Handle], Generic[Handle]):
@@ -202,93 +208,129 @@ class Simulation:
         self.state: StateRecord = new_state(scene)
         self.phases = {name: Stopwatch() for name in PHASES}
         self.problems: list[Diagnostic] = []
-        self._tick = 0
-        self._resets = 0
-        self._watching = False
+        self._counts = object_counts(scene)
+        self._clock = Clock()
+        self._watched = 0
         self._world = World(scene, dt)
-        self._rods = Rods(scene, dt)
-        self._holes = Holes(scene, self._rods, self._world, dt)
-        self._attachments = Attachments(scene)
-        self._ghosts = Ghosts(scene, self._world)
+        self._suture = Suture(scene, self._world, dt)
+        self._mounts = Mounts(scene)
         self._rays = Rays(scene, self._world)
-        self._contacts = Contacts(scene, self._world)
-        self.arms = ArmSet(scene, self._world)
-        self.problems += self.arms.problems
-        clamps = Clamps(scene, self._world)
-        self._actuators = Actuators(scene, Holder(scene, self._world, self._rods, clamps), self._rays)
-        self.grasps = Grasps(scene, self._world, self._rods, clamps, lambda: self._actuators.held)
+        self._touches = Touches(self._world)
+        self.arms = ArmSet(scene, self._world, dt)
+        clamps, rods = Clamps(scene, self._world), self._suture.rods
+        self._actuators = Actuators(scene, Holder(scene, self._world, rods, clamps), self._rays)
+        self.grasps = Grasps(scene, self._world, rods, clamps, lambda: self._actuators.held)
+        self._tick: dict[str, tuple[Subsystem, ...]] = {
+            "control": (self.arms, self._actuators, self._rays, Controllers(self._world)),
+            "suture": (self._suture, self.grasps),
+            "bodies": (self._world,),
+            "sensing": (self._touches, self._mounts, Ghosts(scene, self._world), Contacts(scene, self._world)),
+        }
+        """What a tick does, phase by phase: all subsystems in the order of their steps."""
+        self._subsystems = [subsystem for phase in self._tick.values() for subsystem in phase]
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
+        self._handlers: dict[type[Message], Callable[[Any], None]] = {
+            BodyCommand: self._world.set_command,
+            ActuatorCommand: self._actuate,
+            PlaceCommand: lambda c: self._mounts.place(c.kind, c.index, c.pose),
+            ParentCommand: lambda c: self._mounts.adopt(c.kind, c.index, c.parent),
+            ArmCommand: self.arms.apply,
+            WatchContacts: lambda c: self._touches.watch(c.enabled),
+            Release: self._release,
+            Reset: lambda c: self.reset(bodies_only=c.bodies_only),
+        }
+        self._guard = Guard(scene, self._world, self.state)
         self._write_state()
+        self._watch_anew()
 
     # --- time -------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
         """Simulated seconds since the start; a reset does not set it back."""
-        return self._tick * self.dt
+        return self._clock.tick * self.dt
 
     def step(self, ticks: int = 1) -> None:
-        """Advance by ``ticks`` ticks and write the state."""
+        """Advance by ``ticks`` ticks and write the state; how ticks are shared out over calls changes nothing."""
         for _ in range(ticks):
             self._advance()
-        with self.phases["state"]:
-            self._write_bodies()
-        with self.phases["sensing"]:
-            self._sense()
-        with self.phases["state"]:
-            self._write_rest()
+        self._write_state()
+        self._watch()
 
     def _advance(self) -> None:
-        """One tick."""
-        with self.phases["control"]:
-            self.arms.tick(self.dt)
-            self._world.pre_step()
-        with self.phases["suture"]:
-            self._holes.begin()
-            self._rods.step(self._world)
-            self._holes.end()
-            self.grasps.step(self._tick)
-        with self.phases["bodies"]:
-            self._world.step()
-        self._tick += 1
+        """One tick: commands become motor targets and forces, threads and grasps exchange impulses, bodies move."""
+        for phase, subsystems in self._tick.items():
+            with self.phases[phase]:
+                for subsystem in subsystems:
+                    subsystem.step(self._clock.since_reset)
+        self._clock.advance()
 
-    def _sense(self) -> None:
-        """Ghosts, rays, contact sensors and the poses of what rides on bodies."""
-        poses = self.state["body_pose"][0]
-        self._attachments.update(poses)
-        self._ghosts.update(self._attachments.world[self._attachments.of("ghost")], poses)
-        self._rays.update(poses, self._world.apply_force)
-        self._contacts.update()
+    def _watch(self) -> None:
+        """Report what moves as nothing commands."""
+        passed = self._clock.tick - self._watched
+        if passed >= GUARD_TICKS:
+            self._watched = self._clock.tick
+            alarm = self._guard.check(passed * self.dt)
+            if alarm is not None:
+                self.problems.append(alarm)
+
+    def _watch_anew(self) -> None:
+        """Bodies were put elsewhere: they have the motion that the state has."""
+        self._watched = self._clock.tick
+        self._guard.reset()
+
+    def _write_state(self) -> None:
+        """Fill the state record: what is, then what sensors make of it. Looking changes nothing."""
+        with self.phases["state"]:
+            for subsystem in self._subsystems:
+                subsystem.write_state(self.state)
+                self.problems += subsystem.take_problems()
+            self._clock.write_state(self.state, self.dt, self.ticks_per_update)
+        with self.phases["sensing"]:
+            for subsystem in self._subsystems:
+                subsystem.sense(self.state)
 
     @property
     def insertions(self) -> tuple[Insertion, ...]:
         """Needles and threads in tissue holes, as after the last tick; ``scene.holes`` names the holes."""
-        return self._holes.insertions
+        return self._suture.holes.insertions
 
     # --- commands ---------------------------------------------------------------------------
 
     def apply(self, command: Command) -> None:
-        """Take a command; it acts from the next tick on. Raises ValueError for numbers that are not finite."""
-        check(command)
-        if isinstance(command, BodyCommand):
-            self._world.set_command(command)
-        elif isinstance(command, ActuatorCommand):
-            problem = self._actuators.apply(command, self.state["body_pose"][0])
-            if problem is not None:
-                self.problems.append(problem)
-        elif isinstance(command, PlaceCommand):
-            self._attachments.place(command.kind, command.index, command.pose)
-        elif isinstance(command, WatchContacts):
-            self._watching = command.enabled
-        elif isinstance(command, ParentCommand):
-            self._attachments.adopt(command.kind, command.index, command.parent)
-        elif isinstance(command, ArmCommand):
-            self.arms.apply(command)
-        elif isinstance(command, Release):
-            self._release(command)
-        elif isinstance(command, Reset):
-            self.reset(bodies_only=command.bodies_only)
+        """Take a command; it acts from the next tick on.
+
+        Raises ValueError, and changes nothing, for invalid values, and for an object that the scene does not have.
+        What an arm rejects becomes its warning, what goes wrong in it its FAULT. What goes wrong in another object
+        clears its command and is among `problems`.
+        """
+        command.check()
+        command.check_indices(self._counts)
+        try:
+            handle(self._handlers, command)
+        except Exception as error:  # no command ends a run
+            self.problems.append(failure(self._name_of(command), error))
+            if isinstance(command, BodyCommand):
+                self._world.release(command.body)
+
+    def _name_of(self, command: Command) -> str:
+        """The object of a command, for messages."""
+        if command.object is None:
+            return type(command).__name__
+        kind, index = command.object
+        items: dict[str, Sequence[Body] | Sequence[Actuator] | Sequence[Camera] | Sequence[Light]] = {
+            "body": self.scene.bodies,
+            "actuator": self.scene.actuators,
+            "camera": self.scene.cameras,
+            "light": self.scene.lights,
+        }
+        return f"{kind} '{items[kind][index].identity.identifier if kind in items else self.scene.arms[index].name}'"
+
+    def _actuate(self, command: ActuatorCommand) -> None:
+        problem = self._actuators.apply(command, self.state["body_pose"][0])
+        if problem is not None:
+            self.problems.append(problem)
 
     def _release(self, command: Release) -> None:
         if command.kind == "body":
@@ -303,121 +345,100 @@ class Simulation:
 
         Raises ValueError for a link of an arm.
         """
-        check(BodyCommand(body, CommandType.POSITION, tuple(pose)))
+        BodyCommand(body, CommandType.POSITION, tuple(pose)).check()
         before = pose7_matrix(self._world.pose7(body))
         self.grasps.let_go_of(body)
         self._world.set_pose(body, pose)
-        self._rods.carry(body, pose7_matrix(pose) @ inverse(before))
-        self._holes.forget(body)
+        self._suture.rods.carry(body, pose7_matrix(pose) @ inverse(before))
+        self._suture.holes.forget(body)
         self._write_state()
+        self._watch_anew()
 
     def reset(self, bodies_only: bool = False) -> None:
-        """Put everything back to where the scene starts; time goes on and commands hold."""
-        self.grasps.let_go_of()
-        self._world.reset()
-        self._rods.reset()
-        self._holes.reset()
-        self.arms.reset()
-        if not bodies_only:
-            self._attachments.reset()
-        self._resets += 1
+        """Put everything back to where the scene starts, to the bit; time goes on and commands hold.
+
+        ``bodies_only`` leaves ghosts, cameras and lights where they are.
+        """
+        for subsystem in reversed(self._subsystems):
+            if not (bodies_only and subsystem is self._mounts):
+                subsystem.reset()
+        self._clock.restart()
         self._write_state()
+        self._watch_anew()
 
     # --- snapshots --------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
-        """The whole dynamic state; this simulation and a restored one continue with the same bits."""
-        parts: dict[str, Any] = {
-            "tick": self._tick,
-            "resets": self._resets,
-            "world": self._world.snapshot(),
-            "rods": self._rods.memory(),
-            "holes": self._holes.memory(),
-            "attachments": self._attachments.memory(),
-            "arms": self.arms.memory(),
-            "actuators": self._actuators.memory(),
-            "grasps": self.grasps.memory(),
-        }
-        self._holes.restart()
-        self._ghosts.forget()
-        self.grasps.recall(parts["grasps"])
-        self._write_state()
-        return Snapshot(copy.deepcopy(parts))
+        """The whole dynamic state: this simulation and a restored one continue with the same bits.
+
+        Bullet keeps contacts that nobody can read. A snapshot drops them here, too, as `restore` does: a run that
+        is snapshot goes on with other last bits than one that is not.
+        """
+        parts = {"clock": self._clock, **{f"{n}": s.snapshot() for n, s in enumerate(self._subsystems)}}
+        taken = Snapshot(copy.deepcopy(parts), self.state.copy())
+        self.restore(taken)
+        return taken
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Continue from a snapshot of this scene."""
+        """Continue from a snapshot of this scene, taken here or elsewhere."""
         parts = copy.deepcopy(dict(snapshot.parts))
-        self._tick, self._resets = parts["tick"], parts["resets"]
-        self._world.restore(parts["world"])
-        self._rods.recall(parts["rods"])
-        self._holes.recall(parts["holes"])
-        self._attachments.recall(parts["attachments"])
-        self.arms.recall(parts["arms"])
-        self._ghosts.forget()
-        self._actuators.recall(parts["actuators"])
-        self.grasps.recall(parts["grasps"])
-        self._write_state()
+        self._clock = parts["clock"]
+        for n, subsystem in reversed(list(enumerate(self._subsystems))):
+            subsystem.restore(parts[f"{n}"])
+        self.state[:] = snapshot.state
+        self._watch_anew()
 
-    def state_hash(self) -> str:
-        """SHA-256 of the full state: equal for equal scenes, commands and versions."""
+    def state_hash(self, clock: bool = True) -> str:
+        """SHA-256 of the full state: equal for equal scenes, commands and versions.
+
+        ``clock=False`` leaves out time and the number of resets, to compare with a run that began elsewhere.
+        """
         digest = hashlib.sha256()
+        left_out = ("wall_time", "stamp", "update", *(() if clock else ("tick", "sim_time", "resets")))
         for name in sorted(self.state.dtype.names or ()):
-            if name not in ("wall_time", "stamp"):
+            if name not in left_out:
                 digest.update(np.ascontiguousarray(self.state[name]).tobytes())
-        for kept in (*self._rods.memory(), self._holes.memory()):
-            for name in sorted(kept):
-                digest.update(np.ascontiguousarray(kept[name]).tobytes())
+        _digest(self._suture.snapshot(), digest.update)
         return digest.hexdigest()
 
     def close(self) -> None:
         """Give the physics engine back."""
         self._world.close()
 
-    # --- state ------------------------------------------------------------------------------
 
-    def _write_bodies(self) -> None:
-        self.problems += self._world.heal() + self._rods.heal()
-        self._world.write_state(self.state)
-        self._rods.write_state(self.state)
-        self._holes.write_state(self.state)
+@dataclass
+class Clock:
+    """Ticks since the start and since the last reset, and how many resets there were."""
 
-    def _write_state(self) -> None:
-        """Fill the state record anew, after something was put elsewhere."""
-        self._write_bodies()
-        self._attachments.update(self.state["body_pose"][0])
-        self._write_rest()
+    tick: int = 0
+    since_reset: int = 0
+    resets: int = 0
 
-    def _write_touches(self) -> None:
-        """Contact points and forces for whoever looks at them, as often as eyes can see."""
-        if self._watching and self._tick % LOOK_TICKS < self.ticks_per_update:
-            points, forces = self._world.touches(MAX_TOUCHES)
-            count = self.state["touch_count"][0] = len(points)
-            self.state["touch_point"][0, :count], self.state["touch_force"][0, :count] = points, forces
-        elif not self._watching:
-            self.state["touch_count"] = 0
+    def advance(self) -> None:
+        """A tick went by."""
+        self.tick += 1
+        self.since_reset += 1
 
-    def _write_rest(self) -> None:
-        """Fill everything of the state record but the bodies."""
-        state, attachments = self.state, self._attachments
-        state["tick"] = self._tick
-        state["update"] = self._tick // self.ticks_per_update
-        state["resets"] = self._resets
-        state["sim_time"] = self.time
-        state["ghost_world"][0] = attachments.world[attachments.of("ghost")]
-        state["ghost_sensed"][0] = self._ghosts.sensed
-        for kind in ("camera", "light"):
-            state[f"{kind}_pose"][0] = attachments.local[attachments.of(kind)]
-            state[f"{kind}_world"][0] = attachments.world[attachments.of(kind)]
-        hits = self._rays.hits
-        state["ray_measurement"][0] = self._rays.measurement
-        state["ray_body"][0], state["ray_point"][0], state["ray_normal"][0] = (
-            hits.body,
-            hits.point,
-            hits.normal,
-        )
-        self._contacts.write(state)
-        self._write_touches()
-        self.grasps.write_state(state)
-        self.arms.write(state["arm"][0])
-        held = np.array(self._actuators.held, dtype=np.int32)
-        state["actuator_body"][0], state["actuator_active"][0] = held, held >= 0
+    def restart(self) -> None:
+        """The scene was put back to its start."""
+        self.since_reset = 0
+        self.resets += 1
+
+    def write_state(self, state: StateRecord, dt: float, ticks_per_update: int) -> None:
+        """Write counts and time."""
+        state["tick"], state["resets"], state["sim_time"] = self.tick, self.resets, self.tick * dt
+        state["update"] = self.tick // ticks_per_update
+
+
+def _digest(value: Any, update: Callable[[bytes], object]) -> None:
+    """Feed nested dicts, sequences and arrays of a snapshot to a hash."""
+    if isinstance(value, Mapping):
+        for name in sorted(value):
+            _digest(value[name], update)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            _digest(item, update)
+    elif is_dataclass(value):
+        _digest([getattr(value, field.name) for field in fields(value)], update)
+    else:
+        update(np.ascontiguousarray(value).tobytes())

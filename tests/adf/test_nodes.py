@@ -71,7 +71,7 @@ def test_deep_nesting_is_refused() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "- 1\n- 2\n", "just text"])
-def test_a_file_without_a_mapping_says_so(text: str) -> None:
+def test_a_file_without_a_mapping_reports_it(text: str) -> None:
     with pytest.raises(AdfError, match="the file"):
         parse(text, FILE)
 

@@ -144,7 +144,7 @@ def test_changes_that_meet_are_refused() -> None:
         apply(TEXT, [set_value(TEXT, a, "mass", 1), set_value(TEXT, a, "mass", 2)])
 
 
-def test_what_cannot_be_is_told() -> None:
+def test_what_cannot_be_is_reported() -> None:
     with pytest.raises(PatchError, match="'mass' at m.yaml:4:9 is no block"):
         set_value(TEXT, block(TEXT, "BODY a"), "mass.x", 1)
     with pytest.raises(PatchError, match="is there already"):

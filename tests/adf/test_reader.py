@@ -38,7 +38,7 @@ def test_values_and_defaults_come_from_the_schema(model) -> None:
     assert body.has("mass") and not body.has("scale")
 
 
-def test_a_bad_value_leaves_the_object_out_and_says_where(model) -> None:
+def test_a_bad_value_leaves_the_object_out_and_states_where(model) -> None:
     document = model(BODY + "  scale: big\n")
     assert document.elements("bodies") == ()
     assert messages(document) == [
@@ -66,17 +66,17 @@ def test_an_unknown_key_gets_a_suggestion(model) -> None:
     ]
 
 
-def test_keys_that_ambf_ignores_are_told_at_debug_only(model) -> None:
+def test_keys_that_ambf_ignores_are_reported_at_debug_only(model) -> None:
     document = model(BODY + "  color: red\n")
     assert messages(document) == []
     assert "key 'color' of body 'BODY a' has no effect" in messages(document, Severity.DEBUG)[0]
 
 
-def test_a_key_that_stands_twice_is_told(model) -> None:
+def test_a_key_that_stands_twice_is_reported(model) -> None:
     assert "key 'mass' stands twice; the first one counts" in messages(model(BODY + "  mass: 3\n"))[0]
 
 
-def test_a_bad_value_of_the_file_itself_is_told_and_its_default_taken(model) -> None:
+def test_a_bad_value_of_the_file_itself_is_reported_and_its_default_taken(model) -> None:
     document = model(BODY + "gravity: {x: 0, y: 0}\nignore inter-collision: maybe\n")
     assert len(document.elements("bodies")) == 1
     assert not document.top.has("gravity") and document.top.flag("ignore inter-collision") is False
@@ -87,7 +87,7 @@ def test_objects_exist_only_when_listed(model) -> None:
     assert len(model(BODY + "BODY b:\n  name: b\n").elements("bodies")) == 1
 
 
-def test_a_listed_object_without_definition_is_told(model) -> None:
+def test_a_listed_object_without_definition_is_reported(model) -> None:
     assert "body 'BODY b' is listed but not defined" in messages(model("bodies: [BODY b]\n"))[0]
 
 

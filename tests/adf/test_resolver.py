@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ligature.adf import ResolutionError, Resolver
-from ligature.adf.resolver import SEARCH_PATH
+from ligature.adf.resolver import SEARCH_PATH, scene_root
 
 
 @pytest.fixture
@@ -51,7 +57,7 @@ def test_a_large_file_is_refused(lab: Path) -> None:
         Resolver([lab]).read_bytes(lab / "big.obj", limit=10)
 
 
-def test_a_missing_file_and_a_folder_say_which(lab: Path) -> None:
+def test_a_missing_file_and_a_folder_state_which(lab: Path) -> None:
     with pytest.raises(ResolutionError, match="does not exist"):
         Resolver([lab]).read_bytes(lab / "none.yaml")
     with pytest.raises(ResolutionError, match="is a folder"):
@@ -63,7 +69,90 @@ def test_the_search_path_adds_roots(lab: Path, monkeypatch: pytest.MonkeyPatch) 
     assert Resolver.for_file(lab / "ADF" / "m.yaml").exists(lab.parent / "secret.txt")
 
 
-def test_bytes_that_are_no_text_say_where(lab: Path) -> None:
+def test_bytes_that_are_no_text_state_where(lab: Path) -> None:
     (lab / "bad.yaml").write_bytes(b"name: \xff\xfe")
     with pytest.raises(ResolutionError, match=r"is not UTF-8 text \(byte 6\)"):
         Resolver([lab]).read_text(lab / "bad.yaml")
+
+
+NAMES = st.sampled_from(["ADF", "meshes", "descriptions", "multi-bodies", "robots", "b c", "d"])
+
+
+@st.composite
+def archives(draw: st.DrawFn) -> tuple[list[str], list[str], list[str]]:
+    """Folders of a launch file within an archive, of a model below the launch file, and of the model that it names."""
+    launch = draw(st.lists(NAMES, max_size=2))
+    branch = draw(NAMES)
+    return launch, [branch, *draw(st.lists(NAMES, max_size=3))], [branch, *draw(st.lists(NAMES, max_size=3))]
+
+
+def write(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+@given(archives(), st.booleans())
+def test_a_model_of_an_archive_has_the_root_of_its_launch_file(
+    folders: tuple[list[str], list[str], list[str]], quoted: bool
+) -> None:
+    at, own, named = folders
+    with TemporaryDirectory() as place:
+        top = Path(place).resolve() / "downloads" / "archive"
+        home = top.joinpath(*at)
+        text = os.path.join(".", *named, "named.yaml")
+        launch = write(home / "scene.yaml", f"multibody configs:\n  - {json.dumps(text) if quoted else text}\n")
+        model = write(home.joinpath(*own, "own.yaml"), "bodies: []\n")
+        assert Resolver.for_file(model).roots == Resolver.for_file(launch).roots == (home.parent,)
+        assert Resolver.for_file(model).exists(write(home.parent / "meshes" / "m.obj", ""))
+        outside = write(home.parent.parent / "secret.obj", "")
+        with pytest.raises(ResolutionError, match="lies outside"):
+            Resolver.for_file(model).allow(outside)
+
+
+@given(archives(), NAMES)
+def test_a_launch_file_that_names_another_branch_widens_nothing(
+    folders: tuple[list[str], list[str], list[str]], other: str
+) -> None:
+    at, own, _ = folders
+    with TemporaryDirectory() as place:
+        home = Path(place).resolve().joinpath("archive", *at)
+        model = write(home.joinpath(f"{own[0]} alone", *own[1:], "own.yaml"), "bodies: []\n")
+        write(home / "scene.yaml", f"multibody configs: ['{other}/named.yaml', '../elsewhere.yaml', '/etc/passwd']\n")
+        write(home / "broken.yaml", "multibody configs: [\n")
+        assert Resolver.for_file(model).roots == (model.parent.parent,)
+
+
+def test_the_root_is_never_a_whole_disk_nor_above_the_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    home = tmp_path / "homes" / "ann"
+    model = write(home / "model.yaml", "bodies: []\n")
+    monkeypatch.setenv("HOME", str(home))
+    assert scene_root(model) == home
+    write(tmp_path / "launch.yaml", "multibody configs: [homes/ann/scene/ADF/x.yaml]\n")
+    assert scene_root(write(home / "scene" / "ADF" / "y.yaml", "")) == home / "scene"
+    assert scene_root(Path("/launch.yaml")) == Path("/")
+
+
+def test_hints_of_many_files_outside_name_one_root(lab: Path) -> None:
+    resolver = Resolver.for_file(lab / "ADF" / "deep" / "m.yaml")
+    hints = set()
+    for number in range(20):
+        with pytest.raises(ResolutionError) as caught:
+            resolver.resolve(f"../../meshes/m{number}/high_res/m.obj", lab / "ADF" / "deep")
+        hints.add(caught.value.diagnostic.hint)
+    assert hints == {f"allow it with --root {lab} or {SEARCH_PATH}"}
+
+
+def test_every_file_of_the_corpus_loads_from_an_archive_as_it_does_from_a_repository(
+    corpus: Path, tmp_path: Path
+) -> None:
+    """Neither `.git` nor `package.xml` is in it; only paths of their authors' machines stay outside."""
+    from ligature.cli.check import findings
+
+    copy = tmp_path / "downloads" / "archive"
+    shutil.copytree(corpus, copy, symlinks=True, ignore=shutil.ignore_patterns(".git", "package.xml"))
+    for file in sorted(copy.rglob("*.yaml")):
+        for diagnostic in findings(file, [], False):
+            if "lies outside" in diagnostic.message:
+                named = Path(diagnostic.message.split("'")[1])
+                assert copy not in named.parents, str(diagnostic)

@@ -1,4 +1,4 @@
-"""Findings that take more than one key: each rule says what is wrong, where, and what would be right."""
+"""Findings that take more than one key: each rule states what is wrong, where, and what would be right."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def findings(tmp_path: Path, text: str, least: Severity = Severity.DEBUG) -> str
         ("revolute", "  offset: 1\n  child offset: 2\n", "has 'offset' too, which wins; remove one"),
     ],
 )
-def test_joint_keys_that_contradict_the_type_are_told(tmp_path: Path, kind: str, keys: str, words: str) -> None:
+def test_joint_keys_that_contradict_the_type_are_reported(tmp_path: Path, kind: str, keys: str, words: str) -> None:
     assert words in findings(tmp_path, JOINT.format(type=kind, keys=keys))
 
 
@@ -65,7 +65,7 @@ def test_joint_keys_that_contradict_the_type_are_told(tmp_path: Path, kind: str,
         ),
     ],
 )
-def test_cameras_that_show_nothing_are_told(tmp_path: Path, keys: str, words: str) -> None:
+def test_cameras_that_show_nothing_are_reported(tmp_path: Path, keys: str, words: str) -> None:
     assert words in findings(tmp_path, CAMERA.format(keys=keys))
 
 
@@ -82,7 +82,7 @@ def test_cameras_that_show_nothing_are_told(tmp_path: Path, keys: str, words: st
         ("bodies", "  mass: -1\n", "'mass' of body 'X' is not usable; expected at least 0, not -1"),
     ],
 )  # fmt: skip
-def test_objects_that_cannot_work_are_told(tmp_path: Path, list_: str, keys: str, words: str) -> None:
+def test_objects_that_cannot_work_are_reported(tmp_path: Path, list_: str, keys: str, words: str) -> None:
     assert words in findings(tmp_path, OBJECT.format(list=list_, keys=keys))
 
 

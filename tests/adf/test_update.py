@@ -1,4 +1,4 @@
-"""A file is made to say what is wanted by changing only what differs."""
+"""A file is made to state what is wanted by changing only what differs."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def differing(before: str, after: str) -> list[str]:
     return [line for line in after.splitlines() if line not in old]
 
 
-def test_what_says_the_same_stays_byte_for_byte(tmp_path: Path) -> None:
+def test_what_states_the_same_stays_byte_for_byte(tmp_path: Path) -> None:
     document = read(tmp_path, TEXT)
     assert changed(document, "BODY a", {"mass": 1.0, "location": ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0))}) == TEXT
 
@@ -131,7 +131,7 @@ def test_an_unreadable_object_is_left_alone(tmp_path: Path) -> None:
     assert changed(read(tmp_path, text), "BODY a", {"mass": 9.0}) == text.replace("mass: 1.00000", "mass: 9.0")
 
 
-def test_a_new_file_is_canonical_and_says_the_same(tmp_path: Path) -> None:
+def test_a_new_file_is_canonical_and_states_the_same(tmp_path: Path) -> None:
     document = read(tmp_path, TEXT)
     text = new_text(document.kind, given_values(document.top), items_of(document))
     again = read(tmp_path, text)

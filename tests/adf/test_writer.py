@@ -38,7 +38,7 @@ def test_keys_come_in_the_order_of_the_schema() -> None:
 
 
 def test_every_corpus_file_written_anew_reads_the_same(corpus: Path) -> None:
-    compared = 0
+    compared = set()
     for file in sorted(corpus.rglob("*.yaml")):
         if file.name in ("compound_example.yaml", "colors.yaml"):
             continue
@@ -46,8 +46,15 @@ def test_every_corpus_file_written_anew_reads_the_same(corpus: Path) -> None:
         values = plain(parse(document.text, file))
         again = plain(parse(write_document(document.kind, values), file))
         assert _without_null(again) == _without_null(values), file.name
-        compared += 1
-    assert compared == 53
+        compared.add(file.name)
+    assert {
+        "launch.yaml",
+        "world.yaml",
+        "phantom.yaml",
+        "psm1.yaml",
+        "blender-pr2.yaml",
+        "input_devices.yaml",
+    } <= compared
 
 
 def _without_null(value: object) -> object:

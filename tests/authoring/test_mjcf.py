@@ -44,7 +44,7 @@ def tensor(moments: Any, T: np.ndarray) -> np.ndarray:
 
 @pytest.fixture
 def load(tmp_path: Path) -> Callable[..., tuple[Scene, str]]:
-    """Converts by the command line and loads the model: the scene, and what was told."""
+    """Converts by the command line and loads the model: the scene, and what was reported."""
 
     def convert(world: str, more: str = "") -> tuple[Scene, str]:
         (tmp_path / "m.xml").write_text(f"<!-- a <robot> -->\n{HEAD}<worldbody>{world}</worldbody>{more}</mujoco>")
@@ -179,7 +179,7 @@ def test_joints_in_one_place_become_a_six_dof_joint_that_moves_the_same_way(case
     T_parent_a, at_rest = joint_pose(keys_of(joint)), child_pose(keys_of(joint))
     wanted = np.linalg.inv(T_parent_a) @ relative(model, q, "p", "b") @ np.linalg.inv(at_rest) @ T_parent_a
     found = [*wanted[:3, 3], *matrix_rpy(wanted[:3, :3])]  # turned by Rz Ry Rx, as the format composes them
-    upper = dict(zip(q.values(), (0.6, 0.7, 0.8), strict=True))  # which joint an axis is, its position tells
+    upper = dict(zip(q.values(), (0.6, 0.7, 0.8), strict=True))  # the position shows which joint an axis is
     seen = 0
     for path, value in zip([(half, a) for half in ("linear", "angular") for a in "xyz"], found, strict=True):
         low, high = (joint[f"joint limits.{path[0]}.{end}.{path[1]}"] for end in ("low", "high"))
@@ -193,7 +193,7 @@ def test_joints_in_one_place_become_a_six_dof_joint_that_moves_the_same_way(case
     assert seen == 3
 
 
-def test_joints_that_no_joint_of_the_format_expresses_are_told_by_name() -> None:
+def test_joints_that_no_joint_of_the_format_expresses_are_reported_by_name() -> None:
     tags = "".join(f'<joint name="{n}" type="{t}" axis="{a}"/>' for n, t, a in SEVERAL["along"])
     result = converted(f'<body name="p"><freejoint/>{BALL}<body name="b">{tags}{BALL}</body></body>')
     assert [i.key for i in result.parts.items] == ["BODY p", "BODY b"]
@@ -220,7 +220,7 @@ def test_springs_and_dampers_of_joints_that_nothing_drives(load: Callable[..., t
     assert "gains of the actuators are left out: 'm'" in output
 
 
-def test_a_damped_hinge_slows_down_as_its_damper_says(load: Callable[..., tuple[Scene, str]]) -> None:
+def test_a_damped_hinge_slows_down_as_its_damper_states(load: Callable[..., tuple[Scene, str]]) -> None:
     """A wheel whose centre of mass is a little off swings out: the envelope decays with b / 2 I."""
     scene, _ = load(
         '<body name="w" euler="0 0.3 0"><joint name="spin" axis="0 1 0" damping="0.01"/>'
@@ -329,18 +329,18 @@ def test_contact_masks_become_collision_groups_where_they_can() -> None:
     assert groups == {1: (0,), 2: (1,), 3: (0, 1)} and not result.notes
     result = converted(f'<body name="a"><freejoint/>{geom.format(1)}{geom.format(2)}</body>')
     assert result.notes == [
-        "contype and conaffinity differ in a way that collision groups cannot say; everything collides"
+        "contype and conaffinity differ in a way that collision groups cannot state; everything collides"
     ]
 
 
-def test_a_file_that_is_no_mjcf_is_told(tmp_path: Path) -> None:
+def test_a_file_that_is_no_mjcf_is_reported(tmp_path: Path) -> None:
     (tmp_path / "m.xml").write_text(f"{HEAD}<worldbody><geom type='cube'/></worldbody></mujoco>")
     done = CliRunner().invoke(app, ["convert", str(tmp_path / "m.xml"), "-o", str(tmp_path / "m.yaml")])
     assert done.exit_code == 1 and "this is not an MJCF that can be read" in done.output
     assert not (tmp_path / "m.yaml").exists()
 
 
-def test_without_mujoco_it_is_told_how_to_get_the_release_that_is_tested(
+def test_without_mujoco_it_is_reported_how_to_get_the_release_that_is_tested(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "m.xml").write_text(f"{HEAD}<worldbody/></mujoco>")

@@ -44,7 +44,7 @@ def test_the_same_mesh_gives_the_same_bytes() -> None:
     assert "f 1//1 " in obj_texts([surface], "m.mtl", "m")[0]
 
 
-def test_what_cannot_be_written_is_told_with_its_name() -> None:
+def test_what_cannot_be_written_is_reported_with_its_name() -> None:
     with pytest.raises(MeshWriteError, match="'part' has no face"):
         obj_texts([Surface(Paint("m"), VERTICES, FACES[:0])], "m.mtl", "part")
     with pytest.raises(MeshWriteError, match="'part' has a vertex that is not finite"):

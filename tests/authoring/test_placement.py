@@ -1,4 +1,4 @@
-"""Joints, cameras and lights: what the keys say and where things stand are two forms of one thing."""
+"""Joints, cameras and lights: what the keys state and where things stand are two forms of one thing."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_axes_that_are_exactly_parallel_or_antiparallel_are_exact() -> None:
         np.testing.assert_allclose(child_pose(keys), child, atol=1e-12)
 
 
-def test_the_jaws_of_a_real_instrument_stand_where_their_file_says(corpus: Path) -> None:
+def test_the_jaws_of_a_real_instrument_stand_where_their_file_states(corpus: Path) -> None:
     file = next(corpus.rglob("LND_400006_SIMPLE/psm1.yaml"))
     document = read_any(file, Resolver([corpus]))
     bodies = {body.key: body for body in document.elements("bodies")}
@@ -118,7 +118,7 @@ def test_a_view_that_looks_nowhere_has_the_formats_identity() -> None:
     np.testing.assert_array_equal(T[:3, 1], [0.0, 0.0, 1.0])
 
 
-def test_poses_are_told_apart_beyond_single_precision() -> None:
+def test_poses_are_distinguished_beyond_single_precision() -> None:
     A = pose_matrix((1, 2, 3), (0.1, 0.2, 0.3))
     assert same_place(A, A.astype(np.float32).astype(float))
     assert not same_place(A, pose_matrix((1, 2, 3.0001), (0.1, 0.2, 0.3)))

@@ -40,7 +40,7 @@ def test_what_took_its_place_goes_back_when_a_later_file_cannot(tmp_path: Path) 
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "z"]
 
 
-def test_a_file_reached_through_a_folder_that_is_not_there_yet_is_known(tmp_path: Path) -> None:
+def test_a_file_reached_through_a_folder_that_is_missing_yet_is_known(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"old")
     (tmp_path / "z").mkdir()
     around = tmp_path / "new" / ".." / "a"

@@ -19,14 +19,14 @@ from ligature.cli.master import master_answers
 ROOT = Path(__file__).resolve().parents[2]
 CORPUS = Path(os.environ.get("LIGATURE_CORPUS", ROOT.parent / "shared" / "corpus")) / "suturing_scene" / "launch.yaml"
 SECONDS = 10.0
-PATIENCE = 120.0
+TIMEOUT = 120.0
 """Seconds to wait for the first picture."""
 
 TOPICS = ("ImageData", "DepthImage", "IdImage")
 
 
 def listen(cameras: tuple[str, ...], seconds: float) -> None:
-    """Print rates and latencies of ``cameras``, and what the simulator says of itself meanwhile."""
+    """Print rates and latencies of ``cameras``, and what the simulator states of itself meanwhile."""
     import rospy
     from diagnostic_msgs.msg import DiagnosticArray
     from sensor_msgs.msg import Image
@@ -74,7 +74,7 @@ def main() -> int:
         from sensor_msgs.msg import Image
 
         rospy.init_node("cameras_bench", anonymous=True, disable_signals=True)
-        rospy.wait_for_message("/ambf/env/cameras/cameraR/ImageData", Image, PATIENCE)
+        rospy.wait_for_message("/ambf/env/cameras/cameraR/ImageData", Image, TIMEOUT)
         load = os.getloadavg()[0]
         listen(("cameraL",), SECONDS)
         listen(("cameraL", "cameraR"), SECONDS)

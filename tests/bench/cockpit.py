@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import viser
 from ligature.bus import Outbox, Pace
-from ligature.model.commands import ArmCommand
+from ligature.robots.commands import ServoJp, StateCommand
 
 from tests.cockpit.conftest import SMALL, Served
 
@@ -68,7 +68,7 @@ def sway(served: Served, outbox: Outbox, seconds: float) -> Round:
     while (now := time.monotonic()) < begin + seconds:
         served.block.rings["spare"].beat()
         goal = [SWAY * np.sin(4.0 * now), SWAY * np.cos(4.0 * now) - SWAY, *home[2:]]
-        outbox.push(ArmCommand(arm, "servo_jp", tuple(map(float, goal))))
+        outbox.push(ServoJp(arm, tuple(map(float, goal))))
         time.sleep(0.02)
     simulated, took = float(served.state["sim_time"]) - before, time.monotonic() - start
     had, paged = processor_seconds(served)
@@ -79,7 +79,7 @@ def ready(served: Served, outbox: Outbox) -> None:
     """Enable and home PSM1."""
     arm = served.names.index("PSM1")
     for word in ("enable", "home"):
-        outbox.push(ArmCommand(arm, "state_command", (), word))
+        outbox.push(StateCommand(arm, word))
         deadline = time.monotonic() + 60.0
         while not (served.arm("PSM1")["homed"] if word == "home" else served.arm("PSM1")["operating"] == 1):
             assert time.monotonic() < deadline, f"PSM1 does not {word}"

@@ -1,6 +1,6 @@
 """Browsers that only look on, for `tests.bench.cockpit`: ``URL VERSION COUNT``; ends when its input does.
 
-Light on purpose: it imports nothing of the simulator, tells when all are connected, and takes whatever is sent.
+Light on purpose: it imports nothing of the simulator, reports when all are connected, and takes whatever is sent.
 """
 
 from __future__ import annotations

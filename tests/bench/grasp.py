@@ -105,7 +105,9 @@ def main() -> None:
     sys.stdout.write(f"onset of slip around the limit surface: within {100 * off:.1f} %\n")
     threads = {angle: _thread(angle) for angle in (-0.05, -0.1, -0.15)}
     for angle, (_, tension, limit) in threads.items():
-        sys.stdout.write(f"thread, jaw at {angle:.2f} rad: slides at {tension[-1]:.3f} N, the law says {limit:.3f} N\n")
+        sys.stdout.write(
+            f"thread, jaw at {angle:.2f} rad: slides at {tension[-1]:.3f} N, the law states {limit:.3f} N\n"
+        )
     if arguments.pictures:
         _draw(arguments.pictures, onsets, threads)
 

@@ -47,7 +47,7 @@ class Timed(TwoArms):
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs/pictures")
     arms = Timed()
-    arms.tie()
+    arms.attachment()
     shapes = [("tied", arms.rod.positions.copy())]
     arms.move(RIGHT, (0.10, 0.0, 0.02))
     shapes.append(("drawn", arms.rod.positions.copy()))

@@ -19,9 +19,9 @@ from ligature.bus import Block
 from ligature.bus.outbox import Outbox
 from ligature.cli.options import RunOptions, model_indices
 from ligature.cli.physics import Loop
-from ligature.model.commands import ArmCommand
 from ligature.model.frames import matrix_pose7
 from ligature.model.state import new_state
+from ligature.robots.commands import VERBS
 from ligature.simulation import Simulation
 from numpy.typing import NDArray
 
@@ -52,7 +52,7 @@ def resident_bytes() -> int:
 
 
 class Operator:
-    """Commands both arms through the bus and looks at what the bus says of them."""
+    """Commands both arms through the bus and looks at what the bus states of them."""
 
     def __init__(self, simulation: Simulation, block: Block) -> None:
         names = list(simulation.arms)
@@ -63,13 +63,13 @@ class Operator:
         self._state = new_state(simulation.scene)
         self.seen = 0
 
-    def command(self, name: str, verb: str, values: Array | list[float], text: str = "") -> None:
-        self._outbox.push(ArmCommand(self._arms[name], verb, tuple(map(float, values)), text))
+    def command(self, name: str, verb: str, value: Array | list[float] | str) -> None:
+        self._outbox.push(VERBS[verb](self._arms[name], value if isinstance(value, str) else tuple(map(float, value))))
 
     def ready(self) -> None:
         """Switch both arms on."""
         for name in self._arms:
-            self.command(name, "state_command", [], "home")
+            self.command(name, "state_command", "home")
 
     def servo(self, t: float) -> float:
         """Send the set-points of time ``t``; returns the worst following error that the newest state shows."""

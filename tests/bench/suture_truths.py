@@ -3,7 +3,7 @@
     python tests/bench/suture_truths.py [FOLDER]
 
 Writes `suture_truths.png` into FOLDER, default `docs/pictures`, and prints each error; about a minute.
-SI units; figures in millimetres where they say so.
+SI units; figures in millimetres where they report it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "suture"))
 from conftest import DT, Bench, body, damped, energy, line  # noqa: E402
 from ligature.model.frames import axis_rotation, pose7_matrix  # noqa: E402
 from ligature.model.scene import Cylinder  # noqa: E402
-from ligature.suture.description import FREE, RodDescription, Tie, from_material  # noqa: E402
+from ligature.suture.description import FREE, Attachment, RodDescription, from_material  # noqa: E402
 from ligature.suture.rod import Rod  # noqa: E402
 from scipy.integrate import solve_ivp  # noqa: E402
 from scipy.optimize import brentq  # noqa: E402
@@ -280,7 +280,7 @@ def momentum(axes: Any) -> str:
         T, none = np.eye(4), np.zeros(3)
         T[:3, 3] = description.ends[-1, 1]
         bench = Bench([body(0, None, (0.1, 0.0, 0.0), mass=mass, inertia=mass * 1e-5)])
-        rod = bench.add(replace(description, ties=(Tie(19, 0, T, np.eye(4), none, none, none, *FREE),)))
+        rod = bench.add(replace(description, attachments=(Attachment(19, 0, T, np.eye(4), none, none, none, *FREE),)))
         twists = np.zeros((20, 6))
         twists[:, 1], twists[:, 2] = np.linspace(0.5, 0.0, 20), 0.2
         _moving(rod, twists)

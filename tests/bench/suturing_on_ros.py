@@ -24,7 +24,7 @@ CLOCK = 120
 
 HZ = 10
 RUNS = (("no cameras", False, UNTHROTTLED), ("stereo cameras", True, UNTHROTTLED), ("the same in real time", True, "1"))
-"""What is told of a run, whether it has cameras, and its limit of the real-time factor."""
+"""What is informed of a run, whether it has cameras, and its limit of the real-time factor."""
 
 PICTURES = [f"/ambf/env/cameras/camera{side}/ImageData" for side in "LR"]
 
@@ -43,7 +43,7 @@ def scene_at(hz: int, folder: Path) -> Path:
 
 
 def measure(launch: Path, cameras: bool, limit: str, seconds: float) -> str:
-    """Run the scene, listen, and tell how it went."""
+    """Run the scene, listen, and report how it went."""
     import rospy
     from sensor_msgs.msg import Image
 

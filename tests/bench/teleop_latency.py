@@ -1,6 +1,6 @@
-"""From a device's message to the first ``measured_cp`` of the arm it leads that moved, over ROS on loopback.
+"""From a device's message to the first ``measured_cp`` of the arm it drives that moved, over ROS on loopback.
 
-``python -m tests.bench.teleop_latency``: a pen's driver publishes poses at 200 Hz to `ligature teleop`, which leads PSM1
+``python -m tests.bench.teleop_latency``: a pen's driver publishes poses at 200 Hz to `ligature teleop`, which drives PSM1
 of the small scene's arms; now and then the pen steps by two millimetres, and the time until the measured pose has moved
 is the latency. Exit status 1 when its 99th percentile is above 15 ms.
 """
@@ -37,7 +37,7 @@ BOUND = 15.0
 
 CONFIG = """
 camera: {position: [0.0, 0.0, 1.0], rpy: [3.1415927, 0.0, 0.0]}
-settings: {scale: 0.5, fastest: 2.0, patience: 0.5}
+settings: {scale: 0.5, max velocity: 2.0, timeout: 0.5}
 devices: {pen: {kind: touch, topic: /arm1/}}
 pairs: {pen: [PSM1]}
 """
@@ -82,7 +82,7 @@ def measure() -> Array:
 
     deadline = time.monotonic() + 60.0
     while not (follows and follows[-1]):
-        assert time.monotonic() < deadline, "the pen does not lead within 60 s"
+        assert time.monotonic() < deadline, "the pen does not drive within 60 s"
         stream(20)
     watcher.along = direction(stream, message)
     latencies = []

@@ -1,4 +1,4 @@
-"""A suture by hands, over ROS alone: drivers of a haptic pen and of a Razer Hydra lead both arms through a throw.
+"""A suture by hands, over ROS alone: drivers of a haptic pen and of a Razer Hydra drive both arms through a throw.
 
 ``python -m tests.bench.teleop_suture``: the drivers publish what real ones do; who holds the devices plans as
 ``examples/suture.py``, and sees the needle, the arms and the set-up joints by their topics. Reach, grasp, lift, hand
@@ -27,7 +27,7 @@ from ligature.robots.fitting import psm_kinematics
 from ligature.tasks.throws import NeedleArc
 from numpy.typing import NDArray
 
-from tests.ros.drivers import PATIENCE, Driver, Paddle, Pen, apart, patiently, until, wait_for_listener
+from tests.ros.drivers import TIMEOUT, Driver, Paddle, Pen, apart, patiently, until, wait_for_listener
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
@@ -40,7 +40,7 @@ SCALE = 0.5
 JAW = (suture.SHUT, suture.OPEN)
 CONFIG = f"""
 camera: ECM
-settings: {{scale: {SCALE}, fastest: 1.0, patience: 4.0, align: false, jaw: [{JAW[0]}, {JAW[1]}], jaw speed: 2.5}}
+settings: {{scale: {SCALE}, max velocity: 1.0, timeout: 4.0, align: false, jaw: [{JAW[0]}, {JAW[1]}], jaw speed: 2.5}}
 devices:
   pen: {{kind: touch, topic: /arm1/, buttons: {{grey: clutch, white: close}}}}
   paddle: {{kind: hydra, paddle: left, buttons: {{bumper: clutch}}}}
@@ -79,7 +79,7 @@ SLOW = 0.04
 
 
 class Arm:
-    """An arm as its CRTK topics tell of it: set-point and measured pose (4, 4) in its base."""
+    """An arm as its CRTK topics report it: set-point and measured pose (4, 4) in its base."""
 
     def __init__(self, rospy: Any, name: str) -> None:
         from geometry_msgs.msg import PoseStamped, WrenchStamped
@@ -127,7 +127,7 @@ class Arm:
 
 
 class Hand:
-    """A hand on a device that leads an arm; what the mapping should make of it is computed here, by itself."""
+    """A hand on a device that drives an arm; what the mapping should make of it is computed here, by itself."""
 
     def __init__(self, driver: Driver, device: str, rospy: Any) -> None:
         from std_msgs.msg import Bool, String
@@ -161,8 +161,8 @@ class Hand:
         return messages[-1].data if messages else "nothing"
 
     def take(self, arm: Arm, T_base_view: Array) -> None:
-        """Lead an arm from now on, from where both are: the hand rests."""
-        until(lambda: self.follows(arm.name), lambda: f"{self.device} does not lead: {self.status(arm.name)}", 60.0)
+        """Drive an arm from now on, from where both are: the hand rests."""
+        until(lambda: self.follows(arm.name), lambda: f"{self.device} does not drive: {self.status(arm.name)}", 60.0)
         self.arm, self._T_base_view = arm, T_base_view
         self._hand, self._tip = self.driver.T.copy(), inverse(T_base_view) @ arm.setpoint()
 
@@ -259,7 +259,7 @@ class Operator(suture.Surgeon):
                 hand.reach(inverse(self._base[name]) @ way[index])
                 reached = index
             if not hand.follows(name):
-                raise suture.Failure(f"{hand.device} leads {name} no more: {hand.status(name)}")
+                raise suture.Failure(f"{hand.device} stopped driving {name}: {hand.status(name)}")
             time.sleep(0.005)
         self.judge(name)
 
@@ -269,12 +269,12 @@ class Operator(suture.Surgeon):
     def judge(self, name: str) -> None:
         """Note how far the arm is from the ideal mapping once it has come to rest.
 
-        One that touches something may lean on it: with its tip, which its force tells, or with its shaft on the other
-        arm's, which its drives tell.
+        One that touches something may lean on it: with its tip, which its force reports, or with its shaft on the other
+        arm's, which its drives report.
         """
         hand, arm = self.hands[name], self.psms[name]
         ideal, asked = hand.ideal(), (np.inf, np.inf)
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         while max(asked) > 1e-3 and time.monotonic() < end:
             asked = apart(arm.setpoint(), ideal)
             time.sleep(0.01)
@@ -359,7 +359,7 @@ class Operator(suture.Surgeon):
         self.done("clutched ten times with the needle in the jaw")
 
     def switch(self, rospy: Any) -> None:
-        """The pen leads the other arm, and then its own again."""
+        """The pen drives the other arm, and then its own again."""
         from std_msgs.msg import String
 
         say = {
@@ -388,7 +388,7 @@ class Operator(suture.Surgeon):
         held = self.needle()
         self.wait(0.3)
         assert apart(held, self.needle())[0] < 0.5, "the needle was dropped"
-        self.done("the pen led PSM2 and then PSM1 again, which held the needle")
+        self.done("the pen drove PSM2 and then PSM1 again, which held the needle")
 
     def lead_camera(self, rospy: Any) -> None:
         """Both hands pull the scene near while the pedal is pressed."""
@@ -442,7 +442,7 @@ class Operator(suture.Surgeon):
         for what, (act, word) in cases.items():
             took = self.fault(act, word)
             self.note("hold after a fault, ms", took)
-            self.done(f"{what}: the arm holds after {took:.0f} ms, and the status says '{self.pen.status('PSM1')}'")
+            self.done(f"{what}: the arm holds after {took:.0f} ms, and the status states '{self.pen.status('PSM1')}'")
             self.pen.driver.muted, self.pen.driver.says = False, None
             time.sleep(0.1)
             self.pen.squeeze(True, grey=True)

@@ -1,4 +1,4 @@
-"""Fetching Blender as a Python module: what cannot be had is told in one line, in bounded time, and is no failure."""
+"""Fetching Blender as a Python module: what is unavailable is reported in one line, in bounded time, and is no failure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 
 
 def fetch(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the script for a release as it is without network: the index is a folder that is not there."""
+    """Runs the script for a release as it is without network: the index is a missing folder."""
     index = {
         "PIP_INDEX_URL": "file:///nowhere/simple",
         "PIP_EXTRA_INDEX_URL": "",
@@ -28,7 +28,7 @@ def fetch(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.skipif(not Path("/usr/bin/python3").exists(), reason="the system has no Python of its own")
-def test_without_an_index_the_reason_is_told_and_the_tests_are_skipped_with_it(tmp_path: Path) -> None:
+def test_without_an_index_the_reason_is_reported_and_the_tests_are_skipped_with_it(tmp_path: Path) -> None:
     done = fetch(tmp_path / "bpy-5.0.1")
     assert done.returncode == 0, done.stderr
     why = (tmp_path / "bpy-5.0.1.why").read_text().strip()

@@ -134,7 +134,7 @@ def test_panels_draw_operators_are_undone_and_nothing_is_left(session: Callable[
         assert told["undone"] == pytest.approx(told["before"], abs=1e-7), label
 
 
-def test_the_tutorial_leads_to_a_scene_that_moves(session: Callable[[str], tuple[dict, str]], tmp_path: Path) -> None:
+def test_the_tutorial_drives_to_a_scene_that_moves(session: Callable[[str], tuple[dict, str]], tmp_path: Path) -> None:
     found, output = session("tutorial.py")
     assert len(found["pictures"]) == 5
     assert "bodies over" in output  # Simulate Here played the motion back

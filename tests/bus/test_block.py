@@ -67,9 +67,9 @@ def test_states_are_never_torn() -> None:
     assert len(seen) > 100
 
 
-def test_nobody_to_attach_to_is_said() -> None:
+def test_nobody_to_attach_to_is_stated() -> None:
     with pytest.raises(BusError, match="no simulator writes to shared memory 'ligature-1-none'"):
-        Block.attach("ligature-1-none", DTYPE, patience=0.05)
+        Block.attach("ligature-1-none", DTYPE, timeout=0.05)
 
 
 def test_waiting_for_a_simulator_can_be_given_up() -> None:
@@ -81,9 +81,9 @@ def test_waiting_for_a_simulator_can_be_given_up() -> None:
 
 def test_a_block_without_a_state_is_waited_for(block: Block) -> None:
     with pytest.raises(BusError, match="no simulator writes"):
-        Block.attach(NAME, DTYPE, patience=0.05)
+        Block.attach(NAME, DTYPE, timeout=0.05)
     threading.Timer(0.2, lambda: block.write(np.ones(1, DTYPE))).start()
-    reader, into = Block.attach(NAME, DTYPE, patience=5.0), np.zeros(1, DTYPE)
+    reader, into = Block.attach(NAME, DTYPE, timeout=5.0), np.zeros(1, DTYPE)
     assert reader.read(into) and into["tick"][0] == 1
     reader.close()
 
@@ -92,7 +92,7 @@ def test_a_block_that_is_just_being_made_is_not_mistaken_for_another() -> None:
     empty = FOLDER / f"ligature-{os.getpid()}-00000001"
     empty.touch()
     with pytest.raises(BusError, match="no simulator writes"):
-        Block.attach(empty.name, DTYPE, patience=0.05)
+        Block.attach(empty.name, DTYPE, timeout=0.05)
     empty.unlink()
 
 
@@ -105,7 +105,7 @@ def test_a_reader_gives_up_on_a_writer_that_died_while_writing(block: Block) -> 
     reader.close()
 
 
-def test_too_little_shared_memory_is_told_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_little_shared_memory_is_reported_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -117,7 +117,7 @@ def test_too_little_shared_memory_is_told_before_anything_runs(monkeypatch: pyte
 
 def test_another_layout_is_refused(block: Block) -> None:
     with pytest.raises(BusError, match="belongs to another scene or version"):
-        Block.attach(NAME, np.dtype([("tick", "u8"), ("values", "f8", (99999,))]), patience=0.05)
+        Block.attach(NAME, np.dtype([("tick", "u8"), ("values", "f8", (99999,))]), timeout=0.05)
 
 
 def dead_pid() -> int:

@@ -2,60 +2,71 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ligature.bus.codec import CodecError, Message, decode, encode
-from ligature.bus.pacing import Throttle
-from ligature.model.commands import (
-    ActuatorCommand,
-    BodyCommand,
-    CommandType,
-    ParentCommand,
-    PlaceCommand,
-    Release,
-    Reset,
-    WatchContacts,
-)
+from ligature.bus.codec import CodecError, decode, encode
+from ligature.bus.ring import MOST_BYTES
+from ligature.model.commands import ActuatorCommand, BodyCommand, Command, CommandType
+from ligature.model.messages import Message
+from ligature.robots.commands import VERBS, ArmCommand
 
-NUMBER = st.floats(allow_nan=False)
-POSE = st.tuples(*[NUMBER] * 7)
-MESSAGES = st.one_of(
-    st.builds(
-        BodyCommand, st.integers(0, 10**6), st.sampled_from(CommandType), POSE,
-        st.lists(st.sampled_from(CommandType), max_size=64).map(tuple), st.lists(NUMBER, max_size=64).map(tuple),
-    ),
-    st.builds(
-        ActuatorCommand, st.integers(0, 99), st.booleans(), st.text(max_size=40), st.none() | POSE,
-        st.none() | st.text(max_size=40),
-    ),
-    st.builds(PlaceCommand, st.sampled_from(["camera", "light"]), st.integers(0, 99), st.none() | POSE),
-    st.builds(ParentCommand, st.sampled_from(["camera", "light"]), st.integers(0, 99), st.none() | st.integers(0, 99)),
-    st.builds(Release, st.sampled_from(["body", "actuator", "camera"]), st.integers(0, 99)),
-    st.builds(Reset, st.booleans()),
-    st.builds(WatchContacts, st.booleans()),
-    st.builds(Throttle, st.booleans(), st.booleans(), st.integers(0, 255)),
-)  # fmt: skip
+from tests.strategies import messages
 
 
-@given(MESSAGES)
-def test_every_command_comes_back_equal(message: Message) -> None:
-    assert decode(encode(message)) == message
+def classes(base: type[Message]) -> set[type[Message]]:
+    """All classes below ``base`` that are no mere bases."""
+    found = {base} if base.code >= 0 else set()
+    return found.union(*(classes(below) for below in base.__subclasses__()))
+
+
+@given(messages())
+def test_every_message_comes_back_equal_and_fits_a_slot(message: Message) -> None:
+    data = encode(message)
+    assert len(data) <= MOST_BYTES
+    back = decode(data)
+    assert type(back) is type(message)
+    assert repr(back) == repr(message)  # NaN equals itself here
 
 
 @given(st.binary(max_size=300))
-def test_other_bytes_are_refused_or_are_a_command(data: bytes) -> None:
+def test_other_bytes_are_rejected_or_are_a_message(data: bytes) -> None:
     try:
         decode(data)
     except CodecError as error:
         assert "no command" in str(error)
 
 
-def test_too_many_numbers_are_refused() -> None:
+@given(messages(), st.data())
+def test_a_message_that_passes_its_check_is_finite(message: Message, data: st.DataObject) -> None:
+    try:
+        message.check()
+    except ValueError as error:
+        assert str(error)
+        return
+    for name, _, _ in message.fields():
+        value = getattr(message, name)
+        for number in value if isinstance(value, tuple) else (value,):
+            assert not isinstance(number, float) or math.isfinite(number)
+
+
+def test_every_command_travels() -> None:
+    assert classes(Message) == set(Message.by_code.values())
+    assert {c for c in classes(Command) if issubclass(c, ArmCommand)} == set(VERBS.values())
+
+
+def test_two_commands_with_one_code_are_rejected() -> None:
+    with pytest.raises(TypeError, match="the code 1 is taken"):
+        type("Another", (Command,), {}, code=1)
+
+
+def test_too_many_numbers_are_rejected() -> None:
     with pytest.raises(CodecError, match="at most 64 numbers"):
         encode(BodyCommand(0, CommandType.FORCE, (0.0,) * 6, (), (0.0,) * 65))
 
 
-def test_a_long_name_is_refused() -> None:
+def test_a_long_name_is_rejected() -> None:
     with pytest.raises(CodecError, match="at most 200 bytes"):
         encode(ActuatorCommand(0, True, "x" * 201))

@@ -37,7 +37,7 @@ def test_commands_go_out_in_their_order(ring: Ring) -> None:
     assert drain(ring) == sent and ring.refused == 0
 
 
-def test_a_release_said_while_the_ring_is_full_arrives_later(ring: Ring) -> None:
+def test_a_release_stated_while_the_ring_is_full_arrives_later(ring: Ring) -> None:
     outbox = Outbox(ring)
     fill(outbox, ring)
     for message in (force(3, 1.0), Reset(), force(3, 2.0), Release("body", 3)):

@@ -84,7 +84,7 @@ def test_the_end_of_throttling_runs_freely_again() -> None:
     assert pacer.wait(7.0) == pytest.approx(0.01)
 
 
-def test_a_watchdog_tells_each_silence_once() -> None:
+def test_a_watchdog_reports_each_silence_once() -> None:
     dog: Watchdog[str] = Watchdog()
     dog.feed("needle", 10.0)
     assert dog.alive("needle") and dog.expired(10.5) == []

@@ -1,4 +1,4 @@
-"""Records of runs: what was written is read; what is cut off, damaged or cannot be written is told."""
+"""Records of runs: what was written is read; what is cut off, damaged or cannot be written is reported."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 from ligature.bus.record import Excerpt, Header, Moment, Record, RecordError, RecordWriter, is_record
-from ligature.model.commands import ArmCommand, BodyCommand, Command, CommandType, Reset
+from ligature.model.commands import BodyCommand, Command, CommandType, Reset
+from ligature.robots.commands import ServoJp
 
 HEADER = Header('{"scene": "a.yaml"}', "ab" * 32)
 COMMANDS: list[tuple[int, Command]] = [
-    (1, ArmCommand(0, "servo_jp", (0.1, 0.2, 0.3))),
+    (1, ServoJp(0, (0.1, 0.2, 0.3))),
     (1, Reset(True)),
     (7, BodyCommand(3, CommandType.FORCE, (1.0, 0.0, 1e-300, 0.0, 0.0, 0.0))),
 ]
@@ -42,7 +43,7 @@ def test_commands_are_replayed_between_the_updates_they_came_between(whole: Path
     assert seen == [first, second, *["update"] * 6, third, *["update"] * 2]
 
 
-def test_a_part_of_a_run_holds_what_was_before_it_and_says_where_it_begins(tmp_path: Path) -> None:
+def test_a_part_of_a_run_holds_what_was_before_it_and_states_where_it_begins(tmp_path: Path) -> None:
     """The part begins between two commands of one update; what comes after its end is not in it."""
     (_, first), (_, second), (_, third) = COMMANDS
     writer = RecordWriter(tmp_path / "run.record", HEADER)
@@ -84,7 +85,7 @@ def test_a_part_that_the_disk_does_not_take_leaves_nothing(tmp_path: Path) -> No
     assert [path.name for path in tmp_path.iterdir()] == ["run.record"]
 
 
-def test_a_journal_that_is_too_short_is_told(tmp_path: Path) -> None:
+def test_a_journal_that_is_too_short_is_reported(tmp_path: Path) -> None:
     writer = RecordWriter(tmp_path / "run.record", HEADER)
     part = Excerpt(tmp_path / "part.record", writer, writer.moment(1, "ef" * 32))
     with pytest.raises(OSError, match="shorter than it was"):
@@ -93,7 +94,7 @@ def test_a_journal_that_is_too_short_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.99])
-def test_a_record_that_is_cut_off_is_told_so(whole: Path, share: float) -> None:
+def test_a_record_that_is_cut_off_is_reported(whole: Path, share: float) -> None:
     data = whole.read_bytes()
     begin = data.index(b"\n") + 1
     whole.write_bytes(data[: begin + int(share * (len(data) - begin))])
@@ -101,13 +102,13 @@ def test_a_record_that_is_cut_off_is_told_so(whole: Path, share: float) -> None:
         Record.read(whole)
 
 
-def test_what_is_no_record_is_told_so(tmp_path: Path, whole: Path) -> None:
+def test_what_is_no_record_is_reported(tmp_path: Path, whole: Path) -> None:
     other = tmp_path / "other"
     for data, message in (
         (b"", "is no record of a run"),
         (b"#ROSBAG V2.0\nabc", "is no record of a run"),
-        (b'{"format": "ligature record 9", "options": "", "begin": ""}\n', "this version reads 'ligature record 1'"),
-        (b'{"format": "ligature record 1", "begin": ""}\n', "is no record of a run"),
+        (b'{"format": "ligature record 9", "options": "", "begin": ""}\n', "this version reads 'ligature record 2'"),
+        (b'{"format": "ligature record 2", "begin": ""}\n', "is no record of a run"),
         (whole.read_bytes()[:-44] + struct.pack("<QI", 9, 70_000), "no frame of a record"),
         (whole.read_bytes()[:-44] + struct.pack("<QI", 2, 8), "no frame of a record"),
     ):
@@ -116,7 +117,7 @@ def test_what_is_no_record_is_told_so(tmp_path: Path, whole: Path) -> None:
             Record.read(other)
 
 
-def test_bytes_that_are_no_command_are_told_with_their_place(whole: Path) -> None:
+def test_bytes_that_are_no_command_are_reported_with_their_place(whole: Path) -> None:
     data = whole.read_bytes()
     begin = data.index(b"\n") + 1
     whole.write_bytes(data[:begin] + struct.pack("<QI", 1, 3) + b"\xfe\x00\x00" + data[begin:])

@@ -52,7 +52,7 @@ def test_a_prefix_and_a_speed_are_taken() -> None:
     assert run.prefix == "/lab" and run.speed == 0.5
 
 
-def test_flags_without_effect_are_accepted_and_told() -> None:
+def test_flags_without_effect_are_accepted_and_reported() -> None:
     run = options("-t 0 -g 1 -n 2 --plugins 'a.so, b.so'")
     assert run.notes == (
         "-n (number of input devices) has no effect here",
@@ -61,11 +61,11 @@ def test_flags_without_effect_are_accepted_and_told() -> None:
     )
 
 
-def test_a_rate_of_no_whole_ticks_is_rounded_and_told() -> None:
+def test_a_rate_of_no_whole_ticks_is_rounded_and_reported() -> None:
     assert options("-p 120").notes == ("-p 120: an update has whole ticks of 1 ms: 8 ms, 125 a second",)
 
 
-def test_a_rate_beyond_one_tick_is_capped_and_told() -> None:
+def test_a_rate_beyond_one_tick_is_capped_and_reported() -> None:
     run = options("-p 2000")
     assert run.rate == 1000 and run.notes == ("-p 2000: a tick has 1 ms; 1000 updates per second are made",)
 
@@ -83,13 +83,13 @@ def test_a_rate_beyond_one_tick_is_capped_and_told() -> None:
         ("--no_such_flag", "unrecognized arguments: --no_such_flag"),
     ],
 )
-def test_bad_flags_end_with_two_and_say_why(line: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_flags_end_with_two_and_state_why(line: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         options(line)
     assert ended.value.code == 2 and message in capsys.readouterr().err
 
 
-def test_a_missing_launch_file_flag_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_launch_file_flag_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         options_of(["-l", "1"])
     assert "--launch_file" in capsys.readouterr().err

@@ -33,7 +33,7 @@ def test_check_names_file_line_and_column(tmp_path: Path) -> None:
     assert "Traceback" not in done.stdout + done.stderr
 
 
-def test_check_of_a_missing_file_says_so(tmp_path: Path) -> None:
+def test_check_of_a_missing_file_reports_it(tmp_path: Path) -> None:
     done = ligature("check", tmp_path / "none.yaml")
     assert done.returncode == 1 and "does not exist" in done.stdout
 
@@ -50,12 +50,12 @@ def test_bench_of_a_bad_file_ends_with_two(tmp_path: Path) -> None:
     assert done.returncode == 2 and "does not exist" in " ".join(done.stdout.split())  # rich wraps long paths
 
 
-def test_a_list_of_indices_that_is_none_is_told() -> None:
+def test_a_list_of_indices_that_is_none_is_reported() -> None:
     done = ligature("bench", SMALL, "-l", "1,x")
     assert done.returncode == 2 and "'1,x' is not a list of whole numbers" in done.stdout + done.stderr
 
 
-def test_run_of_a_bad_file_ends_and_says_why(tmp_path: Path) -> None:
+def test_run_of_a_bad_file_ends_and_states_why(tmp_path: Path) -> None:
     bad = tmp_path / "bad.yaml"
     bad.write_text("bodies: [")
     done = ligature("run", bad)
@@ -81,7 +81,7 @@ def test_decompose_writes_one_material_per_hull(tmp_path: Path) -> None:
     assert f"{hulls} hulls" in done.stdout
 
 
-def test_decompose_of_nonsense_says_where(tmp_path: Path) -> None:
+def test_decompose_of_nonsense_states_where(tmp_path: Path) -> None:
     (tmp_path / "bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
     done = ligature("decompose", tmp_path / "bad.obj")
     assert done.returncode == 1 and "bad.obj:2:1: error: a face names vertex 2, but 1 are defined" in done.stdout
@@ -129,3 +129,21 @@ def test_demo_needs_the_repository(
         "import sys; sys.exit(0 if sys.argv[1:4] == ['--throws', '2', '--seed'] else 3)"
     )
     assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 0
+
+
+def test_render_warns_of_a_picture_that_is_mostly_white(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(
+        "bodies: [Wall]\ncameras: [C]\nlights: [L]\n"
+        "Wall: {name: Wall, mass: 0, shape: BOX, geometry: {x: 0.1, y: 9, z: 9}, location: {position: {x: -1, y: 0, z: 0}}, "
+        "color rgba: {r: 0.9, g: 0.9, b: 0.9, a: 1}}\n"
+        "C: {name: C, location: {x: 0, y: 0, z: 0}, look at: {x: -1, y: 0, z: 0}, up: {x: 0, y: 0, z: 1}, "
+        "field view angle: 0.7, clipping plane: {near: 0.1, far: 10}}\n"
+        "L: {name: L, location: {x: 0, y: 0, z: 0}, direction: {x: -1, y: 0, z: 0}, cutoff angle: 1.5, spot exponent: 0, "
+        "attenuation: {constant: 0.1}}\n"
+    )
+    picture = ("render", tmp_path / "m.yaml", "--camera", "C", "--out", tmp_path / "out", "--width", 64, "--height", 48)
+    bright, dark = ligature(*picture), ligature(*picture, "--exposure", -5)
+    if "no OpenGL" in bright.stdout:
+        pytest.skip(bright.stdout)
+    assert "100% of the picture of C is saturated (white); lower --exposure" in bright.stdout
+    assert bright.returncode == 0 and "saturated" not in dark.stdout

@@ -47,7 +47,7 @@ def test_fmt_orders_keys_and_keeps_what_it_cannot_hold(tmp_path: Path) -> None:
     assert file.read_text() == text
 
 
-def test_diff_tells_what_changed_in_meaning(tmp_path: Path) -> None:
+def test_diff_reports_what_changed_in_meaning(tmp_path: Path) -> None:
     a, b = tmp_path / "a.yaml", tmp_path / "b.yaml"
     a.write_text(MODEL)
     b.write_text("# reordered\n" + MODEL.replace("  name: a\n", "").replace("mass: 6.0", "mass: 6.00\n  name: a"))
@@ -64,7 +64,7 @@ def test_inertia_of_a_box_is_its_closed_form(tmp_path: Path) -> None:
     assert "BODY a: mass 6 kg, volume 6 m³, inertia {ix: 6.5, iy: 5, iz: 2.5}" in run("inertia", tmp_path / "m.yaml")
 
 
-def test_a_urdf_robot_moves_in_the_simulator_as_its_file_says(tmp_path: Path) -> None:
+def test_a_urdf_robot_moves_in_the_simulator_as_its_file_states(tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text(URDF)
     output = run("convert", tmp_path / "r.urdf", "-o", tmp_path / "out" / "r.yaml")
     assert "3 bodies, 2 joints" in output
@@ -78,7 +78,7 @@ def test_a_urdf_robot_moves_in_the_simulator_as_its_file_says(tmp_path: Path) ->
         np.testing.assert_allclose(parent.T_world_body @ joint.T_parent_child_zero, child.T_world_body, atol=1e-6)
 
 
-def test_a_file_that_is_no_urdf_is_told(tmp_path: Path) -> None:
+def test_a_file_that_is_no_urdf_is_reported(tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text("<robot")
     assert "this is not a URDF that can be read" in run(
         "convert", tmp_path / "r.urdf", "-o", tmp_path / "r.yaml", status=1

@@ -1,4 +1,4 @@
-"""Whether a ROS master answers, and what is said where none can be started."""
+"""Whether a ROS master answers, and what is stated where none can be started."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def test_nobody_is_no_master() -> None:
 def test_a_program_that_never_answers_is_given_up_soon(listener: socket.socket) -> None:
     begin = time.monotonic()
     assert not master.master_answers(f"http://127.0.0.1:{listener.getsockname()[1]}")
-    assert time.monotonic() - begin < 2 * master.ANSWER_PATIENCE + 0.5
+    assert time.monotonic() - begin < 2 * master.ANSWER_TIMEOUT + 0.5
 
 
-def test_a_taken_port_is_told(listener: socket.socket) -> None:
+def test_a_taken_port_is_reported(listener: socket.socket) -> None:
     port = listener.getsockname()[1]
     assert master.obstacle(f"http://localhost:{port}") == (
         f"port {port} is taken by another program that is no ROS master; set ROS_MASTER_URI to a free port"
@@ -51,7 +51,7 @@ def test_a_taken_port_is_told(listener: socket.socket) -> None:
 
 
 @pytest.mark.parametrize("uri", ["foo", "http://", "http://localhost:notaport", "http://localhost:99999", "ftp://a:1"])
-def test_a_text_that_is_no_address_is_told(uri: str) -> None:
+def test_a_text_that_is_no_address_is_reported(uri: str) -> None:
     assert not master.master_answers(uri)
     assert master.obstacle(uri) == f"ROS_MASTER_URI '{uri}' is no address such as http://127.0.0.1:11311"
 

@@ -1,4 +1,4 @@
-"""The loop of the physics process: it obeys the clock of a client and outlives whatever commands say."""
+"""The loop of the physics process: it obeys the clock of a client and survives whatever commands state."""
 
 from __future__ import annotations
 
@@ -13,11 +13,20 @@ import numpy as np
 import pytest
 from ligature import Simulation, load
 from ligature.bus import Block, Mailbox, Throttle
-from ligature.bus.bounds import FARTHEST, FASTEST, STRONGEST
 from ligature.bus.codec import Message, encode
 from ligature.cli.options import RunOptions
 from ligature.cli.physics import Loop
-from ligature.model.commands import ActuatorCommand, BodyCommand, CommandType, PlaceCommand, Release, Reset
+from ligature.model.commands import (
+    MAX_FORCE,
+    MAX_POSITION,
+    MAX_VELOCITY,
+    ActuatorCommand,
+    BodyCommand,
+    CommandType,
+    PlaceCommand,
+    Release,
+    Reset,
+)
 from ligature.model.scene import Scene
 
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -88,7 +97,7 @@ def test_readers_see_what_the_loop_wrote(run: Run) -> None:
     reader.close()
 
 
-def test_figures_tell_rate_and_rejections_once_a_second(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_report_rate_and_rejections_once_a_second(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     bad = BodyCommand(0, CommandType.FORCE, (float("nan"),) * 6)
     run.push(bad, bad, Reset())
     run.turn_for(1.1)
@@ -109,15 +118,15 @@ def random_commands(scene: Scene, rng: random.Random) -> Iterator[Message]:
     def pose() -> tuple[float, ...]:
         quaternion = [rng.gauss(0, 1) for _ in range(4)]
         length = math.hypot(*quaternion) * rng.choice([1.0, 1.0, 1.05, 0.5])
-        return (*(number(FARTHEST) for _ in range(3)), *(v / length for v in quaternion))
+        return (*(number(MAX_POSITION) for _ in range(3)), *(v / length for v in quaternion))
 
     names = [body.identity.identifier for body in scene.bodies]
     while True:
         type_, count = rng.choice(list(CommandType)), rng.choice([0, 8, 64])
-        bound = FASTEST if type_ is CommandType.VELOCITY else STRONGEST
+        bound = MAX_VELOCITY if type_ is CommandType.VELOCITY else MAX_FORCE
         target = pose() if type_ is CommandType.POSITION else tuple(number(bound) for _ in range(6))
         types = tuple(rng.choice(list(CommandType)) for _ in range(count))
-        values = tuple(number(STRONGEST) for _ in range(count))
+        values = tuple(number(MAX_FORCE) for _ in range(count))
         yield BodyCommand(rng.randrange(len(scene.bodies) + 1), type_, target, types, values)
         yield ActuatorCommand(rng.randrange(3), rng.random() < 0.6, rng.choice(names), rng.choice([None, pose()]))
         yield PlaceCommand(rng.choice(["camera", "light"]), rng.randrange(2), rng.choice([None, pose()]))

@@ -1,4 +1,4 @@
-"""Parts of a run are recorded on demand: simulated again they end in the same bits, and what fails is told."""
+"""Parts of a run are recorded on demand: simulated again they end in the same bits, and what fails is reported."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from ligature.bus.record import Record
 from ligature.cli.options import RunOptions
 from ligature.cli.physics import Loop
 from ligature.cli.replay import replay
-from ligature.model.commands import ArmCommand, Reset
+from ligature.model.commands import Reset
+from ligature.robots.commands import PlaceJp, ServoJp
 from rich.console import Console
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -30,7 +31,7 @@ HOME = (0.1, 0.1, 0.12, 0.0, 0.0, 0.0)
 
 
 class Run:
-    """The physics of a run in this process, with a page's ring and what is told to it."""
+    """The physics of a run in this process, with a page's ring and what is asked to it."""
 
     def __init__(self, **options: Any) -> None:
         self.options = RunOptions(str(SCENE), MODELS, rate=500.0, speed=20.0, **options)
@@ -83,17 +84,17 @@ def again(file: Path) -> tuple[int, str]:
 
 def moved(run: Run) -> None:
     """The arm goes somewhere, the scene is reset, and the arm goes on."""
-    run.push(ArmCommand(0, "servo_jp", (0.12, 0.1, 0.12, 0.0, 0.0, 0.1)))
+    run.push(ServoJp(0, (0.12, 0.1, 0.12, 0.0, 0.0, 0.1)))
     run.updates(20)
     run.push(Reset())
     run.updates(5)
-    run.push(ArmCommand(0, "servo_jp", (0.14, 0.1, 0.12, 0.1, 0.0, 0.1)))
+    run.push(ServoJp(0, (0.14, 0.1, 0.12, 0.1, 0.0, 0.1)))
     run.updates(20)
 
 
 def test_two_parts_of_a_run_are_simulated_again_bit_for_bit(start: Callable[..., Run]) -> None:
     run = start(cockpit="127.0.0.1:0")
-    run.push(ArmCommand(0, "place_jp", HOME))
+    run.push(PlaceJp(0, HOME))
     run.updates(10)
     for name in ("first", "second.record"):
         run.push(Recording(name))
@@ -117,7 +118,7 @@ def test_two_parts_of_a_run_are_simulated_again_bit_for_bit(start: Callable[...,
 
 def test_a_run_that_ends_ends_its_recordings(start: Callable[..., Run]) -> None:
     run = start(record="whole.record")
-    run.push(ArmCommand(0, "place_jp", HOME), Recording("part"))
+    run.push(PlaceJp(0, HOME), Recording("part"))
     run.updates(10)
     run.loop.end()
     part, whole = Record.read(Path("recordings/part.record")), Record.read(Path("whole.record"))
@@ -143,7 +144,7 @@ def test_a_paused_run_is_recorded_too(start: Callable[..., Run]) -> None:
 
 
 @pytest.mark.parametrize("what", ["exists", "folder", "name", "no page"])
-def test_what_cannot_be_recorded_is_told_and_the_run_goes_on(
+def test_what_cannot_be_recorded_is_reported_and_the_run_goes_on(
     start: Callable[..., Run], what: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run = start() if what == "no page" else start(cockpit="127.0.0.1:0")
@@ -187,13 +188,13 @@ def test_a_disk_that_fills_up_ends_the_recording_and_not_the_run(start: Callable
     assert again(Path("recordings/next.record"))[0] == 0
 
 
-def test_a_journal_without_room_is_told_when_a_recording_is_asked_for(
+def test_a_journal_without_room_is_reported_when_a_recording_is_asked_for(
     start: Callable[..., Run], capsys: pytest.CaptureFixture[str]
 ) -> None:
     run = start(cockpit="127.0.0.1:0")
     with open("/dev/full", "wb") as full:
         os.dup2(full.fileno(), run.loop._recorder._journal._file.fileno())  # type: ignore[union-attr]
-    run.push(ArmCommand(0, "place_jp", HOME))
+    run.push(PlaceJp(0, HOME))
     run.push(Recording("part"))
     run.hears("nothing is recorded: No space left on device: 'recordings/part.record'")
     run.loop._recorder.flush()

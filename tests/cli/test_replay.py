@@ -13,7 +13,7 @@ import pytest
 from ligature.bus.record import Header, Record, RecordWriter
 from ligature.cli.options import RunOptions
 from ligature.cli.replay import replay
-from ligature.model.commands import ArmCommand
+from ligature.robots.commands import VERBS, PlaceJp, ServoJp
 from rich.console import Console
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -32,7 +32,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     commands = {1: ("place_jp", (0.1, 0.1, 0.12, 0.0, 0.0, 0.0)), 20: ("servo_jp", (0.12, 0.1, 0.12, 0.0, 0.0, 0.1))}
     for update in range(1, 100):
         if update in commands:
-            command = ArmCommand(0, *commands[update])
+            verb, position = commands[update]
+            command = VERBS[verb](0, position)
             writer.write(update, command)
             simulation.apply(command)
         simulation.step(2)
@@ -66,15 +67,15 @@ def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) ->
     record, path = Record.read(recorded), tmp_path / "changed.record"
     writer = RecordWriter(path, record.header)
     for update, command in record.commands:
-        assert isinstance(command, ArmCommand)
-        writer.write(update, replace(command, values=(command.values[0] + 1e-9, *command.values[1:])))
+        assert isinstance(command, PlaceJp | ServoJp)
+        writer.write(update, replace(command, position=(command.position[0] + 1e-9, *command.position[1:])))
     writer.finish(record.updates, record.end)
     status, text = said(path)
     assert status == 1
     assert "the run ended otherwise" in text
 
 
-def test_a_file_that_is_missing_or_cut_off_is_told(recorded: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_missing_or_cut_off_is_reported(recorded: Path, tmp_path: Path) -> None:
     assert said(tmp_path / "none.record") == (1, f"{tmp_path / 'none.record'}: No such file or directory\n")
     cut = tmp_path / "cut.record"
     cut.write_bytes(recorded.read_bytes()[:-10])

@@ -1,4 +1,4 @@
-"""One process of a run: what it says arrives, and it ends when told, or is killed."""
+"""One process of a run: what it states arrives, and it ends when reported, or is killed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def next_of(events: Queue[Event]) -> Event:
     return events.get(timeout=10)
 
 
-def test_events_and_log_lines_are_told_apart() -> None:
+def test_events_and_log_lines_are_distinguished() -> None:
     _, events = child("print('@ready 3 bodies'); print('hello'); print('@beat')")
     assert next_of(events) == ("tester", "ready", "3 bodies")
     assert next_of(events) == ("tester", "log", "hello")
@@ -68,7 +68,7 @@ def test_a_process_starts_again() -> None:
     assert [next_of(events)[1] for _ in range(2)] == ["log", "ended"]
 
 
-def test_a_run_that_cannot_have_a_master_says_why_and_leaves_nothing(
+def test_a_run_that_cannot_have_a_master_states_why_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "foo")

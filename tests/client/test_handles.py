@@ -46,7 +46,7 @@ def test_constructors_take_the_keywords_of_the_third_generation(kind: type) -> N
     assert kind(ral=None, a_name="/a/b", time_out=1.0).get_name() == "/a/b"
 
 
-def test_a_handle_without_a_name_says_how_it_is_made() -> None:
+def test_a_handle_without_a_name_states_how_it_is_made() -> None:
     with pytest.raises(TypeError, match=r"RigidBody needs a name: \(ral, name\)"):
         RigidBody()
 
@@ -156,7 +156,7 @@ def test_joints_are_read_by_name_or_index() -> None:
 
 
 @pytest.mark.parametrize("joint", ["elbow", 3, -1])
-def test_a_joint_that_is_not_there_gives_none_and_commands_nothing(joint: Any, caplog: Any) -> None:
+def test_a_joint_that_is_missing_gives_none_and_commands_nothing(joint: Any, caplog: Any) -> None:
     body = body_with_joints()
     assert body.get_joint_pos(joint) is None
     body.set_joint_pos(joint, 1.0)
@@ -321,7 +321,7 @@ def test_a_world_without_updates_ends_throttling_after_its_time_out() -> None:
     assert not world._cmd.enable_step_throttling
 
 
-def test_a_handle_without_a_client_says_where_handles_come_from() -> None:
+def test_a_handle_without_a_client_states_where_handles_come_from() -> None:
     for call in (World("/a/World").reset, RigidBody("/a/b").publish):
         with pytest.raises(RuntimeError, match=r"is not connected: get its handle from a Client after connect\(\)"):
             call()

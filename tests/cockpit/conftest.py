@@ -26,7 +26,7 @@ from ligature.model.state import new_state
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
-PATIENCE = 100.0
+TIMEOUT = 100.0
 COARSE = 0.25
 """Pixels drawn of the 3D view for each of the window: nobody looks at it here, and software draws."""
 
@@ -37,7 +37,7 @@ FLAGS = (
 )  # fmt: skip
 
 
-def until(condition: Callable[[], Any], what: str, seconds: float = PATIENCE) -> Any:
+def until(condition: Callable[[], Any], what: str, seconds: float = TIMEOUT) -> Any:
     """Wait for ``condition``; returns what it returned."""
     deadline = time.monotonic() + seconds
     while True:
@@ -127,8 +127,8 @@ class Person:
         for flag in FLAGS:
             options.add_argument(flag)
         self.driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
-        self.driver.set_script_timeout(PATIENCE)
-        self.driver.set_page_load_timeout(PATIENCE)
+        self.driver.set_script_timeout(TIMEOUT)
+        self.driver.set_page_load_timeout(TIMEOUT)
 
     def opens(self, url: str) -> None:
         self.driver.get(f"{url}/?fixedDpr={COARSE}")
@@ -230,7 +230,7 @@ class Person:
         return found[1:]
 
     def goes(self) -> None:
-        with suppress(Exception):  # a browser that was killed cannot be told to end
+        with suppress(Exception):  # a browser that was killed cannot be asked to end
             self.driver.quit()
 
 

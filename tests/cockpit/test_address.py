@@ -17,7 +17,7 @@ def test_addresses_are_read() -> None:
 
 
 @pytest.mark.parametrize("text", ["8080", "localhost", ":8080", "host:", "host:99999", "host:8a"])
-def test_what_is_no_address_is_told(text: str) -> None:
+def test_what_is_no_address_is_reported(text: str) -> None:
     with pytest.raises(AddressError, match="is no ADDRESS:PORT such as 127.0.0.1:8080"):
         read_address(text)
 
@@ -36,7 +36,7 @@ def test_a_short_token_is_refused_everywhere() -> None:
         check_token(Address("127.0.0.1", 1), "short")
 
 
-def test_a_taken_port_is_told() -> None:
+def test_a_taken_port_is_reported() -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()

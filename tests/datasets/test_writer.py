@@ -45,7 +45,7 @@ def written(simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFa
     return path
 
 
-def test_samples_come_at_the_rate_and_say_what_was_there(written: Path) -> None:
+def test_samples_come_at_the_rate_and_state_what_was_there(written: Path) -> None:
     truth = np.load(written.parent / "truth.npz")
     with h5py.File(written) as file:
         episodes = [file[name] for name in ("episode_0000", "episode_0001")]
@@ -130,7 +130,7 @@ except DatasetError as error:
 """
 
 
-def test_a_file_that_cannot_grow_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+def test_a_file_that_cannot_grow_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
     """A limit of file sizes stands for a full disk: both have writes refused in the middle."""
     path = tmp_path / "a.h5"
     done = subprocess.run(

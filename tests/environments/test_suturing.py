@@ -119,7 +119,7 @@ def test_both_kinds_of_observation_come_together() -> None:
     assert observation["state"].shape == (34,)
 
 
-def test_what_the_arm_refuses_is_told_and_the_episode_goes_on() -> None:
+def test_what_the_arm_refuses_is_reported_and_the_episode_goes_on() -> None:
     env = SuturingEnv("reach")
     env.reset(seed=1)
     up = np.array([0, 0, 1, 0, 0, 0, 0], dtype=np.float32)
@@ -139,7 +139,7 @@ def test_what_the_arm_refuses_is_told_and_the_episode_goes_on() -> None:
         ({"arm": "PSM9"}, "no arm is called 'PSM9'"),
     ],
 )
-def test_wrong_options_are_told_with_the_right_ones(wrong: dict[str, str], message: str) -> None:
+def test_wrong_options_are_reported_with_the_right_ones(wrong: dict[str, str], message: str) -> None:
     with pytest.raises((ValueError, KeyError), match=message):
         SuturingEnv(**wrong)  # type: ignore[arg-type]
 

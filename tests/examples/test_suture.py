@@ -43,7 +43,7 @@ def test_the_thread_followed_the_needle_out_of_the_exit(operated: tuple) -> None
     assert {"Entry1", "Exit1"} <= holes
 
 
-def test_holes_too_far_apart_for_the_needle_are_told() -> None:
+def test_holes_too_far_apart_for_the_needle_are_reported() -> None:
     with pytest.raises(ValueError, match=r"holes 25\.0 mm apart are too far for a needle of radius 10\.0 mm"):
         throws.Throw.through(np.zeros(3), np.array([0.025, 0, 0]), 0.01, throws.UP)
 

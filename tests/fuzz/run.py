@@ -1,8 +1,9 @@
-"""Runs mutants in worker processes: ``python -m tests.fuzz.run --mutants 100000 --jobs 2``.
+"""Runs mutants, or generated scenes, in worker processes: ``python -m tests.fuzz.run --mutants 100000 --jobs 2``.
 
-A mutant must end, within a time limit, accepted or with findings that name their place. Any other
-exception, a hang or a crash of the process is a failure; its file is kept in ``build/fuzz``. Mutant
-N is the same in every run, so that ``--first N --mutants 1`` repeats it.
+A mutant must end, within a time limit, accepted or with findings that name their place; a scene, with
+``--scenes 10000``, must run a second as `tests.fuzz.simulate` states. Any other exception, a hang or a crash of the
+process is a failure; its files are kept in ``build/fuzz``. Mutant and scene N are the same in every run, so that
+``--first N --mutants 1`` repeats one.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from tests.fuzz.mutate import mutate
+from tests.fuzz.scenes import scene
 from tests.fuzz.seeds import Seed, seeds, write_scene
 
 LIMIT = 10.0
@@ -31,8 +33,11 @@ LIMIT = 10.0
 START_LIMIT = 120.0
 """Seconds in which a worker must be ready, its compiled code loaded."""
 
-CHUNK = 1000
-"""Mutants that a worker is given at a time."""
+SCENE_LIMIT = 60.0
+"""Seconds for one scene; the slowest takes 6, and the first of a worker loads compiled code."""
+
+CHUNK, SCENE_CHUNK = 1000, 25
+"""Mutants, and scenes, that a worker is given at a time."""
 
 MEMORY = 8 << 30
 """Bytes of address space of a worker."""
@@ -40,6 +45,8 @@ MEMORY = 8 << 30
 KEPT = Path(__file__).resolve().parents[2] / "build" / "fuzz"
 
 Attempt = Callable[[Seed, Path, int], str]
+Trial = Callable[[Path, int, Attempt | None], str]
+"""What case N goes through in a folder of its own; returns its verdict, one word and more after a colon."""
 
 
 @dataclass
@@ -61,30 +68,70 @@ def mutant(number: int) -> tuple[Seed, bytes]:
     return seed, mutate(seed.data, random.Random(number), seed.binary, seed.yaml)
 
 
-def work(connection: Connection, folder: str, attempt: Attempt | None) -> None:
-    """Run the mutants of each received range; tells the number of each before it starts, then how it ended."""
-    os.environ["LIGATURE_CACHE"] = os.path.join(folder, "cache")
+def mutant_files(number: int) -> dict[str, bytes]:
+    """The file of a mutant by its name."""
+    seed, data = mutant(number)
+    return {seed.name: data}
+
+
+def scene_files(number: int) -> dict[str, bytes]:
+    """The files of a generated scene by their names."""
+    return {name: text.encode() for name, text in scene(number).files.items()}
+
+
+def try_mutant(folder: Path, number: int, attempt: Attempt | None) -> str:
+    """Put a mutant in the place of its seed and attempt it."""
+    os.environ["LIGATURE_CACHE"] = str(folder.parent / "cache")
     if attempt is None:
         from tests.fuzz.attempt import attempt
+    if not (folder / "red.png").exists():
+        write_scene(folder)
+    seed, data = mutant(number)
+    (folder / seed.name).write_bytes(data)
+    try:
+        return attempt(seed, folder, number)
+    finally:
+        (folder / seed.name).write_bytes(seed.data)
+
+
+def try_scene(folder: Path, number: int, attempt: Attempt | None) -> str:
+    """Simulate a generated scene."""
+    from tests.fuzz.simulate import simulate
+
+    return simulate(folder, number)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A kind of cases: what they go through, their files, and what they are called in figures and reports."""
+
+    trial: Trial
+    files: Callable[[int], dict[str, bytes]]
+    noun: str
+    group: Callable[[int], str]
+
+
+MUTANTS = Campaign(try_mutant, mutant_files, "mutant", lambda number: Path(mutant(number)[0].name).suffix[1:])
+SCENES = Campaign(try_scene, scene_files, "scene", lambda number: "scene")
+
+
+def work(connection: Connection, folder: str, trial: Trial, attempt: Attempt | None) -> None:
+    """Run the cases of each received range; reports the number of each before it starts, then how it ended."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
-    scene = Path(folder, "scene")
-    scene.mkdir(exist_ok=True)
-    write_scene(scene)
+    place = Path(folder, "scene")
+    place.mkdir(exist_ok=True)
     connection.send(("ready", 0, ""))
     while True:
         first, end = connection.recv()
         for number in range(first, end):
             connection.send(("begin", number, ""))
-            seed, data = mutant(number)
-            (scene / seed.name).write_bytes(data)
             try:
-                verdict = attempt(seed, scene, number)
+                verdict = trial(place, number, attempt)
             except Exception as error:
                 verdict = f"failure: {type(error).__name__}: {str(error)[:300]}"
-            (scene / seed.name).write_bytes(seed.data)
             connection.send(("end", number, verdict))
         connection.send(("ready", 0, ""))
 
@@ -92,11 +139,13 @@ def work(connection: Connection, folder: str, attempt: Attempt | None) -> None:
 class _Worker:
     """A worker process as its parent sees it."""
 
-    def __init__(self, folder: Path, attempt: Attempt | None) -> None:
+    def __init__(self, folder: Path, trial: Trial, attempt: Attempt | None) -> None:
         context = multiprocessing.get_context("spawn")
         folder.mkdir(exist_ok=True)
         self.connection, theirs = context.Pipe()
-        self.process: BaseProcess = context.Process(target=work, args=(theirs, str(folder), attempt), daemon=True)
+        self.process: BaseProcess = context.Process(
+            target=work, args=(theirs, str(folder), trial, attempt), daemon=True
+        )
         self.process.start()
         theirs.close()
         self.number: int | None = None
@@ -114,33 +163,41 @@ class _Worker:
         self.connection.close()
 
 
-def run(mutants: int, first: int = 0, jobs: int = 1, attempt: Attempt | None = None, limit: float = LIMIT) -> Outcome:
-    """Run ``mutants`` mutants from number ``first`` on in ``jobs`` processes.
+def run(
+    cases: int,
+    first: int = 0,
+    jobs: int = 1,
+    attempt: Attempt | None = None,
+    limit: float = LIMIT,
+    campaign: Campaign = MUTANTS,
+    chunk: int = CHUNK,
+) -> Outcome:
+    """Run ``cases`` cases of a campaign from number ``first`` on in ``jobs`` processes.
 
-    ``attempt`` says what a mutant goes through; it must be importable; None stands for
+    ``attempt`` states what a mutant goes through; it must be importable; None stands for
     `tests.fuzz.attempt.attempt`, which only the workers import.
     """
     outcome = Outcome()
-    todo = [(a, min(a + CHUNK, first + mutants)) for a in range(first, first + mutants, CHUNK)][::-1]
+    todo = [(a, min(a + chunk, first + cases)) for a in range(first, first + cases, chunk)][::-1]
     with tempfile.TemporaryDirectory(prefix="ligature-fuzz-") as folder:
         count = min(jobs, len(todo))
-        workers = {slot: _Worker(Path(folder, str(slot)), attempt) for slot in range(count)}
+        workers = {slot: _Worker(Path(folder, str(slot)), campaign.trial, attempt) for slot in range(count)}
         while workers:
             wait([worker.connection for worker in workers.values()], timeout=0.2)
             for slot, worker in list(workers.items()):
-                reason = _listen(worker, todo, outcome, limit)
+                reason = _listen(worker, todo, outcome, limit, campaign)
                 if reason == "idle":
                     worker.stop()
                     del workers[slot]
                 elif reason:
                     worker.stop()
-                    _fail(worker, reason, todo, outcome)
-                    workers[slot] = _Worker(Path(folder, str(slot)), attempt)
+                    _fail(worker, reason, todo, outcome, campaign)
+                    workers[slot] = _Worker(Path(folder, str(slot)), campaign.trial, attempt)
     return outcome
 
 
-def _listen(worker: _Worker, todo: list[tuple[int, int]], outcome: Outcome, limit: float) -> str:
-    """Take what a worker says; returns why it must be stopped, or nothing."""
+def _listen(worker: _Worker, todo: list[tuple[int, int]], outcome: Outcome, limit: float, campaign: Campaign) -> str:
+    """Take what a worker states; returns why it must be stopped, or nothing."""
     try:
         while worker.connection.poll():
             what, number, verdict = worker.connection.recv()
@@ -148,7 +205,7 @@ def _listen(worker: _Worker, todo: list[tuple[int, int]], outcome: Outcome, limi
             if what == "begin":
                 worker.number = number
             elif what == "end":
-                _count(number, verdict, outcome)
+                _count(number, verdict, outcome, campaign)
             elif todo:
                 worker.range = todo.pop()
                 worker.connection.send(worker.range)
@@ -160,44 +217,51 @@ def _listen(worker: _Worker, todo: list[tuple[int, int]], outcome: Outcome, limi
     return f"hang (more than {limit:g} s)" if worker.overdue(limit) else ""
 
 
-def _count(number: int, verdict: str, outcome: Outcome) -> None:
-    seed, data = mutant(number)
-    outcome.ended[f"{Path(seed.name).suffix[1:]} {verdict.split(':')[0]}"] += 1
+def _count(number: int, verdict: str, outcome: Outcome, campaign: Campaign) -> None:
+    outcome.ended[f"{campaign.group(number)} {verdict.split(':')[0]}"] += 1
     if verdict.startswith("failure"):
-        _keep(number, seed, data, verdict, outcome)
+        _keep(number, verdict, outcome, campaign)
 
 
-def _fail(worker: _Worker, reason: str, todo: list[tuple[int, int]], outcome: Outcome) -> None:
+def _fail(worker: _Worker, reason: str, todo: list[tuple[int, int]], outcome: Outcome, campaign: Campaign) -> None:
     """Note that a worker was lost, and put back what it had not begun."""
     if worker.number is None:
         raise RuntimeError(f"a worker did not start: {reason}")
-    seed, data = mutant(worker.number)
-    outcome.ended[f"{Path(seed.name).suffix[1:]} failure"] += 1
-    _keep(worker.number, seed, data, reason, outcome)
+    outcome.ended[f"{campaign.group(worker.number)} failure"] += 1
+    _keep(worker.number, reason, outcome, campaign)
     if worker.number + 1 < worker.range[1]:
         todo.append((worker.number + 1, worker.range[1]))
 
 
-def _keep(number: int, seed: Seed, data: bytes, reason: str, outcome: Outcome) -> None:
+def _keep(number: int, reason: str, outcome: Outcome, campaign: Campaign) -> None:
     KEPT.mkdir(parents=True, exist_ok=True)
-    (KEPT / f"{number}-{seed.name}").write_bytes(data)
-    outcome.failures.append(f"mutant {number} of {seed.name}: {reason}")
+    files = campaign.files(number)
+    for name, data in files.items():
+        (KEPT / f"{number}-{name}").write_bytes(data)
+    outcome.failures.append(f"{campaign.noun} {number} of {min(files)}: {reason}")
 
 
 def main() -> int:
     """Entry point."""
     flags = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    flags.add_argument("--mutants", type=int, default=100_000)
-    flags.add_argument("--first", type=int, default=0, help="number of the first mutant")
+    kind = flags.add_mutually_exclusive_group()
+    kind.add_argument("--mutants", type=int, default=100_000)
+    kind.add_argument("--scenes", type=int, help="generated scenes, instead of mutants")
+    flags.add_argument("--first", type=int, default=0, help="number of the first one")
     flags.add_argument("--jobs", type=int, default=2, help="worker processes")
     given = flags.parse_args()
     begin = time.monotonic()
-    outcome = run(given.mutants, given.first, given.jobs)
+    if given.scenes is None:
+        cases, outcome = given.mutants, run(given.mutants, given.first, given.jobs)
+    else:
+        cases = given.scenes
+        outcome = run(cases, given.first, given.jobs, limit=SCENE_LIMIT, campaign=SCENES, chunk=SCENE_CHUNK)
     for failure in outcome.failures[:50]:
         sys.stdout.write(f"{failure}\n")
     ended = ", ".join(f"{key} {count}" for key, count in sorted(outcome.ended.items()))
     seconds = time.monotonic() - begin
-    sys.stdout.write(f"{given.mutants} mutants in {seconds:.0f} s: {ended}; {len(outcome.failures)} failures\n")
+    noun = "mutants" if given.scenes is None else "scenes"
+    sys.stdout.write(f"{cases} {noun} in {seconds:.0f} s: {ended}; {len(outcome.failures)} failures\n")
     return int(bool(outcome.failures))
 
 

@@ -1,4 +1,4 @@
-"""Two thousand mutants, and that the harness would tell; `make fuzz` runs a hundred thousand."""
+"""Two thousand mutants, eighty scenes, and that the harness would report; `make fuzz` runs many more."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from tests.fuzz import run as harness
 from tests.fuzz.attempt import attempt
-from tests.fuzz.run import mutant, run
+from tests.fuzz.run import SCENE_LIMIT, SCENES, mutant, run
 from tests.fuzz.seeds import Seed, seeds, write_scene
 
 
@@ -19,6 +19,12 @@ def test_no_mutant_crashes_hangs_or_surprises() -> None:
     assert outcome.failures == []
     assert sum(outcome.ended.values()) == 2000
     assert min(outcome.total(verdict) for verdict in ("clean", "findings", "refused")) > 100
+
+
+def test_what_check_passes_runs_a_second_finite_and_slow() -> None:
+    outcome = run(80, jobs=2, limit=SCENE_LIMIT, campaign=SCENES, chunk=40)
+    assert outcome.failures == []
+    assert outcome.total("clean") > 60
 
 
 @pytest.mark.parametrize("seed", seeds(), ids=lambda seed: seed.name)
@@ -57,7 +63,7 @@ def hang(seed: Seed, folder: Path, number: int) -> str:
     ("attempt", "reason"),
     [(surprise, "failure: KeyError"), (die, "crash (status -6)"), (hang, "hang (more than 1 s)")],
 )
-def test_the_harness_tells_failures_and_goes_on(
+def test_the_harness_reports_failures_and_goes_on(
     attempt: harness.Attempt, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(harness, "KEPT", tmp_path)

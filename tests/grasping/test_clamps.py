@@ -46,7 +46,7 @@ def _pulled(sim: Simulation, force: float, ticks: int = 100) -> float:
     return float(np.linalg.norm(needle.pose[:3] - start))
 
 
-def test_an_actuator_holds_rigidly_unless_it_is_told_to_slip(simulate: Make) -> None:
+def test_an_actuator_holds_rigidly_unless_it_is_asked_to_slip(simulate: Make) -> None:
     sim = simulate("")
     assert sim.scene.actuators[0].slip is None
     assert _pulled(sim, 10.0) < 0.3e-3

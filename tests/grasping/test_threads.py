@@ -19,7 +19,7 @@ class Stretched(Theatre):
     def __init__(self) -> None:
         super().__init__()
         self.open("PSM1")
-        self.rod = self.sim._rods.rods[0]
+        self.rod = self.sim._suture.rods.rods[0]
         for element in range(len(self.rod.positions)):
             self.rod.set_gravity(element, (0.0, 0.0, 0.0))
         H = self.holder("PSM1")

@@ -112,7 +112,9 @@ def test_a_disk_without_room_is_an_error_that_names_both_folders(tmp_path: Path)
     assert list((tmp_path / "collision").iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_written_is_replaced_and_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_folder_that_cannot_be_written_is_replaced_and_stated(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     (tmp_path / "file").write_text("")
     cache = CollisionCache(tmp_path / "file" / "below")
     path = cache.hulls([CUBE])

@@ -1,4 +1,4 @@
-"""Collision pieces by kind, and what is said of parts that make none."""
+"""Collision pieces by kind, and what is stated of parts that make none."""
 
 from __future__ import annotations
 

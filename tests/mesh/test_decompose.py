@@ -90,14 +90,16 @@ def test_a_flat_moving_mesh_is_its_outline() -> None:
     assert len(convex_pieces(vertices[:6], faces[:4])[0]) == 5
 
 
-def test_when_coacd_takes_too_long_the_hull_stands_in_and_a_warning_says_so(
+def test_when_coacd_hangs_the_hull_stands_in_and_a_warning_reports_it(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(module, "QUICK_LIMIT", 0.001)
+    monkeypatch.setattr(module, "HANG_LIMIT", 0.001)
     with caplog.at_level(logging.WARNING):
-        (piece,) = convex_pieces(*ell())
+        (piece,) = convex_pieces(*ell(), "/ell.obj")
     assert len(piece) == 10
-    assert "collides as its convex hull: CoACD took longer than 0.001 s; run 'ligature decompose'" in caplog.text
+    assert (
+        "/ell.obj collides as its convex hull: CoACD took longer than 0.001 s; run 'ligature decompose'" in caplog.text
+    )
 
 
 @pytest.mark.parametrize(("threshold", "text"), [(0.0, "threshold is 0; it must be from 0.01 to 1"), (2.0, "is 2;")])

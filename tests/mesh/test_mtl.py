@@ -1,4 +1,4 @@
-"""Materials and textures of OBJ files: what is honoured, and what is said of the rest."""
+"""Materials and textures of OBJ files: what is honoured, and what is stated of the rest."""
 
 from __future__ import annotations
 

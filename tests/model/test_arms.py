@@ -59,7 +59,7 @@ def test_the_arms_of_an_unmodified_lab_scene_are_found(corpus: Path) -> None:
     assert [arm.tool for arm in scene.arms[:2]] == ["400006", "400006"]
 
 
-def test_half_an_arm_says_what_is_missing(tmp_path: Path) -> None:
+def test_half_an_arm_states_what_is_missing(tmp_path: Path) -> None:
     scene = scene_with(tmp_path, "", drop="JOINT tool roll link-tool pitch link")
     assert "PSM1" not in names(scene)
     assert "PSM2" in names(scene)
@@ -96,7 +96,7 @@ def test_a_launch_file_may_declare_that_there_are_none(tmp_path: Path) -> None:
         ("just words", "'just words' is no map"),
     ],
 )
-def test_a_wrong_declaration_is_told_and_the_others_stand(tmp_path: Path, entry: str, why: str) -> None:
+def test_a_wrong_declaration_is_reported_and_the_others_stand(tmp_path: Path, entry: str, why: str) -> None:
     scene = scene_with(tmp_path, f"ligature arms:\n  - {entry}\n  - {{name: MTMR, kind: mtm}}\n")
     assert names(scene) == ["MTMR"]
     (found,) = [d for d in scene.diagnostics if d.code == "arm"]

@@ -1,4 +1,4 @@
-"""From files to scenes: references, parents, trees, rods, and what is said when something is missing."""
+"""From files to scenes: references, parents, trees, rods, and what is stated when something is missing."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_gravity_is_the_bodys_else_the_files_else_the_worlds(lab) -> None:
     assert [b.gravity.tolist() for b in scene.bodies] == [[1, 0, 0], [0, 2, 0], [0, 0, -9.8]]
 
 
-def test_without_mass_the_inertial_block_has_no_effect_and_that_is_said(lab) -> None:
+def test_without_mass_the_inertial_block_has_no_effect_and_that_is_stated(lab) -> None:
     text = "bodies: [BODY a]\nBODY a: {name: a, inertia: {ix: 5, iy: 5, iz: 5}, collision shape: SPHERE, collision geometry: {radius: 1}}\n"
     scene = lab(m=text)
     assert scene.bodies[0].mass == 1.0
@@ -89,7 +89,7 @@ def test_an_exact_name_in_the_namespace_beats_forty_parts(lab) -> None:
     assert (scene.joints[0].parent, scene.joints[0].child) == (0, 1)
 
 
-def test_an_ambiguous_parent_is_told_with_its_candidates(lab) -> None:
+def test_an_ambiguous_parent_is_reported_with_its_candidates(lab) -> None:
     joint = f"joints: [J]\nJ: {{name: j, type: fixed, parent: Thr, child: BODY b, {AXES}}}\n"
     scene = lab(m=bodies("Thr1", "Thr2", "b") + joint)
     assert scene.joints == ()
@@ -161,9 +161,9 @@ def test_a_camera_that_hangs_on_another_resolves_although_its_own_name_holds_the
     assert scene.cameras[0].attachment.parent == ("camera", 1)
 
 
-def test_a_parent_that_never_comes_is_told(lab) -> None:
+def test_a_parent_that_never_comes_is_reported(lab) -> None:
     text = "bodies: [BODY a]\nBODY a: {name: a, mass: 1}\nlights: [L]\nL: {name: L, parent: BODY none}\n"
-    assert "has the parent 'BODY none', which is not there or not unique" in said(lab(m=text))
+    assert "has the parent 'BODY none', that is missing or not unique" in said(lab(m=text))
 
 
 def test_cameras_look_along_minus_x_with_z_up(lab) -> None:
@@ -196,7 +196,7 @@ def test_a_file_without_bodies_cannot_run(tmp_path: Path) -> None:
         ligature.load(tmp_path / "m.yaml")
 
 
-def test_an_index_beyond_the_list_is_told(lab, tmp_path: Path) -> None:
+def test_an_index_beyond_the_list_is_reported(lab, tmp_path: Path) -> None:
     lab(m=bodies("a"))
     scene = ligature.load(tmp_path / "launch.yaml", models=[0, 7])
     assert "there is no model 7; 'multibody configs' lists 1, counted from 0" in said(scene)

@@ -1,4 +1,4 @@
-"""Proxies of input devices are models of the scene whose root link stands where the device says."""
+"""Proxies of input devices are models of the scene whose root link stands where the device states."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_proxies_are_there_when_they_are_asked_for(launch: Path) -> None:
     assert [body.identity.passive for body in scene.bodies] == [False, *[False, True, True] * 2]
 
 
-def test_a_proxy_stands_whole_where_the_device_says_with_its_gains(launch: Path) -> None:
+def test_a_proxy_stands_whole_where_the_device_states_with_its_gains(launch: Path) -> None:
     scene = ligature.load(launch, devices=[0])
     palm, left = scene.bodies[1:3]
     assert palm.T_world_body[:3, 3] == pytest.approx([0.0, 0.0, 0.5])
@@ -90,7 +90,7 @@ def test_a_proxy_stands_whole_where_the_device_says_with_its_gains(launch: Path)
     assert own.T_world_body[:3, 3] == pytest.approx([1.0, 0.0, 0.0]), "its own place without a location"
 
 
-def test_a_proxy_that_nobody_leads_does_not_fall(launch: Path) -> None:
+def test_a_proxy_that_nobody_drives_does_not_fall(launch: Path) -> None:
     simulation = ligature.Simulation(ligature.load(launch, devices=[0]))
     before = simulation.bodies["/ambf/env/simulated_device/palm"].pose
     simulation.step(300)
@@ -108,7 +108,7 @@ def test_a_proxy_follows_the_poses_that_are_commanded(launch: Path) -> None:
     simulation.close()
 
 
-def test_a_proxy_that_is_not_there_is_a_finding(launch: Path) -> None:
+def test_a_proxy_that_is_missing_is_a_finding(launch: Path) -> None:
     scene = ligature.load(launch, devices=[2, 7])
     assert scene.input_devices[2].proxy == -1
     texts = [str(found) for found in scene.diagnostics]

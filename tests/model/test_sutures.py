@@ -56,7 +56,7 @@ def test_it_hangs_from_its_needle(tmp_path: Path) -> None:
         ("USP size: 2-0", "diameter: -1", "has the diameter -1; give metres"),
     ],
 )
-def test_data_that_make_no_thread_are_told(tmp_path: Path, old: str, new: str, text: str) -> None:
+def test_data_that_make_no_thread_are_reported(tmp_path: Path, old: str, new: str, text: str) -> None:
     scene = load(tmp_path, NEEDLE + SILK.replace(old, new))
     assert scene.rods == ()
     assert text in "\n".join(str(d) for d in scene.diagnostics if d.severity >= Severity.ERROR)

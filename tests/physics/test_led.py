@@ -1,4 +1,4 @@
-"""A body led by poses or twists pushes as firmly as a needle of half a kilogram, however light it is."""
+"""A body kinematically controlled or twists pushes as firmly as a needle of half a kilogram, however light it is."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_released_it_falls_by_its_own_weight(sim: Simulation) -> None:
     assert sim.bodies["Ball"].twist[2] == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_snapshot_of_a_led_body_continues_with_the_same_bits(sim: Simulation) -> None:
+def test_a_snapshot_of_a_driven_body_continues_with_the_same_bits(sim: Simulation) -> None:
     led(sim, 0.05)
     sim.step(300)
     snapshot = sim.snapshot()
@@ -57,3 +57,20 @@ def test_a_snapshot_of_a_led_body_continues_with_the_same_bits(sim: Simulation) 
     sim.step(300)
     assert sim.state_hash() == first
     assert np.isfinite(sim.bodies["Block"].pose).all()
+
+
+def test_a_new_pursuit_by_forces_begins_without_the_slope_of_an_earlier_one(simulate: Make) -> None:
+    """A client commands a pose, then no force, moves the body otherwise and commands a pose again."""
+    sim = simulate(
+        "bodies: [Ball]\n"
+        "Ball: {name: Ball, mass: 0.1, collision shape: SPHERE, collision geometry: {radius: 0.01}, "
+        f"{SMOOTH}, gravity: {{x: 0, y: 0, z: 0}}, controller: {{linear: {{P: 2, I: 0, D: 1}}}}}}\n"
+    )
+    ball = sim.bodies["Ball"]
+    ball.command_pose([0.1, 0, 0, 0, 0, 0, 1])
+    sim.step(5)
+    ball.command_wrench([0.0] * 6)
+    ball.set_pose([0, 0, 0, 0, 0, 0, 1])
+    ball.command_pose([-0.1, 0, 0, 0, 0, 0, 1])
+    sim.step(1)
+    assert ball.twist[0] == pytest.approx(-2 * 0.1 / 0.1 * 1e-3, rel=1e-3)

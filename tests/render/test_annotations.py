@@ -1,4 +1,4 @@
-"""Annotations say which pixels show which object, in COCO's own terms."""
+"""Annotations state which pixels show which object, in COCO's own terms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One picture for each feature of materials and lights, and what of it can be said in numbers."""
+"""One picture for each feature of materials and lights, and what of it can be stated in numbers."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_a_point_light_shines_around_itself(tmp_path: Path) -> None:
     assert brightness(point, view, beside) > 1.5 * brightness(spot, view, beside)
 
 
-def test_light_falls_off_as_the_specification_says(tmp_path: Path) -> None:
+def test_light_falls_off_as_the_specification_states(tmp_path: Path) -> None:
     lamp = (
         "name: L, location: {x: 0, y: 0, z: 0.5}, direction: {x: 0, y: 0, z: -1}, cutoff angle: 1.2, spot exponent: 2, "
         "attenuation: {constant: 0.5, linear: 1.0, quadratic: 2.0}"
@@ -223,7 +223,7 @@ def test_optical_flow_is_how_far_pixels_move(tmp_path: Path) -> None:
     assert np.abs(frame.flow[seen][:, 1]).max() < 0.02
 
 
-def test_parts_tell_materials_of_one_body_apart(tmp_path: Path) -> None:
+def test_parts_report_materials_of_one_body_apart(tmp_path: Path) -> None:
     renderer, simulation = Stage(tmp_path, [ball(RED), ball(RED, (0.2, 0, 0.1))]).renderer()
     view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
     frame = renderer.render(simulation.state, view, ("ids", "parts"))

@@ -59,7 +59,7 @@ def test_ids_split_the_picture_where_the_silhouette_is(drawn) -> None:
     assert pixels == pytest.approx(np.pi * outline**2, rel=0.002)
 
 
-def test_a_known_point_is_seen_where_the_intrinsics_say(drawn) -> None:
+def test_a_known_point_is_seen_where_the_intrinsics_state(drawn) -> None:
     frame, view = drawn
     rows, columns = np.nonzero(frame.ids == 2)
     assert columns.mean() == pytest.approx(view.intrinsics[0, 2], abs=0.1)

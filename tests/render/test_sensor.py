@@ -1,4 +1,4 @@
-"""Lens and sensor: what they do to a picture is what they say."""
+"""Lens and sensor: what they do to a picture is what they state."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_undistort_undoes_distort() -> None:
 
 
 @pytest.mark.parametrize("lens", [BARREL, (0.2, 0.0, 0.0, 0.0, 0.0)], ids=["barrel", "cushion"])
-def test_a_lens_shows_known_points_where_its_coefficients_say(simulate: Make, lens: tuple[float, ...]) -> None:
+def test_a_lens_shows_known_points_where_its_coefficients_state(simulate: Make, lens: tuple[float, ...]) -> None:
     simulation = simulate(C=camera("C"))
     how = {"resolution": (1280, 960), "sensor": ImageSensor(distortion=lens)}
     calibration = simulation.cameras["C"].calibration(**how)
@@ -78,7 +78,7 @@ def test_a_stop_more_doubles_the_light(simulate: Make) -> None:
         ({"distortion": (0.0, float("inf"), 0.0, 0.0, 0.0)}, "the distortion of a sensor has to be finite"),
     ],
 )
-def test_a_sensor_that_makes_no_sense_is_refused(wrong: dict[str, Any], words: str) -> None:
+def test_a_sensor_that_is_invalid_is_refused(wrong: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         ImageSensor(**wrong)
 

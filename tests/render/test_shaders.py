@@ -1,4 +1,4 @@
-"""Shaders of scene files: every name that authors use, what they compute, and what is said of broken ones."""
+"""Shaders of scene files: every name that authors use, what they compute, and what is stated of broken ones."""
 
 from __future__ import annotations
 
@@ -230,8 +230,8 @@ PROBES = {
     "-gl_LightSource[0].spotDirection": np.array([0.3, 0.25, 0.9]) / np.linalg.norm([0.3, 0.25, 0.9]),
     "gl_FrontMaterial.specular.rgb": [0.3, 0.4, 0.5],
     "gl_FrontMaterial.shininess / 40.0": [0.5] * 3,
-    "gl_FrontLightModelProduct.sceneColor.rgb": [0.1, 0.0, 0.05],
-    "gl_FrontLightProduct[0].ambient.rgb": [0.35 * 0.3, 0.35 * 0.2, 0.35 * 0.05],
+    "gl_FrontLightModelProduct.sceneColor.rgb": [0.1 + 0.2 * 0.3, 0.2 * 0.2, 0.05 + 0.2 * 0.05],
+    "gl_FrontLightProduct[0].ambient.rgb": [0.15 * 0.3, 0.15 * 0.2, 0.15 * 0.05],
     "gl_DepthRange.diff": [1.0] * 3,
     "float(gl_MaxLights) / 16.0": [0.5] * 3,
     "-(gl_ModelViewMatrix * vec4(0.0, 0.0, 0.0, 1.0)).xyz / 2.0": [0.0, 0.0, 0.7],

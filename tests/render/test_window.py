@@ -36,7 +36,7 @@ def wait(condition: Callable[[], bool], turn: Callable[[], object], seconds: flo
         turn()
 
 
-def test_without_a_display_the_message_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_display_the_message_states_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     with pytest.raises(RenderUnavailable, match="there is no display; set DISPLAY, or run without '--window'"):
         Window("x")

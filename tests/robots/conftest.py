@@ -21,12 +21,12 @@ def ideal_psm(start: np.ndarray | None = None) -> PsmArm:
     limits = np.array([kinematics.lower, kinematics.upper])
     at = np.zeros(6) if start is None else start
     joints = Axes(
-        kinematics.joint_names, limits, psm_arm.FASTEST, psm_arm.HARDEST,
+        kinematics.joint_names, limits, psm_arm.MAX_VELOCITY, psm_arm.MAX_ACCELERATION,
         IdealPlant(limits[0], limits[1], np.full(6, 0.1), np.full(6, 0.5), at),
     )  # fmt: skip
     ends = np.array(kinematics.instrument.jaw).reshape(2, 1)
     plant = IdealPlant(ends[0], ends[1], np.full(1, 0.01), np.full(1, 0.1), np.zeros(1))
-    jaw = Axes(("jaw",), ends, [psm_arm.JAW_FASTEST], [psm_arm.JAW_HARDEST], plant)
+    jaw = Axes(("jaw",), ends, [psm_arm.JAW_MAX_VELOCITY], [psm_arm.JAW_MAX_ACCELERATION], plant)
     return PsmArm("PSM1", kinematics, joints, jaw)
 
 

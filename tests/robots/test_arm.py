@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +11,7 @@ from ligature.model.frames import frame, matrix_pose7, pose7_matrix, rpy_matrix
 from ligature.robots.arm import Arm
 from ligature.robots.impedance import CartesianImpedance
 from ligature.robots.operating_state import Refused
-from ligature.robots.psm_arm import FASTEST, HARDEST, LEAST_DEPTH, PsmArm
+from ligature.robots.psm_arm import LEAST_DEPTH, MAX_ACCELERATION, MAX_VELOCITY, PsmArm
 
 from tests.robots.conftest import DT, advance
 
@@ -48,8 +49,8 @@ def test_a_move_keeps_velocity_and_acceleration_limits_and_ends_at_its_goal(read
         rows.append(ready.setpoint_js().position)
     q = np.array(rows)
     speed = np.diff(q, axis=0) / DT
-    assert (np.abs(speed) <= FASTEST * (1 + 1e-6)).all()
-    assert (np.abs(np.diff(speed, axis=0)) / DT <= HARDEST * 1.01).all()
+    assert (np.abs(speed) <= MAX_VELOCITY * (1 + 1e-6)).all()
+    assert (np.abs(np.diff(speed, axis=0)) / DT <= MAX_ACCELERATION * 1.01).all()
     assert q[-1] == pytest.approx(goal, abs=1e-9)
     assert told(ready, "goal_reached") == [True]
 
@@ -60,7 +61,7 @@ def test_a_move_at_a_tenth_of_speed_and_acceleration_takes_the_time_that_they_al
     start = ready.time
     while ready.is_busy:
         ready.tick(DT)
-    v, a = 0.1 * FASTEST[0], HARDEST[0]
+    v, a = 0.1 * MAX_VELOCITY[0], MAX_ACCELERATION[0]
     assert ready.time - start == pytest.approx(0.5 / v + v / a, abs=3 * DT)
 
 
@@ -81,7 +82,7 @@ def test_a_newer_move_takes_over_without_a_jump(ready: PsmArm, told: Told) -> No
     speed = ready.setpoint_js().velocity[0]
     ready.move_jp([0.0, 0, 0.12, 0, 0, 0])
     ready.tick(DT)
-    assert ready.setpoint_js().velocity[0] == pytest.approx(speed, abs=HARDEST[0] * 2 * DT)
+    assert ready.setpoint_js().velocity[0] == pytest.approx(speed, abs=MAX_ACCELERATION[0] * 2 * DT)
     advance(ready, 3.0)
     assert ready.setpoint_js().position[0] == pytest.approx(0.0, abs=1e-9)
     assert told(ready, "goal_reached") == [False, True]
@@ -284,11 +285,11 @@ def test_forward_and_inverse_kinematics_on_demand(ready: PsmArm) -> None:
 def test_a_recalled_arm_goes_on_as_the_other_did(ready: PsmArm) -> None:
     ready.move_jp([0.5, 0.2, 0.15, 0, 0, 0])
     advance(ready, 0.3)
-    memory = ready.memory()
-    plant = ready.joints.plant.memory()
+    kept = copy.deepcopy(ready.snapshot())
+    plant = copy.deepcopy(ready.joints.plant.snapshot())
     advance(ready, 0.5)
     first = ready.measured_js().position
-    ready.recall(memory)
-    ready.joints.plant.recall(plant)
+    ready.restore(kept)
+    ready.joints.plant.restore(plant)
     advance(ready, 0.5)
     assert (ready.measured_js().position == first).all()

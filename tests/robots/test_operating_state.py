@@ -20,11 +20,11 @@ DISABLED, ENABLED, PAUSED, FAULT = State
 
 
 def make_arm() -> PsmArm:
-    """A PSM without bodies: it is where it is told to be."""
+    """A PSM without bodies: it is where it is asked to be."""
     kinematics = Psm(420006, "Si")
     limits = np.array([kinematics.lower, kinematics.upper])
     plant = IdealPlant(*limits, np.ones(6), np.ones(6), psm_arm.HOME * 0.9)
-    joints = Axes(kinematics.joint_names, limits, psm_arm.FASTEST, psm_arm.HARDEST, plant)
+    joints = Axes(kinematics.joint_names, limits, psm_arm.MAX_VELOCITY, psm_arm.MAX_ACCELERATION, plant)
     ends = np.array(kinematics.instrument.jaw).reshape(2, 1)
     fingers = IdealPlant(ends[0], ends[1], np.ones(1), np.ones(1), np.zeros(1))
     return PsmArm("PSM1", kinematics, joints, Axes(("jaw",), ends, [10.0], [10.0], fingers))
@@ -146,7 +146,7 @@ def told(arm: PsmArm, name: str) -> list[object]:
 
 
 @pytest.mark.parametrize(("state", "command"), COMMANDS)
-def test_a_state_command_leads_where_the_table_says(state, command):
+def test_a_state_command_drives_where_the_table_states(state, command):
     arm, expected = MADE[state](), COMMANDS[state, command]
     before = arm.operating_state
     if expected is REFUSED:
@@ -168,7 +168,7 @@ def test_every_accepted_command_is_answered_by_a_new_event(state):
             arm.events.clear()
             arm.state_command(command)
             settle(arm)
-            assert told(arm, "operating_state"), f"{command} told nothing: a client that waits would wait for ever"
+            assert told(arm, "operating_state"), f"{command} reported nothing: a client that waits would wait for ever"
 
 
 @pytest.mark.parametrize("state", MADE)

@@ -20,7 +20,7 @@ from ligature.model.frames import matrix_pose7, pose7_matrix
 TASK_3_JOINTS = [-0.4, -0.22, 0.139, -1.64, -0.37, -0.11]
 TIP_IN_NEEDLE = np.array([0.006617809, 0.006973457, 0.0, 1.0])
 CLOSING = {420006: 0.3, 400006: 0.6}
-"""Seconds for which jaws are told to close. The scripts take 0.3 s; on a 400006 pad the needle lies first beside the
+"""Seconds for which jaws are asked to close. The scripts take 0.3 s; on a 400006 pad the needle lies first beside the
 ghost, which names it 0.38 s after the jaws began to close."""
 
 CAMERA_STEP = 0.002
@@ -47,7 +47,7 @@ NEEDLE_IN_JAWS = at(0.00997302, -0.00521514, 0.00323717) @ turned(0, -math.pi / 
 
 
 def measured(handle: Any) -> np.ndarray:
-    """Pose of an object as its handle tells."""
+    """Pose of an object as its handle reports."""
     p, q = handle.get_pos(), handle.get_rot()
     return pose7_matrix(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
 
@@ -148,7 +148,7 @@ class Psm:
 
 
 TURNED = 0.05
-"""Angle in radians to its goal within which a body that is led has arrived."""
+"""Angle in radians to its goal within which a body that is driven has arrived."""
 
 
 def lead(stage: Stage, handle: Any, target: Callable[[], np.ndarray], step: float, arrived: float) -> None:

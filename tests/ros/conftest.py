@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,14 @@ from ligature.bus.process import end_with_parent
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
 BIN = Path(sys.executable).parent
+
+
+PROCESSES = (
+    *(f"ligature.cli.{name}" for name in (
+        "physics", "ros_process", "render_process", "tasks_process", "window_process", "cockpit_process",
+    )), "rosmaster",
+)  # fmt: skip
+"""What the processes of a run are called in a list of processes."""
 
 
 def free_port() -> int:
@@ -65,24 +73,21 @@ class Program:
         for line in listing.splitlines()[1:]:
             pid, parent, args = line.split(None, 2)
             if int(parent) == self.process.pid:
-                for name in (
-                    "ligature.cli.physics",
-                    "ligature.cli.ros_process",
-                    "ligature.cli.render_process",
-                    "rosmaster",
-                ):
+                for name in PROCESSES:
                     if name in args:
                         found[name.rpartition(".")[2]] = int(pid)
         return found
 
-    def end(self, patience: float = 5.0) -> int:
+    def end(self, timeout: float = 5.0) -> int:
         """Ctrl-C; returns the exit status."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(patience)
+            return self.process.wait(timeout)
         except subprocess.TimeoutExpired:
-            self.process.kill()
+            for pid in (self.process.pid, *self.children().values()):  # a node that stays keeps its name
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
             self.process.wait()
             raise
 

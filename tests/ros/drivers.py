@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 PERIOD = 0.005
-PATIENCE = 20.0
+TIMEOUT = 20.0
 """Seconds that a test waits for what takes a moment when nothing else runs."""
 
 SEPARATOR = "=" * 80
@@ -53,8 +53,8 @@ float64 w
 """
 
 
-def until(condition: Callable[[], Any], what: Any = "", seconds: float = PATIENCE) -> Any:
-    """Wait for a condition; ``what`` says what was awaited, or is asked when it did not come. Returns its value."""
+def until(condition: Callable[[], Any], what: Any = "", seconds: float = TIMEOUT) -> Any:
+    """Wait for a condition; ``what`` states what was awaited, or is asked when it did not come. Returns its value."""
     deadline = time.monotonic() + seconds
     while not (value := condition()):
         assert time.monotonic() < deadline, what() if callable(what) else what
@@ -62,8 +62,8 @@ def until(condition: Callable[[], Any], what: Any = "", seconds: float = PATIENC
     return value
 
 
-def patiently(ask: Callable[[], Any], seconds: float = PATIENCE) -> Any:
-    """What a client tells, although a busy machine keeps its messages waiting for longer than the client does."""
+def patiently(ask: Callable[[], Any], seconds: float = TIMEOUT) -> Any:
+    """What a client reports, although a busy machine keeps its messages waiting for longer than the client does."""
     deadline = time.monotonic() + seconds
     while True:
         try:
@@ -74,15 +74,15 @@ def patiently(ask: Callable[[], Any], seconds: float = PATIENCE) -> Any:
 
 
 def wait_for_listener(publisher: Any, count: int = 1) -> Any:
-    """What is said before somebody listens is lost; the console's topics have two who do. Returns the publisher."""
+    """What is stated before somebody listens is lost; the console's topics have two who do. Returns the publisher."""
     until(lambda: publisher.get_num_connections() >= count, f"fewer than {count} listen to {publisher.name}")
     return publisher
 
 
 class Driver:
-    """Says where the handle ``T`` (4, 4) is every `PERIOD`; ``grip`` is how far its grip is pressed, 0 to 1.
+    """States where the handle ``T`` (4, 4) is every `PERIOD`; ``grip`` is how far its grip is pressed, 0 to 1.
 
-    ``muted`` silences it, ``says`` (7,) replaces the pose.
+    ``muted`` silences it, ``states`` (7,) replaces the pose.
     """
 
     AXES = np.eye(3)
@@ -202,7 +202,7 @@ class Paddle(Driver):
 
 
 def camera_of(arms: dict[str, Any], name: str, listen: Callable[..., Any]) -> Array:
-    """T_base_camera of an arm, from what the set-up joints tell."""
+    """T_base_camera of an arm, as the set-up joints report it."""
     from geometry_msgs.msg import PoseStamped
 
     from tests.ros.crtk import pose7

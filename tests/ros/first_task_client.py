@@ -10,7 +10,7 @@ from ambf_msgs.msg import RigidBodyState
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 
-PATIENCE = 90.0
+TIMEOUT = 90.0
 REPORT = "/surgical_robotics_challenge/completion_report/testers/task1/"
 SCORE = "/ligature/tasks/pose_estimation/score"
 
@@ -27,7 +27,7 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def seen(name: str) -> tuple[np.ndarray, np.ndarray]:
-    pose = rospy.wait_for_message(f"/ambf/env/{name}/State", RigidBodyState, PATIENCE).pose
+    pose = rospy.wait_for_message(f"/ambf/env/{name}/State", RigidBodyState, TIMEOUT).pose
     p, q = pose.position, pose.orientation
     return np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
 
@@ -40,7 +40,7 @@ class FirstTask(unittest.TestCase):
 
     def judged(self, position: np.ndarray, q: np.ndarray) -> dict[str, str]:
         """The score for a report of the needle's pose in the camera's frame."""
-        end = rospy.get_time() + PATIENCE
+        end = rospy.get_time() + TIMEOUT
         while self.report.get_num_connections() == 0 and rospy.get_time() < end:
             rospy.sleep(0.05)
         before = len(self.scores)

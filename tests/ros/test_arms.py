@@ -148,7 +148,7 @@ def test_joint_states_carry_names_and_arrays_of_one_length(arm):
 
 
 @on_every_arm
-def test_poses_are_told_in_the_frame_of_the_base(arm):
+def test_poses_are_reported_in_the_frame_of_the_base(arm):
     reference = "HRSV" if arm.name.startswith("MTM") else f"{arm.name}_base"
     assert arm.hear("measured_cp").header.frame_id == arm.hear("setpoint_cp").header.frame_id == reference
     for topic in ("local/measured_cp", "local/setpoint_cp"):
@@ -178,7 +178,7 @@ def test_inverse_kinematics_undoes_the_local_forward(arm):
 
 
 @on_every_arm
-def test_queries_that_cannot_be_answered_say_why(arm):
+def test_queries_that_cannot_be_answered_state_why(arm):
     q = arm.measured_jp()
     answer = arm.forward_kinematics([*q, 0.0])
     assert (answer.result, "too many joints" in answer.message) == (False, True)
@@ -215,7 +215,7 @@ def test_the_operating_state_is_latched_for_whoever_comes_late(arm, node):
 
 
 @on_every_arm
-def test_services_tell_state_and_version(arm, node):
+def test_services_report_state_and_version(arm, node):
     from crtk_msgs.srv import TriggerOperatingState
     from std_srvs.srv import Trigger
 
@@ -260,7 +260,7 @@ def test_states_follow_the_reference_sequence(arm):
     assert arm.enable(1.0)
     assert arm.home(5.0)
     told = [(e.state, e.is_homed, e.is_busy) for e in arm.state.events[before:]]
-    told = told[told.index(("DISABLED", False, True)) :]  # what was told before belongs to 'disable' and 'unhome'
+    told = told[told.index(("DISABLED", False, True)) :]  # what was reported before belongs to 'disable' and 'unhome'
     short = [told[0], *(state for last, state in zip(told, told[1:], strict=False) if state != last)]
     assert short == [
         ("DISABLED", False, True), ("ENABLED", False, False), ("ENABLED", False, True), ("ENABLED", True, False),

@@ -274,7 +274,7 @@ def test_a_killed_camera_process_comes_back(simulator: Program, listen: Callable
     assert world.messages[-1].sim_time > before + 0.5
 
 
-def test_without_opengl_the_simulator_says_so_and_runs_on(
+def test_without_opengl_the_simulator_reports_it_and_runs_on(
     start: Callable[..., Program], scene: Path, ros_env: dict[str, str], listen: Callable[..., Any]
 ) -> None:
     from ambf_msgs.msg import WorldState

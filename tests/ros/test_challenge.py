@@ -192,7 +192,7 @@ def test_opened_jaws_let_the_needle_fall_and_a_reset_puts_it_back(stage: Stage, 
     stage.until(lambda: np.allclose(psm2.measured_jp(), [-0.3, -0.12, 0.125, -1.4, -0.3, 0.0], atol=5e-3), 3.0)
 
 
-def test_the_camera_body_is_led_in_small_steps_and_the_cameras_ride_on_it(stage: Stage) -> None:
+def test_the_camera_body_is_driven_in_small_steps_and_the_cameras_ride_on_it(stage: Stage) -> None:
     frame, camera = stage.client.get_obj_handle("CameraFrame"), stage.client.get_obj_handle("cameraL")
     start, on_frame = measured(frame), measured(camera)
     goal = start @ turned(1, 0.05)
@@ -218,7 +218,7 @@ def test_the_evaluation_reads_needle_and_camera_from_their_literal_topics(
     assert abs(stage.client.get_time() - time.time()) < 1.0
 
 
-def test_a_needle_led_through_entry_and_exit_is_two_insertions_in_order(
+def test_a_needle_driven_through_entry_and_exit_is_two_insertions_in_order(
     stage: Stage, needle: Any, holes: dict[str, Any]
 ) -> None:
     stage.world.reset_bodies()

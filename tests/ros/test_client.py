@@ -251,7 +251,7 @@ def test_several_ral_of_one_process_share_its_node(client: Any) -> None:
         two.create_child("left")
 
 
-def test_a_ral_tells_time_stamps_messages_and_runs_functions(client: Any) -> None:
+def test_a_ral_reports_time_stamps_messages_and_runs_functions(client: Any) -> None:
     from geometry_msgs.msg import PoseStamped
     from ligature.client import ral
 
@@ -351,7 +351,7 @@ SCRIPT = """
 import sys
 from ambf_client import Client
 from ligature.client import layer
-layer.MASTER_PATIENCE = 0.5
+layer.MASTER_TIMEOUT = 0.5
 client = Client("alone", 1)
 try:
     client.connect()

@@ -61,7 +61,7 @@ def ready(arm: Any) -> None:
 
 def at_rest(arm: Any, goal: np.ndarray) -> None:
     """The arm stands at the joint values ``goal``."""
-    from ligature.robots.mtm import JOINT_NAMES  # its length tells the kinds apart
+    from ligature.robots.mtm import JOINT_NAMES  # its length distinguishes the kinds
 
     tolerance = np.full(len(goal), SETTLED[1])
     if len(goal) < len(JOINT_NAMES):
@@ -279,7 +279,7 @@ def test_dvrk_reset_teleoperation_brings_master_and_roll_to_zero(arms, node):
 def run_gravity_collection(arm: Any) -> None:
     """dvrk_ecm_psm_gc_collect: a grid of poses, some beyond the limits, efforts read at each."""
     ready(arm)
-    assert arm.home(0.0), "homed already: home() without patience is True"
+    assert arm.home(0.0), "homed already: home() without timeout is True"
     angles = arm.setpoint_jp()
     for yaw, pitch, insertion in ((-80.0, -40.0, 0.005), (-40.0, 60.0, 0.105), (0.0, 20.0, 0.205), (40.0, -20.0, 0.23)):
         goal = angles.copy()

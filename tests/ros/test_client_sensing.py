@@ -56,7 +56,7 @@ def wait_for(condition: Callable[[], Any], seconds: float = 10.0) -> None:
         time.sleep(0.01)
 
 
-def test_rays_tell_what_they_hit_and_how_near_it_is(client: Any) -> None:
+def test_rays_report_what_they_hit_and_how_near_it_is(client: Any) -> None:
     rays = client.get_obj_handle("tip_sensor_array")
     assert rays.get_count() == 2 and rays.get_range(0) == pytest.approx(2.0) and rays.get_parent() == "Probe"
     assert rays.is_triggered(0) and not rays.is_triggered(1) and rays.is_triggered(2) is None

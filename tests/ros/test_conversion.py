@@ -182,7 +182,7 @@ def test_joint_types_that_are_missing_mean_force_and_extra_values_are_left_out(s
 @pytest.mark.parametrize(
     "message", [RigidBodyCmd(cartesian_cmd_type=7), RigidBodyCmd(joint_cmds=[0.0], joint_cmds_types=[5])]
 )
-def test_unknown_command_types_say_what_would_be_right(scene: Scene, message: RigidBodyCmd) -> None:
+def test_unknown_command_types_state_what_would_be_right(scene: Scene, message: RigidBodyCmd) -> None:
     with pytest.raises(ValueError, match="0 force, 1 position, 2 velocity"):
         conversion.body_command(message, body(scene, "psm1/baselinksimple"))
 
@@ -199,7 +199,7 @@ def test_what_an_actuator_command_leaves_out_is_none() -> None:
     assert (command.actuator, command.actuate, command.offset, command.sensor) == (3, True, None, None)
 
 
-def test_ray_and_contact_sensors_say_what_they_see(tmp_path: Path) -> None:
+def test_ray_and_contact_sensors_state_what_they_see(tmp_path: Path) -> None:
     path = tmp_path / "model.yaml"
     path.write_text(SENSOR_MODEL)
     scene = ligature.load(path)

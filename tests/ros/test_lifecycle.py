@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from ligature.cli.master import master_answers
 
+from tests.fuzz.kills import STAGES, kill
 from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
 
 pytestmark = pytest.mark.ros
@@ -141,9 +142,16 @@ def test_the_end_of_the_physics_process_ends_the_run_with_a_message(start: Calla
     assert "the physics process ended with status -9; the run is over" in program.output
 
 
-def test_no_process_outlives_a_killed_supervisor(start: Callable[..., Program]) -> None:
+def test_no_process_survives_a_killed_supervisor(start: Callable[..., Program]) -> None:
     program = start(BIN / "ligature", "run", SMALL, "-p", "200")
     program.wait_for("first state published")
     pids = program.children()
     program.process.kill()
     wait_until(lambda: not any(alive(pid) for pid in pids.values()), 5)
+
+
+@pytest.mark.parametrize("number", [2, 4], ids=lambda number: STAGES[number])
+def test_three_signals_within_a_millisecond_leave_no_process(number: int) -> None:
+    """`python -m tests.fuzz.kills` does so at 200 moments on a busy machine."""
+    done = kill(number)
+    assert done.processes >= 3 and not done.left, str(done)

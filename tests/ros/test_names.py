@@ -64,7 +64,7 @@ SCENERY = re.compile(r"/(Table|BlackGround1?|Barrier)\Z|/psm[12]/toolpitchlink\Z
 """What no client asks for: decor, and a link that an instrument has when its wrist is drawn."""
 
 INSTRUMENT = re.compile(r"(?<=link)simple\Z|[/_]4[02]0006\Z")
-"""What names of links say of the instrument; clients look for what stands before it."""
+"""What names of links state of the instrument; clients look for what stands before it."""
 
 
 def asked_for(scene: ligature.Scene, policy: str) -> dict[str, str]:

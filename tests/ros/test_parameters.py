@@ -1,4 +1,4 @@
-"""Run-time parameters of cameras and lights: what they mean, and what is said of nonsense."""
+"""Run-time parameters of cameras and lights: what they mean, and what is stated of nonsense."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_projection_and_mode_switch(camera: Camera, light: Light) -> None:
         ({"mode": True}, "mode is True; expected MONO or STEREO"),
     ],
 )
-def test_a_camera_parameter_that_makes_no_sense_is_named(camera: Camera, values: dict, message: str) -> None:
+def test_a_camera_parameter_that_is_invalid_is_named(camera: Camera, values: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         parameters.camera_with(camera, values)
 
@@ -70,7 +70,7 @@ def test_a_camera_parameter_that_makes_no_sense_is_named(camera: Camera, values:
         ({"sensor/exposure": float("nan")}, "sensor/exposure is nan; expected a finite number"),
     ],
 )
-def test_a_sensor_parameter_that_makes_no_sense_is_named(values: dict, message: str) -> None:
+def test_a_sensor_parameter_that_is_invalid_is_named(values: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         parameters.sensor_with(values)
 

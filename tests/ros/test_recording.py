@@ -153,7 +153,7 @@ def test_the_task_is_scored_from_the_record_and_from_the_bag(session: Session) -
     assert scores[0]["measures"]["path_length_PSM1"] > 0.01
 
 
-def test_what_cannot_be_scored_is_told(session: Session, tmp_path: Path) -> None:
+def test_what_cannot_be_scored_is_reported(session: Session, tmp_path: Path) -> None:
     cut = tmp_path / "cut.bag"
     cut.write_bytes(session.bag.read_bytes()[:200_000])
     small = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -171,7 +171,7 @@ def test_what_cannot_be_scored_is_told(session: Session, tmp_path: Path) -> None
 
 
 @pytest.mark.slow  # commands come at their own times: a simulator that lags behind is not homed when the move comes
-def test_recorded_commands_and_recorded_joints_lead_the_arm_to_the_same_place(
+def test_recorded_commands_and_recorded_joints_drive_the_arm_to_the_same_place(
     session: Session, node: Any, listen: Callable[..., Any]
 ) -> None:
     import rosbag
@@ -195,7 +195,7 @@ def test_recorded_commands_and_recorded_joints_lead_the_arm_to_the_same_place(
         program.end()
 
 
-def test_recordings_that_cannot_be_made_are_told_and_leave_nothing(session: Session, tmp_path: Path) -> None:
+def test_recordings_that_cannot_be_made_are_reported_and_leave_nothing(session: Session, tmp_path: Path) -> None:
     from ligature.cli.record import record
 
     there = tmp_path / "there.bag"
@@ -213,7 +213,7 @@ def test_recordings_that_cannot_be_made_are_told_and_leave_nothing(session: Sess
     assert there.read_text() == "mine"
 
 
-def test_a_run_whose_record_exists_ends_and_says_so(session: Session) -> None:
+def test_a_run_whose_record_exists_ends_and_reports_it(session: Session) -> None:
     done = session.ligature(*RUN, "--record", session.record)
     assert done.returncode != 0
     assert "cannot be recorded" in done.stdout

@@ -30,7 +30,7 @@ class Late(Exception):
 
 
 class Replayer:
-    """Steps a simulator by the edges of its clock and sends PSM1 where a bag says."""
+    """Steps a simulator by the edges of its clock and sends PSM1 where a bag states."""
 
     def __init__(self, node: Any) -> None:
         from ambf_msgs.msg import RigidBodyState, WorldCmd, WorldState

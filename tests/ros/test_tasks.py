@@ -1,4 +1,4 @@
-"""Tasks on ROS: reports in, scores and measures out, and what a scene without the bodies of a task is told."""
+"""Tasks on ROS: reports in, scores and measures out, and what a scene without the bodies of a task is reported."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_the_first_task_runs_from_launch_file_to_score(ros_env: dict[str, str], 
     assert "RESULT: SUCCESS" in done.stdout
 
 
-def test_an_insertion_that_was_not_made_is_told_so_with_measures(
+def test_an_insertion_that_was_not_made_is_reported_with_measures(
     start: Callable[..., Program], node: Any, listen: Callable[..., Any], publish: Callable[..., Any]
 ) -> None:
     from diagnostic_msgs.msg import DiagnosticStatus
@@ -53,7 +53,7 @@ def test_an_insertion_that_was_not_made_is_told_so_with_measures(
     assert program.end() == 0
 
 
-def test_a_run_whose_scene_lacks_holes_ends_and_says_so(ros_env: dict[str, str]) -> None:
+def test_a_run_whose_scene_lacks_holes_ends_and_reports_it(ros_env: dict[str, str]) -> None:
     env = dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}")
     done = subprocess.run(
         [BIN / "ligature", "run", SMALL, "--task", "insertion"], env=env, capture_output=True, text=True, timeout=120

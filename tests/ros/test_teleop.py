@@ -1,4 +1,4 @@
-"""Teleoperation through ROS only: device nodes that publish the real message types lead the arms of a simulator.
+"""Teleoperation through ROS only: device nodes that publish the real message types drive the arms of a simulator.
 
 Nothing here is measured against the clock; `tests.bench.teleop_suture` and `tests.bench.teleop_latency` measure.
 """
@@ -17,8 +17,8 @@ from ligature.model.frames import inverse
 
 from tests.ros.conftest import BIN
 from tests.ros.drivers import (
-    PATIENCE,
     PERIOD,
+    TIMEOUT,
     Paddle,
     Pen,
     apart,
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.ros
 
 CONFIG = """
 camera: ECM
-settings: {scale: 0.5, fastest: 1.0, patience: 2.0, align: false}
+settings: {scale: 0.5, max velocity: 1.0, timeout: 2.0, align: false}
 devices:
   pen: {kind: touch, topic: /arm1/, buttons: {grey: clutch, white: close}}
   paddle: {kind: hydra, paddle: left, buttons: {bumper: clutch}}
@@ -171,7 +171,7 @@ def test_the_white_button_closes_the_jaw(pen: Pen, arms: dict[str, Any]) -> None
     ],
     ids=["nan", "zero quaternion", "leap", "silence"],
 )
-def test_a_device_that_fails_lets_the_arm_hold_and_says_why(
+def test_a_device_that_fails_lets_the_arm_hold_and_states_why(
     pen: Pen, arms: dict[str, Any], listen: Callable[..., Any], values: Any, says: str, teleop: Any
 ) -> None:
     from std_msgs.msg import Bool, String
@@ -179,7 +179,7 @@ def test_a_device_that_fails_lets_the_arm_hold_and_says_why(
     status, other = listen("/pen_PSM1/status", String), listen("/paddle_PSM2/following", Bool)
     before = settled(arms, "PSM1")
     pen.says, pen.muted = values, values is None
-    status.wait(lambda m: says in m.data, PATIENCE)
+    status.wait(lambda m: says in m.data, TIMEOUT)
     pen.says, pen.muted = None, False
     pen.glide((0.02, 0.0, 0.0), seconds=0.2)
     assert says in status.messages[-1].data
@@ -219,7 +219,7 @@ def test_the_pen_switches_to_the_other_arm_without_a_jump(
     status.wait(lambda m: m.data == "following")
 
 
-def test_an_arm_that_two_leaders_claim_holds_and_the_claim_is_told(
+def test_an_arm_that_two_leaders_claim_holds_and_the_claim_is_reported(
     pen: Pen, arms: dict[str, Any], publish: Callable[..., Any], listen: Callable[..., Any]
 ) -> None:
     from std_msgs.msg import String
@@ -258,7 +258,7 @@ def test_the_camera_pedal_moves_the_camera_and_not_the_tips(
         assert apart(settled(arms, name), before[name])[0] < 0.05
 
 
-def test_what_devices_said_is_written_down_and_can_be_said_again(
+def test_what_devices_stated_is_written_down_and_can_be_stated_again(
     teleop: Any, arms: dict[str, Any], start: Callable[..., Any], tmp_path: Path
 ) -> None:
     from ligature.teleop.record import Replay

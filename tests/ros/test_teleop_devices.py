@@ -94,7 +94,7 @@ def test_a_pen_in_millimetres_is_read_in_metres(node: Any, publish: Callable[...
     device.close()
 
 
-def test_messages_of_a_type_that_is_no_pose_are_told_and_the_pen_is_heard_on(
+def test_messages_of_a_type_that_is_no_pose_are_reported_and_the_pen_is_heard_on(
     node: Any, publish: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from geometry_msgs.msg import PoseStamped
@@ -152,7 +152,7 @@ def test_a_pen_presses_back_with_its_driver_s_messages(
     device.close()
 
 
-def test_the_guide_asks_for_motions_and_tells_the_block(node: Any, publish: Callable[..., Any]) -> None:
+def test_the_guide_asks_for_motions_and_reports_the_block(node: Any, publish: Callable[..., Any]) -> None:
     import threading
     from pathlib import Path
 

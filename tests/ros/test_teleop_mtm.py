@@ -1,4 +1,4 @@
-"""A master arm of the simulator leads an instrument: alignment, the dVRK's component topics, forces, rivals."""
+"""A master arm of the simulator drives an instrument: alignment, the dVRK's component topics, forces, rivals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.ros
 CONFIG = """
 camera: ECM
 enabled: false
-settings: {patience: 2.0}
+settings: {timeout: 2.0}
 devices:
   MTMR: {kind: mtm, force: {gain: 1.0, limit: 2.0, damping: 0.0}}
 pairs: {MTMR: [PSM1, PSM2]}
@@ -99,7 +99,7 @@ def test_the_instrument_follows_the_master_by_the_dvrk_s_scale(
     hand, tip = measured(arms, "MTMR")[:3, 3], settled(arms, "PSM1")
     speeds = listen("/MTMR_PSM1/MTM/measured_cv", TwistStamped)
     drive(arms["MTMR"], (0.03, 0.02, -0.02))
-    until(lambda: any(m.twist.linear.x < -0.01 for m in speeds.messages), "the hand's speed is not told")
+    until(lambda: any(m.twist.linear.x < -0.01 for m in speeds.messages), "the hand's speed is not reported")
     moved = settled(arms, "MTMR")[:3, 3] - hand
     assert np.linalg.norm(moved) > 0.03
     ideal = tip[:3, 3] + 0.2 * T_base_camera[:3, :3] @ VIEW_CONSOLE @ moved
@@ -109,7 +109,7 @@ def test_the_instrument_follows_the_master_by_the_dvrk_s_scale(
     )
 
 
-def test_locks_and_scale_are_told_and_move_nothing(
+def test_locks_and_scale_are_reported_and_move_nothing(
     component: Any, arms: dict[str, Any], publish: Callable[..., Any], listen: Callable[..., Any]
 ) -> None:
     from sensor_msgs.msg import Joy
@@ -150,7 +150,7 @@ def test_what_is_pressed_on_the_hand_arrives_at_the_master(
     assert felt.wait(lambda m: abs(m.wrench.force.z) < 0.05)
 
 
-def test_an_arm_that_another_node_moves_holds_and_says_so(
+def test_an_arm_that_another_node_moves_holds_and_reports_it(
     component: Any, arms: dict[str, Any], publish: Callable[..., Any]
 ) -> None:
     from sensor_msgs.msg import Joy
@@ -168,7 +168,7 @@ def test_an_arm_that_another_node_moves_holds_and_says_so(
     assert component("following").wait(lambda m: m.data)
 
 
-def test_disabled_and_without_an_operator_nothing_leads(component: Any, publish: Callable[..., Any]) -> None:
+def test_disabled_and_without_an_operator_nothing_drives(component: Any, publish: Callable[..., Any]) -> None:
     from crtk_msgs.msg import StringStamped
     from sensor_msgs.msg import Joy
 

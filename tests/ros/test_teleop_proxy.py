@@ -1,4 +1,4 @@
-"""A device leads its proxy on ROS where the scene has no arm: the pose by its scale, the grip, and it holds."""
+"""A device drives its proxy on ROS where the scene has no arm: the pose by its scale, the grip, and it holds."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ligature.model.frames import pose7_matrix
 
 from tests.model.test_proxies import write_scene
 from tests.ros.conftest import BIN
-from tests.ros.drivers import PATIENCE, Pen, apart, until
+from tests.ros.drivers import TIMEOUT, Pen, apart, until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300)]
 
 
-def test_a_pen_leads_its_proxy_which_holds_when_the_pen_falls_silent(
+def test_a_pen_drives_its_proxy_which_holds_when_the_pen_falls_silent(
     node: Any, start: Callable[..., Any], listen: Callable[..., Any], tmp_path: Path
 ) -> None:
     from ambf_msgs.msg import RigidBodyState
@@ -25,7 +25,7 @@ def test_a_pen_leads_its_proxy_which_holds_when_the_pen_falls_silent(
 
     launch = write_scene(tmp_path)
     start(BIN / "ligature", "run", launch, "-i", "0", "-p", "500", "--no-cameras").wait_for("first state published")
-    start(BIN / "ligature", "teleop", launch, "-i", "0").wait_for("leading: arm1 → Proxy0")
+    start(BIN / "ligature", "teleop", launch, "-i", "0").wait_for("driving: arm1 → Proxy0")
     state = listen("/ambf/env/simulated_device/palm/State", RigidBodyState)
     follows, status = listen("/arm1_Proxy0/following", Bool), listen("/arm1_Proxy0/status", String)
     pen = Pen(node)
@@ -45,7 +45,7 @@ def test_a_pen_leads_its_proxy_which_holds_when_the_pen_falls_silent(
         joints = np.array([-0.3, 0.0])
         until(lambda: np.abs(np.array(state.messages[-1].joint_positions) - joints).max() < 0.03, "the grip closes")
         pen.muted = True
-        status.wait(lambda m: "silent" in m.data, PATIENCE)
+        status.wait(lambda m: "silent" in m.data, TIMEOUT)
         held = pose()
         count = len(state.messages)
         until(lambda: len(state.messages) > count + 100, "no states")

@@ -47,7 +47,7 @@ def test_objects_publish_at_the_rate_without_commands(listen: Callable[..., Any]
     assert needle.rate(2.0) == pytest.approx(100, abs=5)
 
 
-def test_state_messages_say_who_they_are(listen: Callable[..., Any]) -> None:
+def test_state_messages_state_who_they_are(listen: Callable[..., Any]) -> None:
     from ambf_msgs.msg import RigidBodyState
 
     message = listen(f"{NEEDLE}/State", RigidBodyState).wait()

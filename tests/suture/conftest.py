@@ -21,7 +21,7 @@ DT = 1e-3
 class Bench:
     """Rods among rigid bodies without contacts of their own: what the engine is in a simulation.
 
-    Bodies with mass are integrated freely from impulses and gravity; those without move as told.
+    Bodies with mass are integrated freely from impulses and gravity; those without move as commanded.
     """
 
     def __init__(self, bodies: Sequence[Body], gravity: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
@@ -125,7 +125,7 @@ def energy(rod: Rod) -> float:
         kinetic += 0.5 * float(d.inertia[e] @ (R.T @ twists[e, 3:]) ** 2)
     fall = -float((d.mass[:, None] * d.gravity * rod.positions).sum())
     bend = 0.5 * float((joints.stiffness * (joints.angle - joints.rest) ** 2).sum())
-    stretch = 0.5 * float((joints.give * (joints.load[:, :3] ** 2).sum(axis=1)).sum()) / DT**4
+    stretch = 0.5 * float((joints.compliance * (joints.load[:, :3] ** 2).sum(axis=1)).sum()) / DT**4
     return kinetic + fall + bend + stretch
 
 

@@ -1,4 +1,4 @@
-"""A twisted ring leaves its plane where Michell says."""
+"""A twisted ring leaves its plane where Michell states."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def test_chain_solution_satisfies_every_row(fixed, top):
 
 
 @pytest.mark.parametrize(("low", "top"), [(2, 4), (0, 6), (3, 3)])
-def test_loads_between_two_nodes_move_them_as_the_whole_chain_says(low, top):
+def test_loads_between_two_nodes_move_them_as_the_whole_chain_states(low, top):
     n = 7
     k = _chain(n, (5,))
     k.c[:] = 0.0

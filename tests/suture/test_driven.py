@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from ligature import Simulation, load
 
-SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+SMALL = SCENES / "suturing_small" / "launch.yaml"
+TIP_IN_ENTRY = np.array([0.0335893825, 0.27, 0.7155273, -0.302078873, 0.639334306, 0.639334306, 0.302078873])
+"""Pose of the needle of `suturing` with its tip in the first entry, pointing down."""
 
 
 @pytest.fixture
@@ -50,3 +53,26 @@ def test_a_needle_that_is_let_go_hangs_on_its_thread_again(sim: Simulation) -> N
     needle.command_wrench([0.0] * 6)
     sim.step(300)
     assert needle.pose[2] < 0.75
+
+
+def test_a_needle_controlled_through_a_hole_and_out_again_falls_with_its_own_mass() -> None:
+    """While it is commanded in a hole nothing moves it; that must not last, or its thread throws it at 20 m/s."""
+    sim = Simulation(load(SCENES / "suturing" / "launch.yaml", models=[0, 1]))
+    needle = sim.bodies["Needle"]
+    inserted = 0
+    for height, ticks in ((0.04, 1000), (0.0, 600), (-0.003, 300), (0.0, 300), (0.04, 600)):
+        needle.command_pose([*TIP_IN_ENTRY[:2], TIP_IN_ENTRY[2] + height, *TIP_IN_ENTRY[3:]])
+        sim.step(ticks)
+        inserted += len(sim.insertions)
+    assert inserted and not sim.insertions
+    needle.release()
+    rod = sim._rods.rods[0]
+    sim.step()
+    assert rod.nodes.mass[rod.node_of[needle.body.index]] == needle.body.mass
+    fastest = 0.0
+    for _ in range(150):
+        sim.step(10)
+        fastest = max(fastest, float(np.linalg.norm(needle.twist[:3])))
+    assert fastest < 1.5
+    assert needle.pose[2] == pytest.approx(0.715, abs=0.015)
+    assert not [problem for problem in sim.problems if problem.code == "diverged"]

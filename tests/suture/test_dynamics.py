@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ligature.model.frames import pose7_matrix
-from ligature.suture.description import FREE, Tie
+from ligature.suture.description import FREE, Attachment
 
 
 def _crossings(values, dt):
@@ -85,17 +85,17 @@ def test_energy_never_grows_while_a_thread_whips_about(kit):
     assert before < start - 0.1 * scale
 
 
-def _tie(element, body, offset):
+def _attachment(element, body, offset):
     T = np.eye(4)
     T[:3, 3] = offset
-    return Tie(element, body, T, np.eye(4), np.zeros(3), np.zeros(3), np.zeros(3), *FREE)
+    return Attachment(element, body, T, np.eye(4), np.zeros(3), np.zeros(3), np.zeros(3), *FREE)
 
 
 @pytest.mark.parametrize("mass", [1e-7, 1e-3, 0.5, 100.0])
 def test_momentum_passes_between_rod_and_body_without_loss(kit, mass):
     description = kit.from_material(kit.line(20, 0.1), 1e-3, 1e8, 1100.0, gravity=(0, 0, 0))
     bench = kit.Bench([kit.body(0, None, (0.1, 0.0, 0.0), mass=mass, inertia=mass * 1e-5)])
-    rod = bench.add(replace(description, ties=(_tie(19, 0, description.ends[-1, 1]),)))
+    rod = bench.add(replace(description, attachments=(_attachment(19, 0, description.ends[-1, 1]),)))
     twists = np.zeros((20, 6))
     twists[:, 1] = np.linspace(0.5, 0.0, 20)
     twists[:, 2] = 0.2
@@ -125,7 +125,7 @@ def test_weight_a_million_times_an_element_swings_as_a_pendulum(kit):
     n, length = 40, 0.1
     description = kit.from_material(kit.line(n, -length, axis=2), 0.3e-3, 2e9, 1100.0)
     bench = kit.Bench([kit.body(0, None, (0.0, 0.0, -length), mass=0.2, inertia=1e-5)], gravity=(0, 0, -9.81))
-    rod = bench.add(replace(description, ties=(_tie(n - 1, 0, description.ends[-1, 1]),)))
+    rod = bench.add(replace(description, attachments=(_attachment(n - 1, 0, description.ends[-1, 1]),)))
     rod.hold_element(0)
     bench.twist[0][0] = 0.03
     x = []

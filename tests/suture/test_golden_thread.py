@@ -23,7 +23,7 @@ def scene(corpus):
 def _thread(scene, held):
     """The scene's thread on its needle, far from anything else."""
     description = from_chain(scene, scene.rods[0])
-    needle = scene.bodies[description.ties[0].body]
+    needle = scene.bodies[description.attachments[0].body]
     partner = Partner(needle.index, needle.mass, needle.inertia, needle.T_body_inertial, needle.gravity, fixed=held)
     return Rod(description, [partner]), needle
 
@@ -45,7 +45,7 @@ def test_chain_of_the_scene_becomes_a_rod_of_forty_elements_on_its_needle(scene)
     assert len(description.mass) == 40
     assert description.mass == pytest.approx(np.full(40, 0.03))
     assert description.joint_stiffness == pytest.approx(np.full((39, 3), 0.2))
-    assert [tie.element for tie in description.ties] == [0]
+    assert [attachment.element for attachment in description.attachments] == [0]
     lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
     assert lengths == pytest.approx(np.full(40, 0.00244), abs=0.05e-3)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 from ligature.model.frames import matrix_pose7, minimal_rotation, pose7_matrix
@@ -48,7 +50,7 @@ class Tissued:
         b = self.scene.bodies[body]
         return np.zeros((6, 6)) if b.static else np.diag(np.r_[np.full(3, 1.0 / b.mass), 1.0 / b.inertia])
 
-    def burden(self, body):
+    def attached_load(self, body):
         return 0.0, np.zeros(3), self.wrench
 
     @property
@@ -189,14 +191,14 @@ def test_needle_outside_every_hole_feels_nothing(kit):
     assert tissue.bench.twist[NEEDLE] == pytest.approx([0.0, 0.0, 50 * DT * 1e-3 / MASS, 0.0, 0.0, 0.0])
 
 
-def test_memory_continues_with_the_same_bits(kit):
+def test_a_snapshot_continues_with_the_same_bits(kit):
     one, two = Tissued(kit), Tissued(kit)
     push = [0.1, 0.2, 0.1, 0.0, 0.001, 0.002]
     one.run(50, push)
-    kept = {k: v.copy() for k, v in one.holes.memory().items()}
+    kept = copy.deepcopy(one.holes.snapshot())
     two.bench.pose = {k: v.copy() for k, v in one.bench.pose.items()}
     two.bench.twist = {k: v.copy() for k, v in one.bench.twist.items()}
-    two.holes.recall(kept)
+    two.holes.restore(kept)
     one.run(50, push)
     two.run(50, push)
     assert (one.pose == two.pose).all()

@@ -23,7 +23,7 @@ def _supple(kit, points, diameter, youngs, **keys):
     """A stress-free thread through ``points``, stretching by 0.05 % at 2 N."""
     description = kit.from_material(points, diameter, youngs, 1100.0, gravity=(0, 0, 0), straight=False, **keys)
     n, length = len(description.mass), np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-    return replace(description, give=np.full(n - 1, length / n / 4000.0))
+    return replace(description, compliance=np.full(n - 1, length / n / 4000.0))
 
 
 class TwoArms:
@@ -37,7 +37,7 @@ class TwoArms:
         flat = np.vstack([lead, bend, bend[-1] + np.linspace(0.0, 0.075, 100)[1:, None] * away])
         points, self.length = _resample(np.column_stack([flat, np.zeros(len(flat))]), n)
         self.bench = kit.Bench([kit.body(LEFT, None, at=points[0]), kit.body(RIGHT, None, at=points[-1])])
-        # So viscous a medium that the thread stays where it is led; a braid that creeps for 10 ms when bent.
+        # So viscous a medium that the thread stays where it is driven; a braid that creeps for 10 ms when bent.
         thread = _supple(kit, points, 0.8e-3, 1e6, friction=0.6, damping=0.01)
         self.rod = self.bench.add(kit.damped(thread, 1.0))
         for element, hand in ((0, LEFT), (n - 1, RIGHT)):
@@ -67,7 +67,7 @@ class TwoArms:
             self.bench.step()
         self.bench.twist[RIGHT][:] = 0.0
 
-    def tie(self):
+    def attachment(self):
         """The right hand crosses over the thread near the left one, back under it, and up through the loop."""
         for to in ((-60, 10, 6), (-12, 5, 6), (-12, -20, 6), (-12, -25, -6), (-4, -15, -8), (-4, 16, -8), (0, 16, 20)):
             self.move(RIGHT, 1e-3 * np.array(to))
@@ -75,7 +75,7 @@ class TwoArms:
 
 def test_trefoil_tied_by_two_moving_arms_draws_tight_and_holds_a_newton_for_five_seconds(kit):
     arms = TwoArms(kit)
-    arms.tie()
+    arms.attachment()
     arms.move(RIGHT, (0.10, 0.0, 0.02))
     while arms.tension < 1.0:
         arms.move(RIGHT, arms.bench.pose[RIGHT][:3] + [0.001, 0.0, 0.0], 0.05)
@@ -104,7 +104,7 @@ def test_trefoil_pulled_tight_by_two_hands_holds_a_newton_for_five_seconds(kit):
     n, diameter = 160, 0.8e-3
     points, length = _open_trefoil(n, 0.004, 0.03)
     description = kit.from_material(points, diameter, 1e7, 1100.0, friction=0.6, gravity=(0, 0, 0), straight=False)
-    rod = kit.Bench([]).add(kit.damped(replace(description, give=np.full(n - 1, length / n / 4000.0)), 0.999))
+    rod = kit.Bench([]).add(kit.damped(replace(description, compliance=np.full(n - 1, length / n / 4000.0)), 0.999))
     rod.hold_element(0)
     rod.hold_element(n - 1)
     apart = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])

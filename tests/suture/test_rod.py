@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ligature.model.scene import Box, Plane
-from ligature.suture.description import FREE, Tie
+from ligature.suture.description import FREE, Attachment
 
 
 @pytest.mark.parametrize(
@@ -36,9 +36,9 @@ def test_element_without_length_is_named(kit):
 def test_tie_to_an_unknown_body_is_refused(kit):
     description = kit.from_material(kit.line(5, 0.1), 1e-3, 1e9, 1100.0)
     none = np.zeros(3)
-    tie = Tie(0, 9, np.eye(4), np.eye(4), none, none, none, *FREE)
+    attachment = Attachment(0, 9, np.eye(4), np.eye(4), none, none, none, *FREE)
     with pytest.raises(ValueError, match="tied to body 9, which is no partner"):
-        kit.Bench([]).add(replace(description, ties=(tie,)))
+        kit.Bench([]).add(replace(description, attachments=(attachment,)))
 
 
 def _messy(kit):
@@ -53,7 +53,7 @@ def _messy(kit):
     T = np.eye(4)
     T[:3, 3] = description.ends[-1, 1]
     none = np.zeros(3)
-    rod = bench.add(replace(description, ties=(Tie(39, 1, T, np.eye(4), none, none, none, *FREE),)))
+    rod = bench.add(replace(description, attachments=(Attachment(39, 1, T, np.eye(4), none, none, none, *FREE),)))
     return bench, rod
 
 

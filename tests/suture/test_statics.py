@@ -15,7 +15,7 @@ def _settle(rod, ticks):
     assert np.abs(rod.twists[:, :3]).max() < 1e-4
 
 
-def test_cantilever_sags_by_its_weight_as_euler_and_bernoulli_say(kit):
+def test_cantilever_sags_by_its_weight_as_euler_and_bernoulli_state(kit):
     n, length, diameter, youngs, density = 40, 0.1, 0.5e-3, 50e9, 6450.0
     bench = kit.Bench([])
     rod = bench.add(kit.damped(kit.from_material(kit.line(n, length), diameter, youngs, density), 1 - 1e-12))
@@ -82,7 +82,7 @@ def test_thread_with_locked_joints_stretches_by_less_than_a_thousandth_under_two
     description = kit.from_material(kit.line(n, length, axis=2), 0.38e-3, 1e9, 1100.0)
     gravity = np.zeros((n, 3))
     gravity[-1, 2] = 2.0 / description.mass[-1]
-    locked = replace(description, give=np.full(n - 1, length / n / 4000.0), gravity=gravity)
+    locked = replace(description, compliance=np.full(n - 1, length / n / 4000.0), gravity=gravity)
     rod = kit.Bench([]).add(kit.damped(locked))
     rod.hold_element(0)
     _settle(rod, 1000)
@@ -91,7 +91,7 @@ def test_thread_with_locked_joints_stretches_by_less_than_a_thousandth_under_two
     assert stretch == pytest.approx(0.0005, rel=0.02)
 
 
-def test_nylon_stretches_as_its_modulus_says(kit):
+def test_nylon_stretches_as_its_modulus_states(kit):
     n, length, diameter, youngs = 40, 0.1, 0.3e-3, 2e9
     description = kit.from_material(kit.line(n, length, axis=2), diameter, youngs, 1100.0)
     gravity = np.zeros((n, 3))

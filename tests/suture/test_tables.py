@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from ligature.suture.compiled import kernel
+from ligature.kernels import kernel
 from ligature.suture.tables import opener, table_of
 
 

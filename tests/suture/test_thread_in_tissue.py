@@ -159,7 +159,7 @@ def test_released_needle_half_through_stays_with_its_thread(sim):
     assert 2.0 * RADIUS * np.linalg.norm(sim.bodies["Needle"].pose[3:6] - start[3:6]) < 0.2e-3
 
 
-def test_hole_gives_to_the_pull_of_a_thread_as_its_spring_says(sim):
+def test_hole_gives_to_the_pull_of_a_thread_as_its_spring_states(sim):
     """The needle draws the thread sideways; tissue and ring together take the force."""
     _at(sim, (RADIUS, 0.0, 0.24))
     sim.step(200)

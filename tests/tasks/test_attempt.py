@@ -25,7 +25,7 @@ def scene() -> Scene:
 
 
 def led_through(attempt: Attempt, scene: Scene, pair: int) -> Any:
-    """Leads the needle of ``scene`` along its arc through holes that are laid out for it; returns the last state."""
+    """Drives the needle of ``scene`` along its arc through holes that are laid out for it; returns the last state."""
     scenery, state = attempt.monitor.scenery, new_state(scene)[0]
     base, middle, tip = scenery.points
     circle = np.linalg.lstsq(

@@ -57,7 +57,7 @@ def test_an_insertion_is_judged_with_its_figures(scenery: Scenery) -> None:
     assert any("pair 2 in 12.5 s" in line for line in score.lines())
 
 
-def test_an_insertion_that_is_not_done_says_why(scenery: Scenery) -> None:
+def test_an_insertion_that_is_not_done_states_why(scenery: Scenery) -> None:
     poses = hole_poses()
     poses[scenery.needle, :3] = poses[scenery.exits[0], :3] - scenery.points[2]
     assert judge_insertion(scenery, poses, [], 1.0).why == "the tip went through 0 holes, two are needed"
@@ -93,7 +93,7 @@ def test_an_exact_estimate_has_no_error_and_a_turned_one_the_way_of_its_points(s
     assert score.E_tip == pytest.approx(2 * 0.01 * np.sin(0.05))
 
 
-def test_a_scene_without_holes_is_told_so() -> None:
+def test_a_scene_without_holes_is_reported() -> None:
     scene = ligature.load(SMALL)
     with pytest.raises(MissingBodies, match=r"has 0 pairs of holes Entry1, Exit1, …, not 1"):
         Scenery.of(scene)

@@ -1,4 +1,4 @@
-"""Axes of devices: told by words, or by the motions of a hand."""
+"""Axes of devices: given by words, or by the motions of a hand."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ def test_a_pen_s_up_is_up_in_the_picture() -> None:
     assert hand.T_view_hand[:3, 3] == pytest.approx([0, -0.1, 0])
 
 
-def test_two_motions_tell_the_axes_of_a_device_that_stands_askew() -> None:
+def test_two_motions_report_the_axes_of_a_device_that_stands_askew() -> None:
     R_view_device = axis_rotation((0.6, 0.0, 0.8), 1.1)
     right, up = R_view_device.T @ [0.1, 0.004, 0], R_view_device.T @ [0.0, -0.12, 0.004]
     assert axes_of_motions(right, up) == pytest.approx(R_view_device, abs=0.05)
     assert np.linalg.det(axes_of_motions(right, up)) == pytest.approx(1.0)
 
 
-def test_motions_that_tell_nothing_are_refused() -> None:
+def test_motions_that_report_nothing_are_refused() -> None:
     x = np.array([0.1, 0.0, 0.0])
     with pytest.raises(Unclear, match="moved 10 mm to the right; move at least 30 mm"):
         axes_of_motions(x / 10, np.array([0, 0.1, 0]))

@@ -1,4 +1,4 @@
-"""Teleoperation files: what they mean, and what is told about those that are wrong."""
+"""Teleoperation files: what they mean, and the errors of invalid ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def read(text: str) -> TeleopConfig:
     return from_text(text, Path("teleop.yaml"))
 
 
-def test_a_file_says_who_leads_whom_and_how() -> None:
+def test_a_file_states_who_drives_whom_and_how() -> None:
     config = read(GOOD)
     assert config.pairs == {"MTMR": ("PSM1", "PSM3"), "pen": ("PSM2",), "pad": ()}
     assert config.camera_scale == 0.5
@@ -40,7 +40,7 @@ def test_a_file_says_who_leads_whom_and_how() -> None:
     assert config.devices["pad"].options["speed"] == 0.2
 
 
-def test_more_devices_than_arms_wait_until_they_are_told_whom_to_lead() -> None:
+def test_more_devices_than_arms_wait_until_they_are_reported_whom_to_drive() -> None:
     config = read(GOOD.replace("pad: []", "pad: [none, PSM1, PSM2]"))
     assert config.pairs["pad"] == ("PSM1", "PSM2")
     assert config.waiting == {"pad"}
@@ -72,8 +72,25 @@ def test_a_fixed_camera_stands_in_the_world() -> None:
         ("pairs:", "pears:", "a teleoperation has no key 'pears'"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place_and_what_would_be_right(wrong: str, right: str, message: str) -> None:
+def test_what_is_wrong_is_reported_with_its_place_and_what_would_be_right(wrong: str, right: str, message: str) -> None:
     with pytest.raises(AdfError) as error:
         read(GOOD.replace(wrong, right, 1))
     assert message in str(error.value)
     assert str(error.value).startswith("teleop.yaml:")
+
+
+def test_keys_of_version_0_1_are_accepted_with_a_note(tmp_path: Path) -> None:
+    text = (
+        "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {timeout: 2.0, fastest: 0.3, quickest: 4.0}\n"
+    )
+    config = from_text(text, tmp_path / "old.yaml")
+    settings = config.devices["MTMR"].settings
+    assert (settings.timeout, settings.max_velocity, settings.max_angular_velocity) == (2.0, 0.3, 4.0)
+    assert len(config.notes) == 3
+    assert config.notes[0].endswith("old.yaml:3:12: 'timeout' is deprecated; write 'timeout'")
+
+
+def test_a_key_and_its_former_name_together_are_rejected(tmp_path: Path) -> None:
+    text = "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {timeout: 2.0, timeout: 1.0}\n"
+    with pytest.raises(AdfError, match="both 'timeout' and 'timeout'"):
+        from_text(text, tmp_path / "both.yaml")

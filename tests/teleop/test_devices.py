@@ -42,7 +42,7 @@ def test_a_stick_moves_its_hand_as_fast_as_it_is_deflected() -> None:
 
 
 def test_a_stick_that_is_lost_while_deflected_speaks_no_more_and_one_at_rest_does() -> None:
-    hand = RateHand(0.1, 1.0, patience=0.2)
+    hand = RateHand(0.1, 1.0, timeout=0.2)
     hand.deflect(0.0, np.array([1.0, 0, 0, 0, 0, 0]))
     assert hand.pose(0.1) is not None
     assert hand.pose(0.3) is None
@@ -115,7 +115,7 @@ def test_what_was_recorded_is_replayed_at_its_pace(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("line", ["{", '{"t": 0, "device": "pen", "pose": [1, 2], "buttons": {}}', '{"t": 0}', "[1]"])
-def test_a_file_that_is_no_record_is_told_with_its_line(tmp_path: Path, line: str) -> None:
+def test_a_file_that_is_no_record_is_reported_with_its_line(tmp_path: Path, line: str) -> None:
     (tmp_path / "record.jsonl").write_text('{"t": 0, "event": "clutch", "value": true}\n' + line + "\n")
     with pytest.raises(ValueError, match=r"record.jsonl:2: no reading of a device and no event"):
         Replay(tmp_path / "record.jsonl")

@@ -24,7 +24,7 @@ MASS, STIFFNESS = 0.3, 3000.0
 
 
 class Motors(Device):
-    """A device that exerts the force that it was told last."""
+    """A device that exerts the newest force that it received."""
 
     def __init__(self) -> None:
         super().__init__(lambda reading: None)

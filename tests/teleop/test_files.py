@@ -27,10 +27,10 @@ def test_the_file_of_the_documentation_is_read() -> None:
     assert config.waiting == {"pad"}
 
 
-def test_the_command_tells_what_a_file_says_and_what_is_wrong(tmp_path: Path) -> None:
+def test_the_command_reports_what_a_file_states_and_what_is_wrong(tmp_path: Path) -> None:
     good = CliRunner().invoke(app, ["teleop", str(ROOT / "scenes/suturing_small/teleop.yaml"), "--check"])
     assert good.exit_code == 0
-    assert "MTMR (mtm) leads PSM1, PSM2" in good.output
+    assert "MTMR (mtm) drives PSM1, PSM2" in good.output
     (tmp_path / "bad.yaml").write_text("devices: {a: {kind: glove}}\npairs: {a: PSM1}\n")
     bad = CliRunner().invoke(app, ["teleop", str(tmp_path / "bad.yaml"), "--check"])
     assert bad.exit_code == 1

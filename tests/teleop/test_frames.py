@@ -1,4 +1,4 @@
-"""Frames of arms: what different tellers say fits together."""
+"""Frames of arms: what different tellers state fits together."""
 
 from __future__ import annotations
 
@@ -22,11 +22,20 @@ def test_two_branches_meet_in_the_world() -> None:
     assert frames.between("ECM", "MTMR") is None
 
 
-def test_arms_told_in_the_camera_need_no_world() -> None:
+def test_arms_reported_in_the_camera_need_no_world() -> None:
     frames = Frames()
     frames.put("ECM", "PSM1_base", T_WORLD_PSM, 1)
     assert frames.between("ECM", "PSM1_base") == pytest.approx(T_WORLD_PSM)
     assert frames.between("ECM", "ECM") == pytest.approx(np.eye(4))
+
+
+@pytest.mark.parametrize("written", ["left/{}", "/left/{}", "{}"])
+def test_frames_of_a_simulator_with_a_prefix_are_the_arms_own(written: str) -> None:
+    frames = Frames("left/")
+    frames.put(written.format("world"), written.format("PSM1_base"), T_WORLD_PSM)
+    assert frames.between("world", "PSM1_base") == pytest.approx(T_WORLD_PSM)
+    assert frames.has_prefix("left/PSM1_base") and not frames.has_prefix("PSM1_base")
+    assert Frames().has_prefix("PSM1_base")
 
 
 def test_tf_counts_more_than_set_up_joints_and_nonsense_counts_nothing() -> None:

@@ -1,4 +1,4 @@
-"""What hands feel: the tip's contacts in the device's axes, and nothing any more when nobody leads."""
+"""What hands feel: the tip's contacts in the device's axes, and nothing when nobody drives."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def device(key: str, hardware: str, root: str = "", **settings: object) -> Input
     return InputDevice(key, hardware, root, settings)
 
 
-def test_a_device_leads_the_arm_of_its_root_link_with_its_gains_and_buttons(scene: ligature.Scene) -> None:
+def test_a_device_drives_the_arm_of_its_root_link_with_its_gains_and_buttons(scene: ligature.Scene) -> None:
     pen = device(
         "my pen", "PHANTOM Omni", "psm2/toolyawlink", **{"workspace scaling": 2.0, "haptic gain": {"linear": 5.0},
         "deadband": 0.2, "button mapping": {"a1": 0, "a2": -1, "g1": 1}},
@@ -43,11 +43,11 @@ def test_a_device_leads_the_arm_of_its_root_link_with_its_gains_and_buttons(scen
     assert config.devices["MTMR"].topic == "/MTMR/"
 
 
-def test_devices_that_nobody_knows_are_passed_over_and_none_at_all_is_told(scene: ligature.Scene) -> None:
+def test_devices_that_nobody_knows_are_passed_over_and_none_at_all_is_reported(scene: ligature.Scene) -> None:
     config = of_devices(scene, [device("a", "Abacus"), device("b", "Razer Hydra")], SMALL)
     assert list(config.pairs) == ["b"]
     assert config.notes[0].startswith("a: no hardware 'Abacus' is known; known names hold mtm")
-    with pytest.raises(AdfError, match="none of its input devices can lead an arm; a: no hardware 'Abacus' is known"):
+    with pytest.raises(AdfError, match="none of its input devices can drive an arm; a: no hardware 'Abacus' is known"):
         of_devices(scene, [device("a", "Abacus")], SMALL)
 
 
@@ -60,32 +60,32 @@ def test_a_hydra_is_claimed_paddle_by_paddle_and_a_master_once(scene: ligature.S
     assert list(config.devices) == ["MTMR"]
 
 
-def test_a_root_link_that_is_of_no_arm_is_refused_and_too_many_devices_are_told(scene: ligature.Scene) -> None:
+def test_a_root_link_that_is_of_no_arm_is_refused_and_too_many_devices_are_reported(scene: ligature.Scene) -> None:
     lost = device("lost", "Falcon", "/ambf/env/BODY gripper palm link")
     config = of_devices(scene, [lost, *(device(f"pen{k}", "Falcon") for k in range(3))], SMALL)
     assert config.notes == (
-        "lost: its root link '/ambf/env/BODY gripper palm link' is of no arm, and nothing else can be led",
-        "pen2: it leads nothing, because no arm is left",
+        "lost: its root link '/ambf/env/BODY gripper palm link' is of no arm, and nothing else can be driven",
+        "pen2: it drives nothing, because no arm is left",
     )
 
 
-def test_what_has_no_effect_on_an_arm_is_told(scene: ligature.Scene) -> None:
+def test_what_has_no_effect_on_an_arm_is_reported(scene: ligature.Scene) -> None:
     settings = {
         "simulated multibody": "pr2.yaml", "controller gain": {}, "max force": "2", "enable joint control": "False",
         "pair cameras": ["nowhere", "cameraR"], "button mapping": {"prev mode": "1"},
     }  # fmt: skip
     config = of_devices(scene, [device("pen", "PHANTOM Omni", **settings)], SMALL)
     assert config.notes == (
-        "pen: it leads the arm itself and not its proxy",
+        "pen: it drives the arm itself and not its proxy",
         "pen: controller gain, max force: no effect on an arm",
-        "pen: enable joint control: a grip leads the jaw all the same",
+        "pen: enable joint control: a grip drives the jaw all the same",
         "pair cameras: the scene has no camera 'nowhere'",
     )
     assert config.camera == "ECM"
     assert config.devices["pen"].buttons == {"white": "previous"}
 
 
-def test_where_no_arm_is_left_a_device_leads_its_proxy(tmp_path: Path) -> None:
+def test_where_no_arm_is_left_a_device_drives_its_proxy(tmp_path: Path) -> None:
     config = of_launch_file(write_scene(tmp_path))
     assert config.pairs == {"arm1": ("Proxy0",), "second": ("Proxy1",)}
     assert [spec.topic for spec in config.proxies.values()] == [
@@ -93,7 +93,7 @@ def test_where_no_arm_is_left_a_device_leads_its_proxy(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert config.proxies["Proxy0"].limits.tolist() == [[-0.3, 0.0], [0.5, 0.7]]
     assert (config.devices["arm1"].settings.jaw, config.devices["arm1"].settings.scale) == ((0.0, 1.0), 0.5)
-    assert "third: it leads nothing, because the scene has no arm" in config.notes
+    assert "third: it drives nothing, because the scene has no arm" in config.notes
     (tmp_path / "devices.yaml").write_text(
         (tmp_path / "devices.yaml").read_text().replace("  workspace", "  enable joint control: false\n  workspace")
     )

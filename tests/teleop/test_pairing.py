@@ -97,7 +97,7 @@ def test_a_device_without_a_grip_leaves_the_jaw_alone() -> None:
 
 def test_speed_and_workspace_are_bounded() -> None:
     corners = ((-0.02, -0.05, 0.05), (0.02, 0.05, 0.15))
-    pairing = engaged(scale=1.0, fastest=0.1, quickest=1.0, workspace=corners)
+    pairing = engaged(scale=1.0, max_velocity=0.1, max_angular_velocity=1.0, workspace=corners)
     goal = pairing.update(hand(DT, (0.04, 0, 0), axis_rotation((0, 0, 1), 0.5)))
     assert np.linalg.norm(goal.T_camera_tip[:3, 3] - START[:3, 3]) <= 0.1 * DT + 1e-12
     cosine = (np.trace(goal.T_camera_tip[:3, :3].T @ START[:3, :3]) - 1) / 2
@@ -106,7 +106,7 @@ def test_speed_and_workspace_are_bounded() -> None:
     assert goal.T_camera_tip[0, 3] == pytest.approx(0.02)
 
 
-def test_a_silent_leader_leads_no_more() -> None:
+def test_a_silent_leader_stops_driving() -> None:
     pairing = engaged()
     pairing.update(hand(DT))
     assert pairing.watch(DT + 0.09)
@@ -115,7 +115,7 @@ def test_a_silent_leader_leads_no_more() -> None:
     assert pairing.update(hand(1.0, (0.04, 0, 0))).T_camera_tip == pytest.approx(START)
 
 
-def test_a_leader_that_leaps_or_sends_no_pose_leads_no_more() -> None:
+def test_a_leader_that_leaps_or_sends_no_pose_stops_driving() -> None:
     pairing = engaged()
     assert pairing.update(hand(DT, (0.5, 0, 0))).T_camera_tip == pytest.approx(START)
     assert pairing.status is Status.LEAPT
@@ -125,7 +125,7 @@ def test_a_leader_that_leaps_or_sends_no_pose_leads_no_more() -> None:
         assert pairing.status is Status.BROKEN
 
 
-def test_an_operator_must_move_fingers_or_wrist_before_leading() -> None:
+def test_an_operator_must_move_fingers_or_wrist_before_driving() -> None:
     pairing = engaged(presence_grip=0.5, presence_roll=0.1)
     goal = pairing.update(hand(DT, (0.04, 0, 0)))
     assert pairing.status is Status.WAITING

@@ -15,7 +15,7 @@ CAMERA = frame(axis_rotation((1, 0, 0), 2.0), (0, 0, 0.2))
 
 @pytest.fixture
 def seat() -> Seat:
-    made = Seat({"MTML": ("PSM2", "PSM3"), "MTMR": ("PSM1", "PSM3")}, Settings(scale=1.0, fastest=10.0))
+    made = Seat({"MTML": ("PSM2", "PSM3"), "MTMR": ("PSM1", "PSM3")}, Settings(scale=1.0, max_velocity=10.0))
     made.enable(True)
     return made
 
@@ -31,19 +31,19 @@ def test_nothing_moves_before_it_is_enabled() -> None:
     assert seat.status("MTMR") is Status.IDLE
 
 
-def test_a_leader_leads_its_first_follower(seat: Seat) -> None:
+def test_a_leader_drives_its_first_follower(seat: Seat) -> None:
     feed(seat, 0.0)
     goals = feed(seat, 0.01, 0.02)
     assert list(goals) == ["PSM1"]
     assert goals["PSM1"].T_camera_tip[0, 3] == pytest.approx(0.02)
 
 
-def test_a_leader_that_waits_leads_nobody_until_it_is_told_to() -> None:
-    seat = Seat({"MTMR": ("PSM1",), "pad": ("PSM1", "PSM2")}, Settings(scale=1.0, fastest=10.0), waiting=["pad"])
+def test_a_leader_that_waits_drives_nobody_until_it_is_asked_to() -> None:
+    seat = Seat({"MTMR": ("PSM1",), "pad": ("PSM1", "PSM2")}, Settings(scale=1.0, max_velocity=10.0), waiting=["pad"])
     seat.enable(True)
     assert feed(seat, 0.0, leader="pad") == {}
     assert seat.leaders["pad"].selected is None
-    assert seat.next_follower("pad") == "PSM2", "PSM1 is led"
+    assert seat.next_follower("pad") == "PSM2", "PSM1 is driven"
     feed(seat, 0.01, leader="pad")
     assert list(feed(seat, 0.02, 0.02, leader="pad")) == ["PSM2"]
 
@@ -62,7 +62,7 @@ def test_a_follower_obeys_one_leader(seat: Seat) -> None:
     with pytest.raises(Conflict, match="PSM3 obeys MTMR; unselect it there first"):
         seat.select("MTML", "PSM3")
     assert seat.next_follower("MTML") == "PSM2"
-    with pytest.raises(Conflict, match="MTML may lead PSM2, PSM3, not PSM1"):
+    with pytest.raises(Conflict, match="MTML may drive PSM2, PSM3, not PSM1"):
         seat.select("MTML", "PSM1")
     with pytest.raises(Conflict, match="PSM1 obeys A"):
         Seat({"A": ("PSM1",), "B": ("PSM1",)})
@@ -122,12 +122,12 @@ def test_two_hands_roll_the_camera_by_the_line_between_them() -> None:
         CameraDrive().engage([], np.eye(4))
 
 
-def test_unknown_names_are_told_with_the_known_ones(seat: Seat) -> None:
+def test_unknown_names_are_reported_with_the_known_ones(seat: Seat) -> None:
     with pytest.raises(Conflict, match="no leader 'omni'; there are MTML, MTMR"):
         seat.sample("omni", Hand(0.0, np.eye(4)))
 
 
-def test_the_clutch_of_one_leader_leaves_the_others_leading(seat: Seat) -> None:
+def test_the_clutch_of_one_leader_leaves_the_others_driving(seat: Seat) -> None:
     for leader in ("MTMR", "MTML"):
         feed(seat, 0.0, leader=leader)
     feed(seat, 0.001)
@@ -149,7 +149,7 @@ def test_a_clutch_tap_makes_a_silent_leader_trusted_again(seat: Seat) -> None:
     assert "PSM1" in feed(seat, 0.32)
 
 
-def test_a_leader_leads_only_while_it_is_allowed_to(seat: Seat) -> None:
+def test_a_leader_drives_only_while_it_is_allowed_to(seat: Seat) -> None:
     seat.allow("MTMR", False)
     feed(seat, 0.0)
     assert feed(seat, 0.01, 0.01) == {}
@@ -158,7 +158,7 @@ def test_a_leader_leads_only_while_it_is_allowed_to(seat: Seat) -> None:
     assert feed(seat, 0.03, 0.02)["PSM1"].T_camera_tip[0, 3] == pytest.approx(0.01)
 
 
-def test_another_scale_while_leading_moves_nothing(seat: Seat) -> None:
+def test_another_scale_while_driving_moves_nothing(seat: Seat) -> None:
     feed(seat, 0.0)
     before = feed(seat, 0.01, 0.02)["PSM1"].T_camera_tip[0, 3]
     seat.change("MTMR", scale=0.1)
@@ -174,7 +174,7 @@ def test_a_hand_that_leaps_lets_the_camera_go(seat: Seat) -> None:
     seat.sample("MTMR", Hand(0.02, frame(np.eye(3), (0.2, 0, 0))))
     assert seat.update(0.02, TIPS, CAMERA).camera is None
     assert seat.status("MTMR") is Status.LEAPT
-    assert seat.leads_camera == ()
+    assert seat.drives_camera == ()
 
 
 def test_a_silent_hand_lets_the_camera_rest_and_begins_anew(seat: Seat) -> None:

@@ -43,7 +43,7 @@ def _face_load(grid, axis, force):
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49])
-def test_bar_under_tension_lengthens_and_thins_as_hooke_says(poisson):
+def test_bar_under_tension_lengthens_and_thins_as_hooke_states(poisson):
     size, force = np.array([0.02, 0.01, 0.008]), 1e-3
     grid = _block(size, (4, 3, 2))
     load, end = _face_load(grid, 0, (force, 0.0, 0.0))
@@ -80,7 +80,7 @@ def _flap(cells, poisson):
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.45, 0.49])
-def test_flap_bends_as_timoshenko_says_and_better_on_a_finer_grid(poisson):
+def test_flap_bends_as_timoshenko_states_and_better_on_a_finer_grid(poisson):
     coarse, fine = _flap((8, 4, 2), poisson), _flap((16, 8, 4), poisson)
     assert coarse == pytest.approx(1.0, abs=0.15)
     assert fine == pytest.approx(1.0, abs=0.10)

@@ -34,7 +34,7 @@ for _kind, _keys in SCHEMA.items():
 
 
 def problems(element: Element) -> list[Diagnostic]:
-    """Everything that is wrong with an element, as far as single keys tell."""
+    """Everything that is wrong with an element, as far as single keys show."""
     found: list[Diagnostic] = []
     _check_block(element.node, "", element, found)
     return found

@@ -16,7 +16,7 @@ from ligature.adf.writer import Literal, entry_lines, flow_text, scalar_text, te
 
 
 class PatchError(ValueError):
-    """A change that cannot be made in place; the message says why."""
+    """A change that cannot be made in place; the message states why."""
 
 
 @dataclass(frozen=True, order=True)

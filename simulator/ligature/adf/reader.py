@@ -77,7 +77,7 @@ def read_devices(path: Path, resolver: Resolver, strict: bool = False) -> Docume
 
 
 def read_any(path: Path, resolver: Resolver, strict: bool = False) -> Document:
-    """Read a file of any kind, told apart by its keys; raises `AdfError` when it is not readable at all."""
+    """Read a file of any kind, distinguished by its keys; raises `AdfError` when it is not readable at all."""
     source = _opened(path, resolver)
     kind = kind_of(source.root)
     if kind == "launch":
@@ -287,7 +287,7 @@ def _typeless_is_revolute(element: Element, found: list[Diagnostic]) -> list[Dia
 
 
 def _refuse_as_ambf(document: Document) -> None:
-    """Drop everything when one finding makes AMBF refuse the file, and say which."""
+    """Drop everything when one finding makes AMBF refuse the file, and state which."""
     causes = [d for d in document.diagnostics if d.severity >= Severity.ERROR and d.code in REFUSING]
     if causes:
         message = f"AMBF refuses the whole file for {len(causes)} of these errors"

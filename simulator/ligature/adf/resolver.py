@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections import abc
+from collections.abc import Iterable
 from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
+from ligature.adf.nodes import Node, Scalar, Sequence, parse
 
 MAX_BYTES = 256 * 1024 * 1024
-"""Largest file that is read unless the caller says otherwise."""
+"""Largest file that is read unless the caller sets otherwise."""
 
 MAX_PATH, MAX_NAME = 4000, 255
 """Longest path in characters and longest file name in bytes that file systems take."""
@@ -22,10 +24,14 @@ MAX_PATH, MAX_NAME = 4000, 255
 SEARCH_PATH = "LIGATURE_SCENE_PATH"
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
 _ROOT_SIGNS = (".git", "package.xml")
+_LAUNCH_KEYS = ("world config", "color config", "input devices config", "multibody configs")
+_LAUNCH_SIGN = re.compile(rb"^[ \t]*['\"]?(?:multibody configs|world config)", re.MULTILINE)
+MAX_LAUNCH_FILES, MAX_LAUNCH_BYTES = 200, 1024 * 1024
+"""Most files of a folder, and the largest in bytes, that are looked at for being a launch file."""
 
 
 class ResolutionError(AdfError):
-    """A path that may not be opened or does not exist; ``diagnostic`` says why."""
+    """A path that may not be opened or does not exist; ``diagnostic`` states why."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(diagnostic)
@@ -41,15 +47,14 @@ class Resolver:
         Folders below which files may be opened.
     """
 
-    def __init__(self, roots: Sequence[Path]) -> None:
+    def __init__(self, roots: abc.Sequence[Path]) -> None:
         self.roots = tuple(Path(root).resolve() for root in roots)
 
     @classmethod
     def for_file(cls, path: Path, extra_roots: Iterable[Path] = ()) -> Resolver:
         """A resolver for the scene of ``path``, the file that the user named.
 
-        Its root is the repository or ROS package that encloses the file, else the folder above the
-        file's own; ``extra_roots`` and the folders of ``LIGATURE_SCENE_PATH`` are added.
+        Its root is that of `scene_root`; ``extra_roots`` and the folders of ``LIGATURE_SCENE_PATH`` are added.
         """
         listed = os.environ.get(SEARCH_PATH, "")
         more = [Path(item) for item in listed.split(os.pathsep) if item]
@@ -76,7 +81,7 @@ class Resolver:
             raise self._refusal(
                 f"'{real}' lies outside the scene's folders ({roots})",
                 mark,
-                f"allow it with --root {real.parent} or {SEARCH_PATH}",
+                f"allow it with --root {self._wider_root(real)} or {SEARCH_PATH}",
             )
         return real
 
@@ -112,15 +117,71 @@ class Resolver:
                 f"'{path}' is not UTF-8 text (byte {error.start})", place, "save it as UTF-8"
             ) from error
 
+    def _wider_root(self, path: Path) -> Path:
+        """The smallest folder around a root and ``path``; the path's own where that would be all of a disk or home."""
+        around = (Path(os.path.commonpath([root, path])) for root in self.roots)
+        narrow = [folder for folder in around if not _too_wide(folder)]
+        return max(narrow, key=lambda folder: len(folder.parts), default=path.parent)
+
     @staticmethod
     def _refusal(message: str, mark: Mark | None, hint: str = "") -> ResolutionError:
         return ResolutionError(Diagnostic(Severity.ERROR, message, mark, hint, "path"))
 
 
 def scene_root(path: Path) -> Path:
-    """The repository or ROS package that encloses ``path``, else the folder above its own."""
+    """The folder below which the scene of ``path``, the file that the user named, may open files.
+
+    The repository or ROS package that encloses the file. Without one (a downloaded archive), the folder above that of
+    the highest launch file around it which names a file of the same branch: that launch file may open the same
+    folder. Else the folder above the file's own. Never all of a disk, nor what lies above the user's home.
+    """
     folder = path.resolve().parent
     for candidate in (folder, *folder.parents):
         if any((candidate / sign).exists() for sign in _ROOT_SIGNS):
             return candidate
-    return folder.parent
+    scene = folder
+    for candidate, branch in zip(folder.parents, (folder, *folder.parents), strict=False):
+        if not _too_wide(candidate) and _launches(candidate, branch):
+            scene = candidate
+    return scene if scene.parent == scene.parent.parent or _above_home(scene.parent) else scene.parent
+
+
+def _too_wide(folder: Path) -> bool:
+    """Whether ``folder`` holds more than scenes: all of a disk, all of a home, or more."""
+    return folder == folder.parent or _above_home(folder) or folder == _home()
+
+
+def _above_home(folder: Path) -> bool:
+    return folder in _home().parents
+
+
+def _home() -> Path:
+    return Path(os.path.expanduser("~")).resolve()
+
+
+def _launches(folder: Path, branch: Path) -> bool:
+    """Whether a launch file in ``folder`` names a file in its subfolder ``branch``."""
+    try:
+        candidates = sorted(folder.glob("*.y*ml"))[:MAX_LAUNCH_FILES]
+    except OSError:
+        return False
+    return any(branch in file.parents for launch in candidates for file in _named_files(launch))
+
+
+def _named_files(launch: Path) -> list[Path]:
+    """The files that a launch file names; none when it is something else or cannot be read."""
+    try:
+        if not launch.is_file() or launch.stat().st_size > MAX_LAUNCH_BYTES:
+            return []
+        data = launch.read_bytes()
+        if not _LAUNCH_SIGN.search(data):
+            return []
+        top = parse(data.decode("utf-8-sig"), launch)
+    except (OSError, UnicodeDecodeError, AdfError):
+        return []
+    named = []
+    for key in _LAUNCH_KEYS:
+        value = top.entries[key][1] if key in top.entries else None
+        items: list[Node | None] = [*value.items] if isinstance(value, Sequence) else [value]
+        named += [item.text for item in items if isinstance(item, Scalar) and item.text and "\0" not in item.text]
+    return [Path(os.path.normpath(os.path.join(launch.parent, text))) for text in named if len(text) <= MAX_PATH]

@@ -1,4 +1,4 @@
-"""What single keys cannot tell about an element: keys that need each other, and values without effect.
+"""What single keys cannot show about an element: keys that need each other, and values without effect.
 
 Each rule takes an element whose keys are sound and returns findings; the numbers are sections of the
 ADF specification. Codes are those of `checker`.
@@ -221,5 +221,5 @@ RULES: dict[str, tuple[Rule, ...]] = {
 
 
 def rule_findings(element: Element) -> list[Diagnostic]:
-    """What the rules of its kind say about an element whose keys are sound."""
+    """What the rules of its kind state about an element whose keys are sound."""
     return [finding for rule in RULES.get(element.kind, ()) for finding in rule(element)]

@@ -9,13 +9,13 @@ _INTRODUCTION = """# ADF support
 Every key that the reader knows, by kind of file or object, with its type, default and what becomes of it. Section
 numbers (§) are those of the ADF specification. Keys that are not here are reported as unknown, with a suggestion.
 
-- **used**, where nothing else is said: has the effect that AMBF gives it.
-- **{ignored}**: legal, without effect there and here; told at debug level (`ligature check -v`).
+- **used**, where nothing else is stated: has the effect that AMBF gives it.
+- **{ignored}**: legal, without effect there and here; reported at debug level (`ligature check -v`).
 - **{kept}**: handed on as written; no plug-in is run.
 - **{not_simulated_status}**: of kinds that are not simulated.
 - **{ours}**, so files that use it stay valid there.
 
-A bad value is an error at its place, and leaves its object out; where the table says "bad: default", it is a warning
+A bad value is an error at its place, and leaves its object out; where the table states "bad: default", it is a warning
 and the default is taken. {simulated} are simulated; {not_simulated} are read, checked and reported as not simulated.
 
 Where AMBF's behaviour is a defect that no file relies on, ours is the sane one: an unknown sensor type leaves that

@@ -1,4 +1,4 @@
-"""Makes a file say what is wanted by changing only what differs, and writes new files in canonical order.
+"""Makes a file state what is wanted by changing only what differs, and writes new files in canonical order.
 
 An `Item` is one object as it is to stand in the file. Values are typed as the schema types them;
 numbers count as equal when they are equal in single precision, which is what editors store.
@@ -104,7 +104,7 @@ def updated(
     removed: Collection[str] = (),
     parsed: nodes.Mapping | None = None,
 ) -> str:
-    """``text``, a file of ``kind``, with the changes that make it say ``top`` and hold ``items``.
+    """``text``, a file of ``kind``, with the changes that make it state ``top`` and hold ``items``.
 
     Objects whose keys are ``removed`` go; all others stay, also those that cannot be read. Keys that
     the schema does not know, comments, anchors and order stay. ``parsed`` are the nodes of ``text`` where they are
@@ -117,7 +117,7 @@ def updated(
         if not edits:
             return text
         text = apply(text, edits)
-    raise PatchError("the file cannot be changed as wanted; aliases lead in a circle")
+    raise PatchError("the file cannot be changed as wanted; aliases form a circle")
 
 
 def _renamed(text: str, kind: str, items: Sequence[Item]) -> str:
@@ -258,7 +258,7 @@ def _different(path: str, names: Sequence[str], before: Sequence[float], after: 
 
 
 def _missing_block(owner: nodes.Mapping, path: str) -> str | None:
-    """The outermost block on the way to ``path`` that is not there, so that its keys are added at once."""
+    """The outermost block on the way to ``path`` that is missing, so that its keys are added at once."""
     node: nodes.Node | None = owner
     parts = path.split(".")
     for depth, part in enumerate(parts[:-1]):

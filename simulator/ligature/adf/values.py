@@ -1,4 +1,4 @@
-"""Turns nodes into values of the types that the schema names; every refusal says where and what was expected."""
+"""Turns nodes into values of the types that the schema names; every refusal states where and what was expected."""
 
 from __future__ import annotations
 
@@ -41,6 +41,11 @@ def convert(key: Key, node: Node) -> Any:
     value = _CONVERTERS[key.type](key, node)
     if key.least is not None and isinstance(value, int | float) and value < key.least:
         raise BadValue(node, f"at least {key.least:g}, not {value:g}", unusable=True)
+    if key.most is not None:
+        numbers = value[0] if key.type is Type.POSE else value if isinstance(value, tuple) else (value,)
+        beyond = [n for n in numbers if isinstance(n, int | float) and abs(n) > key.most]
+        if beyond:
+            raise BadValue(node, f"at most {key.most:g} {key.unit.split(',')[0]}, not {beyond[0]:g}", unusable=True)
     return value
 
 

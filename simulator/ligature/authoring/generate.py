@@ -317,7 +317,7 @@ def _tube(spec: Needle, stations: Array) -> tuple[Array, Any]:
 
 
 def _joint_ends(holder: Holder, child: str, T_child: Array, T_joint: Array) -> dict[str, Any]:
-    """The keys that say which bodies a joint holds, and where; all poses in the world."""
+    """The keys that state which bodies a joint holds, and where; all poses in the world."""
     to_parent = inverse(holder.T_world)
     keys = joint_keys(to_parent @ T_joint, to_parent @ T_child, holder.T_inertial)
     return {

@@ -21,7 +21,7 @@ FULL_SHININESS = 128.0
 
 
 class MeshWriteError(ValueError):
-    """A mesh that cannot be written; the message says why."""
+    """A mesh that cannot be written; the message states why."""
 
 
 @dataclass(frozen=True)

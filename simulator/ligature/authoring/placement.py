@@ -1,4 +1,4 @@
-"""Where things stand, and which keys say so: joints, cameras, lights, axes of round shapes.
+"""Where things stand, and which keys describe it: joints, cameras, lights, axes of round shapes.
 
 Poses are ``T_a_b`` (4, 4), frame b in frame a, in metres; angles in radians. A view looks along −Z
 with +Y up, as OpenGL and Blender have it; the format's own camera looks along −X with +Z up (ADF §18.1).
@@ -38,7 +38,7 @@ SAME_PLACE = 2e-6
 
 @dataclass(frozen=True)
 class JointKeys:
-    """What a file says about where a joint is; pivots and axes in body frames, angles in radians."""
+    """What a file states about where a joint is; pivots and axes in body frames, angles in radians."""
 
     parent_pivot: Vector
     child_pivot: Vector
@@ -156,7 +156,7 @@ def joint_keys(
 
     Both axes are the joint frame's own, so that they map onto each other without the format's choice
     for antiparallel axes; ``offset`` takes the turn that is left (ADF §15.2). Where the child tilts the
-    axis by less than 0.001 rad, or turns it over within 0.0016 rad, the format cannot say so: the axes
+    axis by less than 0.001 rad, or turns it over within 0.0016 rad, the format cannot express it: the axes
     are then taken as exactly parallel or antiparallel. ``scales`` are the factors that the simulator
     puts on the pivots of parent and child.
     """

@@ -17,7 +17,7 @@ WRITERS = 16
 
 
 class SaveError(OSError):
-    """Files that could not be saved; nothing was changed. The message says which and why."""
+    """Files that could not be saved; nothing was changed. The message states which and why."""
 
 
 def save_all(files: Mapping[Path, bytes]) -> list[Path]:

@@ -1,7 +1,7 @@
 """Turns a URDF robot, as yourdfpy reads it, into objects of the format.
 
 Links become bodies at the robot's zero pose, joints keep their axes; the joint frame of URDF is the
-child's frame. What ADF cannot express is told, never dropped in silence. Metres and radians.
+child's frame. What ADF cannot express is reported, never dropped in silence. Metres and radians.
 """
 
 from __future__ import annotations

@@ -51,24 +51,27 @@ FIGURES = np.dtype(
         ("frames_dropped", "u8"),
         ("frame_seconds", "f8"),
         ("recording", "u8"),
+        ("alarms", "u8"),
+        ("alarm", "S240"),
     ]
 )
 """Figures of the running loop; times in seconds, ``physics_beat`` on the monotonic clock.
 
 ``frames`` are pictures drawn for clients, ``frame_seconds`` is how long the last round of them took. ``recording`` is 1
-while a recording goes on that was asked for during the run.
+while a recording goes on that was asked for during the run. ``alarms`` counts bodies that moved as no command asks for
+or diverged; ``alarm`` is the newest, in UTF-8.
 """
 
 _STATE_AT = 4096
 RETRIES = 1000
 """Attempts of one reading; the writer is at it for a microsecond of every update."""
 
-PATIENCE = 120.0
+TIMEOUT = 120.0
 """Seconds to wait for the first state: the first start of all compiles the solvers."""
 
 
 class BusError(RuntimeError):
-    """The shared memory block is missing or belongs to another scene; the message says which."""
+    """The shared memory block is missing or belongs to another scene; the message states which."""
 
 
 class Block:
@@ -111,14 +114,14 @@ class Block:
 
     @classmethod
     def attach(
-        cls, name: str, dtype: StateDtype, patience: float = PATIENCE, cancelled: Callable[[], bool] = lambda: False
+        cls, name: str, dtype: StateDtype, timeout: float = TIMEOUT, cancelled: Callable[[], bool] = lambda: False
     ) -> Block:
         """Map the block ``name`` once it holds a state.
 
-        Raises `BusError` when it does not within ``patience`` seconds, when ``cancelled`` says to stop
+        Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True
         waiting, or when the block is of another layout.
         """
-        deadline = time.monotonic() + patience
+        deadline = time.monotonic() + timeout
         while True:
             with suppress(FileNotFoundError):
                 block = cls(FOLDER / name, dtype, False)
@@ -172,7 +175,7 @@ class Block:
 
 
 def _reserve(descriptor: int, path: Path, size: int) -> None:
-    """Take memory now: a page that cannot be had later would kill the process that writes to it."""
+    """Take memory now: a page that cannot be allocated later would kill the process that writes to it."""
     try:
         os.posix_fallocate(descriptor, 0, size)
     except OSError as error:

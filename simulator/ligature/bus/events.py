@@ -20,13 +20,17 @@ SLOTS = 1024
 RUN = -1
 """Number of an event that is about the run and no arm."""
 
+_CHARACTER = 12
+"""Most bytes that JSON takes for a character: two escaped halves for one beyond the basic plane."""
+
 _HEADER = 64
 LOG_BYTES = _HEADER + SLOTS * SLOT_BYTES
 
 
 @dataclass(frozen=True)
 class BusEvent:
-    """Something that happened to the arm with number ``arm``, or to the `RUN`; ``name`` is the topic that tells it."""
+    """Something that happened to the arm with number ``arm``, or to the `RUN`; ``name`` is the topic that reports
+    it."""
 
     arm: int
     name: str
@@ -45,9 +49,11 @@ class EventLog:
 
     def write(self, arm: int, name: str, value: Any) -> None:
         """Append an event; a text that is too long for a slot is cut."""
-        data = json.dumps([arm, name, value]).encode("utf-8")
-        if len(data) > MOST_BYTES:
-            data = json.dumps([arm, name, str(value)[: MOST_BYTES // 8]]).encode("utf-8")
+        data = _line(arm, name, value)
+        text = str(value)[:MOST_BYTES]
+        while len(data) > MOST_BYTES:
+            data = _line(arm, name, text)
+            text = text[: -max((len(data) - MOST_BYTES) // _CHARACTER, 1)]
         number = int(self._written[0])
         slot = number % SLOTS
         at = _HEADER + slot * SLOT_BYTES
@@ -90,3 +96,7 @@ class EventLog:
         """Let go of the memory."""
         del self._written, self._marks
         self._memory.release()
+
+
+def _line(arm: int, name: str, value: Any) -> bytes:
+    return json.dumps([arm, name, value]).encode("ascii")

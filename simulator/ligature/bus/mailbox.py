@@ -9,20 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError, Message, decode
-from ligature.bus.newest import Newest, object_of
-from ligature.bus.pacing import Pace, Throttle
-from ligature.bus.recording import Recording, file_name
+from ligature.bus.newest import Newest
+from ligature.bus.pacing import WORLD, Throttle
 from ligature.bus.ring import Ring
-from ligature.model.commands import ParentCommand, Release, check
+from ligature.model.commands import Release, object_counts
 from ligature.model.scene import Scene
 
 SILENCE = 0.5
 """Seconds without a sign of life after which a front end counts as dead."""
-
-
-WORLD = ("world", 0)
 
 
 class Mailbox:
@@ -30,13 +25,7 @@ class Mailbox:
 
     def __init__(self, scene: Scene, rings: Mapping[str, Ring]) -> None:
         self._rings = rings
-        self._limits = {
-            "body": len(scene.bodies),
-            "actuator": len(scene.actuators),
-            "camera": len(scene.cameras),
-            "light": len(scene.lights),
-            "arm": len(scene.arms),
-        }
+        self._counts = {**object_counts(scene), WORLD[0]: 1}
         self._owned: dict[str, set[tuple[str, int]]] = {name: set() for name in rings}
         self.received = self.coalesced = self.rejected = 0
         self.last_rejection = ""
@@ -49,42 +38,30 @@ class Mailbox:
                 self.received += 1
                 try:
                     message = decode(data)
-                    self._check(message)
+                    message.check()
+                    message.check_indices(self._counts)
                 except (CodecError, ValueError) as error:
-                    self.rejected += 1
-                    self.last_rejection = str(error)
+                    self.reject(error)
                     continue
                 self._put(box, name, message)
-            self._bury(box, name, ring)
+            self._release_client(box, name, ring)
         return box.messages()
+
+    def reject(self, error: ValueError) -> None:
+        """Count a command that is not carried out."""
+        self.rejected += 1
+        self.last_rejection = str(error)
 
     def _put(self, box: Newest, producer: str, message: Message) -> None:
         owned = self._owned[producer]
-        item = WORLD if isinstance(message, Throttle) else object_of(message)
-        if item is not None:
-            free = isinstance(message, Release) or (isinstance(message, Throttle) and not message.enabled)
-            owned.discard(item) if free else owned.add(item)
+        if message.object is not None:
+            owned.discard(message.object) if message.releases else owned.add(message.object)
         self.coalesced += box.put(message)
 
-    def _bury(self, box: Newest, producer: str, ring: Ring) -> None:
+    def _release_client(self, box: Newest, producer: str, ring: Ring) -> None:
         """Release what a dead front end commanded."""
         if self._owned[producer] and ring.silence > SILENCE:
             for item in sorted(self._owned[producer]):
                 box.put(Throttle(False, False, 0) if item == WORLD else Release(*item))
             self._owned[producer].clear()
             ring.forget()
-
-    def _check(self, message: Message) -> None:
-        if isinstance(message, Throttle):
-            return
-        if isinstance(message, Recording):
-            file_name(message.name)
-            return
-        if not isinstance(message, Pace):
-            check(message)
-        check_bounds(message)
-        item = object_of(message)
-        if item is not None and not 0 <= item[1] < self._limits.get(item[0], 0):
-            raise ValueError(f"there is no {item[0]} number {item[1]}")
-        if isinstance(message, ParentCommand) and not 0 <= (message.parent or 0) < self._limits["body"]:
-            raise ValueError(f"there is no body number {message.parent} to hang a {message.kind} on")

@@ -4,43 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from ligature.bus.codec import Message
-from ligature.model.commands import (
-    STREAMED,
-    ActuatorCommand,
-    ArmCommand,
-    BodyCommand,
-    ParentCommand,
-    PlaceCommand,
-    Release,
-)
-
-
-def object_of(message: Message) -> tuple[str, int] | None:
-    """Kind and index of the object that a command is for; None for events."""
-    if isinstance(message, BodyCommand):
-        return "body", message.body
-    if isinstance(message, ActuatorCommand):
-        return "actuator", message.actuator
-    if isinstance(message, ArmCommand):
-        return "arm", message.arm
-    if isinstance(message, PlaceCommand | ParentCommand | Release):
-        return message.kind, message.index
-    return None
-
-
-def _slot(message: Message) -> Hashable | None:
-    """What a command replaces the last one of; None for what must not be lost.
-
-    Grasping and letting go are different things to do with one actuator: neither replaces the other. Arms are
-    streamed set-points of each kind, and told other things one by one.
-    """
-    item = object_of(message)
-    if isinstance(message, ActuatorCommand):
-        return item, message.actuate
-    if isinstance(message, ArmCommand):
-        return (item, message.verb) if message.verb in STREAMED else None
-    return (item, "parent") if isinstance(message, ParentCommand) else item
+from ligature.model.messages import Message
 
 
 class Newest:
@@ -55,7 +19,7 @@ class Newest:
 
     def put(self, message: Message) -> bool:
         """Add a command; True when it takes the place of an older one."""
-        slot = _slot(message)
+        slot = message.slot
         if slot is None:
             self.events += 1
             self._box["event", self.events] = message

@@ -7,6 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ligature.model.messages import COUNT, FLAG, Message, Real, wire
+
+WORLD = ("world", 0)
+"""The object that world commands are for."""
+
 DEFAULT_SKIP = 10
 BACKLOG = 0.05
 """Seconds of delay that are made up for; what is later than that stays lost, and is reported."""
@@ -16,23 +21,35 @@ MOST_AHEAD = 10
 
 
 @dataclass(frozen=True)
-class Throttle:
+class Throttle(Message, code=6):
     """A world command (interface reference §2.5): step throttling, its clock, and updates per edge."""
 
-    enabled: bool
-    clock: bool
-    skip: int
+    enabled: bool = wire(FLAG)
+    clock: bool = wire(FLAG)
+    skip: int = wire(COUNT)
+
+    @property
+    def object(self) -> tuple[str, int]:  # noqa: D102
+        return WORLD
+
+    @property
+    def slot(self) -> None:
+        """Each edge of the clock counts."""
+
+    @property
+    def releases(self) -> bool:  # noqa: D102
+        return not self.enabled
 
 
-SLOWEST, FASTEST = 0.01, 100.0
+MIN_SPEED, MAX_SPEED = 0.01, 100.0
 """Bounds of simulated over wall time that may be asked for."""
 
 
 @dataclass(frozen=True)
-class Pace:
+class Pace(Message, code=10):
     """Simulated over wall time from now on."""
 
-    speed: float
+    speed: float = wire(Real(MIN_SPEED, MAX_SPEED), "the speed")
 
 
 class Pacer:
@@ -81,7 +98,7 @@ class Pacer:
         return max(self._next - now, 0.0)
 
     def done(self, now: float) -> None:
-        """An update was run, after `wait` had told that it may."""
+        """An update was run, after `wait` had reported that it may."""
         if self._throttled:
             self._budget -= 1
             return

@@ -1,6 +1,6 @@
-"""What every process of a run does: end with its parent, end on a signal, tell its parent how it is.
+"""What every process of a run does: end with its parent, inform its parent.
 
-A process tells by lines on standard output: ``@event text``; everything else is a log line.
+A process reports by lines on standard output: ``@event text``; everything else is a log line.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import ctypes
 import os
 import signal
 import sys
-import threading
 import time
 
 _GROUP_TRIES, _GROUP_PAUSE = 4, 0.11
@@ -29,11 +28,11 @@ def end_with_parent() -> None:
         sys.exit(0)
 
 
-def stand_behind(nice: int) -> None:
+def lower_priority(nice: int) -> None:
     """Take the processor only where others leave it; runs between fork and exec too.
 
     Linux shares the processor among sessions first where its automatic groups are on, as on most desktops: within a
-    session of its own a process is alone, and nice to nobody, unless the group is told too.
+    session of its own a process is alone, and nice to nobody, unless the group's priority is lowered too.
     """
     os.nice(nice)
     for _ in range(_GROUP_TRIES):
@@ -50,15 +49,7 @@ def stand_behind(nice: int) -> None:
             return
 
 
-def stop_on_signal() -> threading.Event:
-    """An event that SIGTERM sets; SIGINT is left to the parent, which the terminal also tells."""
-    stop = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: stop.set())
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return stop
-
-
 def tell(event: str, text: str = "") -> None:
-    """Tell the parent about ``event``."""
+    """Report the parent about ``event``."""
     sys.stdout.write(f"@{event} {text}\n")
     sys.stdout.flush()

@@ -2,8 +2,8 @@
 
 The same scene and commands give the same bits, so that a record is all that a run was. A file has one line of JSON,
 then frames: update (u8), length (u4), a command as `ligature.bus.codec` packs it; the last has the length `END` and
-says the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too, and
-a frame of the length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
+states the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too,
+and a frame of the length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from ligature.bus.codec import CodecError, LoopCommand, decode, encode
+from ligature.bus.codec import CodecError, decode, encode
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
 
-FORMAT = "ligature record 1"
+FORMAT = "ligature record 2"
 END, BEGIN = 0xFFFFFFFF, 0xFFFFFFFE
 _HEAD = struct.Struct("<QI")
 _HASH_BYTES = 32
@@ -29,7 +29,7 @@ _CHUNK = 1 << 20
 
 
 class RecordError(ValueError):
-    """A file that is no whole record; the message says why, and where."""
+    """A file that is no whole record; the message states why, and where."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ class Record:
                 command = decode(data[at : at + length])
             except CodecError as error:
                 raise RecordError(f"{path}: at byte {at}: {error}") from error
-            if isinstance(command, LoopCommand):
+            if not isinstance(command, Command):
                 raise RecordError(f"{path}: at byte {at}: no command of a record")
             commands.append((update, command))
         raise RecordError(

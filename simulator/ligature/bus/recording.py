@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ligature.model.messages import Message, Text, wire
+
 SUFFIX = ".record"
 MOST_BYTES = 150
 """Of a name: with what is put after it, file systems take it."""
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Message, code=11):
     """Record what happens from now on as the file ``name`` in the folder of recordings; an empty name ends it."""
 
-    name: str
+    name: str = wire(Text())
+
+    def check(self) -> None:  # noqa: D102
+        file_name(self.name)
 
 
 def file_name(text: str) -> str:
-    """The file that a person means by ``text``, a name without folders; raises ValueError that says what is allowed."""
+    """The file that a person means by ``text``, a name without folders; raises ValueError that states what is
+    allowed."""
     name = text.strip()
     if "/" in name or name.startswith(".") or not name.isprintable():
         raise ValueError(f"'{text[:40]}' is no name of a recording; write letters and digits, without folders")

@@ -6,9 +6,9 @@ import argparse
 import sys
 
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
-from ligature.cli.supervisor import Supervisor
+from ligature.cli.supervisor import supervise
 
-FASTEST = 1000.0
+MAX_UPDATE_RATE = 1000.0
 """Updates per second of one tick each: no update can be shorter."""
 
 _WITHOUT_EFFECT = {
@@ -43,7 +43,7 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument(
         "--cameras", action=argparse.BooleanOptionalAction,
-        help="publish pictures of all cameras, or of none; else as the scene says (not an AMBF flag)",
+        help="publish pictures of all cameras, or of none; else as the scene states (not an AMBF flag)",
     )  # fmt: skip
     flags.add_argument("--root", action="append", default=[], help="further folder of scene files (not an AMBF flag)")
     for words, what in _WITHOUT_EFFECT.items():
@@ -81,7 +81,8 @@ def options_of(arguments: list[str]) -> RunOptions:
             flags.error(f"--{name} must be at least 1 Hz, not {frequency}")
     return RunOptions(
         given.launch_file, models, tuple(f for f in (given.a or "").split(",") if f), tuple(given.root), given.ns,
-        min(given.p, FASTEST), given.s, min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
+        min(given.p, MAX_UPDATE_RATE), given.s,
+        min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
         window=bool(given.g), notes=_notes(given), devices=devices,
     )  # fmt: skip
@@ -89,7 +90,7 @@ def options_of(arguments: list[str]) -> RunOptions:
 
 def main() -> None:
     """Entry point of the command."""
-    sys.exit(Supervisor(options_of(sys.argv[1:])).run())
+    supervise(options_of(sys.argv[1:]))
 
 
 def _switch(text: str) -> bool:
@@ -110,8 +111,8 @@ def _notes(given: argparse.Namespace) -> tuple[str, ...]:
     ]
     if given.t is False:
         notes.append("-t 0: the step is fixed all the same; simulated time falls behind on a machine that is too slow")
-    if given.p > FASTEST:
-        notes.append(f"-p {given.p:g}: a tick has 1 ms; {FASTEST:g} updates per second are made")
+    if given.p > MAX_UPDATE_RATE:
+        notes.append(f"-p {given.p:g}: a tick has 1 ms; {MAX_UPDATE_RATE:g} updates per second are made")
         return tuple(notes)
     return (*notes, *rate_notes(given.p))
 

@@ -57,6 +57,8 @@ def bench(
     for phase in PHASES:
         table.add_row(f"{phase} per tick, us", f"{figures['phases_us'][phase]:,.1f}")
     console.print(table)
+    for problem in figures["problems"]:
+        console.print(problem, style="yellow", markup=False)
     return 0
 
 
@@ -93,5 +95,6 @@ def measure(scene: Scene, seconds: float, rate: float, loading: float = 0.0) -> 
         "tick_max_us": max(times) * 1e6,
         "start_s": start,
         "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "problems": [str(problem) for problem in simulation.problems],
         "phases_us": {name: phase.seconds / ticks * 1e6 for name, phase in simulation.phases.items()},
     }

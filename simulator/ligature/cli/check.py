@@ -13,11 +13,18 @@ from ligature.adf import AdfError, Diagnostic, Document, Resolver, Severity, rea
 _STYLES = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "", Severity.DEBUG: "dim"}
 
 
-def check(files: Sequence[Path], roots: Sequence[Path], strict: bool, verbose: bool, console: Console) -> int:
+def check(
+    files: Sequence[Path],
+    roots: Sequence[Path],
+    strict: bool,
+    verbose: bool,
+    console: Console,
+    models: Sequence[int] | None = None,
+) -> int:
     """Print the findings of ``files``; returns 1 when one is an error."""
     status = 0
     for file in files:
-        found = findings(file, roots, strict)
+        found = findings(file, roots, strict, models)
         for diagnostic in found:
             if diagnostic.severity > Severity.DEBUG or verbose:
                 console.print(str(diagnostic), style=_STYLES[diagnostic.severity], markup=False)
@@ -28,8 +35,11 @@ def check(files: Sequence[Path], roots: Sequence[Path], strict: bool, verbose: b
     return status
 
 
-def findings(file: Path, roots: Sequence[Path], strict: bool) -> list[Diagnostic]:
-    """Findings of one file: those of reading it, and for launch and model files those of resolving it."""
+def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[int] | None = None) -> list[Diagnostic]:
+    """Findings of one file: those of reading it, and for launch and model files those of resolving it.
+
+    Of the models of a launch file those of the indices ``models`` are looked at, all for None.
+    """
     resolver = Resolver.for_file(file, roots)
     try:
         document = read_any(file, resolver, strict)
@@ -40,7 +50,7 @@ def findings(file: Path, roots: Sequence[Path], strict: bool) -> list[Diagnostic
     if document.kind == "model" and not _has_bodies(document):
         return document.diagnostics
     try:
-        scene = ligature.load(file, roots=roots)
+        scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
         return list(error.diagnostics)
     return _distinct([*document.diagnostics, *scene.diagnostics])
@@ -52,4 +62,5 @@ def _has_bodies(document: Document) -> bool:
 
 
 def _distinct(found: Sequence[Diagnostic]) -> list[Diagnostic]:
-    return list(dict.fromkeys(found))
+    """Each finding once, as it was reported last: the scene adds to a file's finding what follows from it."""
+    return list({(d.severity, d.message, d.mark): d for d in found}.values())

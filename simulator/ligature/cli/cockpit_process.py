@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.cockpit.address import TOKEN_VARIABLE, AddressError, read_address
 from ligature.cockpit.pictures import Pictures

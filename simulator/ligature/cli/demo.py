@@ -8,6 +8,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from ligature.bus.process import end_with_parent
+
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "suture.py"
 
 
@@ -21,4 +23,4 @@ def demo(throws: int, seed: int, out: Path, dataset: Path | None, console: Conso
     else:
         words = [str(dataset), "--throws", str(throws), "--seed", str(seed)]
         command = [sys.executable, str(EXAMPLE.with_name("record_dataset.py")), *words]
-    return subprocess.run(command, check=False).returncode
+    return subprocess.run(command, check=False, preexec_fn=end_with_parent).returncode

@@ -20,7 +20,7 @@ from ligature.mesh.surface import joined
 
 
 def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> int:
-    """Write files in canonical form, or tell those that are not; returns the exit status.
+    """Write files in canonical form, or report those that are not; returns the exit status.
 
     Comments, anchors and blocks that no list names have no place in the canonical form: a file that
     has them is left alone unless ``lossy``.
@@ -66,7 +66,7 @@ def _save(file: Path, text: str, console: Console) -> int:
 
 
 def diff(before: Path, after: Path, console: Console) -> int:
-    """Print what two files say differently, object by object; returns 1 when they differ."""
+    """Print what two files state differently, object by object; returns 1 when they differ."""
     documents = [_read(file, console) for file in (before, after)]
     if documents[0] is None or documents[1] is None:
         return 2

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import sys
-import threading
 from typing import NoReturn
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import Stop, stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.model.scene import Scene
 from ligature.model.state import state_dtype
 
-SCENE_PATIENCE = 10.0
+SCENE_TIMEOUT = 10.0
 """Seconds to wait for the end of the run, for which the physics process gives the reasons."""
 
 
-def join_run() -> tuple[RunOptions, Scene, threading.Event]:
+def join_run() -> tuple[RunOptions, Scene, Stop]:
     """Options, scene and stop signal of the run whose options are this process's one argument.
 
     Waits until physics runs. Where the scene does not load or the run ends, this process ends.
@@ -29,7 +29,7 @@ def join_run() -> tuple[RunOptions, Scene, threading.Event]:
         scene = options.load()
         Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set).close()
     except ligature.SceneError:
-        stop.wait(SCENE_PATIENCE)
+        stop.wait(SCENE_TIMEOUT)
         sys.exit(2)
     except BusError as error:
         tell("warning", str(error))
@@ -37,8 +37,8 @@ def join_run() -> tuple[RunOptions, Scene, threading.Event]:
     return options, scene, stop
 
 
-def give_up(stop: threading.Event, error: Exception) -> NoReturn:
+def give_up(stop: Stop, error: Exception) -> NoReturn:
     """End the run for a reason that its user has to put right."""
     tell("fatal", str(error))
-    stop.wait(SCENE_PATIENCE)
+    stop.wait(SCENE_TIMEOUT)
     sys.exit(2)

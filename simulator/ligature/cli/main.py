@@ -14,7 +14,7 @@ from ligature.cli.bench import bench as run_bench
 from ligature.cli.check import check as run_check
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
 from ligature.cli.poses import poses as run_poses
-from ligature.cli.supervisor import Supervisor
+from ligature.cli.supervisor import supervise
 
 app = typer.Typer(
     add_completion=False,
@@ -78,7 +78,7 @@ def run(
     cameras: Annotated[
         Optional[bool],  # noqa: UP045
         typer.Option(
-            "--cameras/--no-cameras", help="Publish pictures of all cameras, or of none; else as the scene says."
+            "--cameras/--no-cameras", help="Publish pictures of all cameras, or of none; else as the scene states."
         ),
     ] = None,
     window: Annotated[bool, typer.Option("--window", help="Show the scene in a window.")] = False,
@@ -109,7 +109,7 @@ def run(
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
         devices=indices(devices) or (),
     )  # fmt: skip
-    raise typer.Exit(Supervisor(options).run())
+    supervise(options)
 
 
 def _served_at(text: str | None) -> str:
@@ -138,7 +138,7 @@ def cockpit(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
         cockpit=_served_at(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
     )  # fmt: skip
-    raise typer.Exit(Supervisor(options).run())
+    supervise(options)
 
 
 @app.command()
@@ -147,9 +147,11 @@ def check(
     strict: Annotated[bool, typer.Option(help="Refuse what AMBF refuses.")] = False,
     root: Roots = None,
     verbose: Annotated[bool, typer.Option("-v", help="Show keys without effect too.")] = False,
+    models: Models = None,
 ) -> None:
-    """Tell every problem of a scene as file:line:column; exit status 1 on errors."""
-    raise typer.Exit(run_check(files, root or [], strict, verbose, Console(highlight=False, soft_wrap=True)))
+    """Report every problem of a scene as file:line:column; exit status 1 on errors."""
+    console = Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_check(files, root or [], strict, verbose, console, indices(models)))
 
 
 @app.command()
@@ -163,6 +165,16 @@ def bench(
 ) -> None:
     """Measure the physics of a scene: ticks per second, real-time factor, times by phase, memory."""
     raise typer.Exit(run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False)))
+
+
+@app.command("compile")
+def compile_kernels(
+    scenes: Annotated[Optional[list[Path]], typer.Argument(help="Launch files; else scenes of the repository.")] = None,  # noqa: UP045
+) -> None:
+    """Compile ahead what scenes need, which their first start would do else; several at a time."""
+    from ligature.cli.compile import compile_ahead
+
+    raise typer.Exit(compile_ahead(scenes or [], Console(highlight=False, soft_wrap=True)))
 
 
 @app.command()
@@ -234,7 +246,7 @@ def decompose(
 @app.command()
 def fmt(
     files: Annotated[list[Path], typer.Argument(help="Scene files of any kind.")],
-    check: Annotated[bool, typer.Option(help="Only tell files that are not in canonical form.")] = False,
+    check: Annotated[bool, typer.Option(help="Only report files that are not in canonical form.")] = False,
     lossy: Annotated[bool, typer.Option(help="Write files too whose comments or spare blocks are lost.")] = False,
 ) -> None:
     """Write scene files in canonical form: keys in the schema's order, numbers and vectors in one style."""
@@ -245,7 +257,7 @@ def fmt(
 
 @app.command()
 def diff(before: Path, after: Path) -> None:
-    """Tell what two scene files say differently, object by object; exit status 1 when they differ."""
+    """Report what two scene files state differently, object by object; exit status 1 when they differ."""
     from ligature.cli.documents import diff as run_diff
 
     raise typer.Exit(run_diff(before, after, Console(highlight=False, soft_wrap=True)))
@@ -269,7 +281,7 @@ def convert(
     out: Annotated[Path, typer.Option("-o", help="The model file to write.")],
     namespace: Annotated[str, typer.Option(help="Namespace of the model.")] = "/ambf/env/",
 ) -> None:
-    """Turn a URDF or MJCF robot into an ADF model with its meshes; tells what ADF cannot express."""
+    """Turn a URDF or MJCF robot into an ADF model with its meshes; reports what ADF cannot express."""
     from ligature.cli.convert import convert as run_convert
 
     raise typer.Exit(run_convert(source, out, namespace, Console(highlight=False, soft_wrap=True)))
@@ -335,25 +347,25 @@ def score(
     task: Annotated[str, typer.Argument(help="pose_estimation, insertion or suture.", callback=task_name)],
     file: Annotated[Optional[Path], typer.Argument(help="A bag or a run's record; else the run that goes on.")] = None,  # noqa: UP045
     scene: Annotated[Optional[Path], typer.Option(help="Launch file; of a record, instead of its own.")] = None,  # noqa: UP045
-    patience: Annotated[float, typer.Option(help="Seconds to wait for a report.", min=1)] = 3600.0,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for a report.", min=1)] = 3600.0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Tell how well a task was done; exit status 0 done, 1 not done, 2 not judged."""
+    """Report how well a task was done; exit status 0 done, 1 not done, 2 not judged."""
     from ligature.cli.score import score as run_score
 
-    raise typer.Exit(run_score(task, file, scene, patience, json, Console(highlight=False, soft_wrap=True)))
+    raise typer.Exit(run_score(task, file, scene, timeout, json, Console(highlight=False, soft_wrap=True)))
 
 
 @app.command()
 def teleop(
     config: Annotated[Path, typer.Argument(help="Teleoperation file, or a launch file with input devices.")],
-    record: Annotated[Optional[Path], typer.Option(help="File to write what devices say to.")] = None,  # noqa: UP045
+    record: Annotated[Optional[Path], typer.Option(help="File to write what devices state to.")] = None,  # noqa: UP045
     replay: Annotated[Optional[Path], typer.Option(help="Recorded file that speaks for the devices.")] = None,  # noqa: UP045
     calibrate: Annotated[Optional[str], typer.Option(help="Device to calibrate.")] = None,  # noqa: UP045
-    check: Annotated[bool, typer.Option("--check", help="Only read the file, and tell who leads whom.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Only read the file, and print who drives whom.")] = False,
     devices: Annotated[Optional[str], typer.Option("-i", help="Indices of a launch file's input devices.")] = None,  # noqa: UP045
 ) -> None:
-    """Lead arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""
+    """Drive arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""
     from ligature.cli.teleop import teleop as run_teleop
 
     console = Console(highlight=False, soft_wrap=True)

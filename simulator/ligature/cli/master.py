@@ -11,21 +11,21 @@ from urllib.parse import urlparse
 
 DEFAULT_MASTER = "http://127.0.0.1:11311"
 DEFAULT_PORT = 11311
-ANSWER_PATIENCE = 1.0
+ANSWER_TIMEOUT = 1.0
 """Seconds that a master is given to answer."""
 
 
 class _Transport(xmlrpc.client.Transport):
-    """A transport that does not wait for ever for a program that listens and says nothing."""
+    """A transport that does not wait for ever for a program that listens and answers nothing."""
 
     def make_connection(self, host: object) -> HTTPConnection:
         connection = super().make_connection(host)  # type: ignore[arg-type]
-        connection.timeout = ANSWER_PATIENCE
+        connection.timeout = ANSWER_TIMEOUT
         return connection
 
 
 def master_answers(uri: str) -> bool:
-    """Whether a ROS master answers at ``uri`` within `ANSWER_PATIENCE`."""
+    """Whether a ROS master answers at ``uri`` within `ANSWER_TIMEOUT`."""
     try:
         code, _, _ = xmlrpc.client.ServerProxy(uri, _Transport()).getPid("/ligature")  # type: ignore[misc]
     except (OSError, HTTPException, xmlrpc.client.Error, ValueError, TypeError):

@@ -17,10 +17,10 @@ class RunOptions:
     ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
     ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy,
     ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
-    tells whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` says
-    whether pictures are published (None: of the cameras for which the scene says so), ``window`` whether
+    reports whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` states
+    whether pictures are published (None: of the cameras for which the scene reports it), ``window`` whether
     one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
-    the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines to tell the user at
+    the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines for the user at
     the start, ``devices`` are indices of the input devices whose proxies are there.
     """
 
@@ -100,7 +100,7 @@ def model_indices(text: str) -> tuple[int, ...]:
 
 
 def rate_notes(rate: float) -> tuple[str, ...]:
-    """What to tell the user about a rate of updates that is no whole number of ticks."""
+    """The note about a rate of updates that is no whole number of ticks."""
     ticks = max(1, round(1000.0 / rate))
     if abs(1000.0 / rate - ticks) < 1e-6:
         return ()

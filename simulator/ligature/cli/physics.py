@@ -6,17 +6,20 @@ import gc
 import math
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
 import ligature
 from ligature.adf import Severity
 from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Recording, Throttle
-from ligature.bus.codec import Message
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.cli.recorder import Recorder
+from ligature.model.commands import Command
+from ligature.model.messages import Message, handle
 from ligature.simulation import Simulation
 
 TICK = 1e-3
@@ -27,6 +30,11 @@ CLOCK_NAP = 1e-3
 """Sleep in seconds while the clock of a client rests: its next edge is answered that soon."""
 
 _EVENTS = {Severity.INFO: "finding", Severity.WARNING: "warning", Severity.ERROR: "problem"}
+
+ALARMS = ("speed", "diverged")
+"""Codes of findings that `/diagnostics` repeats."""
+
+ALARM_BYTES = 240
 
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
@@ -79,6 +87,12 @@ class Loop:
         self._period = self._ticks * TICK
         self._mailbox = Mailbox(simulation.scene, block.rings)
         self._pacer = Pacer(self._period, options.speed)
+        self._handlers: dict[type[Message], Callable[[Any], None]] = {
+            Throttle: self._pacer.throttle,
+            Pace: self._pacer.pace,
+            Recording: self._record,
+            Command: self._simulate,
+        }
         self._start = self._mark = time.monotonic()
         self._durations = np.zeros(WINDOW)
         self._updates = 0
@@ -90,7 +104,7 @@ class Loop:
         self._recorder.end(self._updates + 1)
 
     def turn(self) -> None:
-        """Sleep, take commands, and run an update when it is due; the commands may say that it is not."""
+        """Sleep, take commands, and run an update when it is due; the commands may state that it is not."""
         self._block.beat()
         nap = self._pacer.wait(time.monotonic())
         if nap > 0.0:
@@ -122,15 +136,18 @@ class Loop:
 
     def _obey(self, messages: Iterable[Message]) -> None:
         for message in messages:
-            if isinstance(message, Throttle):
-                self._pacer.throttle(message)
-            elif isinstance(message, Pace):
-                self._pacer.pace(message)
-            elif isinstance(message, Recording):
-                self._recorder.obey(self._updates + 1, message)
-            else:
-                self._recorder.note(self._updates + 1, message)
-                self._simulation.apply(message)
+            handle(self._handlers, message)
+
+    def _record(self, message: Recording) -> None:
+        self._recorder.obey(self._updates + 1, message)
+
+    def _simulate(self, command: Command) -> None:
+        try:
+            self._simulation.apply(command)
+        except ValueError as error:
+            self._mailbox.reject(error)
+        else:
+            self._recorder.note(self._updates + 1, command)
 
     def _figures(self) -> None:
         """Once a second: rates, times and counts of the loop, and what went wrong."""
@@ -156,6 +173,10 @@ class Loop:
                 f"{self._mailbox.rejected - self._warned} commands rejected: {self._mailbox.last_rejection}",
             )
             self._warned = self._mailbox.rejected
+        for problem in self._simulation.problems:
+            if problem.code in ALARMS:
+                figures["alarms"] += 1
+                figures["alarm"] = str(problem).encode("utf-8")[:ALARM_BYTES]
         for problem in self._simulation.problems[:5]:
             tell("warning", str(problem))
         self._simulation.problems.clear()

@@ -13,13 +13,14 @@ from pathlib import Path
 from rich.console import Console
 
 from ligature.bus.process import end_with_parent
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m|\[[0-9.]+\]: |\[ ?(INFO|WARN|ERROR)\] ")
 _LOUD = ("error", "less than", "what()")
-"""What lines of the recorder begin with, in small letters, that tell why it gave up."""
+"""What lines of the recorder begin with, in small letters, that show why it gave up."""
 
-END_PATIENCE = 60.0
+END_TIMEOUT = 60.0
 """Seconds that the recorder is given to write its index."""
 
 
@@ -83,10 +84,8 @@ def _commanded() -> list[str]:
 
 
 def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
-    """What the recorder said, and its status; a signal to this program or the end of time has it end well."""
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, _: stopped.append(number))
+    """What the recorder printed, and its status; a signal to this program or the end of time has it end well."""
+    stop = stop_on_signal((signal.SIGINT, signal.SIGTERM), timeout=None)
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         start_new_session=True, preexec_fn=end_with_parent,
@@ -95,9 +94,9 @@ def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
     deadline = time.monotonic() + seconds if seconds > 0 else float("inf")
     asked = False
     while True:
-        if not asked and (stopped or time.monotonic() > deadline):
+        if not asked and (stop.is_set() or time.monotonic() > deadline):
             process.send_signal(signal.SIGINT)
-            deadline, asked = time.monotonic() + END_PATIENCE, True
+            deadline, asked = time.monotonic() + END_TIMEOUT, True
         elif asked and time.monotonic() > deadline:
             process.kill()
         try:
@@ -116,7 +115,7 @@ def _reason(lines: list[str]) -> str:
 
 
 def _tell_rest(part: Path, console: Console) -> None:
-    """Remove a bag that holds nothing; say where one is that was cut off."""
+    """Remove a bag that holds nothing; state where one is that was cut off."""
     part.unlink(missing_ok=True)
     active = part.with_name(f"{part.name}.active")
     if active.exists():

@@ -69,7 +69,7 @@ class Recorder:
                 self._give_up(error)
 
     def flush(self) -> None:
-        """Hand what was written to the disk, and tell what was copied; once a second will do."""
+        """Hand what was written to the disk, and report what was copied, at most once a second."""
         while self._copied:
             self._say(*self._copied.popleft())
         if self._journal is not None:
@@ -147,7 +147,7 @@ class Recorder:
         return journal.moment(update, self._simulation.state_hash())
 
     def _give_up(self, error: OSError) -> None:
-        """Go on without records, and say so: a run matters more than its records."""
+        """Go on without records, and report it: a run matters more than its records."""
         assert self._journal is not None
         if self._writer is not None:
             part = self._writer.abandon()
@@ -162,7 +162,7 @@ class Recorder:
         self._block.figures["recording"] = 0
 
     def _say(self, text: str, bad: bool = False) -> None:
-        """Tell the page, and the terminal when something is wrong."""
+        """Report the page, and the terminal when something is wrong."""
         self._block.events.write(RUN, EVENT, text)
         if bad:
             tell("warning", text)

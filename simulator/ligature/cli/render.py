@@ -11,8 +11,12 @@ import ligature
 from ligature.render import Frame, ImageSensor, RenderUnavailable
 from ligature.render.annotations import coco, mask_image
 from ligature.render.files import write_calibration, write_frame, write_json, write_png
+from ligature.render.target import saturated_share
 
 ANNOTATIONS = ("coco", "mask")
+MAX_SATURATED = 0.5
+"""Share of saturated pixels above which a picture shows next to nothing."""
+
 PASSES = ("rgb", "depth", "ids", "normals")
 
 
@@ -53,6 +57,11 @@ def render(
     except (KeyError, ValueError, RenderUnavailable, OSError) as error:
         console.print(str(error.args[0] if isinstance(error, KeyError) else error), style="red", markup=False)
         return 1
+    white = saturated_share(frame.rgb)
+    if white > MAX_SATURATED:
+        text = f"{white:.0%} of the picture of {name} is saturated (white)"
+        hint = "lower --exposure, give the lights an attenuation, or correct the shaders of the scene"
+        console.print(f"{text}; {hint}", style="yellow", markup=False)
     for problem in handle.problems:
         console.print(str(problem.diagnostics[0]), style="yellow", markup=False)
     console.print("\n".join(str(path) for path in files), markup=False)

@@ -13,8 +13,9 @@ import numpy as np
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
-from ligature.cli.joining import SCENE_PATIENCE
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import stop_on_signal
+from ligature.cli.joining import SCENE_TIMEOUT
 from ligature.cli.options import RunOptions
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Camera, Scene
@@ -45,7 +46,7 @@ def main() -> None:
         block = Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set)
         studio = Studio(scene, renderer, block, options)
     except ligature.SceneError:
-        stop.wait(SCENE_PATIENCE)
+        stop.wait(SCENE_TIMEOUT)
         sys.exit(2)
     except (RenderUnavailable, NameTaken) as error:
         tell("warning", f"no pictures: {error}")
@@ -155,7 +156,8 @@ class Studio:
             exposure.topics.publish_cloud(points, frame.rgb, stamp)
 
     def _sensor(self, camera: Camera, view: CameraView) -> ImageSensor:
-        """What the parameters say of a camera's sensor; one without faults, told once, when they cannot be used."""
+        """What the parameters state of a camera's sensor; one without faults, reported once, when they cannot be
+        used."""
         values = self._follower.sensors[camera.index]
         wrong = f"{camera.identity.topic}: {values}"
         if wrong in self._refused:
@@ -184,7 +186,7 @@ class Studio:
         return camera if (camera.stereo is None) == (started.stereo is None) else started
 
     def _set_lights(self) -> None:
-        """Give the lights what their parameters say now."""
+        """Give the lights what their parameters state now."""
         settings = self._renderer.lights.settings
         for index in range(len(settings)):
             values = self._follower.lights[index]

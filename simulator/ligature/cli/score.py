@@ -17,11 +17,11 @@ EVERY = 0.005
 """Simulated seconds between two looks at a run that is simulated again."""
 
 
-def score(task: str, file: Path | None, scene: Path | None, patience: float, json: bool, console: Console) -> int:
+def score(task: str, file: Path | None, scene: Path | None, timeout: float, json: bool, console: Console) -> int:
     """Print score and measures; status 0 when the task was done, 1 when it was not, 2 when nothing could be judged."""
     try:
         if file is None:
-            report, measures = _live(task, patience)
+            report, measures = _live(task, timeout)
         elif is_record(file):
             report, measures = _recorded(task, file, scene)
         else:
@@ -46,14 +46,14 @@ def score(task: str, file: Path | None, scene: Path | None, patience: float, jso
 Figures = tuple[Mapping[str, object], Mapping[str, object]]
 
 
-def _live(task: str, patience: float) -> Figures:
+def _live(task: str, timeout: float) -> Figures:
     """The next score of a simulator that judges ``task``."""
     uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if not master_answers(uri):
         raise RuntimeError(f"no ROS master answers at {uri}; start the simulator with 'ligature run … --task {task}'")
     from ligature.ros.scores import next_score
 
-    return next_score(task, patience)
+    return next_score(task, timeout)
 
 
 def _recorded(task: str, file: Path, scene: Path | None) -> Figures:
@@ -79,7 +79,7 @@ def _in_bag(task: str, file: Path, scene: Path | None) -> Figures:
     from ligature.ros.bags import judge
 
     if scene is None:
-        raise ValueError("a bag says where bodies were; name the launch file that says what they are with '--scene'")
+        raise ValueError("a bag holds poses, no bodies; name the launch file with '--scene'")
     found, attempt = judge(file, ligature.load(str(scene)), task)
     measures = attempt.monitor.measures().report()
     return found.report(), {name: measures[name] for name in measures if name in ("time", "passages") or "path" in name}

@@ -1,4 +1,4 @@
-"""The supervisor: starts the processes of a run, tells how they are, restarts or ends them."""
+"""The supervisor: starts the processes of a run, reports how they are, restarts or ends them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from queue import Empty, Queue
+from typing import NoReturn
 
 from rich.console import Console
 from rich.markup import escape
 
 from ligature.bus.block import remove, remove_leftovers
-from ligature.bus.process import end_with_parent, stand_behind
+from ligature.bus.process import end_with_parent, lower_priority
+from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
 from ligature.cli import master
 from ligature.cli.options import RunOptions
 
-MASTER_PATIENCE = 15.0
-END_PATIENCE = 1.5
-"""Seconds that processes are given to end before they are killed."""
+MASTER_TIMEOUT = 15.0
+LAST_TIMEOUT = 1.8
+"""Seconds after a signal at which the supervisor itself ends, should whoever reads its output no longer do so."""
 
 RESTART_PAUSE = 0.3
 QUICK_DEATH, MAX_QUICK_DEATHS = 5.0, 5
@@ -37,13 +39,26 @@ _ENVIRONMENT = {
 _DRAWING = ("window", "render", "cockpit")
 """Processes that a run can do without; status 0 means that they have nothing to draw, or nowhere."""
 
-_BEHIND = 10
-"""How far the processes that draw stand behind: software would leave no processor time to physics otherwise."""
+_DRAWING_NICE = 10
+"""How far the processes that draw have a lower scheduling priority: software would leave no processor time to physics
+otherwise."""
 
 _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
 Event = tuple[str, str, str]
 """Process, event, text."""
+
+
+def supervise(options: RunOptions) -> NoReturn:
+    """Run from start to end, then leave with the exit status.
+
+    Everything that the run had is gone by then. The interpreter would take apart what the simulator's modules hold,
+    which takes a second on a busy machine.
+    """
+    status = Supervisor(options).run()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
 
 
 class Child:
@@ -69,7 +84,7 @@ class Child:
         """In the new process, in its session, before it is the program."""
         end_with_parent()
         if self._nice:
-            stand_behind(self._nice)
+            lower_priority(self._nice)
 
     def _listen(self, process: subprocess.Popen[str]) -> None:
         assert process.stdout is not None
@@ -81,12 +96,12 @@ class Child:
                 self._events.put((self.name, "log", line.rstrip("\n")))
         self._events.put((self.name, "ended", str(process.wait())))
 
-    def end(self, patience: float) -> None:
-        """Ask the process to end; kill it after ``patience`` seconds."""
+    def end(self, timeout: float) -> None:
+        """Ask the process to end; kill it after ``timeout`` seconds."""
         if self.process.poll() is None:
             self.process.terminate()
         try:
-            self.process.wait(max(patience, 0.0))
+            self.process.wait(max(timeout, 0.0))
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -103,17 +118,17 @@ class Supervisor:
         self._events: Queue[Event] = Queue()
         self._children: dict[str, Child] = {}
         self._begin = time.monotonic()
-        self._published = self._stop = False
+        self._published = self._over = False
+        self._signalled = Stop(None)
         self._status = 0
         self._env = dict(os.environ, **_ENVIRONMENT)
 
     def run(self) -> int:
         """Run until Ctrl-C, a signal, or the end of the physics process."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: setattr(self, "_stop", True))
+        self._signalled = stop_on_signal((signal.SIGINT, signal.SIGTERM), LAST_TIMEOUT)
         try:
             self._start()
-            while not self._stop:
+            while not self._stopping:
                 try:
                     self._handle(*self._events.get(timeout=0.1))
                 except Empty:
@@ -121,6 +136,11 @@ class Supervisor:
         finally:
             self._end_all()
         return self._status
+
+    @property
+    def _stopping(self) -> bool:
+        """Whether the run is over, by a signal or by itself."""
+        return self._over or self._signalled.is_set()
 
     def _start(self) -> None:
         self._say(f"loading [bold]{escape(self._options.scene)}[/bold]")
@@ -140,8 +160,9 @@ class Supervisor:
                     "tasks", [sys.executable, "-m", "ligature.cli.tasks_process", text], self._events, self._env
                 )
 
-    def _start_drawing(self, name: str, module: str, nice: int = _BEHIND) -> None:
-        """Start a process that draws, behind all others unless told; without a ROS master the run is over."""
+    def _start_drawing(self, name: str, module: str, nice: int = _DRAWING_NICE) -> None:
+        """Start a process that draws, with a lower priority unless set otherwise; without a ROS master the run is
+        over."""
         if "ros" in self._children or not self._options.ros:
             command = [sys.executable, "-m", module, self._options.to_text()]
             self._children[name] = Child(name, command, self._events, self._env, nice)
@@ -158,12 +179,12 @@ class Supervisor:
             return False
         self._say(f"no ROS master answers at {uri}: starting one")
         child = self._children["master"] = Child("master", master.command(uri), self._events, self._env)
-        deadline = time.monotonic() + MASTER_PATIENCE
-        while time.monotonic() < deadline and not self._stop and child.process.poll() is None:
+        deadline = time.monotonic() + MASTER_TIMEOUT
+        while time.monotonic() < deadline and not self._stopping and child.process.poll() is None:
             if master.master_answers(uri):
                 return True
             time.sleep(0.05)
-        if not self._stop:
+        if not self._stopping:
             self._fail(f"the ROS master that was started for {uri} does not answer; start 'roscore' and try again")
         return False
 
@@ -173,7 +194,8 @@ class Supervisor:
             if process == "physics" and self._options.window:
                 self._start_drawing("window", "ligature.cli.window_process")
             if process == "physics" and self._options.cockpit:
-                # an arm is led from the page, which has its pictures drawn by a process that stands behind
+                # an arm is driven from the page, which has its pictures drawn by a process that has a lower scheduling
+                # priority
                 self._start_drawing("cockpit", "ligature.cli.cockpit_process", 0)
             if self._options.ros:
                 self._progress.update("connecting to ROS")
@@ -198,7 +220,7 @@ class Supervisor:
             self._console.print(f"{process}: {text}", style="dim", markup=False)
 
     def _ended(self, process: str, status: int) -> None:
-        if self._stop:
+        if self._stopping:
             return
         child = self._children[process]
         if process == "physics":
@@ -223,12 +245,12 @@ class Supervisor:
     def _fail(self, text: str) -> None:
         self._console.print(text, style="red", markup=False)
         self._status = self._status or 1
-        self._stop = True
+        self._over = True
 
     def _end_all(self) -> None:
-        self._stop = True
+        self._over = True
         self._progress.stop()
-        deadline = time.monotonic() + END_PATIENCE
+        deadline = time.monotonic() + END_TIMEOUT
         order = [self._children[n] for n in (*_DRAWING, "tasks", "ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
             if child.process.poll() is None:

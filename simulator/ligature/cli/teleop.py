@@ -1,16 +1,16 @@
-"""The command ``ligature teleop``: devices lead arms on ROS, whoever runs those."""
+"""The command ``ligature teleop``: devices drive arms on ROS, whoever runs those."""
 
 from __future__ import annotations
 
 import os
 import signal
-import threading
 from contextlib import ExitStack
 from pathlib import Path
 
 from rich.console import Console
 
 from ligature.adf.diagnostics import AdfError
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
@@ -20,7 +20,7 @@ def teleop(
     file: Path, record: Path | None, replay: Path | None, calibrate: str | None, check: bool,
     devices: tuple[int, ...] | None, console: Console,
 ) -> int:  # fmt: skip
-    """Lead until Ctrl-C; returns the exit status."""
+    """Drive until Ctrl-C; returns the exit status."""
     try:
         wanted = _configuration(file, devices)
     except (AdfError, OSError) as error:
@@ -32,7 +32,7 @@ def teleop(
         for leader, arms in wanted.pairs.items():
             waits = "waits, and " if leader in wanted.waiting else ""
             followers = ", ".join(arms) or "the camera alone"
-            console.print(f"{leader} ({wanted.devices[leader].kind}) {waits}leads {followers}", markup=False)
+            console.print(f"{leader} ({wanted.devices[leader].kind}) {waits}drives {followers}", markup=False)
         return 0
     uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if not master_answers(uri):
@@ -42,7 +42,7 @@ def teleop(
 
 
 def _configuration(file: Path, devices: tuple[int, ...] | None) -> TeleopConfig:
-    """That of a teleoperation file, or what the input devices of a launch file say."""
+    """That of a teleoperation file, or what the input devices of a launch file state."""
     text = file.read_text("utf-8")
     if "multibody configs" in text:
         from ligature.teleop.launch import of_launch_file
@@ -58,20 +58,18 @@ def _on_ros(
     from ligature.teleop.node import Teleop, begin_node
     from ligature.teleop.record import Recorder, Replay
 
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     begin_node()
     try:
         if calibrate is not None:
             block = calibration_of(wanted, calibrate, console.input, console.print)
             console.print(block, markup=False, end="")
             return 0
+        stop = stop_on_signal((signal.SIGINT, signal.SIGTERM))  # not before: Ctrl-C ends a question of the guide
         with ExitStack() as files:
             recorder = Recorder(files.enter_context(record.open("w", encoding="utf-8"))) if record else None
             node = Teleop(wanted, recorder, Replay(replay) if replay else None)
             pairs = (f"{leader} → {wanted.begins_with(leader) or config.NOBODY}" for leader in wanted.pairs)
-            console.print(f"leading: {', '.join(pairs)}")
+            console.print(f"driving: {', '.join(pairs)}")
             node.run(stop.is_set)
     except (ValueError, OSError, RuntimeError) as error:
         console.print(str(error), style="red", markup=False)

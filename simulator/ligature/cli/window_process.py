@@ -7,7 +7,8 @@ import time
 
 import ligature
 from ligature.bus import Block, BusError, Outbox
-from ligature.bus.process import end_with_parent, stop_on_signal, tell
+from ligature.bus.process import end_with_parent, tell
+from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.model.state import new_state, state_dtype
 from ligature.render import RenderUnavailable
@@ -17,7 +18,7 @@ from ligature.render.window import Window
 PHYSICS_SILENCE = 5.0
 """Seconds without a sign of life of the physics process after which this one ends."""
 
-FASTEST = 1.0 / 60.0
+MIN_FRAME_PERIOD = 1.0 / 60.0
 """Seconds that a picture is shown at least."""
 
 SMOOTHING = 0.1
@@ -41,7 +42,7 @@ def main() -> None:
     viewer = Viewer(scene, outbox.push, window.context)
     window.listen(viewer)
     tell("ready", "H in the window shows its keys")
-    period = FASTEST
+    period = MIN_FRAME_PERIOD
     while not (stop.is_set() or window.closed) and block.age < PHYSICS_SILENCE:
         begin = time.monotonic()
         ring.beat()
@@ -50,7 +51,7 @@ def main() -> None:
         window.show(viewer.picture(state, window.size, figures))
         viewer.pull()
         outbox.flush()
-        time.sleep(max(FASTEST - (time.monotonic() - begin), 0.0))
+        time.sleep(max(MIN_FRAME_PERIOD - (time.monotonic() - begin), 0.0))
         period += SMOOTHING * (time.monotonic() - begin - period)
     window.close()
 

@@ -79,7 +79,7 @@ class BaseObject:
         return _text(self._state, "identifier")
 
     def get_parent_name(self) -> str:
-        """The parent as the file names it; empty for none, and for kinds whose messages do not tell."""
+        """The parent as the file names it; empty for none, and for kinds whose messages lack it."""
         return _text(self._state, "parent_name")
 
     def get_sim_step(self) -> int:

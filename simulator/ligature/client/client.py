@@ -32,7 +32,7 @@ SETTLING = 0.1
 """Seconds in which a simulator that is just starting must not have advertised more, to be taken as complete."""
 CONNECTING = 2.0
 """Seconds that the simulator has to connect to all topics; what is sent before that is lost."""
-FIRST_STATE_PATIENCE = 0.5
+FIRST_STATE_TIMEOUT = 0.5
 """Seconds to wait for an object's first state when its handle is given out."""
 POLL = 0.02
 COMPLAINT_PAUSE = 5.0
@@ -43,7 +43,7 @@ class Client:
 
     ``get_obj_handle`` makes an object *active*: one daemon thread publishes the commands of all active objects at the
     rate given to `connect`, so that targets hold until they are changed. Objects that appear after `connect` are
-    found by `refresh`. Names that match no object or several give None, with a message that says what there is.
+    found by `refresh`. Names that match no object or several give None, with a message that states what there is.
     """
 
     def __init__(self, client_name: str = "ambf_client", max_discovery_attempts: int = 5) -> None:
@@ -107,19 +107,19 @@ class Client:
     def get_obj_handle(self, name: str) -> Any:
         """The object of that name, or the only one whose name contains ``name``, made active; None for none or many.
 
-        Waits for its first state, for `FIRST_STATE_PATIENCE` at most.
+        Waits for its first state, for `FIRST_STATE_TIMEOUT` at most.
         """
         handle = self._find(name)
         if handle is not None:
             handle.set_active()
-            handle.await_state(FIRST_STATE_PATIENCE)
+            handle.await_state(FIRST_STATE_TIMEOUT)
         return handle
 
     def get_world_handle(self) -> World | None:
         """The world, not made active; None when no simulator was found."""
         world = next((handle for handle in self._objects.values() if isinstance(handle, World)), None)
         if world is not None:
-            world.await_state(FIRST_STATE_PATIENCE)
+            world.await_state(FIRST_STATE_TIMEOUT)
         return world
 
     def get_obj_pose(self, name: str) -> Any:

@@ -14,7 +14,7 @@ from geometry_msgs.msg import Point, Vector3, Wrench
 
 from ligature.client.base_object import BaseObject
 
-LISTS_PATIENCE = 0.5
+LISTS_TIMEOUT = 0.5
 """Seconds after a handle became active within which a simulator lists its children and joints."""
 POLL = 0.005
 
@@ -22,7 +22,7 @@ POLL = 0.005
 class JointedObject(BaseObject):
     """A handle whose messages list children and joints, once a command has asked for them.
 
-    Who reads or commands joints right after getting a handle is kept waiting for the lists, for `LISTS_PATIENCE` at
+    Who reads or commands joints right after getting a handle is kept waiting for the lists, for `LISTS_TIMEOUT` at
     most.
     """
 
@@ -53,7 +53,7 @@ class JointedObject(BaseObject):
         self.set_wrench(Wrench(vector(fx, fy, fz), vector(nx, ny, nz)))
 
     def _wrench_commanded(self) -> None:
-        """Have the command say that its wrench is meant."""
+        """Mark the command's wrench as the one that is meant."""
         raise NotImplementedError
 
     def get_children_names(self) -> list[str]:
@@ -73,7 +73,7 @@ class JointedObject(BaseObject):
         return len(self._listed.joint_positions)
 
     def is_joint_idx_valid(self, joint_idx: int) -> bool:
-        """Whether there is a joint of that index; tells which there are when not."""
+        """Whether there is a joint of that index; logs the known ones when not."""
         if 0 <= joint_idx < self.get_num_joints():
             return True
         rospy.logwarn(f"{self._name}: no joint {joint_idx}; {self._extent()}")
@@ -135,7 +135,7 @@ class JointedObject(BaseObject):
     @property
     def _listed(self) -> Any:
         """The newest state, with the lists that were asked for."""
-        while not self._state.joint_names and time.monotonic() < self._asked + LISTS_PATIENCE:
+        while not self._state.joint_names and time.monotonic() < self._asked + LISTS_TIMEOUT:
             time.sleep(POLL)
         return self._state
 

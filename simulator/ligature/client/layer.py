@@ -17,7 +17,7 @@ import rospy
 
 from ligature.ros.master import NO_ANSWER, Hasty, MasterWatch
 
-MASTER_PATIENCE = 10.0
+MASTER_TIMEOUT = 10.0
 """Seconds to wait for a ROS master; rospy alone would wait for ever."""
 
 _POLL = 0.05
@@ -28,8 +28,8 @@ class ral:  # noqa: N801 - the name that clients import
     """One view of this process's ROS node: topic names begin with ``namespace``.
 
     A process has one node. The first ``ral`` starts it, with an anonymous name made of ``node_name``; later ones
-    share it. A master that restarts is told about all topics again. Raises ConnectionError when no ROS master answers
-    within `MASTER_PATIENCE`.
+    share it. A master that restarts is informed about all topics again. Raises ConnectionError when no ROS master
+    answers within `MASTER_TIMEOUT`.
     """
 
     def __init__(self, node_name: str, namespace: str = "", node: Any = None) -> None:
@@ -198,7 +198,7 @@ def _start_node(name: str) -> None:
 
 def _await_master() -> None:
     uri = rosgraph.get_master_uri()
-    deadline = time.monotonic() + MASTER_PATIENCE
+    deadline = time.monotonic() + MASTER_TIMEOUT
     while not _answers(uri):
         if time.monotonic() > deadline:
             raise ConnectionError(

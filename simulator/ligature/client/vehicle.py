@@ -13,7 +13,7 @@ from ligature.client.joints import grown
 
 
 class Vehicle(BaseObject):
-    """A chassis with wheels, of which all are powered and steered unless told otherwise."""
+    """A chassis with wheels, of which all are powered and steered unless set otherwise."""
 
     State = VehicleState
     Command = VehicleCmd

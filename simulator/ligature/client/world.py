@@ -15,7 +15,7 @@ TIME_OUT = 2.0
 """Seconds after the last `World.update` at which a world that is published periodically runs freely again."""
 
 STEPS = 10
-LISTENER_PATIENCE = 1.0
+LISTENER_TIMEOUT = 1.0
 _POLL = 0.01
 
 
@@ -84,7 +84,7 @@ def _heard(publisher: Any, name: str) -> bool:
     """Whether a simulator listens, after a moment for a connection that is just being made."""
     if publisher is None:
         raise RuntimeError(f"{name} is not connected: get its handle from a Client after connect()")
-    deadline = time.monotonic() + LISTENER_PATIENCE
+    deadline = time.monotonic() + LISTENER_TIMEOUT
     while publisher.get_num_connections() == 0:
         if time.monotonic() > deadline or rospy.is_shutdown():
             rospy.logwarn(f"nobody listens to {publisher.name}: is the simulator running?")

@@ -15,8 +15,8 @@ from ligature.cockpit.desk import Desk
 KEY = "ligature_operator"
 """Name below which a browser keeps the key of its operator."""
 
-KEY_PATIENCE = 10.0
-"""Seconds that a browser is given to tell its key."""
+KEY_TIMEOUT = 10.0
+"""Seconds in which a browser must report its key."""
 
 Put = Callable[[str, int, Any], None]
 
@@ -56,7 +56,7 @@ class Audience:
         if word == "connect":
             self.clients[client] = value
             self._seat(client)
-            self._ask_key(value, "comes back", KEY_PATIENCE)
+            self._ask_key(value, "comes back", KEY_TIMEOUT)
         elif word == "disconnect":
             self.clients.pop(client, None)
             self._buttons.pop(client, None)
@@ -77,13 +77,13 @@ class Audience:
             return client != self.desk.operator
         return True
 
-    def _ask_key(self, client: ClientHandle, then: str, patience: float) -> None:
+    def _ask_key(self, client: ClientHandle, then: str, timeout: float) -> None:
         """Ask a browser for the key that it was given as operator, on a thread of its own: it may take a while."""
 
         def ask() -> None:
             key = None
             with suppress(RuntimeError, TimeoutError):
-                key = client.local_storage.get_item(KEY, timeout=patience)
+                key = client.local_storage.get_item(KEY, timeout=timeout)
             self._put(then, client.client_id, key or "")
 
         threading.Thread(target=ask, daemon=True).start()

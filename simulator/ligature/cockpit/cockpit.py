@@ -1,6 +1,6 @@
 """The cockpit's loop: snapshots to browsers, what the operator does to the bus, and the hand that must not slip.
 
-Browsers speak on the network's thread; whatever they say waits in one queue for the loop, so that all decisions are
+Browsers speak on the network's thread; whatever they send waits in one queue for the loop, so that all decisions are
 made on one thread. Metres, radians, seconds.
 """
 
@@ -22,7 +22,7 @@ from ligature.cockpit.arm_panel import ArmControls, ArmStatus
 from ligature.cockpit.audience import Audience
 from ligature.cockpit.camera_panel import NO_PICTURES, CameraControls
 from ligature.cockpit.curves import Curves
-from ligature.cockpit.deadman import PATIENCE, DeadMan
+from ligature.cockpit.deadman import TIMEOUT, DeadMan
 from ligature.cockpit.gate import Gate
 from ligature.cockpit.page import CAMERA_HEIGHT, LEFT_WIDTH, Header, look_from, serve
 from ligature.cockpit.pictures import Pictures, sights
@@ -30,9 +30,9 @@ from ligature.cockpit.pursuit import ArmPursuits
 from ligature.cockpit.ros_panel import Health, Remote, RosPanel, TeleopControls, obey_teleop
 from ligature.cockpit.simulation_panel import Clockwork, SimulationControls, SimulationPanel
 from ligature.cockpit.stage import Stage, first_view
-from ligature.model.commands import ArmCommand
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import new_state
+from ligature.robots.commands import Hold, StateCommand
 
 PERIOD = 0.01
 STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD = 0.05, 0.2, 0.4
@@ -162,7 +162,7 @@ class Cockpit:
             self._teleop_controls = TeleopControls(client, self._ros, act)
 
     def _end_operating(self, why: str, there: bool) -> None:
-        """Nobody operates any more; ``there`` tells whether the browser still shows the controls."""
+        """Nobody operates any more; ``there`` states whether the browser still shows the controls."""
         self._stop_all(why)
         if there:
             for controls in (*self._controls, self._run_controls, self._camera_controls, self._teleop_controls):
@@ -205,9 +205,9 @@ class Cockpit:
         if word == "command":
             pursuits.stop()
             if value == "Hold":
-                self._outbox.push(ArmCommand(arm, "hold"))
+                self._outbox.push(Hold(arm))
             else:
-                self._outbox.push(ArmCommand(arm, "state_command", (), value.lower()))
+                self._outbox.push(StateCommand(arm, value.lower()))
         elif word == "joint":
             joint, target = value
             pursuits.joint(facts.setpoints(state), joint, target, facts.speed)
@@ -223,7 +223,7 @@ class Cockpit:
         led = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
         dragged = any(controls.dragging for controls in self._controls)
         self._deadman.watch(self._audience.desk.operator if led or dragged else None)
-        if self._deadman.silence > PATIENCE:
+        if self._deadman.silence > TIMEOUT:
             silent = 1e3 * self._deadman.silence
             self._stop_all(f"the operator's browser has not answered for {silent:.0f} ms")
             return
@@ -232,11 +232,11 @@ class Cockpit:
                 self._outbox.push(command)
 
     def _stop_all(self, why: str) -> None:
-        """Hold every arm that the operator leads, and say why."""
+        """Hold every arm that the operator drives, and state why."""
         for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
             dragged = arm < len(self._controls) and self._controls[arm].dragging
             if pursuits.stop() or dragged:
-                self._outbox.push(ArmCommand(arm, "hold"))
+                self._outbox.push(Hold(arm))
                 if why and status.note != f"hold: {why}":
                     status.note = f"hold: {why}"
                     self._warn(f"{status.facts.name} holds: {why}")

@@ -17,7 +17,7 @@ from viser import ViserServer
 PERIOD = 0.02
 """Seconds between pings."""
 
-PATIENCE = 0.07
+TIMEOUT = 0.07
 """Seconds without an answer after which an arm must stop; with a turn of the loop it holds within 0.1 s."""
 
 

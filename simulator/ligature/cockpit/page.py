@@ -21,7 +21,7 @@ LEFT_WIDTH, RIGHT_WIDTH, CAMERA_HEIGHT = 380, 370, 260
 
 
 def serve(address: Address, gate: Gate) -> ViserServer:
-    """A page at ``address`` behind ``gate``; raises `AddressError` when the address cannot be had."""
+    """A page at ``address`` behind ``gate``; raises `AddressError` when the address is unavailable."""
     if address.port:
         check_free(address)
     with guarded(gate), contextlib.redirect_stdout(io.StringIO()):
@@ -48,7 +48,7 @@ def badge(word: str, colour: str) -> str:
 
 
 class Header:
-    """The line that says what is shown, how fast it runs, and who operates."""
+    """The line that states what is shown, how fast it runs, and who operates."""
 
     def __init__(self, server: ViserServer, scene: str) -> None:
         self._scene = scene

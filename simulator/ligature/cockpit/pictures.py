@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, stand_behind
+from ligature.bus.process import end_with_parent, lower_priority
 from ligature.model.optics import EYES, stereo_partners
 from ligature.model.scene import Scene
 from ligature.model.state import new_state, state_dtype
@@ -32,7 +32,7 @@ REST = 3.0
 """Seconds of rest for each second of drawing."""
 
 NICE = 10
-"""How far drawing stands behind physics and the rest of the cockpit."""
+"""How much lower the scheduling priority of drawing is than that of physics and the rest of the cockpit."""
 
 PHYSICS_SILENCE = 5.0
 
@@ -79,7 +79,7 @@ class Pictures:
             self._try(lambda: self._pipe.send(sight))
 
     def newest(self) -> NDArray[np.uint8] | None:
-        """The newest picture (height, width, 3) that was not taken yet; `problem` says why there are none."""
+        """The newest picture (height, width, 3) that was not taken yet; `problem` states why there are none."""
         picture = None
         while not self.problem and self._try(self._pipe.poll):
             got = self._try(self._pipe.recv)
@@ -107,7 +107,7 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
     end_with_parent()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.setsid()
-    stand_behind(NICE)
+    lower_priority(NICE)
     sight: Sight | None = None
     easel: _Easel | None = None
     while True:

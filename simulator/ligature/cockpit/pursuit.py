@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ligature.model.commands import ArmCommand
 from ligature.model.frames import axis_rotation, matrix_pose7
+from ligature.robots.commands import VERBS, ArmCommand
 from ligature.robots.poses import rotation_vector
 
 Array = NDArray[np.float64]
@@ -116,7 +116,7 @@ class ArmPursuits:
         commands = []
         for pursuit in (self._motion, self._jaw):
             if pursuit is not None:
-                commands.append(ArmCommand(self._arm, pursuit.verb, pursuit.advance(dt)))
+                commands.append(VERBS[pursuit.verb](self._arm, pursuit.advance(dt)))
         if self._motion is not None and self._motion.arrived:
             self._motion = None
         if self._jaw is not None and self._jaw.arrived:

@@ -51,7 +51,7 @@ class Remote(Protocol):
     scale: float
 
     def enable(self, on: bool) -> None:
-        """Lead, or not."""
+        """Start or stop driving."""
 
     def select(self, pair: str) -> None:
         """Choose a pair."""
@@ -90,7 +90,7 @@ class RosPanel:
             pair = self.remote.pairs[name]
             colour = "#37b24d" if pair.following else "#1971c2" if pair.selected else "#868e96"
             rows.append(
-                f"{badge('leads' if pair.following else 'selected' if pair.selected else 'idle', colour)} "
+                f"{badge('drives' if pair.following else 'selected' if pair.selected else 'idle', colour)} "
                 f"{escape(pair.leader)} → {escape(pair.follower)} "
                 f'<span style="color:#909296">{escape(pair.status or pair.current_state)}</span>'
             )
@@ -157,7 +157,7 @@ class TeleopControls:
 
 
 def obey_teleop(remote: Remote, word: str, value: Any) -> bool:
-    """Carry out what `TeleopControls` said; False when the word is none of its."""
+    """Carry out an order of `TeleopControls`; False when the word is none of its."""
     if word == "teleop":
         remote.enable(value == "Enable")
     elif word == "pedal":

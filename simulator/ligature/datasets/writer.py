@@ -1,6 +1,6 @@
 """Writes a simulation that goes on into an HDF5 file, episode by episode; docs/learning.md shows the layout.
 
-Metres, radians, seconds, newtons; poses are x y z qx qy qz qw in world axes unless a name says otherwise. Until the
+Metres, radians, seconds, newtons; poses are x y z qx qy qz qw in world axes unless a name sets otherwise. Until the
 dataset is closed, its file is called ``NAME.part``.
 """
 
@@ -29,7 +29,7 @@ EARLY = 1e-6
 
 
 class DatasetError(RuntimeError):
-    """A dataset that cannot be written; the message says why."""
+    """A dataset that cannot be written; the message states why."""
 
 
 class _Disk(io.FileIO):
@@ -73,7 +73,7 @@ class DatasetWriter:
     rate
         Samples per simulated second.
     phases
-        Names that `sample` may be told.
+        Names that `sample` takes.
 
     Raises
     ------
@@ -209,7 +209,7 @@ class DatasetWriter:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Tells in one way what may go wrong with a disk, and leaves nothing behind then."""
+        """Reports in one way what may go wrong with a disk, and leaves nothing behind then."""
         try:
             yield
             if self._disk.error is not None:

@@ -165,7 +165,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self._observe(), float(reward), done, self._count >= self._most, info
 
     def _act(self, action: Array) -> str:
-        """Command the arm; what it refuses is told, and it stays."""
+        """Command the arm; what it rejects is logged, and it stays."""
         arm = self._arm
         try:
             if self._action == "joint":

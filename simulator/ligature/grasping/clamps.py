@@ -57,10 +57,14 @@ class Clamps:
             self.remove(number)
         return bool(lost)
 
-    def memory(self) -> tuple[int, dict[int, tuple[Grip, float]]]:
+    def reset(self) -> None:
+        """Hold nothing; the world forgets it by itself."""
+        self._grips = {}
+
+    def snapshot(self) -> tuple[int, dict[int, tuple[Grip, float]]]:
         """Everything that lasts from tick to tick."""
         return self._added, dict(self._grips)
 
-    def recall(self, memory: tuple[int, dict[int, tuple[Grip, float]]]) -> None:
-        """Continue from `memory`."""
-        self._added, self._grips = memory[0], dict(memory[1])
+    def restore(self, snapshot: tuple[int, dict[int, tuple[Grip, float]]]) -> None:
+        """Continue from `snapshot`."""
+        self._added, self._grips = snapshot[0], dict(snapshot[1])

@@ -50,7 +50,7 @@ class Facing(NamedTuple):
 
 
 class Fingers:
-    """Both fingers of ``jaw``; index 0 or 1 tells which."""
+    """Both fingers of ``jaw``; by index 0 or 1."""
 
     def __init__(self, jaw: Jaw, world: World) -> None:
         self.jaw, self._world = jaw, world
@@ -139,6 +139,18 @@ class Fingers:
             self._slowed = False
             for joint in self.jaw.joints:
                 self._world.let_joint(joint)
+
+    def reset(self) -> None:
+        """Follow commands, in a world that was put back to its start."""
+        self._slowed = False
+
+    def snapshot(self) -> bool:
+        """Whether anything but commands acts on the fingers."""
+        return self._slowed
+
+    def restore(self, snapshot: bool) -> None:
+        """Continue from `snapshot`; the joints belong to the world."""
+        self._slowed = snapshot
 
     def positions(self) -> tuple[float, float]:
         """Where both joints are."""

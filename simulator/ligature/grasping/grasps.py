@@ -21,6 +21,7 @@ from ligature.grasping.grips import Exchange, Grip, begin
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.scene import Jaw, Scene
 from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem, kept, put_back
 from ligature.physics import World
 from ligature.suture import Rods
 from ligature.suture.grasp import Patch, warm_up
@@ -76,7 +77,7 @@ class _Grip(Grip):
         return bool(np.abs(holder_at - before).max() > JUMP)
 
 
-class Grasps(Mapping[str, Held | None]):
+class Grasps(Subsystem, Mapping[str, Held | None]):
     """What the jaws of a scene hold, by the jaw's name; None for nothing.
 
     Parameters
@@ -167,7 +168,7 @@ class Grasps(Mapping[str, Held | None]):
             if faces is not None:
                 between.append((body, faces))
         for body in [body for body in passing if not fingers.near(body)]:
-            self._let_pass(index, body, False)
+            self._disable_collision(index, body, False)
         thread = pinches.within(self._rods, box)
         self._near[index] = bool(between or passing or thread)
         if not between:
@@ -193,7 +194,7 @@ class Grasps(Mapping[str, Held | None]):
         self._grips[index] = grip
         self._take(index, grip)
         self._world.hold_up(body, True, gripped=True)
-        self._rods.weigh(self._world)
+        self._rods.update_masses(self._world)
         self._keep(index, grip)
 
     def _pinch(self, index: int) -> bool:
@@ -204,7 +205,7 @@ class Grasps(Mapping[str, Held | None]):
             pinch = pinches.begin(number, self._rods, self._world, fingers, friction)
             if pinch is not None:
                 self._pinches[index] = pinch
-                self._world.clamped.update(jaw.fingers)
+                self._world.stopped_fingers.update(jaw.fingers)
                 self._keep_thread(index, pinch)
                 return True
         return False
@@ -221,8 +222,8 @@ class Grasps(Mapping[str, Held | None]):
     def _end_thread(self, index: int, pinch: pinches.Pinch) -> None:
         """Let a thread go."""
         self._pinches[index] = self._pads[index] = None
-        self._world.clamped -= set(self._scene.jaws[index].fingers)
-        self._rods.spare(pinch.rod, self._scene.jaws[index].fingers, None)
+        self._world.stopped_fingers -= set(self._scene.jaws[index].fingers)
+        self._rods.exclude(pinch.rod, self._scene.jaws[index].fingers, None)
         self._fingers[index].let()
         self._tell_rod(pinch.rod)
 
@@ -241,12 +242,12 @@ class Grasps(Mapping[str, Held | None]):
 
     def _take(self, index: int, grip: _Grip) -> None:
         """Put the law in the place of Bullet's contacts and motors."""
-        self._let_pass(index, grip.body, True)
+        self._disable_collision(index, grip.body, True)
         self._fingers[index].stop(grip.positions, (0.0, 0.0))
 
-    def _let_pass(self, index: int, body: int, passes: bool) -> None:
+    def _disable_collision(self, index: int, body: int, passes: bool) -> None:
         for finger in self._scene.jaws[index].fingers:
-            self._world.let_pass(finger, body, passes)
+            self._world.disable_collision(finger, body, passes)
         self._passing[index] = sorted({*self._passing[index], body} if passes else {*self._passing[index]} - {body})
 
     def _keep(self, index: int, grip: _Grip) -> None:
@@ -284,14 +285,14 @@ class Grasps(Mapping[str, Held | None]):
         self._grips[index] = None
         self._fingers[index].let()
         self._world.hold_up(grip.body, False, gripped=True)
-        self._rods.weigh(self._world)
+        self._rods.update_masses(self._world)
         self._near[index] = True
 
     def _hold(self) -> None:
         """Exchange impulses between held bodies and what holds them."""
         by_body: dict[int, list[Grip]] = {}
         if self._clamps.lose(slipped=True):
-            self._rods.weigh(self._world)
+            self._rods.update_masses(self._world)
         for clamp in self._clamps.grips:
             by_body.setdefault(clamp.body, []).append(clamp)
         for index, grip in enumerate(self._grips):
@@ -313,7 +314,7 @@ class Grasps(Mapping[str, Held | None]):
             if pinch is not None and body is None:
                 self._end_thread(index, pinch)
         if self._clamps.lose(body):
-            self._rods.weigh(self._world)
+            self._rods.update_masses(self._world)
 
     def write_state(self, state: StateRecord) -> None:
         """Write what every jaw holds into a state record."""
@@ -324,41 +325,30 @@ class Grasps(Mapping[str, Held | None]):
             state["jaw_wrench"][0, index] = 0.0 if held is None else held.wrench
             state["jaw_slip"][0, index] = 0.0 if held is None else held.slip
 
-    def memory(self) -> dict[str, Any]:
-        """Everything that lasts from tick to tick."""
-        return {
-            "grips": list(self._grips),
-            "pinches": list(self._pinches),
-            "pads": list(self._pads),
-            "passing": [list(p) for p in self._passing],
-            "near": list(self._near),
-            "clamps": self._clamps.memory(),
-        }
+    def reset(self) -> None:
+        """Let go of everything; bodies and rods forget what held them by their own resets."""
+        jaws = len(self._scene.jaws)
+        self._grips, self._pinches, self._pads = [None] * jaws, [None] * jaws, [None] * jaws
+        self._passing, self._near = [[] for _ in range(jaws)], [False] * jaws
+        for fingers in self._fingers:
+            fingers.reset()
+        self._clamps.reset()
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Continue from `memory`, with a world that was built anew."""
-        self._grips, self._near = list(memory["grips"]), list(memory["near"])
-        self._pinches, self._pads = list(memory["pinches"]), list(memory["pads"])
-        self._world.clamped.clear()
-        for number in range(len(self._rods.rods)):
-            for jaw in self._scene.jaws:
-                self._rods.spare(number, jaw.fingers, None)
-            self._tell_rod(number)
-        for index, pinch in enumerate(self._pinches):
-            if pinch is not None:
-                fingers = self._scene.jaws[index].fingers
-                self._world.clamped.update(fingers)
-                self._rods.spare(pinch.rod, fingers, self._rods.element_of(pinch.body))
-                self._fingers[index].stop(pinch.positions, (0.0, 0.0))
-        for index, passing in enumerate(memory["passing"]):
-            self._passing[index] = []
-            for body in passing:
-                self._let_pass(index, body, True)
-        for index, grip in enumerate(self._grips):
-            if grip is not None:
-                self._take(index, grip)
-        self._clamps.recall(memory["clamps"])
-        self._rods.weigh(self._world)
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick; what bodies and rods know of it is in their own snapshots."""
+        fingers = [fingers.snapshot() for fingers in self._fingers]
+        return {"fingers": fingers, "clamps": self._clamps.snapshot(), **kept(self, _KEPT)}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+        for fingers, state in zip(self._fingers, snapshot["fingers"], strict=True):
+            fingers.restore(state)
+        self._clamps.restore(snapshot["clamps"])
+
+
+_KEPT = ("_grips", "_pinches", "_pads", "_passing", "_near")
+"""Attributes of `Grasps` that last from tick to tick."""
 
 
 def _held_thread(name: str, pinch: pinches.Pinch) -> Held:

@@ -30,7 +30,7 @@ class Holder:
             self._rods.grip(parent, child, T_parent_frame, T_child_frame)
             return ("rod", parent, child)
         handle = self._world.add_fixed(parent, child, T_parent_frame, T_child_frame)
-        self._weigh(child, True)
+        self._update_mass(child, True)
         return ("body", handle, child)
 
     def add_yielding(self, slip: Slip, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
@@ -38,24 +38,26 @@ class Holder:
         if child in self._rod_bodies:
             return self.add_fixed(parent, child, T_parent_frame, T_child_frame)
         number = self._clamps.add(slip, parent, child, T_parent_frame)
-        self._rods.weigh(self._world)
+        self._rods.update_masses(self._world)
         return ("clamp", number, child)
 
     def holds(self, handle: Any) -> bool:
-        """Whether what a handle stands for has not slipped out."""
-        return handle[0] != "clamp" or self._clamps.holds(handle[1])
+        """Whether what a handle stands for has neither slipped out nor been let go by a reset."""
+        if handle[0] == "clamp":
+            return self._clamps.holds(handle[1])
+        return handle[0] != "rod" or self._rods.holds(handle[1], handle[2])
 
     def remove_fixed(self, handle: Any) -> None:
         """Let go what `add_fixed` or `add_yielding` holds."""
         if handle[0] == "clamp":
             self._clamps.remove(handle[1])
-            self._rods.weigh(self._world)
+            self._rods.update_masses(self._world)
         elif handle[0] == "rod":
             self._rods.release(handle[1], handle[2])
         else:
             self._world.remove_fixed(handle[1])
-            self._weigh(handle[2], False)
+            self._update_mass(handle[2], False)
 
-    def _weigh(self, body: int, held: bool) -> None:
+    def _update_mass(self, body: int, held: bool) -> None:
         self._world.hold_up(body, held)
-        self._rods.weigh(self._world)
+        self._rods.update_masses(self._world)

@@ -45,7 +45,7 @@ class Pinch:
 
 
 def begin(number: int, rods: Rods, world: World, fingers: Fingers, friction: float) -> Pinch | None:
-    """A grasp of a rod, when both pads touch it and the fingers are told to close."""
+    """A grasp of a rod, when both pads touch it and the fingers are asked to close."""
     rod, jaw = rods.rods[number], fingers.jaw
     axis, pivot = fingers.axis()
     touched = [_touched(rod, fingers, finger, axis, pivot) for finger in (0, 1)]
@@ -79,7 +79,7 @@ def keep(pinch: Pinch, rods: Rods, world: World, fingers: Fingers) -> Pads | Non
     pinch.slip = _along(rod, element, on_rod) - pinch.along
     pinch.force = rod.pinched(finger)[1]
     fingers.stop(pinch.positions, (force * pinch.lever, force * pinch.lever))
-    rods.spare(pinch.rod, fingers.jaw.fingers, element)
+    rods.exclude(pinch.rod, fingers.jaw.fingers, element)
     return Pads(finger, pinch.points, pinch.normal, 2.0 * pinch.friction * force)
 
 

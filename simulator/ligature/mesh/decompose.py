@@ -1,6 +1,6 @@
 """Convex decomposition of concave meshes with CoACD: for ADF collision meshes, and for moving triangle meshes.
 
-The ADF form is one OBJ file with one material per convex piece, which is how the format says that
+The ADF form is one OBJ file with one material per convex piece, which is how the format states that
 a collision mesh is made of hulls (ADF specification §12.5). Metres. Method: Wei et al.,
 "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and Tree Search", 2022.
 """
@@ -35,17 +35,19 @@ QUICK: dict[str, Any] = {
     "threshold": 0.15, "max_convex_hull": 16, "resolution": 200, "mcts_iterations": 6, "mcts_max_depth": 1,
     "mcts_nodes": 5, "seed": 0,
 }  # fmt: skip
-"""Coarse settings for meshes that a scene never decomposed: 4158 triangles in 6 s, CoACD's own take minutes."""
+"""Coarse settings for meshes that a scene never decomposed: 4158 triangles in 6 s, CoACD's own take minutes.
 
-QUICK_LIMIT = 120.0
-AUTHORING_LIMIT = 3600.0
-"""Seconds after which CoACD is given up."""
+They bound the search by iterations, so that the pieces are the same on a busy machine.
+"""
+
+HANG_LIMIT = 3600.0
+"""Seconds after which CoACD counts as hanging; nothing of it is kept, and the next start tries again."""
 
 _log = logging.getLogger(__name__)
 
 
 class DecompositionError(ValueError):
-    """A mesh that cannot be decomposed; the message says why."""
+    """A mesh that cannot be decomposed; the message states why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ def decompose(mesh: Mesh, threshold: float = 0.05, max_hulls: int = -1, seed: in
     if not len(faces):
         raise DecompositionError("the mesh holds no triangle")
     settings = {"threshold": threshold, "max_convex_hull": max(max_hulls, 0) or -1, "seed": seed}
-    hulls = _cached_hulls(vertices, faces, settings, AUTHORING_LIMIT)
+    hulls = _cached_hulls(vertices, faces, settings, HANG_LIMIT, str(mesh.path))
     from ligature.mesh.quality import hausdorff_distance, volume_error  # compiled; pieces alone do without
 
     return Decomposition(hulls, volume_error(vertices, faces, hulls), hausdorff_distance(vertices, faces, hulls, seed))
@@ -96,22 +98,19 @@ def obj_text(hulls: Sequence[Array], library: str) -> tuple[str, str]:
     return "\n".join(lines) + "\n", "\n".join(materials)
 
 
-def convex_pieces(vertices: Array, faces: NDArray[np.int32]) -> list[Array]:
+def convex_pieces(vertices: Array, faces: NDArray[np.int32], source: str = "") -> list[Array]:
     """Convex pieces (n, 3) of a triangle mesh that moves: its hull when that is close, else a decomposition.
 
-    When CoACD gives up, the hull stands for the mesh and a warning is logged.
+    When CoACD fails, the hull stands for the mesh and a warning names its file ``source``.
     """
     whole = hull_vertices(vertices)
     if _convex_enough(vertices, faces):
         return [whole]
     try:
-        return list(_cached_hulls(vertices, faces, QUICK, QUICK_LIMIT))
+        return list(_cached_hulls(vertices, faces, QUICK, HANG_LIMIT, source))
     except DecompositionError as error:
-        _log.warning(
-            "a moving mesh of %d triangles collides as its convex hull: %s; run 'ligature decompose' on it",
-            len(faces),
-            error,
-        )
+        name = source or f"a moving mesh of {len(faces)} triangles"
+        _log.warning("%s collides as its convex hull: %s; run 'ligature decompose' on it", name, error)
         return [whole]
 
 
@@ -128,7 +127,7 @@ def _convex_enough(vertices: Array, faces: NDArray[np.int32]) -> bool:
 
 
 def _cached_hulls(
-    vertices: Array, faces: NDArray[np.int32], settings: dict[str, Any], limit: float
+    vertices: Array, faces: NDArray[np.int32], settings: dict[str, Any], limit: float, source: str
 ) -> tuple[Array, ...]:
     """The pieces of an earlier run of CoACD with the same arguments, else of a new one."""
     stored = io.BytesIO()
@@ -139,7 +138,8 @@ def _cached_hulls(
     hulls = _stored_hulls(path)
     if hulls:
         return hulls
-    _log.info("decomposing a mesh of %d triangles; the result is kept in %s", len(faces), path)
+    name = source or "a mesh"
+    _log.warning("decomposing %s, %d triangles, into convex pieces; this is done once", name, len(faces))
     data = _run_coacd(stored.getvalue(), words, limit)
     try:
         write_atomically(path, data)

@@ -23,11 +23,11 @@ MAX_PARTS = 4096
 """Most materials of one file, each of which may become a collision hull."""
 
 MAX_FINDINGS = 50
-"""Most findings kept of one file; the first ones tell what is wrong with the rest."""
+"""Most findings kept of one file; the first ones report what is wrong with the rest."""
 
 
 class MeshError(AdfError):
-    """A mesh file that cannot be used; ``diagnostics`` say where and why."""
+    """A mesh file that cannot be used; ``diagnostics`` state where and why."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,10 @@ class Mesh:
         return np.vstack([p.vertices for p in self.parts]) if self.parts else np.zeros((0, 3))
 
 
+LOOK = "look"
+"""Code of the findings that matter only where the mesh is drawn."""
+
+
 class Findings:
     """Collects what is odd about a file, each message once, at most `MAX_FINDINGS`."""
 
@@ -87,11 +91,17 @@ class Findings:
         self._found: dict[tuple[Path, str], Diagnostic] = {}
 
     def add(
-        self, path: Path, message: str, line: int = 1, hint: str = "", severity: Severity = Severity.WARNING
+        self,
+        path: Path,
+        message: str,
+        line: int = 1,
+        hint: str = "",
+        severity: Severity = Severity.WARNING,
+        code: str = "mesh",
     ) -> None:
-        """Remember ``message`` about a line of ``path``, unless the same was said of an earlier line."""
+        """Remember ``message`` about a line of ``path``, unless the same was stated of an earlier line."""
         if len(self._found) < MAX_FINDINGS:
-            self._found.setdefault((path, message), Diagnostic(severity, message, Mark(path, line, 1), hint, "mesh"))
+            self._found.setdefault((path, message), Diagnostic(severity, message, Mark(path, line, 1), hint, code))
 
     def all(self) -> tuple[Diagnostic, ...]:
         """The findings in the order they were made."""

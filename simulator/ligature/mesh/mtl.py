@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ligature.adf.diagnostics import Severity
 from ligature.adf.resolver import Resolver
-from ligature.mesh.mesh import MAX_PARTS, Findings, Material, Triple, failure
+from ligature.mesh.mesh import LOOK, MAX_PARTS, Findings, Material, Triple, failure
 from ligature.mesh.texture import texture_file
 
 _COLOURS = ("Ka", "Kd", "Ks", "Ke")
@@ -98,14 +98,15 @@ def _value(draft: _Draft, word: str, rest: str, path: Path, number: int, finding
     count = 3 if word in _COLOURS else 1 if word in _SCALARS else 0
     if not count:
         hint = f"{', '.join((*_COLOURS, *_SCALARS, *_TEXTURES))} are honoured"
-        findings.add(path, f"'{word[:40]}' has no effect", number, hint, Severity.DEBUG)
+        findings.add(path, f"'{word[:40]}' has no effect", number, hint, Severity.DEBUG, LOOK)
         return
     try:
         values = [float(value) for value in rest.split()[:count]]
     except ValueError:
         values = []
     if len(values) < count or not all(map(math.isfinite, values)):
-        findings.add(path, f"'{word} {rest[:40]}' has no effect", number, f"{count} finite numbers were expected")
+        hint = f"{count} finite numbers were expected"
+        findings.add(path, f"'{word} {rest[:40]}' has no effect", number, hint, code=LOOK)
     elif count == 3:
         draft.colours[word] = (_unit(values[0]), _unit(values[1]), _unit(values[2]))
     else:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ligature.kernels import compiled
 from ligature.mesh.inertia import hull_properties, mass_properties
 from ligature.mesh.mesh import Array
 from ligature.mesh.surface import Faces, convex_surface
@@ -17,7 +17,7 @@ SAMPLES = 4000
 """Points on each surface from which distances are measured."""
 
 _NUDGE = 1e-6
-"""Step outwards, over the extent, that tells whether a face of a hull is covered by another hull."""
+"""Step outwards, over the extent, that decides whether a face of a hull is covered by another hull."""
 
 
 def volume_error(vertices: Array, faces: Faces, hulls: Sequence[Array]) -> float | None:
@@ -76,7 +76,7 @@ def nearest_points(points: Array, vertices: Array, faces: Faces) -> tuple[Array,
     return found
 
 
-@njit(cache=True)
+@compiled
 def _nearest(
     points: Array, corners: Array, centres: Array, radii: Array, first: NDArray[np.int64]
 ) -> tuple[Array, NDArray[np.int64]]:
@@ -98,13 +98,13 @@ def _nearest(
     return found, triangle
 
 
-@njit(cache=True)
+@compiled
 def _distance(p: Array, q: Array) -> float:
     x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
     return float((x * x + y * y + z * z) ** 0.5)
 
 
-@njit(cache=True)
+@compiled
 def _foot(p: Array, a: Array, b: Array, c: Array, foot: Array) -> None:
     """Write the nearest point of a triangle to ``foot``: in its plane when inside, else on an edge."""
     ab, ac, ap = b - a, c - a, p - a

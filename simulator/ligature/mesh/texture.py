@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path, PureWindowsPath
 
 from ligature.adf.resolver import ResolutionError, Resolver
-from ligature.mesh.mesh import Findings
+from ligature.mesh.mesh import LOOK, Findings
 
 
 def texture_file(name: str, path: Path, line: int, folder: Path, resolver: Resolver, findings: Findings) -> Path | None:
@@ -26,7 +26,7 @@ def texture_file(name: str, path: Path, line: int, folder: Path, resolver: Resol
         if candidate.is_file():
             return candidate
     if refusal is not None:
-        findings.add(path, f"texture: {refusal.diagnostic.message}", line, refusal.diagnostic.hint)
+        findings.add(path, f"texture: {refusal.diagnostic.message}", line, refusal.diagnostic.hint, code=LOOK)
     else:
-        findings.add(path, f"texture '{name[:200]}' does not exist", line, f"looked for {allowed[0]}")
+        findings.add(path, f"texture '{name[:200]}' does not exist", line, f"looked for {allowed[0]}", code=LOOK)
     return allowed[0] if allowed else None

@@ -139,7 +139,7 @@ def _declared(
 
 
 def _entry(bodies: Sequence[Body], chains: Chains, entry: Any) -> ArmDescription:
-    """One declared arm; raises ValueError, saying what is wrong with it."""
+    """One declared arm; raises ValueError, stating what is wrong with it."""
     if not isinstance(entry, Mapping):
         raise ValueError(f"'{entry}' is no map")
     unknown = [str(key) for key in entry if key not in KEYS]

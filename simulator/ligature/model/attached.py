@@ -16,7 +16,7 @@ from ligature.model.frames import Array, axis_rotation, pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
 from ligature.model.parts import camera_frame, light_frame
 from ligature.model.piercing import Tissue
-from ligature.model.scene import Attachment, Camera, Ghost, Identity, Light, Slip
+from ligature.model.scene import Attachment, Camera, Ghost, Identity, Light, SensorType, Slip
 
 STATIC_CUTOFF = np.pi / 2
 """Largest half angle of a light; larger ones are clamped (§19)."""
@@ -112,7 +112,9 @@ def camera(element: Element, index: int, identity: Identity, folder: Path) -> Ca
 
 
 def sensor_rays(element: Element, folder: Path, resolver: Resolver) -> Array:
-    """Start and end points (n, 2, 3) of a sensor's rays in its own frame (§17.2)."""
+    """Start and end points (n, 2, 3) of a sensor's rays in its own frame (§17.2); a contact sensor has none."""
+    if SensorType[element.text("type")] is SensorType.CONTACT:
+        return np.zeros((0, 2, 3))
     reach = element.number("range")
     if reach < 0.0:
         message = f"sensor '{element.key}' has the negative range {reach:g}"

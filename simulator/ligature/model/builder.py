@@ -6,25 +6,29 @@ that cannot be built is reported and left out; the rest goes on.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
+from ligature.adf.nodes import Scalar, Sequence
 from ligature.model import attached, proxies, trees
 from ligature.model.arms import find_arms
+from ligature.model.assembly import assemble
 from ligature.model.frames import pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, shader_files
 from ligature.model.holes import find_holes
 from ligature.model.jaws import find_jaws
 from ligature.model.lookup import candidates
+from ligature.model.lost import LostBodies
 from ligature.model.naming import Names, merged
 from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
 from ligature.model.parts import body_of, joint_of, sensor_of
 from ligature.model.piercing import Hole, Needle
-from ligature.model.rods import rod_chains
+from ligature.model.rods import rod_chains, without_ties_between
 from ligature.model.scene import (
     Actuator,
     Attachment,
@@ -50,7 +54,7 @@ KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
 class SceneBuilder:
     """Collects the objects of a scene; `finish` settles what needs all of them."""
 
-    def __init__(self, name: str, resolver: Resolver, world: WorldSettings, prefix: str = "") -> None:
+    def __init__(self, name: str, resolver: Resolver, world: WorldSettings) -> None:
         self.name = name
         self.resolver = resolver
         self.world = world
@@ -64,13 +68,14 @@ class SceneBuilder:
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
         self.devices: list[InputDevice] = []
-        self._names = {kind: Names(prefix) for kind in (*KINDS, "suture")}
+        self._names = {kind: Names() for kind in (*KINDS, "suture")}
         self._arrivals = Arrivals()
         self._scales: list[float] = []
         self._groups: list[tuple[int, ...]] = []
         self._silent_files: list[list[int]] = []
         self._linked: list[tuple[int, int]] = []
         self._no_rod: set[int] = set()
+        self._lost = LostBodies()
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
@@ -88,6 +93,8 @@ class SceneBuilder:
         )  # fmt: skip
         before = {kind: len(self._list(kind)) for kind in KINDS}
         local = self._add_bodies(document, model, context, shaders)
+        if not top.flag("ligature rod"):
+            self._no_rod.update(local)
         self._add_sutures(document, model, local)
         self._add_ghosts(document, model, context)
         self._add_sensors(document, model, local)
@@ -96,8 +103,6 @@ class SceneBuilder:
         self.add_cameras_and_lights(document, model.namespace, model.index)
         if top.flag("ignore inter-collision"):
             self._silent_files.append(local)
-        if not top.flag("ligature rod"):
-            self._no_rod.update(local)
         self.arrive(before)
 
     def add_proxy(self, document: Document, shaders: ShaderFiles | None, device: Element) -> int:
@@ -137,17 +142,23 @@ class SceneBuilder:
     def finish(self) -> Scene:
         """The scene of everything added."""
         self._arrivals.report_orphans()
+        self._lost.name_what_goes_along(self.diagnostics)
         self.diagnostics += self._arrivals.diagnostics
-        rods = rod_chains(self.bodies, self.joints, frozenset(self._no_rod))
+        rods, between = without_ties_between(rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints)
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
+        self._report_ties(between)
+        self._report_sensors(rod_bodies)
         forest, loops = trees.articulations(self.bodies, self.joints, rod_bodies, rod_joints)
+        start, closures, moved = assemble(self.bodies, self.joints, forest, loops)
+        self.diagnostics += moved
         for rod in rods:
             message = f"{len(rod.bodies)} bodies from '{rod.name}' on are simulated as one elastic rod"
             mark = self.bodies[rod.bodies[0]].identity.mark
             self.report(Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature rod: false'", "rod"))
         bodies = self._finished_bodies()
-        arms, findings = find_arms(bodies, self.joints, self.world.extra.get("ligature arms"))
+        movable = [joint for joint in self.joints if joint.index not in {*loops, *rod_joints}]
+        arms, findings = find_arms(bodies, movable, self.world.extra.get("ligature arms"))
         self.diagnostics += findings
         ghosts = self._attached("ghost", self.ghosts)
         needles = find_needles(bodies, self.joints, forest, rods)
@@ -167,14 +178,31 @@ class SceneBuilder:
             input_devices=tuple(self.devices),
             articulations=forest,
             loops=loops,
+            start=start,
+            closures=closures,
             rods=rods,
             needles=needles,
             holes=holes,
             arms=arms,
-            jaws=find_jaws(bodies, self.joints, arms),
+            jaws=find_jaws(bodies, movable, arms),
             diagnostics=tuple(self.diagnostics),
             roots=self.resolver.roots,
         )
+
+    def _report_ties(self, joints: Iterable[Joint]) -> None:
+        """Joints between two elements of rods: a rod is tied to bodies."""
+        for joint in joints:
+            message = f"joint '{joint.identity.key}' joins two elements of rods; it is left out"
+            hint = "join an element and a body, or write 'ligature rod: false' for one of the two chains"
+            self.report(Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "rod"))
+
+    def _report_sensors(self, rod_bodies: frozenset[int]) -> None:
+        """Resistance sensors on rods push what they touch and not the rod."""
+        for sensor in self.sensors:
+            if sensor.type is SensorType.RESISTANCE and sensor.parent in rod_bodies:
+                message = f"resistance sensor '{sensor.identity.key}' does not push back the rod that it is on"
+                hint = "put it on a body, or write 'ligature rod: false'"
+                self.report(Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod"))
 
     def _report_piercing(self, needles: tuple[Needle, ...], holes: tuple[Hole, ...]) -> None:
         """Name the recognised needles and tissue holes."""
@@ -209,12 +237,14 @@ class SceneBuilder:
         own = document.top.has("gravity")
         gravity = np.array(document.top.vector("gravity")) if own else self.world.gravity
         local = []
+        self._note_unusable(document, model)
         for element in document.elements("bodies"):
             identity = self._identity("body", element, model.namespace, model.index)
             try:
                 body = body_of(element, len(self.bodies), identity, context, gravity, shaders)
             except GeometryError as error:
                 self._names["body"].identifiers.pop()
+                self._lost.add(identity.identifier, len(self.diagnostics))
                 self.report(error.diagnostic)
                 continue
             self.bodies.append(body)
@@ -224,6 +254,18 @@ class SceneBuilder:
                 self._no_rod.add(body.index)
             local.append(body.index)
         return local
+
+    def _note_unusable(self, document: Document, model: Model) -> None:
+        """Remember the listed bodies that an error took away, so that what names them is no further error."""
+        usable = {element.key for element in document.elements("bodies")}
+        listed = document.top.node.get("bodies")
+        for item in listed.items if isinstance(listed, Sequence) else []:
+            if not isinstance(item, Scalar) or item.text in usable:
+                continue
+            for place, finding in enumerate(self.diagnostics):
+                if finding.severity >= Severity.ERROR and f"body '{item.text}'" in finding.message:
+                    self._lost.add(model.namespace + item.text, place)
+                    break
 
     def _add_sutures(self, document: Document, model: Model, local: list[int]) -> None:
         own = document.top.has("gravity")
@@ -348,6 +390,8 @@ class SceneBuilder:
             if len(found) == 1:
                 return local[found[0]] if pool is local_names else found[0]
             ambiguous += [pool[i] for i in found]
+        if not ambiguous and self._lost.took_along(f"{element.kind} '{element.key}'", (text, namespace + text)):
+            return None
         reason = f"is ambiguous ({', '.join(ambiguous[:3])}, …)" if ambiguous else "does not exist"
         message = f"{element.kind} '{element.key}' is left out: its {key} '{text}' {reason}"
         self.report(

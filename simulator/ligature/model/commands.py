@@ -2,16 +2,30 @@
 
 Indices are those of the `Scene`. Poses are x y z qx qy qz qw. A command is a persistent target: it
 holds until the next one for the same object or until a `Release`. SI units, world axes unless a
-field says otherwise.
+field states otherwise. The commands of CRTK arms are in `ligature.robots.commands`.
 """
 
 from __future__ import annotations
 
 import enum
-import math
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
-Vector = tuple[float, ...]
+from ligature.model.messages import (
+    FLAG,
+    INDEX,
+    Choice,
+    Choices,
+    Field,
+    Message,
+    Numbers,
+    OptionalIndex,
+    Pose,
+    Text,
+    Vector,
+    wire,
+)
+from ligature.model.scene import Scene
 
 
 class CommandType(enum.IntEnum):
@@ -22,147 +36,147 @@ class CommandType(enum.IntEnum):
     VELOCITY = 2
 
 
+MOUNTED = ("camera", "light")
+"""Kinds of objects that a `PlaceCommand` or `ParentCommand` moves."""
+
+RELEASED = ("body", "actuator", "camera", "light", "arm")
+"""Kinds of objects whose commands a `Release` clears."""
+
+MAX_POSITION = 1e4
+"""Metres from the origin of a pose; 1e9 m between two attached bodies leaves the doubles no digits to act in."""
+
+MAX_VELOCITY = 1e4
+"""Metres or radians per second of a twist."""
+
+MAX_FORCE = 1e6
+"""Newtons or newton metres of a wrench, and largest joint command of any type."""
+
+_TARGETS: dict[CommandType, Field] = {
+    CommandType.POSITION: Pose(bound=MAX_POSITION),
+    CommandType.VELOCITY: Numbers(6, MAX_VELOCITY, "m/s or rad/s"),
+    CommandType.FORCE: Numbers(6, MAX_FORCE, "N or N m"),
+}
+
+
 @dataclass(frozen=True)
-class BodyCommand:
+class Command(Message):
+    """What the simulation carries out, and records keep."""
+
+
+@dataclass(frozen=True)
+class BodyCommand(Command, code=1):
     """Cartesian and joint command of one body (interface reference §3.1, §3.2).
 
     ``target`` is a pose (7,) for POSITION, a twist (6,) for VELOCITY, a wrench (6,) for FORCE.
     ``joint_values[i]`` goes to the i-th active joint of the body's tree, as ``joint_types[i]``.
     """
 
-    body: int
-    type: CommandType
-    target: Vector
-    joint_types: tuple[CommandType, ...] = ()
-    joint_values: Vector = ()
+    body: int = wire(INDEX)
+    type: CommandType = wire(Choice(tuple(sorted(CommandType))))
+    target: Vector = wire(Numbers(bound=float("inf")), "the command")
+    joint_types: tuple[CommandType, ...] = wire(Choices(tuple(sorted(CommandType))), default=())
+    joint_values: Vector = wire(Numbers(bound=MAX_FORCE), "joint commands", default=())
+
+    @property
+    def object(self) -> tuple[str, int]:  # noqa: D102
+        return "body", self.body
+
+    def check(self) -> None:  # noqa: D102
+        super().check()
+        _TARGETS[self.type].check(f"a {self.type.name} command", self.target)
 
 
 @dataclass(frozen=True)
-class ActuatorCommand:
-    """Grasp or release with a constraint actuator (interface reference §3.4)."""
+class ActuatorCommand(Command, code=2):
+    """Attach a body to a constraint actuator, or release what it holds (interface reference §3.4)."""
 
-    actuator: int
-    actuate: bool
-    body: str = ""
-    offset: Vector | None = None
-    sensor: str | None = None
+    actuator: int = wire(INDEX)
+    actuate: bool = wire(FLAG)
+    body: str = wire(Text(), default="")
+    offset: Vector | None = wire(Pose(bound=MAX_POSITION, optional=True), "the offset", default=None)
+    sensor: str | None = wire(Text(optional=True), default=None)
 
+    @property
+    def object(self) -> tuple[str, int]:  # noqa: D102
+        return "actuator", self.actuator
 
-@dataclass(frozen=True)
-class PlaceCommand:
-    """Put a camera or a light (``kind``) at a pose in its parent's frame; None lets it be."""
-
-    kind: str
-    index: int
-    pose: Vector | None
-
-
-STREAMED = (
-    "servo_jp", "servo_jv", "servo_jf", "servo_cp", "servo_cv", "servo_ci", "servo_cs", "spatial/servo_cf",
-    "body/servo_cf", "jaw/servo_jp", "jaw/servo_jf",
-)  # fmt: skip
-"""Verbs of arms of which only the newest counts."""
-
-ORDERED = (
-    "state_command", "servo_jr", "move_jp", "move_jr", "move_cp", "jaw/move_jp", "hold", "free",
-    "use_gravity_compensation", "body/set_cf_orientation_absolute", "set_base_frame", "trajectory_j/set_ratio",
-    "trajectory_j/set_ratio_v", "trajectory_j/set_ratio_a", "set_tool_type", "tool_type_request",
-    "emulate_adapter_present", "emulate_tool_present", "set_endoscope_type", "lock_orientation",
-    "unlock_orientation", "gripper/servo_jp", "place_jp",
-)  # fmt: skip
-"""Verbs of arms that are carried out one after the other, none left out."""
-
-VERBS = (*STREAMED, *ORDERED)
+    @property
+    def slot(self) -> Hashable:
+        """To attach and to release are different things: neither replaces the other."""
+        return self.object, self.actuate
 
 
 @dataclass(frozen=True)
-class ParentCommand:
-    """Hang a camera or a light (``kind``) on body ``parent``, None for the world; its pose there stays what it was."""
+class _Mounted(Command):
+    """A command to a camera or a light (``kind``)."""
 
-    kind: str
-    index: int
-    parent: int | None
+    kind: str = wire(Choice(MOUNTED))
+    index: int = wire(INDEX)
 
-
-@dataclass(frozen=True)
-class ArmCommand:
-    """One CRTK command to an arm (interface reference §5.4); ``verb`` is the topic's name below the arm's.
-
-    ``values`` are the numbers of the message: joint values, a pose (7,), a twist or wrench (6,), a flag; ``text``
-    its words. How many numbers a verb takes depends on the arm, which refuses a command that does not fit it.
-    """
-
-    arm: int
-    verb: str
-    values: Vector = ()
-    text: str = ""
+    @property
+    def object(self) -> tuple[str, int]:  # noqa: D102
+        return self.kind, self.index
 
 
 @dataclass(frozen=True)
-class Release:
+class PlaceCommand(_Mounted, code=3):
+    """Put a camera or a light (``kind``) at a pose in its parent's frame; None leaves it where it is."""
+
+    pose: Vector | None = wire(Pose(bound=MAX_POSITION, optional=True), "the pose")
+
+
+@dataclass(frozen=True)
+class ParentCommand(_Mounted, code=8):
+    """Mount a camera or a light (``kind``) on body ``parent``, None for the world; its pose there does not change."""
+
+    parent: int | None = wire(OptionalIndex())
+
+    @property
+    def slot(self) -> Hashable:  # noqa: D102
+        return self.object, "parent"
+
+    def check_indices(self, counts: Mapping[str, int]) -> None:  # noqa: D102
+        super().check_indices(counts)
+        if not 0 <= (self.parent or 0) < counts["body"]:
+            raise ValueError(f"the scene has no body number {self.parent} to mount a {self.kind} on")
+
+
+@dataclass(frozen=True)
+class Release(Command, code=4):
     """The watchdog of one object expired: its command is cleared (interface reference §2.4)."""
 
-    kind: str
-    index: int
+    kind: str = wire(Choice(RELEASED))
+    index: int = wire(INDEX)
+
+    @property
+    def object(self) -> tuple[str, int]:  # noqa: D102
+        return self.kind, self.index
+
+    @property
+    def releases(self) -> bool:  # noqa: D102
+        return True
 
 
 @dataclass(frozen=True)
-class Reset:
+class Reset(Command, code=5):
     """Put objects back to their initial poses; ``bodies_only`` leaves cameras and lights."""
 
-    bodies_only: bool = False
+    bodies_only: bool = wire(FLAG, default=False)
 
 
 @dataclass(frozen=True)
-class WatchContacts:
+class WatchContacts(Command, code=9):
     """Write contact points and forces into states from now on, or no longer: somebody looks at them."""
 
-    enabled: bool
+    enabled: bool = wire(FLAG)
 
 
-Command = BodyCommand | ActuatorCommand | PlaceCommand | ParentCommand | ArmCommand | Release | Reset | WatchContacts
-
-
-LARGEST = 1e9
-"""Largest magnitude of a number in a command, in SI units."""
-
-_LENGTHS = {CommandType.POSITION: 7, CommandType.VELOCITY: 6, CommandType.FORCE: 6}
-
-
-def check(command: Command) -> None:
-    """Raise ValueError, saying what was expected, when a command may not reach the physics."""
-    if isinstance(command, BodyCommand):
-        wanted = _LENGTHS[command.type]
-        if len(command.target) != wanted:
-            raise ValueError(f"a {command.type.name} command has {wanted} numbers, not {len(command.target)}")
-        _finite("the command", command.target)
-        _finite("joint commands", command.joint_values)
-        if command.type is CommandType.POSITION:
-            _unit(command.target[3:])
-    elif isinstance(command, ActuatorCommand) and command.offset is not None:
-        _pose("the offset", command.offset)
-    elif isinstance(command, PlaceCommand) and command.pose is not None:
-        _pose("the pose", command.pose)
-    elif isinstance(command, ArmCommand):
-        if command.verb not in VERBS:
-            raise ValueError(f"arms know no '{command.verb}'; they know {', '.join(VERBS)}")
-        _finite(command.verb, command.values)
-
-
-def _pose(what: str, values: Vector) -> None:
-    if len(values) != 7:
-        raise ValueError(f"{what} has 7 numbers, not {len(values)}")
-    _finite(what, values)
-    _unit(values[3:])
-
-
-def _finite(what: str, values: Vector) -> None:
-    for value in values:
-        if not math.isfinite(value) or abs(value) > LARGEST:
-            raise ValueError(f"{what} must be finite and below {LARGEST:g}, not {value}")
-
-
-def _unit(quaternion: Vector) -> None:
-    length = math.sqrt(sum(v * v for v in quaternion))
-    if not 0.9 <= length <= 1.1:
-        raise ValueError(f"the quaternion has the length {length:.3g}; it must be 1")
+def object_counts(scene: Scene) -> dict[str, int]:
+    """How many objects of each kind that can be commanded a scene has, for `Message.check_indices`."""
+    return {
+        "body": len(scene.bodies),
+        "actuator": len(scene.actuators),
+        "camera": len(scene.cameras),
+        "light": len(scene.lights),
+        "arm": len(scene.arms),
+    }

@@ -16,6 +16,7 @@ from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
 from ligature.mesh import ConvexPart, collision_parts, load_mesh
 from ligature.mesh.load import EXTENSIONS
+from ligature.mesh.mesh import LOOK
 from ligature.model.frames import Array, frame, inverse, pose_matrix, rpy_matrix
 from ligature.model.scene import (
     Box,
@@ -50,7 +51,7 @@ HULL_MARGIN_OF_ESTIMATE = 0.04
 
 
 class GeometryError(Exception):
-    """An object that cannot be built; ``diagnostic`` says why."""
+    """An object that cannot be built; ``diagnostic`` states why."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(str(diagnostic))
@@ -235,14 +236,15 @@ def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[
     except AdfError as error:
         raise GeometryError(error.diagnostics[0]) from error
     for diagnostic in mesh.diagnostics:
-        context.report(diagnostic)
+        if diagnostic.code != LOOK:  # this mesh is never drawn
+            context.report(diagnostic)
     identity = np.eye(4)
     shapes: list[Shape] = []
     for piece in pieces:
         if not isinstance(piece, ConvexPart):
-            shapes.append(TriMesh(piece.vertices, piece.faces))
+            shapes.append(TriMesh(piece.vertices, piece.faces, str(path)))
         elif len(piece.vertices) == 1:
-            shapes.append(Sphere(element.number("collision margin")))
+            shapes.append(Sphere(_point_radius(element)))
         else:
             shapes.append(Hull(piece.vertices))
     places = [
@@ -250,6 +252,17 @@ def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[
         for piece, shape in zip(pieces, shapes, strict=True)
     ]
     return tuple(Collider(shape, T) for shape, T in zip(shapes, places, strict=True))
+
+
+def _point_radius(element: Element) -> float:
+    """Radius of the spheres that stand for the points of a mesh: the collision margin."""
+    radius = element.number("collision margin")
+    if not radius > 0.0:
+        raise _error(
+            element, "collision margin", f"its points are spheres of radius {radius:g}",
+            "give a 'collision margin' above 0, or another 'collision mesh type'",
+        )  # fmt: skip
+    return radius
 
 
 def _body_low(element: Element) -> str:

@@ -18,10 +18,6 @@ class RayHits(NamedTuple):
     point: Array
     normal: Array
 
-    def part(self, rows: slice) -> RayHits:
-        """The hits of some of the rays."""
-        return RayHits(self.body[rows], self.fraction[rows], self.point[rows], self.normal[rows])
-
 
 class Contact(NamedTuple):
     """One contact point of a body with another: signed distance, point and normal (3,) on the other body."""

@@ -1,7 +1,7 @@
 """Recognises tissue holes: ghost objects in the opening of a ring of shapes on their parent body.
 
 That is how the suturing challenge builds its phantom: each entry and exit is a body with four capsules
-around an opening and a flat ghost in it. ``ligature hole`` on a ghost says so, or denies it; metres.
+around an opening and a flat ghost in it. ``ligature hole`` on a ghost reports it, or denies it; metres.
 """
 
 from __future__ import annotations

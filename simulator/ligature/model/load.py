@@ -26,14 +26,14 @@ from ligature.adf import (
 )
 from ligature.model.builder import SceneBuilder
 from ligature.model.geometry import shader_files
-from ligature.model.naming import topic_name
+from ligature.model.naming import prefixed, topic_name
 from ligature.model.scene import InputDevice, Scene, ShaderFiles, WorldSettings
 
 SKYBOX_FACES = ("right", "left", "top", "bottom", "front", "back")
 
 
 class SceneError(AdfError):
-    """A scene that cannot run at all; ``diagnostics`` say why."""
+    """A scene that cannot run at all; ``diagnostics`` state why."""
 
 
 def load(
@@ -59,10 +59,10 @@ def load(
     roots
         Folders below which files may be opened besides the scene's own.
     namespace_prefix
-        Put before every namespace.
+        Put before every namespace; what files refer to is settled before, so that it never changes that.
     arms
-        Which bodies are arms, as the launch key ``ligature arms`` would say (`ligature.model.arms`), instead of
-        what the file says and what is found.
+        Which bodies are arms, as the launch key ``ligature arms`` would state (`ligature.model.arms`), instead of
+        what the file states and what is found.
     devices
         Indices of the input devices of a launch file whose proxies are to be there.
 
@@ -79,28 +79,26 @@ def load(
         raise SceneError(*error.diagnostics) from error
     if document.kind == "launch":
         assert isinstance(document, LaunchDocument)
-        scene = _load_launch(document, models, files, resolver, namespace_prefix, arms, devices)
+        scene = _load_launch(document, models, files, resolver, arms, devices)
     elif document.kind == "model":
-        scene = _load_models([document], files, resolver, namespace_prefix, start.stem, arms)
+        scene = _load_models([document], files, resolver, start.stem, arms)
     else:
         message = f"'{start}' is {document.kind} file, not a launch or model file"
         raise SceneError(Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file"))
     if not scene.bodies:
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
         raise SceneError(Diagnostic(Severity.ERROR, "the file yields no body to simulate", document.top.mark), *errors)
-    return scene
+    return prefixed(scene, namespace_prefix)
 
 
 def _load_models(
     documents: Sequence[Document],
     files: Sequence[str | Path],
     resolver: Resolver,
-    prefix: str,
     name: str,
     arms: Sequence[Mapping[str, str]] | None,
 ) -> Scene:
-    world = WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World"))
-    builder = SceneBuilder(name, resolver, _with_arms(world, arms), prefix)
+    builder = SceneBuilder(name, resolver, _with_arms(WorldSettings(), arms))
     for document in [*_extra(files, resolver, builder), *documents]:
         builder.diagnostics += document.diagnostics
         builder.add_model(document, None)
@@ -122,16 +120,13 @@ def _load_launch(
     models: Sequence[int] | None,
     files: Sequence[str | Path],
     resolver: Resolver,
-    prefix: str,
     arms: Sequence[Mapping[str, str]] | None,
     devices: Sequence[int],
 ) -> Scene:
     found = list(launch.diagnostics)
     world = _world_document(launch, resolver, found)
     shaders = None if world is None else shader_files(world.top, "shaders", world.path.parent)
-    builder = SceneBuilder(
-        launch.path.stem, resolver, _with_arms(_settings(world, shaders, prefix, launch), arms), prefix
-    )
+    builder = SceneBuilder(launch.path.stem, resolver, _with_arms(_settings(world, shaders, launch), arms))
     builder.diagnostics += found
     if world is not None:
         _add_environment(world, builder, resolver)
@@ -170,14 +165,12 @@ def _with_arms(settings: WorldSettings, arms: Sequence[Mapping[str, str]] | None
     return replace(settings, extra={**settings.extra, "ligature arms": [dict(arm) for arm in arms]})
 
 
-def _settings(
-    world: Document | None, shaders: ShaderFiles | None, prefix: str, launch: LaunchDocument
-) -> WorldSettings:
+def _settings(world: Document | None, shaders: ShaderFiles | None, launch: LaunchDocument) -> WorldSettings:
     extra: dict[str, Any] = {}
     if launch.top.has("ligature arms"):
         extra["ligature arms"] = launch.top.raw_value("ligature arms")
     if world is None:
-        return WorldSettings(topic=topic_name(prefix + "/ambf/env/", "World"), extra=extra)
+        return WorldSettings(extra=extra)
     top = world.top
     namespace = top.text("namespace")
     skybox = None
@@ -186,7 +179,7 @@ def _settings(
         skybox = {face: folder / top.text(f"skybox.{face}") for face in SKYBOX_FACES}
     return WorldSettings(
         namespace=namespace,
-        topic=topic_name(prefix + namespace, "World"),
+        topic=topic_name(namespace, "World"),
         gravity=np.array(top.vector("gravity")),
         max_substeps=top.integer("max iterations"),
         shaders=shaders,
@@ -269,7 +262,7 @@ def _add_devices(
 def _proxy(
     element: Element, document: Document, builder: SceneBuilder, resolver: Resolver, shaders: ShaderFiles | None
 ) -> int:
-    """Create the proxy of an input device; the index of its root link, -1 when it cannot be had."""
+    """Create the proxy of an input device; the index of its root link, -1 when it is unavailable."""
     mark = element.mark_of("simulated multibody")
     try:
         path = resolver.resolve(element.text("simulated multibody"), document.path.parent, mark)

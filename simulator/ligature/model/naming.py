@@ -1,12 +1,19 @@
-"""Names, namespaces and identifiers of objects (ADF specification §4.1 to §4.3, §4.7)."""
+"""Names, namespaces and identifiers of objects (ADF specification §4.1 to §4.3, §4.7).
+
+Files refer to each other's objects without the prefix of the command line (``--ns``): it is put before all names
+when every reference is settled, so that it cannot change what a text means.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
 
 from ligature.adf import Element
 from ligature.adf.references import merged
-from ligature.model.scene import Identity
+from ligature.model.scene import Identity, Scene
 
 _SLASHES = re.compile(r"/+")
 MAX_REMAP = 100
@@ -20,13 +27,12 @@ def topic_name(namespace: str, name: str) -> str:
 class Names:
     """Hands out identities of one kind of object; repeated identifiers get the suffixes 1, 2, …"""
 
-    def __init__(self, prefix: str) -> None:
-        self._prefix = prefix
+    def __init__(self) -> None:
         self.identifiers: list[str] = []
 
     def identity(self, element: Element, namespace: str, model: int, passive: bool | None = None) -> Identity:
         """The identity of ``element`` in a file with ``namespace``; it is registered as taken."""
-        space = self._prefix + merged(namespace, element.text("namespace"))
+        space = merged(namespace, element.text("namespace"))
         base = space + element.key
         taken = set(self.identifiers)
         suffix = next(s for s in ("", *map(str, range(1, MAX_REMAP + 1)), "?") if base + s not in taken)
@@ -44,7 +50,36 @@ class Names:
             publish_high=element.integer("publish frequency.high"),
             parent_text=parent,
             mark=element.mark,
+            namespace=space,
         )
 
 
-__all__ = ["Names", "merged", "topic_name"]
+def prefixed(scene: Scene, prefix: str) -> Scene:
+    """``scene`` with ``prefix`` before every namespace, without a separator (§4.2), as ``--ns`` has it."""
+    if not prefix:
+        return scene
+    world = replace(scene.world, prefix=prefix, topic=topic_name(prefix + scene.world.namespace, "World"))
+    kinds = ("bodies", "joints", "ghosts", "sensors", "actuators", "cameras", "lights")
+    renamed: dict[str, Any] = {kind: _renamed(getattr(scene, kind), prefix) for kind in kinds}
+    arms = {arm.name for arm in scene.arms}
+    return replace(
+        scene,
+        world=world,
+        rods=tuple(replace(rod, name=prefix + rod.name) for rod in scene.rods),
+        holes=tuple(replace(hole, name=prefix + hole.name) for hole in scene.holes),
+        jaws=tuple(jaw if jaw.name in arms else replace(jaw, name=prefix + jaw.name) for jaw in scene.jaws),
+        **renamed,
+    )
+
+
+def _renamed(things: Iterable[Any], prefix: str) -> tuple[Any, ...]:
+    return tuple(replace(thing, identity=_prefixed(thing.identity, prefix)) for thing in things)
+
+
+def _prefixed(identity: Identity, prefix: str) -> Identity:
+    leaf = identity.topic.removeprefix(topic_name(identity.namespace, ""))
+    topic = topic_name(prefix + identity.namespace, leaf)
+    return replace(identity, identifier=prefix + identity.identifier, topic=topic)
+
+
+__all__ = ["Names", "merged", "prefixed", "topic_name"]

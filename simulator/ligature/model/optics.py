@@ -36,7 +36,7 @@ _MOST_TURNED = np.cos(np.radians(30.0))
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What ``sensor_msgs/CameraInfo`` says of a camera, in pixels and metres.
+    """What ``sensor_msgs/CameraInfo`` states of a camera, in pixels and metres.
 
     ``K`` (3, 3) projects from the optical frame, ``D`` (5,) is plumb-bob distortion k1 k2 p1 p2 k3, ``R`` (3, 3)
     turns the optical frame to the rectified one, ``P`` (3, 4) projects from the rectified frame of the left

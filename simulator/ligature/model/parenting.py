@@ -35,9 +35,9 @@ class Arrivals:
             self._settle((kind, index), identifier)
 
     def report_orphans(self) -> None:
-        """Say which objects found no parent."""
+        """State which objects found no parent."""
         for identifier, text, mark in self.waiting.values():
-            message = f"'{identifier}' has the parent '{text}', which is not there or not unique"
+            message = f"'{identifier}' has the parent '{text}', that is missing or not unique"
             self.diagnostics.append(
                 Diagnostic(Severity.WARNING, message, mark, "its location is taken in the world frame", "parent")
             )

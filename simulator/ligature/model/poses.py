@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
+
 Array = NDArray[np.float64]
-compiled: Any = njit(cache=True)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def compose(parent: Array, local: Array, out: Array) -> None:
     """Write the pose ``local`` (7,), given in the frame ``parent`` (7,), into ``out`` (7,); aliasing is fine."""
     x, y, z, w = parent[3], parent[4], parent[5], parent[6]
@@ -29,7 +27,7 @@ def compose(parent: Array, local: Array, out: Array) -> None:
     out[6] = w * d - x * a - y * b - z * c
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def compose_rows(parents: Array, locals_: Array, rows: NDArray[np.int64], out: Array) -> None:
     """Compose row i of ``parents`` and ``locals_`` (n, 7) into row ``rows[i]`` of ``out``."""
     for i in range(rows.shape[0]):

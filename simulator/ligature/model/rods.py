@@ -8,6 +8,7 @@ or a joint keeps it as bodies. Metres.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,6 +38,16 @@ def rod_chains(bodies: Sequence[Body], joints: Sequence[Joint], opted_out: froze
         elif len(path) >= LEAST_ELEMENTS:
             chains.append(_chain(path[::-1], links[::-1], bodies, joints))
     return tuple(chains)
+
+
+def without_ties_between(
+    chains: Sequence[RodChain], joints: Sequence[Joint]
+) -> tuple[tuple[RodChain, ...], tuple[Joint, ...]]:
+    """The chains with the anchors that a rod can have, to bodies outside all rods, and the joints that are none."""
+    members = {body for chain in chains for body in chain.bodies}
+    between = {j for chain in chains for j in chain.anchors if {joints[j].parent, joints[j].child} <= members}
+    kept = tuple(replace(chain, anchors=tuple(j for j in chain.anchors if j not in between)) for chain in chains)
+    return kept, tuple(joints[j] for j in sorted(between))
 
 
 def _round(body: Body) -> bool:

@@ -9,16 +9,20 @@ immutable and knows nothing of Bullet; objects refer to each other by their inde
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Mark
 from ligature.model.piercing import Hole, Needle, Tissue
+
+if TYPE_CHECKING:
+    from ligature.model.axes import Axis
 
 Array = NDArray[np.float64]
 """A float64 array; the docstring beside each use gives its shape and frame."""
@@ -82,10 +86,11 @@ class Hull:
 
 @dataclass(frozen=True, eq=False)
 class TriMesh:
-    """Triangle mesh: ``vertices`` (n, 3), ``faces`` (m, 3) of int32 indices."""
+    """Triangle mesh: ``vertices`` (n, 3), ``faces`` (m, 3) of int32 indices; ``source`` is its file, for messages."""
 
     vertices: Array
     faces: NDArray[np.int32]
+    source: str = ""
 
 
 Shape = Box | Sphere | Cylinder | Capsule | Cone | Plane | Hull | TriMesh
@@ -145,7 +150,8 @@ class Identity:
 
     ``identifier`` is the qualified identifier with its remap suffix, for example
     ``/ambf/env/phantom/BODY Needle``; ``topic`` is the ROS name below which its topics live, for
-    example ``/ambf/env/phantom/Needle``; ``name`` is the bare name without blanks.
+    example ``/ambf/env/phantom/Needle``; ``name`` is the bare name without blanks; ``namespace`` is what
+    the files state, without the prefix of the scene.
     """
 
     key: str
@@ -158,6 +164,7 @@ class Identity:
     publish_high: int = 1000
     parent_text: str = ""
     mark: Mark | None = None
+    namespace: str = ""
 
 
 class OutputType(enum.Enum):
@@ -195,7 +202,7 @@ class Body:
     model over world). ``joints`` are the active descendant joints in command-vector order (ADF
     specification §11), ``children`` the matching child bodies. ``no_collision_with`` holds the
     bodies whose contacts with this one are switched off by joints, files or groups. ``needle`` is what
-    the file says of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
+    the file states of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
     """
 
     index: int
@@ -311,7 +318,7 @@ class Attachment:
 class Ghost:
     """A volume that senses what overlaps it and never produces a contact force (§16).
 
-    ``hole`` is what the file says of `ligature.model.holes`, None for nothing.
+    ``hole`` is what the file states of `ligature.model.holes`, None for nothing.
     """
 
     index: int
@@ -440,7 +447,7 @@ class Light:
 class InputDevice:
     """An input device of the launch file (§8), as written; teleoperation gives it a meaning.
 
-    ``proxy`` is the body that its hand leads, the root link of its proxy; -1 when that was not asked for.
+    ``proxy`` is the body that its hand drives, the root link of its proxy; -1 when that was not asked for.
     """
 
     key: str
@@ -477,6 +484,33 @@ class Articulation:
 
 
 @dataclass(frozen=True, eq=False)
+class Start:
+    """Where the articulations start.
+
+    ``coordinates`` are the positions of a joint's free axes (`ligature.model.axes`) by joint, of trees and loops;
+    ``roots`` the pose T_world_body (4, 4) of each articulation's first body by body.
+    """
+
+    coordinates: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+    roots: Mapping[int, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """How a joint that closes a loop is held: from body ``inner`` it leads to ``outer``.
+
+    Along the ``free`` axes, in the joint's frame on ``inner``, the other joints hold the two already; there they may
+    differ, by up to ``slack`` metres.
+    """
+
+    joint: int
+    inner: int
+    outer: int
+    free: tuple[Axis, ...] = ()
+    slack: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class RodChain:
     """A chain of bodies that is simulated as one elastic rod (DESIGN §4.1), from end to end.
 
@@ -495,15 +529,29 @@ class RodChain:
 
 @dataclass(frozen=True, eq=False)
 class WorldSettings:
-    """What the world file says: ``gravity`` (3,), namespace, and limits of the loop."""
+    """What the world file states: ``gravity`` (3,), namespace, and limits of the loop.
+
+    ``prefix`` stands before every namespace of the scene (``--ns``); ``topic`` has it already.
+    """
 
     namespace: str = "/ambf/env/"
+    prefix: str = ""
     topic: str = "/ambf/env/World"
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.8]))
     max_substeps: int = 10
     shaders: ShaderFiles | None = None
     skybox: dict[str, Path] | None = None
     extra: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def frame_prefix(self) -> str:
+        """What frames of this scene begin with on ROS: empty, or such as ``left/``."""
+        return "".join(f"{part}/" for part in self.prefix.split("/") if part)
+
+    @property
+    def root(self) -> str:
+        """What topics beside those of objects begin with on ROS: ``/``, or such as ``/left/``."""
+        return "/" + self.frame_prefix
 
 
 class ArmKind(enum.Enum):
@@ -560,9 +608,10 @@ class Scene:
 
     ``articulations`` cover every non-rod body once (a lone body is an articulation of one link);
     ``loops`` are the joints that close a kinematic loop or that an articulation cannot express and
-    that constraints must hold; ``rods`` are the recognised sutures, ``arms`` the recognised
-    manipulators, ``jaws`` what can grasp. ``diagnostics`` are all the findings of reading and resolving,
-    in order. ``roots`` are the folders below which a scene file may have other files opened.
+    that constraints must hold, as ``closures`` state; ``start`` is where all of them start; ``rods``
+    are the recognised sutures, ``arms`` the recognised manipulators, ``jaws`` what can grasp.
+    ``diagnostics`` are all the findings of reading and resolving, in order. ``roots`` are the folders
+    below which a scene file may have other files opened.
     """
 
     name: str
@@ -578,6 +627,8 @@ class Scene:
     input_devices: tuple[InputDevice, ...] = ()
     articulations: tuple[Articulation, ...] = ()
     loops: tuple[int, ...] = ()
+    start: Start = Start()
+    closures: tuple[Closure, ...] = ()
     rods: tuple[RodChain, ...] = ()
     needles: tuple[Needle, ...] = ()
     holes: tuple[Hole, ...] = ()

@@ -1,7 +1,7 @@
 """The state of a running scene: one record of numpy arrays with a layout fixed by the scene.
 
 The record is plain memory, so that a snapshot is one copy and another process can map it.
-Poses are x y z qx qy qz qw in world axes unless a field says otherwise; twists are linear then
+Poses are x y z qx qy qz qw in world axes unless a field sets otherwise; twists are linear then
 angular in world axes, the linear part at the centre of mass. SI units.
 """
 
@@ -67,7 +67,7 @@ def state_dtype(scene: Scene) -> StateDtype:
 
     ``tick`` counts ticks, ``update`` counts updates of 1/p seconds (``WorldState.sim_step``);
     ``stamp`` is Unix time of the update that wrote the record, zero in process.
-    ``ghost_sensed[g, b]`` tells whether body b overlaps ghost g. ``ray_*`` are the rays of all
+    ``ghost_sensed[g, b]`` reports whether body b overlaps ghost g. ``ray_*`` are the rays of all
     sensors one after the other; ``ray_body`` is -1 for no hit. ``camera_pose`` and ``light_pose``
     are in the parent's frame, as the messages want them; ``*_world`` beside them in world axes.
     Of ``touch_*`` the first ``touch_count`` rows count, while contacts are watched (`WatchContacts`): where bodies

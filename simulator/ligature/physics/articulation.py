@@ -9,22 +9,27 @@ Bullet would otherwise work through all links, in three rows a contact point.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
 from ligature.mesh import CollisionCache
+from ligature.model.axes import Axis
 from ligature.model.frames import inverse, matrix_quaternion
-from ligature.model.scene import Articulation, Body, Joint, Scene
+from ligature.model.mechanism import Chain, chain_of
+from ligature.model.scene import Articulation, Body, Closure, JointType, Scene
 from ligature.physics import shapes
-from ligature.physics.axes import Axis, axes_of
+from ligature.physics.response import moved_inertia
 
 Array = NDArray[np.float64]
 
 LIGHT = 1e-3
 """Mass and inertia of a link between two axes of one joint, as a part of the body it carries."""
+
+POINT = 1e-3
+"""Mass of the end of a point-to-point joint that slides along what the other joints hold, as a part of its body's."""
 
 LEAST_INERTIA = 1e-12
 """Moments below this (kg·m²) are replaced by those of a 1 cm ball: Bullet cannot invert them."""
@@ -102,6 +107,10 @@ class Tree:
     """Link, ADF joint, axis and effective mass or inertia of every degree of freedom."""
     static: bool
     frames: list[LinkFrame]
+    start: list[float]
+    """Position of every degree of freedom as the scene starts."""
+    ends: dict[int, int]
+    """Link at the end of each closing joint that starts from this tree."""
 
     @property
     def moving_links(self) -> list[int]:
@@ -113,6 +122,11 @@ class Tree:
         link = self.link_of[body]
         return (self.stand, -1) if link < 0 else (self.uid, link)
 
+    def put_joints(self, client: int) -> None:
+        """Put all joints where they start, at rest."""
+        for (link, *_), position in zip(self.axes, self.start, strict=True):
+            pybullet.resetJointState(self.uid, link, position, 0.0, physicsClientId=client)
+
     @property
     def bases(self) -> tuple[int, ...]:
         """The ids that move when the root is put elsewhere."""
@@ -121,17 +135,33 @@ class Tree:
 
 def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articulation, dt: float) -> Tree:
     """Create the multibody of ``articulation`` at the poses of the scene's files, for ticks of ``dt``."""
-    bodies, joints = scene.bodies, scene.joints
+    bodies, joints = _shared_out(scene), scene.joints
     root = bodies[articulation.links[0].body]
     plan = _Plan()
     link_of = {root.index: -1}
     T_link_inertial = {root.index: np.eye(4)}
     axes: list[tuple[int, int, Axis, float]] = []
+    start: list[float] = []
     for link in articulation.links[1:]:
         assert link.joint is not None
-        inner = articulation.links[link.parent_link].body
-        _append(plan, client, cache, bodies[link.body], joints[link.joint], inner, link_of, T_link_inertial, axes, dt)
-    T_world_inertial = root.T_world_body @ root.T_body_inertial
+        outer = bodies[link.body]
+        chain = chain_of(joints[link.joint], joints[link.joint].child == outer.index)
+        T_link_body = inverse(outer.T_body_inertial @ chain.T_outer)
+        shape = shapes.create(client, cache, outer.colliders, T_link_body, True, outer.collision_margin)
+        link_of[outer.index] = _append(
+            plan, outer, bodies[chain.inner], chain, shape, link_of, T_link_inertial, axes, dt
+        )
+        T_link_inertial[outer.index] = inverse(chain.T_outer)
+        start += _positions(scene, chain)
+    ends = {}
+    for closure in scene.closures:
+        if closure.inner in link_of and needs_link(scene, closure):
+            end, chain = _end(scene, bodies, closure)
+            ends[closure.joint] = _append(
+                plan, end, bodies[chain.inner], chain, shapes.NO_SHAPE, link_of, T_link_inertial, axes, dt
+            )
+            start += [0.0] * len(closure.free) + _positions(scene, chain)
+    T_world_inertial = scene.start.roots[root.index] @ root.T_body_inertial
     at = {
         "basePosition": T_world_inertial[:3, 3].tolist(),
         "baseOrientation": matrix_quaternion(T_world_inertial[:3, :3]).tolist(),
@@ -159,53 +189,104 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         flags=pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_MAINTAIN_LINK_ORDER,
         **at,
     )
-    tree = Tree(uid, uid if stand is None else stand, root.index, link_of, axes, root.static, plan.frames())
+    tree = Tree(
+        uid, uid if stand is None else stand, root.index, link_of, axes, root.static, plan.frames(), start, ends
+    )
     _set_dynamics(client, tree, plan, bodies)
+    tree.put_joints(client)
     return tree
 
 
 def _append(
     plan: _Plan,
-    client: int,
-    cache: CollisionCache,
     outer: Body,
-    joint: Joint,
-    inner: int,
+    inner: Body,
+    chain: Chain,
+    shape: int,
     link_of: dict[int, int],
     T_link_inertial: dict[int, Array],
     axes: list[tuple[int, int, Axis, float]],
     dt: float,
-) -> None:
-    """Add the links of one joint and the body it carries away from the root."""
-    forward = joint.parent == inner
-    T_inner_frame = joint.T_parent_a if forward else joint.T_child_b
-    T_outer_frame = joint.T_child_b if forward else joint.T_parent_a
-    free = axes_of(joint) or ()
-    steps = free if forward else tuple(axis.reversed() for axis in reversed(free))
-    T_parent_link = T_link_inertial[inner] @ T_inner_frame
-    parent = link_of[inner]
-    inertia = _inertia_on(outer, steps, dt)
-    for axis in steps[:-1]:
+) -> int:
+    """Add the links of one joint and of the body ``outer`` that it carries; the last of them."""
+    T_parent_link = T_link_inertial[chain.inner] @ chain.T_inner
+    parent = link_of[chain.inner]
+    inertia = _inertia_on(outer, chain.axes, dt)
+
+    def moved(axis: Axis) -> float:
+        if inner.static or outer.static or not axis.sprung:
+            return _effective(outer, inertia, axis, chain.T_outer)
+        frames = (chain.T_inner, chain.T_outer)
+        return moved_inertia(
+            (inner.mass, outer.mass), (inertia_of(inner), inertia), frames, chain.axes, chain.axes.index(axis)
+        )
+
+    for axis in chain.axes[:-1]:
         plan.masses.append(LIGHT * max(outer.mass, 1e-6))
         plan.inertias.append(np.full(3, LIGHT * max(float(inertia.max()), LEAST_INERTIA)))
         plan.shapes.append(shapes.NO_SHAPE)
         plan.add(parent, _joint_type(axis), axis.direction, T_parent_link, np.eye(4))
         parent = len(plan.masses) - 1
-        axes.append((parent, joint.index, axis, _effective(outer, inertia, axis, T_outer_frame)))
+        axes.append((parent, chain.joint, axis, moved(axis)))
         T_parent_link = np.eye(4)
-    T_own = inverse(T_outer_frame)
     plan.masses.append(outer.mass)
     plan.inertias.append(inertia)
-    T_link_body = T_own @ inverse(outer.T_body_inertial)
-    plan.shapes.append(shapes.create(client, cache, outer.colliders, T_link_body, True, outer.collision_margin))
-    last = steps[-1] if steps else None
+    plan.shapes.append(shape)
+    last = chain.axes[-1] if chain.axes else None
     type_ = pybullet.JOINT_FIXED if last is None else _joint_type(last)
     direction = np.array([0.0, 0.0, 1.0]) if last is None else last.direction
-    plan.add(parent, type_, direction, T_parent_link, T_own)
-    link_of[outer.index] = len(plan.masses) - 1
-    T_link_inertial[outer.index] = T_own
+    plan.add(parent, type_, direction, T_parent_link, inverse(chain.T_outer))
+    link = len(plan.masses) - 1
     if last is not None:
-        axes.append((link_of[outer.index], joint.index, last, _effective(outer, inertia, last, T_outer_frame)))
+        axes.append((link, chain.joint, last, moved(last)))
+    return link
+
+
+def _positions(scene: Scene, chain: Chain) -> list[float]:
+    """Where the axes of a joint start, in the order of its links."""
+    return [scene.start.coordinates[chain.joint][i] for i in chain.order]
+
+
+# --- the ends of closing joints -----------------------------------------------------------------
+
+
+def _end(scene: Scene, bodies: Sequence[Body], closure: Closure) -> tuple[Body, Chain]:
+    """What a closing joint carries, and the joint, free along what the other joints of its loop hold.
+
+    It carries its part of the outer body, which a weld holds to the rest; to a point-to-point joint, a point.
+    """
+    joint = scene.joints[closure.joint]
+    chain = chain_of(joint, joint.child == closure.outer)
+    chain = replace(chain, axes=(*closure.free, *chain.axes))
+    outer = bodies[closure.outer]
+    if not is_point(scene, closure):
+        return outer, chain
+    mass = POINT * outer.mass
+    ball = np.full(3, 0.4 * mass * 0.01**2)
+    return replace(outer, mass=mass, inertia=ball), replace(chain, T_outer=np.eye(4))
+
+
+def _shared_out(scene: Scene) -> list[Body]:
+    """The bodies, each with the part of its mass that the ends of closing joints leave to it."""
+    parts: dict[int, int] = {}
+    for closure in scene.closures:
+        if not is_point(scene, closure):
+            parts[closure.outer] = parts.get(closure.outer, 1) + 1
+    bodies = list(scene.bodies)
+    for index, count in parts.items():
+        body = bodies[index]
+        bodies[index] = replace(body, mass=body.mass / count, inertia=inertia_of(body) / count)
+    return bodies
+
+
+def is_point(scene: Scene, closure: Closure) -> bool:
+    """Whether a closing joint holds a point, not a frame."""
+    return scene.joints[closure.joint].type is JointType.P2P
+
+
+def needs_link(scene: Scene, closure: Closure) -> bool:
+    """Whether a closing joint moves along axes of its own; a point that is held in all directions does not."""
+    return not is_point(scene, closure) or len(closure.free) in (1, 2)
 
 
 def inertia_of(body: Body) -> Array:
@@ -218,7 +299,7 @@ def _inertia_on(body: Body, steps: Sequence[Axis], dt: float) -> Array:
     """`inertia_of` a body on the axes of its joint.
 
     Where the file leaves the inertia open it is large enough for the springs and dampers to act in full in
-    ticks of ``dt``; else they are capped (§15.4), and a tissue hole swings where its file says it is stiff.
+    ticks of ``dt``; else they are capped (§15.4), and a tissue hole swings where its file states it is stiff.
     """
     turning = [axis for axis in steps if not axis.prismatic]
     if not body.inertia_estimated or body.mass == 0.0 or not turning:
@@ -250,13 +331,13 @@ def is_alone(tree: Tree, bodies: tuple[Body, ...]) -> bool:
 
     Bullet's damping of multibodies has a quadratic part besides the linear one.
     """
-    return len(tree.link_of) == 1 and not bodies[tree.root].static
+    return not tree.frames and not bodies[tree.root].static
 
 
-def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: tuple[Body, ...]) -> None:
+def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: Sequence[Body]) -> None:
     root = bodies[tree.root]
     members = [bodies[index] for index in tree.link_of if not bodies[index].static]
-    alone = len(tree.link_of) == 1
+    alone = not tree.frames
     linear = 0.0 if alone else max((decay_rate(b.linear_damping) for b in members), default=0.0)
     angular = 0.0 if alone else max((decay_rate(b.angular_damping) for b in members), default=0.0)
     pybullet.changeDynamics(tree.uid, -1, linearDamping=linear, angularDamping=angular, physicsClientId=client)

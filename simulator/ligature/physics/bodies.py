@@ -132,6 +132,8 @@ class BodyControl:
             ticks = max(1, round(KICK_SECONDS / self._dt))
             self._kick = (self._kick * self._kick_ticks + _difference(target, known) / self._dt) / ticks
             self._kick_ticks = ticks
+            if self.type is not CommandType.POSITION:
+                self._last = None  # of an earlier pursuit: its slope would be a blow
         self.type, self.target = type_, target
 
     def apply(self) -> None:
@@ -156,13 +158,18 @@ class BodyControl:
         by_pose = self.type is CommandType.POSITION and body.controller.linear_output is not OutputType.FORCE
         return self.type is CommandType.VELOCITY or by_pose
 
-    def memory(self) -> tuple[int, Array, Array, int, Array | None]:
+    @property
+    def acts(self) -> bool:
+        """Whether the command does anything: a force of zero does not."""
+        return self.type is not CommandType.FORCE or bool(np.any(self.target))
+
+    def snapshot(self) -> tuple[int, Array, Array, int, Array | None]:
         """Everything that lasts from tick to tick."""
         return int(self.type), self.target.copy(), self._kick.copy(), self._kick_ticks, self._last
 
-    def recall(self, memory: tuple[int, Array, Array, int, Array | None]) -> None:
-        """Continue from `memory`."""
-        type_, self.target, self._kick, self._kick_ticks, self._last = memory
+    def restore(self, snapshot: tuple[int, Array, Array, int, Array | None]) -> None:
+        """Continue from `snapshot`."""
+        type_, self.target, self._kick, self._kick_ticks, self._last = snapshot
         self.type = CommandType(type_)
 
     def _pose(self) -> Array:

@@ -1,95 +1,85 @@
-"""Joints that no tree holds: loops and point-to-point joints, as Bullet constraints.
+"""Joints that no tree holds, as Bullet constraints.
 
-A revolute loop is held by two points on its axis; pivots are given in the inertial frames.
+Bullet has no constraint for most types of joints between trees. So a closing joint is built as any other, on the tree
+of its inner body, and carries a part of its outer body, which is welded to the rest of that: limits, motors, springs
+and reported positions are those of joints of trees. A point-to-point joint is a constraint of points.
+
+A weld holds what the start of the scene holds, so that nothing is torn then. Along what the other joints of a loop
+hold differently, in spite of corrected frames (`ligature.model.assembly`), the closing joint is free.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from ligature.adf import Diagnostic, Severity
-from ligature.model.frames import matrix_quaternion
-from ligature.model.scene import Joint, JointType, Scene
+from ligature.model.frames import inverse, matrix_quaternion, pose7_matrix
+from ligature.model.mechanism import Chain, chain_of
+from ligature.model.scene import Closure, Scene
+from ligature.physics.articulation import Tree, is_point, needs_link
 from ligature.physics.bodies import Placement
+from ligature.physics.motions import Motions
 
 Array = NDArray[np.float64]
 
 MAX_FORCE = 1e5
 """Force in newtons that a closure may use; enough for any arm, finite so that a jam does not explode."""
 
-HALF_AXIS = 0.05
-"""Distance in metres from the pivot of the two points that hold an axis."""
-
 
 class Closures:
-    """The constraints of a scene's loops."""
+    """The constraints of a scene's loops, made where the scene starts."""
 
     def __init__(
-        self,
-        client: int,
-        scene: Scene,
-        place_of: Mapping[int, Placement],
-        report: Callable[[Diagnostic], None],
+        self, client: int, scene: Scene, trees: Sequence[Tree], place_of: Mapping[int, Placement], motions: Motions
     ) -> None:
-        self._client = client
-        self._place_of = place_of
-        self._report = report
+        self._client, self._scene, self._trees = client, scene, trees
+        self._place_of, self._motions = place_of, motions
         self.ids: list[int] = []
-        for index in scene.loops:
-            joint = scene.joints[index]
-            if joint.parent in place_of and joint.child in place_of:
-                self._hold(joint)
+        motions.forget_all()
+        for closure in scene.closures:
+            if needs_link(scene, closure):
+                self._hold_end(closure)
+            elif not closure.free:
+                self._hold_point(closure)
 
-    def _hold(self, joint: Joint) -> None:
-        T_a, T_b = joint.T_parent_a, joint.T_child_b
-        if joint.type is JointType.P2P:
-            self._point(joint, T_a[:3, 3], T_b[:3, 3])
-        elif joint.type is JointType.REVOLUTE:
-            for side in (HALF_AXIS, -HALF_AXIS):
-                self._point(joint, T_a[:3, 3] + side * T_a[:3, 2], T_b[:3, 3] + side * T_b[:3, 2])
-        elif joint.type is JointType.FIXED:
-            self._frames(joint, pybullet.JOINT_FIXED, np.zeros(3))
-        elif joint.type is JointType.PRISMATIC:
-            self._frames(joint, pybullet.JOINT_PRISMATIC, np.array([1.0, 0.0, 0.0]))
-        else:
-            message = f"joint '{joint.identity.key}' closes a loop; a '{joint.type.value}' joint cannot do that here"
-            self._report(
-                Diagnostic(
-                    Severity.WARNING,
-                    message,
-                    joint.identity.mark,
-                    "its bodies stay apart; use revolute or p2p",
-                    "loop",
-                )
-            )
+    def _hold_end(self, closure: Closure) -> None:
+        """Join the end of a closing joint to its outer body."""
+        inner, outer = self._place_of[closure.inner], self._place_of[closure.outer]
+        tree = self._trees[inner.tree]
+        link = tree.ends[closure.joint]
+        self._motions.links(inner.tree)
+        T_world_link = pose7_matrix(self._motions.pose[self._motions.row(inner.tree, link)])
+        point = is_point(self._scene, closure)
+        # at the joint: a force there does not turn the light end about its axis, so that the solver's rows agree
+        T_link_end = np.eye(4) if point else self._chain(closure).T_outer
+        T_outer_end = inverse(self._frame(closure.outer)) @ T_world_link @ T_link_end
+        kind = pybullet.JOINT_POINT2POINT if point else pybullet.JOINT_FIXED
+        self._create(kind, (tree.uid, link), (outer.uid, outer.link), T_link_end, T_outer_end)
 
-    def _point(self, joint: Joint, on_parent: Array, on_child: Array) -> None:
-        self._create(joint, pybullet.JOINT_POINT2POINT, np.zeros(3), on_parent, on_child, {})
+    def _hold_point(self, closure: Closure) -> None:
+        inner, outer = self._place_of[closure.inner], self._place_of[closure.outer]
+        T_inner = self._chain(closure).T_inner
+        T_outer_end = inverse(self._frame(closure.outer)) @ self._frame(closure.inner) @ T_inner
+        self._create(pybullet.JOINT_POINT2POINT, (inner.uid, inner.link), (outer.uid, outer.link), T_inner, T_outer_end)
 
-    def _frames(self, joint: Joint, type_: int, axis: Array) -> None:
-        orientations = {
-            "parentFrameOrientation": matrix_quaternion(joint.T_parent_a[:3, :3]).tolist(),
-            "childFrameOrientation": matrix_quaternion(joint.T_child_b[:3, :3]).tolist(),
-        }
-        self._create(joint, type_, axis, joint.T_parent_a[:3, 3], joint.T_child_b[:3, 3], orientations)
+    def _chain(self, closure: Closure) -> Chain:
+        joint = self._scene.joints[closure.joint]
+        return chain_of(joint, joint.child == closure.outer)
 
-    def _create(
-        self,
-        joint: Joint,
-        type_: int,
-        axis: Array,
-        on_parent: Array,
-        on_child: Array,
-        more: dict[str, list[float]],
-    ) -> None:
-        parent, child = self._place_of[joint.parent], self._place_of[joint.child]
+    def _frame(self, body: int) -> Array:
+        """Inertial frame (4, 4) of a body in the world."""
+        pose, twist = np.empty(7), np.empty(6)
+        self._place_of[body].read_inertial(pose, twist)
+        return pose7_matrix(pose)
+
+    def _create(self, kind: int, one: tuple[int, int], other: tuple[int, int], T_one: Array, T_other: Array) -> None:
         constraint = pybullet.createConstraint(
-            parent.uid, parent.link, child.uid, child.link, type_, axis.tolist(), on_parent.tolist(),
-            on_child.tolist(), physicsClientId=self._client, **more,
+            *one, *other, kind, [0.0] * 3, T_one[:3, 3].tolist(), T_other[:3, 3].tolist(),
+            matrix_quaternion(T_one[:3, :3]).tolist(), matrix_quaternion(T_other[:3, :3]).tolist(),
+            physicsClientId=self._client,
         )  # fmt: skip
         pybullet.changeConstraint(constraint, maxForce=MAX_FORCE, physicsClientId=self._client)
         self.ids.append(int(constraint))

@@ -8,15 +8,18 @@ does, a D near 1 chatters at the rate of the loop; the implicit form is the same
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pybullet
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.commands import CommandType
 from ligature.model.scene import Joint, JointType, OutputType
+from ligature.model.subsystem import kept, put_back
 from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
 from ligature.physics.motions import Motions
 
@@ -52,10 +55,11 @@ MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 
 
-@njit(cache=True)
+@compiled
 def outputs(
     mode: Integers, force_output: Flags, turns: Flags, sprung: Flags, p: Array, i: Array, d: Array,
-    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, fastest: Array, hardest: Array,
+    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, max_velocity: Array,
+    max_deceleration: Array,
     position: Array, velocity: Array, dt: float,
     integral: Array, last_error: Array, kick: Array, kick_ticks: Integers, motor: Array, effort: Array,
 ) -> None:  # fmt: skip
@@ -79,8 +83,8 @@ def outputs(
             last_error[k] = error
         elif mode[k] == SERVO:
             error = target[k] - position[k]
-            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * hardest[k] * abs(error)))
-            motor[k] = min(max(pace[k] + np.copysign(closing, error), -fastest[k]), fastest[k])
+            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * max_deceleration[k] * abs(error)))
+            motor[k] = min(max(pace[k] + np.copysign(closing, error), -max_velocity[k]), max_velocity[k])
         elif mode[k] == VELOCITY:
             motor[k] = target[k]
         elif mode[k] == FORCE:
@@ -97,6 +101,7 @@ class TreeControl:
     ) -> None:
         self._client, self.tree, self._dt = client, tree, dt
         self._motions, self._index = motions, index
+        self._anchor = tree.root if tree.static else -1
         owners = [joints[joint] for _, joint, _, _ in tree.axes]
         self.links = [link for link, *_ in tree.axes]
         self.row = {joint: i for i, (_, joint, _, _) in enumerate(tree.axes)}
@@ -112,13 +117,13 @@ class TreeControl:
             [j.type is JointType.REVOLUTE and a.low is None for j, (_, _, a, _) in zip(owners, tree.axes, strict=True)],
             dtype=bool,
         )
-        self._spring_setup()
+        self._spring_setup(owners)
         self.mode = np.full(n, FREE)
         self.target = np.zeros(n)
         self._pace = np.zeros(n)
-        self._fastest = np.full(n, np.inf)
-        self._hardest = np.full(n, np.inf)
-        self._give = np.zeros(n)
+        self._max_velocity = np.full(n, np.inf)
+        self._max_deceleration = np.full(n, np.inf)
+        self._yield_stiffness = np.zeros(n)
         self.owned = np.zeros(n, dtype=bool)
         self._integral = np.zeros(n)
         self._last_error = np.zeros(n)
@@ -133,19 +138,32 @@ class TreeControl:
         self.position, self.velocity = motions.position[rows], motions.velocity[rows]
         self._sort()
 
-    def _spring_setup(self) -> None:
+    def _spring_setup(self, owners: list[Joint]) -> None:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
         axes = [axis for _, _, axis, _ in self.tree.axes]
         moved = np.array([m for *_, m in self.tree.axes])
+        crowd = self._crowding(owners)
         self._stiffness = np.minimum([a.stiffness for a in axes], moved / (STIFFEST * self._dt**2))
-        self._damping = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / self._dt)
+        self._damping = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / (crowd * self._dt))
         self._rest = np.array([a.rest for a in axes])
         self._sprung = np.array([a.sprung for a in axes], dtype=bool)
+
+    def _crowding(self, owners: list[Joint]) -> Array:
+        """Number (n,) of sprung joints that share a body with that of each axis: their dampers act together."""
+        sprung = {j.index: j for j, (_, _, axis, _) in zip(owners, self.tree.axes, strict=True) if axis.sprung}
+        at = Counter(body for j in sprung.values() for body in {j.parent, j.child} - {self._anchor})
+        return np.array([max(1, at[j.parent], at[j.child]) for j in owners], dtype=float)
 
     @property
     def active(self) -> bool:
         """Whether anything has to be done each tick."""
         return bool(self._driven or self._pushed)
+
+    @property
+    def commanded(self) -> bool:
+        """Whether a client commands a joint: an arm has its own limits of speed."""
+        pushed = (self.mode == FORCE) & (self.target != 0.0)
+        return bool((pushed | (self.mode == POSITION) | (self.mode == VELOCITY)).any())
 
     def command(self, joint: Joint, type_: CommandType, value: float) -> None:
         """Take a command for one joint; a position command of a sprung or disabled joint has no effect.
@@ -164,6 +182,10 @@ class TreeControl:
         if type_ is CommandType.VELOCITY:
             self._switch(row, VELOCITY, value)
             return
+        self._aim(row, value)
+
+    def _aim(self, row: int, value: float) -> None:
+        """Take a position command for one axis."""
         value = min(max(value, self._low[row]), self._high[row])
         if self.mode[row] != POSITION:
             self._motions.joints(self._index)
@@ -181,18 +203,29 @@ class TreeControl:
             self._kick_ticks[row] = ticks
 
     def servo(
-        self, rows: Integers, position: Array, velocity: Array, fastest: Array, hardest: Array, give: Array
+        self,
+        rows: Integers,
+        position: Array,
+        velocity: Array,
+        max_velocity: Array,
+        max_deceleration: Array,
+        yield_stiffness: Array,
     ) -> None:
         """Have the axes ``rows`` (k,) follow set-points that move with ``velocity``.
 
-        They do so at most at the speed ``fastest``, and brake with ``hardest``, so that a step does not overshoot.
-        ``give`` (k,) is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is as strong as the motor.
+        They do so at most at the speed ``max_velocity``, and brake with ``max_deceleration``, so that a step does not
+        overshoot. ``yield_stiffness`` (k,) is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is
+        as strong as the motor.
         """
         self.owned[rows] = True
         self.target[rows] = position
         self._pace[rows] = velocity
         if (self.mode[rows] != SERVO).any():
-            self._fastest[rows], self._hardest[rows], self._give[rows] = fastest, hardest, give
+            self._max_velocity[rows], self._max_deceleration[rows], self._yield_stiffness[rows] = (
+                max_velocity,
+                max_deceleration,
+                yield_stiffness,
+            )
             self._enter(rows, SERVO)
 
     def push(self, rows: Integers, effort: Array) -> None:
@@ -248,7 +281,7 @@ class TreeControl:
         """Effort that the command of one joint asks for, were the joint stopped where it is.
 
         A motor with a set-point pulls in proportion to its following error, with ``stiffness`` (N·m/rad, N/m)
-        unless it was told how it gives; one with a velocity pulls with all its strength.
+        unless it has a yield stiffness; one with a velocity pulls with all its strength.
         """
         row = self.row[joint]
         mode, behind = self.mode[row], self._way(row, self.target[row] - self.position[row])
@@ -257,7 +290,7 @@ class TreeControl:
         if mode == VELOCITY:
             return float(np.sign(self.target[row]) * self._strength[row])
         if mode == SERVO:
-            return float((self._give[row] or stiffness) * behind)
+            return float((self._yield_stiffness[row] or stiffness) * behind)
         if mode == POSITION:
             return float(self._effort[row] if self._force_output[row] else stiffness * behind)
         return 0.0
@@ -296,12 +329,13 @@ class TreeControl:
         self._motions.joints(self._index)
         outputs(
             self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
-            self._damping, self._rest, self.target, self._pace, self._fastest, self._hardest, self.position,
+            self._damping, self._rest, self.target, self._pace, self._max_velocity,
+            self._max_deceleration, self.position,
             self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor,
             self._effort,
         )  # fmt: skip
         if self._laden:
-            self._motions.weigh(self._index)
+            self._motions.apply_gravity(self._index)
         for row, (low, high, _) in self._slowed.items():
             wanted = np.sign(self.target[row]) * FREE_SPEED if self.mode[row] == FORCE else self._motor[row]
             self._motor[row] = min(max(wanted, low), high)
@@ -327,13 +361,13 @@ class TreeControl:
 
     def _strengths(self) -> list[float]:
         """Largest effort of each driven motor; one that gives pulls in proportion to its following error."""
-        if not (self._giving or self._slowed):
+        if not (self._yields or self._slowed):
             return self._driven_strength
         rows = self._driven
-        spring = self._give[rows] * np.abs(self.target[rows] - self.position[rows])
+        spring = self._yield_stiffness[rows] * np.abs(self.target[rows] - self.position[rows])
         strength = self._strength[rows]
-        giving = np.minimum(spring + GIVING_FRICTION, strength)
-        limits = np.where(self._give[rows] > 0.0, giving, strength)
+        yielding = np.minimum(spring + GIVING_FRICTION, strength)
+        limits = np.where(self._yield_stiffness[rows] > 0.0, yielding, strength)
         for i, row in enumerate(rows):
             if row in self._slowed:
                 low, high, most = self._slowed[row]
@@ -360,21 +394,31 @@ class TreeControl:
         self._driven_links = [self.links[row] for row in self._driven]
         self._driven_strength = self._strength[self._driven].tolist()
         self._pushed_links = [self.links[row] for row in self._pushed]
-        self._giving = bool((self._give[self._driven] > 0.0).any())
+        self._yields = bool((self._yield_stiffness[self._driven] > 0.0).any())
 
-    def memory(self) -> dict[str, Array]:
-        """Everything that lasts from tick to tick, for snapshots."""
-        return {
-            name: np.array(getattr(self, name))
-            for name in (
-                "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_fastest",
-                "_hardest", "_give", "owned",
-            )
-        }  # fmt: skip
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        return kept(self, _KEPT)
 
-    def recall(self, memory: dict[str, Array]) -> None:
-        """Continue from `memory`."""
-        for name, value in memory.items():
-            setattr(self, name, value.copy())
-        self._driven = []
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot` in a new Bullet world."""
+        put_back(self, snapshot)
         self._sort()
+
+    def follow(self, before: TreeControl) -> None:
+        """Take the commands of ``before``, the same axes in an earlier world, as if they came now."""
+        for name in ("target", "_pace", "_max_velocity", "_max_deceleration", "_yield_stiffness", "owned"):
+            getattr(self, name)[:] = getattr(before, name)
+        aimed = before.mode == POSITION
+        self.mode[~aimed] = before.mode[~aimed]
+        for row in np.flatnonzero(aimed).tolist():
+            self._aim(row, float(before.target[row]))
+        self._sort()
+
+
+_KEPT = (
+    "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",
+    "_yield_stiffness",
+    "owned", "_stops", "_slowed",
+)  # fmt: skip
+"""Attributes of a `TreeControl` that last from tick to tick."""

@@ -30,9 +30,16 @@ class Drive:
         Stiffness in N·m/rad with which the motors yield to a load; 0 is as strong as they are.
     """
 
-    def __init__(self, world: World, joints: Sequence[int], fastest: Array, hardest: Array, give: float) -> None:
-        self._world, self._joints, self._fastest, self._hardest = world, tuple(joints), fastest, hardest
-        self._give = np.full(len(joints), give)
+    def __init__(
+        self, world: World, joints: Sequence[int], max_velocity: Array, max_deceleration: Array, yield_stiffness: float
+    ) -> None:
+        self._world, self._joints, self._max_velocity, self._max_deceleration = (
+            world,
+            tuple(joints),
+            max_velocity,
+            max_deceleration,
+        )
+        self._yield_stiffness = np.full(len(joints), yield_stiffness)
         control = self._control
         self._rows = np.array([control.row[joint] for joint in self._joints], dtype=np.int64)
 
@@ -46,7 +53,9 @@ class Drive:
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Follow set-points that move with ``velocity``."""
-        self._control.servo(self._rows, position, velocity, self._fastest, self._hardest, self._give)
+        self._control.servo(
+            self._rows, position, velocity, self._max_velocity, self._max_deceleration, self._yield_stiffness
+        )
 
     def push(self, effort: Array) -> None:
         """Drive the joints with efforts."""
@@ -63,8 +72,8 @@ class Drive:
     def reset(self) -> None:
         """Nothing: the joints belong to the physics, which put them back."""
 
-    def memory(self) -> None:
+    def snapshot(self) -> None:
         """Nothing: it is part of the physics."""
 
-    def recall(self, memory: None) -> None:
+    def restore(self, snapshot: None) -> None:
         """Nothing."""

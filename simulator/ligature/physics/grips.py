@@ -5,7 +5,7 @@ Mixed into `World`. World axes, SI units.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,15 +19,15 @@ from ligature.physics.control import FREE, TreeControl
 
 Array = NDArray[np.float64]
 
-LEAST_HELD_MASS = 0.05
+MIN_HELD_MASS = 0.05
 """Mass in kg that a held body has at least towards forces; its weight stays its own, the rest moves as the holder.
 
 What holds it is an arm of kilograms. A needle of 0.1 g between stiff pads and a taut thread would be thrown
 from one to the other within a tick: a force F meets the next reaction only after F dt²/m, 11 mm for 1 N.
 """
 
-LEAST_LED_MASS = 0.5
-"""The same of a body that a command leads by setting its velocity anew each tick: that of the challenge's needle.
+MIN_COMMANDED_MASS = 0.5
+"""The same of a body that a command drives by setting its velocity anew each tick: that of the challenge's needle.
 
 It pushes with the momentum that it has: one of 0.1 g with 3 mN at 30 mm/s, and does not part the rim of a hole.
 """
@@ -47,7 +47,7 @@ class Gaps:
 class BulletGrips:
     """The part of a `World` that grasping needs.
 
-    ``clamped`` are fingers whose joints are stopped while they hold a thread: it cannot move them.
+    ``stopped_fingers`` are fingers whose joints are stopped while they hold a thread: it cannot move them.
     """
 
     scene: Scene
@@ -66,8 +66,9 @@ class BulletGrips:
 
     def _setup_grips(self) -> None:
         self._free_bodies = {tree.root for tree in self.trees if is_alone(tree, self.scene.bodies)}
-        self._burdens: dict[int, tuple[Placement, Array]] = {}
-        self.clamped: set[int] = set()
+        self._attached_loads: dict[int, tuple[Placement, Array]] = {}
+        self.stopped_fingers: set[int] = set()
+        self._passing: set[tuple[int, int]] = set()
         self._held_up: dict[int, int] = {}
         self._gripped: dict[int, int] = {}
 
@@ -92,8 +93,9 @@ class BulletGrips:
         rows = sorted((row[8], row[5], row[7]) for row in found)
         return Gaps(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
 
-    def let_pass(self, body: int, other: int, passes: bool) -> None:
+    def disable_collision(self, body: int, other: int, passes: bool) -> None:
         """Switch contacts between two bodies off, or on again unless the scene has them off."""
+        (self._passing.add if passes else self._passing.discard)((body, other))
         a, b = self.place_of[body], self.place_of[other]
         touch = not passes and other not in self.scene.bodies[body].no_collision_with
         pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(touch), physicsClientId=self.client)
@@ -143,15 +145,15 @@ class BulletGrips:
             if counts[body] == 0:
                 del counts[body]
         if gripped and body in self._free_bodies:
-            self._weigh(body)
+            self._update_mass(body)
 
-    def _weigh(self, body: int) -> None:
+    def _update_mass(self, body: int) -> None:
         """Give Bullet the mass that a body pushes with, and note by what the weight of that is off.
 
-        What is held has its own weight, what is led falls as before: its command makes up for that.
+        What is held has its own weight, what is driven falls as before: its command makes up for that.
         """
         place, led = self.place_of[body], self.driven(body)
-        least = LEAST_LED_MASS if led else LEAST_HELD_MASS if body in self._gripped else 0.0
+        least = MIN_COMMANDED_MASS if led else MIN_HELD_MASS if body in self._gripped else 0.0
         mass, inertia = self._at_least(least, body)
         pybullet.changeDynamics(
             place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self.client
@@ -159,14 +161,14 @@ class BulletGrips:
         extra = mass - place.body.mass
         if extra > 0.0:
             fall = place.body.gravity if led else np.zeros(3)
-            self._burdens[body] = place, extra * (fall - self._world_gravity)
+            self._attached_loads[body] = place, extra * (fall - self._world_gravity)
         else:
-            self._burdens.pop(body, None)
+            self._attached_loads.pop(body, None)
 
     def mass_of(self, body: int) -> tuple[float, Array]:
         """Mass and principal moments (3,) by which a body resists forces now."""
         held = body in self._free_bodies and self.is_held(body)
-        return self._at_least(LEAST_HELD_MASS if held else 0.0, body)
+        return self._at_least(MIN_HELD_MASS if held else 0.0, body)
 
     def _at_least(self, mass: float, body: int) -> tuple[float, Array]:
         """Mass and principal moments (3,) of a body, scaled up to ``mass``."""
@@ -174,11 +176,11 @@ class BulletGrips:
         scale = mass / described.mass if mass > described.mass else 1.0
         return scale * described.mass, scale * inertia_of(described)
 
-    def _led_anew(self, body: int, before: bool) -> None:
-        """Have a light free body push as firmly as what leads it, since a command that leads it came or went."""
-        light = body in self._free_bodies and self.scene.bodies[body].mass < LEAST_LED_MASS
+    def _update_commanded(self, body: int, before: bool) -> None:
+        """Have a light free body push as firmly as what drives it, since a command that drives it came or went."""
+        light = body in self._free_bodies and self.scene.bodies[body].mass < MIN_COMMANDED_MASS
         if light and self.driven(body) != before:
-            self._weigh(body)
+            self._update_mass(body)
 
     def is_held(self, body: int) -> bool:
         """Whether something holds a body."""
@@ -186,17 +188,22 @@ class BulletGrips:
 
     def carry(self, body: int, wrench: Array) -> None:
         """Move the added mass of a body along with its holders, which takes ``wrench`` (6,) in the coming tick."""
-        if body in self._burdens:
-            self._burdens[body][0].load(wrench.tolist())
+        if body in self._attached_loads:
+            self._attached_loads[body][0].load(wrench.tolist())
 
-    def _carry_burdens(self) -> None:
+    def _apply_attached_loads(self) -> None:
         """Take the weight of added mass off again, for the coming tick."""
-        for place, lift in self._burdens.values():
+        for place, lift in self._attached_loads.values():
             place.push(lift)
 
-    def _hold_up_again(self, held_up: Mapping[int, int], gripped: Mapping[int, int]) -> None:
-        """Take up the counts of `hold_up` after a rebuild."""
-        self._held_up, self._gripped = dict(held_up), dict(gripped)
-        for body in self._gripped:
-            if body in self._free_bodies:
-                self._weigh(body)
+    def _weigh_again(self) -> None:
+        """Give a new Bullet world the masses of bodies that are gripped, or driven by commands."""
+        for body in sorted(self._free_bodies):
+            light = self.scene.bodies[body].mass < MIN_COMMANDED_MASS
+            if body in self._gripped or (light and self.driven(body)):
+                self._update_mass(body)
+
+    def _part_again(self) -> None:
+        """Switch off the contacts in a new Bullet world that `disable_collision` switched off."""
+        for body, other in sorted(self._passing):
+            self.disable_collision(body, other, True)

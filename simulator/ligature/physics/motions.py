@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import pybullet
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.poses import compose
 from ligature.physics.articulation import Tree
 
@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 _TURNS, _SLIDES = int(pybullet.JOINT_REVOLUTE), int(pybullet.JOINT_PRISMATIC)
 
 
-@njit(cache=True)
+@compiled
 def _follow(
     begin: int, end: int, rows: Integers, fixed: Array, joints: Array, frame: Array, speed: Array, pose: Array,
     twist: Array,
@@ -62,7 +62,7 @@ def _follow(
         _carried(v, pose[r, 0] - f[0], pose[r, 1] - f[1], pose[r, 2] - f[2], twist[r])
 
 
-@njit(cache=True)
+@compiled
 def _turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float, float]:
     """The vector p, given in the frame ``pose``, in world axes."""
     x, y, z, w = pose[3], pose[4], pose[5], pose[6]
@@ -70,7 +70,7 @@ def _turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float,
     return px + 2.0 * (y * cz - z * cy), py + 2.0 * (z * cx - x * cz), pz + 2.0 * (x * cy - y * cx)
 
 
-@njit(cache=True)
+@compiled
 def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     """The velocity ``twist`` (6,) at a point that lies r off."""
     wx, wy, wz = twist[3], twist[4], twist[5]
@@ -80,8 +80,8 @@ def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     out[3], out[4], out[5] = wx, wy, wz
 
 
-@njit(cache=True)
-def _weigh(
+@compiled
+def _apply_gravity(
     begin: int, end: int, rows: Integers, fixed: Array, frame: Array, pose: Array, force: Array, load: Array,
     effort: Array,
 ) -> None:  # fmt: skip
@@ -110,6 +110,18 @@ def _weigh(
             load[p, a] += load[r, a]
 
 
+@compiled
+def _below(twist: Array, rows: Integers, velocity: Array, limit: float) -> bool:
+    """Whether ``rows`` of ``twist`` (r, 6) and all of ``velocity`` (a,) are finite and below ``limit``."""
+    sound = True
+    for row in rows:
+        for a in range(6):
+            sound = sound and abs(twist[row, a]) < limit
+    for a in range(velocity.shape[0]):
+        sound = sound and abs(velocity[a]) < limit
+    return sound
+
+
 class Motions:
     """Motion of everything in one Bullet world.
 
@@ -122,12 +134,12 @@ class Motions:
         (r, 7) and (r, 6) of all rows.
     position, velocity, effort
         (a,) of all single axes of all trees.
-    told
+    reported
         Efforts of axes, by index, for which Bullet's motor is not the drive: what is reported instead.
     push
         (a,) efforts that the controllers apply in the coming tick.
     force
-        (r, 3) forces at the centres of mass, for `weigh`.
+        (r, 3) forces at the centres of mass, for `apply_gravity`.
     reaction
         (a, 6) force and moment that the joints of these axes carry, where Bullet measures them.
     """
@@ -136,6 +148,7 @@ class Motions:
         self._client = client
         counts = [1 + len(tree.frames) for tree in trees]
         self._begin = np.cumsum([0, *counts]).tolist()
+        self._bases_at = np.array(self._begin[:-1], dtype=np.int64)
         axes = np.cumsum([0, *(len(tree.axes) for tree in trees)]).tolist()
         self.slices = [slice(a, b) for a, b in zip(axes[:-1], axes[1:], strict=True)]
         self._links = [[link for link, *_ in tree.axes] for tree in trees]
@@ -155,6 +168,8 @@ class Motions:
         self._uids = [tree.uid for tree in trees]
         self._still = {k for k, tree in enumerate(trees) if tree.static}
         self._rigid = {k for k, tree in enumerate(trees) if not tree.axes}
+        self._going = [k for k in range(len(trees)) if k not in self._still]
+        self._turning = [k for k in range(len(trees)) if k not in self._rigid]
         self._bases: set[int] = set()
         self._paces: set[int] = set()
         self._jointed: set[int] = set()
@@ -174,10 +189,11 @@ class Motions:
         """Row of a link; -1 is the base."""
         return int(self._begin[tree] + 1 + link)
 
-    def weigh(self, tree: int) -> None:
+    def apply_gravity(self, tree: int) -> None:
         """Add what `force` does to the joints of a tree to `push`."""
         self.links(tree)
-        _weigh(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._frame, self.pose, self.force,
+        _apply_gravity(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._frame,
+            self.pose, self.force,
                self._load, self.push)  # fmt: skip
 
     def measure(self, tree: int) -> None:
@@ -195,11 +211,20 @@ class Motions:
         """A tree was put elsewhere."""
         for known in (self._bases, self._paces, self._jointed, self._linked):
             known.discard(tree)
+        if tree in self._still:
+            self._read_still(tree)
+
+    def _read_still(self, tree: int) -> None:
+        """Read a base that stays, now: Bullet turns it by a last bit in every tick."""
+        self.base(tree)
+        self.pace(tree)
 
     def forget_all(self) -> None:
         """Everything was put elsewhere."""
         for known in (self._bases, self._paces, self._jointed, self._linked):
             known.clear()
+        for tree in sorted(self._still):
+            self._read_still(tree)
 
     def base(self, tree: int) -> None:
         """Bring the pose of the base up to date."""
@@ -244,9 +269,13 @@ class Motions:
         for tree in range(len(self._uids)):
             self.links(tree)
 
-    def slower_than(self, limit: float) -> bool:
-        """Whether all velocities are finite and below ``limit``."""
-        return bool((np.abs(self.twist) < limit).all() and (np.abs(self.velocity) < limit).all())
+    def sound(self, limit: float) -> bool:
+        """Whether the velocities of all bases and joints are finite and below ``limit``."""
+        for tree in self._going:
+            self.pace(tree)
+        for tree in self._turning:
+            self.joints(tree)
+        return bool(_below(self.twist, self._bases_at, self.velocity, limit))
 
     def speeds(self, tree: int) -> list[float]:
         """Velocities of a tree's base and joints."""

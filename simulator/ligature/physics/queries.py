@@ -68,18 +68,22 @@ class BulletQueries:
         self._probes.append(uid)
         return len(self._probes) - 1
 
-    def probe_overlaps(self, probe: int, pose: Array, bodies: Sequence[int]) -> list[int]:
-        """Those of ``bodies`` that penetrate the probe when it stands at ``pose`` (7,)."""
+    def probe_gaps(self, probe: int, pose: Array, bodies: Sequence[int], within: float) -> list[float]:
+        """Distance of each of ``bodies`` from the probe at ``pose`` (7,), negative where they overlap.
+
+        ``within`` stands for all that is farther.
+        """
         uid = self._probes[probe]
         pybullet.resetBasePositionAndOrientation(uid, pose[:3].tolist(), pose[3:].tolist(), physicsClientId=self.client)
-        found = []
+        gaps = []
         for body in bodies:
-            place = self.place_of.get(body)
-            if place is None:
-                continue
-            if pybullet.getClosestPoints(uid, place.uid, 0.0, -1, place.link, physicsClientId=self.client):
-                found.append(body)
-        return found
+            place, gap = self.place_of.get(body), within
+            if place is not None:
+                at = (uid, place.uid, within, -1, place.link)
+                for point in pybullet.getClosestPoints(*at, physicsClientId=self.client) or ():
+                    gap = min(gap, float(point[8]))
+            gaps.append(gap)
+        return gaps
 
     def ray_test(self, starts: Array, ends: Array) -> RayHits:
         """Closest hits of the segments ``starts`` to ``ends``, each (n, 3)."""

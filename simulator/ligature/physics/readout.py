@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pybullet
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.poses import compose_rows
 from ligature.model.scene import JointType, Scene
 from ligature.model.state import StateRecord
@@ -24,7 +24,7 @@ _REPORTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.LINEAR_SPRING, J
 """Joints whose position is reported; all others report 0 (ADF specification §15.5)."""
 
 
-@njit(cache=True)
+@compiled
 def _write_joints(
     joints: Integers, axes: Integers, turns: Flags, feedback: Flags, q: Array, qd: Array, tau: Array,
     position: Array, velocity: Array, effort: Array,
@@ -65,9 +65,9 @@ class Readout:
         self._axes = np.array([row for row, _ in reported.values()], dtype=np.int64)
         self._turns = np.array([joint.type is JointType.REVOLUTE for _, joint in reported.values()], dtype=bool)
         self._feedback = np.array([joint.feedback for _, joint in reported.values()], dtype=bool)
-        measured = [(joint.child, row) for row, _, _, joint in axes if joint.feedback]
-        self._loaded = np.array([child for child, _ in measured], dtype=np.int64)
-        self._measured = np.array([row for _, row in measured], dtype=np.int64)
+        measured = {joint.index: (joint.child, row) for row, _, _, joint in axes if joint.feedback}
+        self._loaded = np.array([child for child, _ in measured.values()], dtype=np.int64)
+        self._measured = np.array([row for _, row in measured.values()], dtype=np.int64)
         for _, link, tree, joint in axes:
             if joint.feedback:
                 motions.measure(tree)

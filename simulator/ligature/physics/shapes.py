@@ -95,4 +95,4 @@ def hull_points(shape: Cone | Hull | TriMesh) -> list[Array]:
         base = shape.radius * np.column_stack([np.cos(angles), np.sin(angles)])
         ring = np.column_stack([base, np.full(CONE_FACETS, -shape.height / 2)])
         return [np.vstack([ring, [0.0, 0.0, shape.height / 2]])]
-    return convex_pieces(shape.vertices, shape.faces)
+    return convex_pieces(shape.vertices, shape.faces, shape.source)

@@ -7,6 +7,7 @@ world axes, twists are linear at the centre of mass, then angular, in world axes
 from __future__ import annotations
 
 import weakref
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,6 +21,7 @@ from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Body, Scene
 from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem, kept, put_back
 from ligature.physics.articulation import Tree, build, inertia_of, is_alone
 from ligature.physics.bodies import BodyControl, Placement
 from ligature.physics.closures import Closures
@@ -29,6 +31,7 @@ from ligature.physics.gravity import common_gravity, gravity_lifts
 from ligature.physics.grips import BulletGrips
 from ligature.physics.mobility import mobility
 from ligature.physics.motions import Motions
+from ligature.physics.parting import Parting
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
 
@@ -36,6 +39,9 @@ Array = NDArray[np.float64]
 
 SOLVER_ITERATIONS = 50
 """With 10, a step on the base of an arm shakes its jaws by 0.06 rad; contacts at rest cost the same."""
+
+LOOP_ITERATIONS = 200
+"""The same where loops close: with 50, links of grams beside ones of kilograms part by 2 mm, with 200 by 0.1 mm."""
 
 CLOSING = 0.8
 """Part of a loop's gap that is closed within a tick; Bullet's 0.2 lets a swinging linkage open by 0.5 mm."""
@@ -46,11 +52,46 @@ NEAR = 0.002
 IMMOVABLE = 1e6
 """Mass in kg, and inertia, that no thread or tissue moves in a tick."""
 
+MOST_CHARACTERS = 300
+"""Most characters of an exception in a finding."""
+
 MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
 
+_KEPT = ("_held_up", "_gripped", "_passing", "stopped_fingers", "_impulses", "_next_handle", "_told_owned")
+"""Attributes that last from tick to tick as they are."""
 
-class World(BulletQueries, BulletGrips):
+
+def failure(what: str, error: Exception) -> Diagnostic:
+    """The finding that ``what`` failed with an exception, and that its command is cleared therefore."""
+    text = f"{what} failed, and its command is cleared: {type(error).__name__}: {str(error)[:MOST_CHARACTERS]}"
+    return Diagnostic(Severity.ERROR, text, code="failed")
+
+
+class Controllers(Subsystem):
+    """Controllers, springs, gravity and damping of a `World`: they act before rods and grasps feel how bodies move.
+
+    All that they remember belongs to the world, which keeps it in its snapshots.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def step(self, tick: int) -> None:
+        """Act on joints and bodies for the coming step of the world."""
+        self._world.pre_step()
+
+    def reset(self) -> None:
+        """Nothing: it is part of the world."""
+
+    def snapshot(self) -> None:
+        """Nothing: it is part of the world."""
+
+    def restore(self, snapshot: None) -> None:
+        """Nothing: it is part of the world."""
+
+
+class World(Subsystem, BulletQueries, BulletGrips):
     """All rigid bodies of ``scene`` outside rods; one Bullet client of its own."""
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
@@ -66,8 +107,9 @@ class World(BulletQueries, BulletGrips):
         self.client = pybullet.connect(pybullet.DIRECT)
         self._end = weakref.finalize(self, pybullet.disconnect, self.client)
         self._world_gravity = common_gravity(scene)
+        iterations = LOOP_ITERATIONS if scene.closures else SOLVER_ITERATIONS
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS, erp=CLOSING,
+            fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=iterations, erp=CLOSING,
             deterministicOverlappingPairs=1, contactBreakingThreshold=NEAR, physicsClientId=self.client,
         )  # fmt: skip
         pybullet.setGravity(*self._world_gravity.tolist(), physicsClientId=self.client)
@@ -91,10 +133,12 @@ class World(BulletQueries, BulletGrips):
         )
         self._damped = self._damping_factors()
         self._silence_pairs()
-        self._closures = Closures(self.client, scene, self.place_of, self.report)
+        self._closures = Closures(self.client, scene, self.trees, self.place_of, self._motions)
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
+        self._parting = Parting(self.client, self.dt)
         self._setup_queries()
         self._setup_grips()
+        self._motions.forget_all()
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
@@ -111,7 +155,7 @@ class World(BulletQueries, BulletGrips):
                 control = self._body_controls[command.body] = BodyControl(self.place_of[command.body], self.dt)
             before = self.driven(command.body)
             control.set(command.type, np.array(command.target, dtype=float))
-            self._led_anew(command.body, before)
+            self._update_commanded(command.body, before)
         types = command.joint_types
         for i, (joint, value) in enumerate(zip(body.joints, command.joint_values, strict=False)):
             tree = self._tree_of_joint.get(joint)
@@ -122,15 +166,17 @@ class World(BulletQueries, BulletGrips):
                 tree.command(self.scene.joints[joint], type_, value)
 
     def _tell_owned(self, body: Body) -> None:
-        """Say once for each body that an arm owns its joints."""
+        """State once for each body that an arm owns its joints."""
         if body.index not in self._told_owned:
             self._told_owned.add(body.index)
             message = f"joint commands to '{body.identity.identifier}' have no effect: its arm is enabled"
             self.report(Diagnostic(Severity.WARNING, message, hint="disable the arm", code="owned"))
 
-    def drive(self, joints: Sequence[int], fastest: Array, hardest: Array, give: float = 0.0) -> Drive:
+    def drive(
+        self, joints: Sequence[int], max_velocity: Array, max_deceleration: Array, yield_stiffness: float = 0.0
+    ) -> Drive:
         """The drive of ``joints``, all of one tree; see `Drive`."""
-        return Drive(self, joints, fastest, hardest, give)
+        return Drive(self, joints, max_velocity, max_deceleration, yield_stiffness)
 
     def control_of(self, joint: int) -> TreeControl:
         """The controllers of the tree that a joint belongs to; another one after a snapshot."""
@@ -139,8 +185,10 @@ class World(BulletQueries, BulletGrips):
     def release(self, body: int) -> None:
         """Clear the command of a body: no force, its joints limp."""
         before = self.driven(body)
+        if before:
+            self._parting.begin()
         self._body_controls.pop(body, None)
-        self._led_anew(body, before)
+        self._update_commanded(body, before)
         for joint in self.scene.bodies[body].joints:
             if joint in self._tree_of_joint:
                 self._tree_of_joint[joint].release(joint)
@@ -152,19 +200,36 @@ class World(BulletQueries, BulletGrips):
         self._impulses.clear()
         for control in self._jointed:
             if control.active:
-                control.apply()
+                try:
+                    control.apply()
+                except Exception as error:  # no command ends a run
+                    self._clear(control.tree.root, error)
         for place, linear, angular in self._damped:
             place.slow_down(linear, angular)
         for lift in self._lifts:
             lift.push()
-        self._carry_burdens()
-        for control_ in self._body_controls.values():
-            control_.apply()
+        self._apply_attached_loads()
+        for body, control_ in list(self._body_controls.items()):
+            try:
+                control_.apply()
+            except Exception as error:
+                self._clear(body, error)
 
-    def step(self) -> None:
-        """Advance Bullet by one tick."""
+    def _clear(self, body: int, error: Exception) -> None:
+        """Clear the commands of a body, or of all joints of the tree of a root, whose controller failed."""
+        self.report(failure(f"the controller of '{self.scene.bodies[body].identity.identifier}'", error))
+        self.release(body)
+        for tree in self._controls:
+            if tree.tree.root == body:
+                tree.let_go(np.arange(len(tree.links)))
+
+    def step(self, tick: int = 0) -> None:
+        """Advance Bullet by one tick, and put back what diverged in it."""
         pybullet.stepSimulation(physicsClientId=self.client)
+        self._parting.step()
         self._motions.expire()
+        if not self._motions.sound(MAX_SPEED):
+            self._heal()
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists, joints and wrenches into a state record."""
@@ -201,11 +266,13 @@ class World(BulletQueries, BulletGrips):
             name = self.scene.bodies[body].identity.identifier
             raise ValueError(f"body '{name}' hangs on joints; set its joints, or the pose of its root")
         place.put(pose)
+        self._parting.begin()
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
         """Set a joint to a position and velocity at once, without dynamics."""
         control = self._tree_of_joint[joint]
         control.put([control.row[joint]], [position], velocity)
+        self._parting.begin()
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
@@ -214,7 +281,7 @@ class World(BulletQueries, BulletGrips):
     def driven(self, body: int) -> bool:
         """Whether a command sets the velocity of a body, so that a thread, however light the body, does not."""
         control = self._body_controls.get(body)
-        return body in self.clamped or (control is not None and control.sets_velocity)
+        return body in self.stopped_fingers or (control is not None and control.sets_velocity)
 
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,).
@@ -223,7 +290,7 @@ class World(BulletQueries, BulletGrips):
         """
         total, given = self._impulses.get(body), np.concatenate([impulse, moment])
         self._impulses[body] = given if total is None else total + given
-        if body in self.clamped or not self.driven(body):
+        if body in self.stopped_fingers or not self.driven(body):
             self.place_of[body].load((given / self.dt).tolist())
 
     def mobility(self, body: int) -> Array:
@@ -231,7 +298,7 @@ class World(BulletQueries, BulletGrips):
         tree = next(tree for tree in self.trees if body in tree.link_of)
         return mobility(self.scene, tree, body, self.dt)
 
-    def burden(self, body: int) -> tuple[float, Array, Array]:
+    def attached_load(self, body: int) -> tuple[float, Array, Array]:
         """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
         if self.driven(body):
             return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
@@ -245,36 +312,70 @@ class World(BulletQueries, BulletGrips):
         forced = control is not None and control.type is CommandType.FORCE
         return mass, inertia, control.target.copy() if control is not None and forced else np.zeros(6)
 
+    def kin(self, body: int) -> set[int]:
+        """The bodies of the tree, or the rod, that ``body`` belongs to."""
+        groups = [tree.link_of.keys() for tree in self.trees] + [rod.bodies for rod in self.scene.rods]
+        return set(next(group for group in groups if body in group))
+
+    def commanded(self, bodies: set[int]) -> bool:
+        """Whether a command acts on any of ``bodies`` or their joints that may make them as fast as it likes."""
+        controls = (self._body_controls.get(body) for body in bodies)
+        if any(control is not None and control.acts for control in controls):
+            return True
+        trees = {id(c): c for c in self._controls if not bodies.isdisjoint(c.tree.link_of)}
+        return any(control.commanded for control in trees.values())
+
+    def overlap(self, bodies: set[int]) -> tuple[float, int]:
+        """How deep in metres one of ``bodies`` overlaps another body, and which; (0, -1) when none does."""
+        deepest = (0.0, -1)
+        for body in sorted(bodies & self.place_of.keys()):
+            for contact in self.contacts(body, 0.0):
+                deepest = max(deepest, (-contact.distance, contact.body))
+        return deepest
+
     # --- health, reset, snapshots -----------------------------------------------------------
 
-    def heal(self) -> list[Diagnostic]:
-        """Put trees that diverged back to where the scene starts; what was found since the last call."""
+    def take_problems(self) -> list[Diagnostic]:
+        """What was found since the last call."""
         found, self.problems = self.problems, []
-        self._motions.everything()
-        if self._motions.slower_than(MAX_SPEED):
-            return found
+        return found
+
+    def _heal(self) -> None:
+        """Put trees that diverged back to where the scene starts."""
         for k, tree in enumerate(self.trees):
             if not all(abs(speed) < MAX_SPEED for speed in self._motions.speeds(k)):
                 self._restart(k, tree)
                 name = self.scene.bodies[tree.root].identity.identifier
                 message = f"'{name}' diverged and was put back to its initial pose"
-                found.append(Diagnostic(Severity.ERROR, message, code="diverged"))
-        return found
+                self.report(Diagnostic(Severity.ERROR, message, code="diverged"))
 
     def reset(self) -> None:
-        """Put every body back to its initial pose, at rest; commands hold on."""
-        for k, tree in enumerate(self.trees):
-            self._restart(k, tree)
+        """Put every body back to its initial pose, at rest.
+
+        The world is built anew, for Bullet's own caches would go on. Commands hold, as if they were sent again; so do
+        the constraints of actuators.
+        """
+        controls, commands, held = self._controls, self._body_controls, self.held_constraints()
+        handle = self._next_handle
+        self.close()
+        self._create()
+        for control, before in zip(self._controls, controls, strict=True):
+            control.follow(before)
+        self._held_up = dict(Counter(grasp.child for grasp in held.values()))
+        for body, command in commands.items():
+            self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
+            self._body_controls[body].set(command.type, command.target.copy())
+        self._weigh_again()
+        self.hold_again(held)
+        self._next_handle = handle
 
     def _restart(self, index: int, tree: Tree) -> None:
-        body = self.scene.bodies[tree.root]
-        self.place_of[tree.root].put(matrix_pose7(body.T_world_body))
-        for link, *_ in tree.axes:
-            pybullet.resetJointState(tree.uid, link, 0.0, 0.0, physicsClientId=self.client)
+        self.place_of[tree.root].put(matrix_pose7(self.scene.start.roots[tree.root]))
+        tree.put_joints(self.client)
         self._motions.forget(index)
 
     def snapshot(self) -> dict[str, Any]:
-        """All dynamic state; the world is rebuilt from it, so that it and a restored one continue alike."""
+        """All dynamic state but Bullet's own caches: a world continues like a restored one once it is restored, too."""
         trees = []
         for tree in self.trees:
             pose = pybullet.getBasePositionAndOrientation(tree.uid, physicsClientId=self.client)
@@ -282,33 +383,37 @@ class World(BulletQueries, BulletGrips):
             links = [link for link, *_ in tree.axes]
             states = pybullet.getJointStates(tree.uid, links, physicsClientId=self.client) if links else []
             trees.append((pose, velocity, [(s[0], s[1]) for s in states]))
-        memory = {
+        return {
             "trees": trees,
-            "controls": [control.memory() for control in self._controls],
+            "controls": [control.snapshot() for control in self._controls],
+            "told": dict(self._motions.told),
+            "parting": self._parting.snapshot(),
             "held": self.held_constraints(),
-            "held_up": (dict(self._held_up), dict(self._gripped)),
-            "bodies": {body: control.memory() for body, control in self._body_controls.items()},
+            "bodies": {body: control.snapshot() for body, control in self._body_controls.items()},
+            **kept(self, _KEPT),
         }
-        self.restore(memory)
-        return memory
 
-    def restore(self, memory: dict[str, Any]) -> None:
-        """Rebuild the world and continue from `snapshot` (DESIGN §4.6: rebuilding is what is exact)."""
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Build the world anew and continue from `snapshot`: Bullet's own saved states are not exact."""
         self.close()
         self._create()
-        for tree, (pose, velocity, joints) in zip(self.trees, memory["trees"], strict=True):
+        for tree, (pose, velocity, joints) in zip(self.trees, snapshot["trees"], strict=True):
             self.place_of[tree.root].put_inertial(*pose)
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
-        for control, kept in zip(self._controls, memory["controls"], strict=True):
-            control.recall(kept)
-        for body, kept in memory["bodies"].items():
-            control_ = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
-            control_.recall(kept)
-            self._led_anew(body, False)
-        self.hold_again(memory["held"])
-        self._hold_up_again(*memory["held_up"])
+        self._motions.told.update(snapshot["told"])
+        for control, state in zip(self._controls, snapshot["controls"], strict=True):
+            control.restore(state)
+        for body, state in snapshot["bodies"].items():
+            command = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
+            command.restore(state)
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+        self._weigh_again()
+        self._part_again()
+        self.hold_again(snapshot["held"])
+        self._parting.restore(snapshot["parting"])
+        self._next_handle = snapshot["_next_handle"]
         self._motions.forget_all()
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """Wrenches that contacts and held constraints exert on bodies, read back from Bullet; world axes, newtons, metres.
 
 Bullet reports a contact's friction in the order of its own pair, whatever order it was asked in; the
-handedness of the three directions of a contact tells which order that was.
+handedness of the three directions of a contact shows which order that was.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 COLOURS = 255
-"""Objects that a palette of one byte tells apart."""
+"""Objects that a palette of one byte distinguishes."""
 
 
 def run_lengths(mask: NDArray[np.bool_]) -> list[int]:

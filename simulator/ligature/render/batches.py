@@ -98,6 +98,7 @@ class Instances:
         self._centres, self.radii = bounds[:, :3], bounds[:, 3] * scales
         self._coarse = np.array([{None: 0, False: -1, True: 1}[piece.coarse] for piece in pieces], dtype=np.int8)
         self.ids = np.array([(piece.owner + 1, index + 1) for index, piece in enumerate(pieces)], dtype="i4")
+        self.ids = self.ids.reshape(-1, 2)  # a scene may have nothing to see
 
     def place(self, T_world_owner: Array) -> None:
         """Move everything along with its owners (n, 4, 4)."""

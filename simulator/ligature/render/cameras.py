@@ -6,7 +6,6 @@ Poses are x y z qx qy qz qw of the camera frame, world axes; the camera looks al
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from ligature.adf import AdfError
 from ligature.model.commands import PlaceCommand
 from ligature.model.optics import Calibration, stereo_partners
-from ligature.model.scene import Camera, Scene
+from ligature.model.scene import Camera
 from ligature.render.calibration import calibrations
 from ligature.render.camera import CameraView, view_of
 from ligature.render.renderer import Renderer
@@ -26,17 +25,30 @@ Array = NDArray[np.float64]
 
 
 class Studio:
-    """Draws the cameras of one scene with one renderer, which is made when the first picture is taken."""
+    """Draws the cameras of a simulation with one renderer, which is made when the first picture is taken."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self.partners = stereo_partners(scene)
-        self.handles: list[CameraHandle] = []
+    def __init__(self, simulation: Simulation) -> None:
+        self.scene = simulation.scene
+        self.partners = stereo_partners(self.scene)
+        self._renderer: Renderer | None = None
+        self._closed = False
+        self.handles = [CameraHandle(simulation, self, camera) for camera in simulation.scene.cameras]
 
-    @cached_property
+    @property
     def renderer(self) -> Renderer:
-        """The renderer; raises `RenderUnavailable` where no OpenGL can be had."""
-        return Renderer(self.scene)
+        """The renderer; raises `RenderUnavailable` where no OpenGL is available, RuntimeError after `close`."""
+        if self._closed:
+            raise RuntimeError("the simulation is closed: its cameras take no more pictures")
+        if self._renderer is None:
+            self._renderer = Renderer(self.scene)
+        return self._renderer
+
+    def close(self) -> None:
+        """Give OpenGL back."""
+        self._closed = True
+        if self._renderer is not None:
+            self._renderer.release()
+            self._renderer = None
 
 
 class CameraHandle:
@@ -110,8 +122,6 @@ class CameraHandle:
         return calibrations(cameras, poses, self._studio.partners, lenses, resolution)[self.camera.index, eye]
 
 
-def camera_handles(simulation: Simulation) -> Handles[CameraHandle]:
-    """All cameras of ``simulation`` by name."""
-    studio = Studio(simulation.scene)
-    studio.handles = [CameraHandle(simulation, studio, camera) for camera in simulation.scene.cameras]
-    return Handles("camera", simulation.scene.cameras, studio.handles)
+def camera_handles(studio: Studio) -> Handles[CameraHandle]:
+    """All cameras of a simulation by name."""
+    return Handles("camera", studio.scene.cameras, studio.handles)

@@ -6,18 +6,24 @@ import moderngl
 
 
 class RenderUnavailable(RuntimeError):
-    """No OpenGL can be had on this machine; the message says what to install."""
+    """No OpenGL is available on this machine; the message states what to install."""
 
 
 def create_context() -> moderngl.Context:
     """A stand-alone OpenGL 3.3 core context; raises `RenderUnavailable`."""
     try:
-        return moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[arg-type]
+        return tidy(moderngl.create_standalone_context(require=330, backend="egl"))  # type: ignore[arg-type]
     except Exception as error:
         raise RenderUnavailable(
             f"no OpenGL 3.3 context through EGL ({error}); install libegl1 and libgl1-mesa-dri "
             "for the software rasteriser, or a GPU driver; the simulator runs on without cameras"
         ) from error
+
+
+def tidy(context: moderngl.Context) -> moderngl.Context:
+    """``context``, whose ``gc`` gives objects back that Python has dropped, wherever Python found that they are."""
+    context.gc_mode = "context_gc"
+    return context
 
 
 SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -16,16 +17,13 @@ from numpy.typing import NDArray
 from ligature.adf import AdfError, Diagnostic, Mark, Resolver, Severity
 from ligature.model.scene import Colour, ShaderFiles
 from ligature.render.geometry import Triangles
-from ligature.render.lights import LightKind, Lights
+from ligature.render.lights import LIGHT_AMBIENT, LIGHT_MODEL_AMBIENT, LightKind, Lights, LightSettings
 from ligature.render.programs import Program
 from ligature.render.surface import Surface
 from ligature.render.textures import Textures
-from ligature.render.translate import PREFIX, translate
+from ligature.render.translate import MAX_CLIP_PLANES, MAX_COORDS, MAX_LIGHTS, PREFIX, translate
 
 Array = NDArray[np.float64]
-
-AMBIENT_LIGHT = 0.35
-"""Share of a material's ambient colour that each light gives, as in the built-in shader."""
 
 MAX_SHADER_BYTES = 1 << 20
 
@@ -37,7 +35,7 @@ _ATTRIBUTES = {
     "aPosition": "positions", f"{PREFIX}Vertex": "positions",
     "aNormal": "normals", f"{PREFIX}Normal": "normals",
     "aTexCoord": "uvs", **{f"{PREFIX}MultiTexCoord{i}": "uvs" for i in range(8)},
-    "aColor": "colours", f"{PREFIX}Color": "colours", f"{PREFIX}SecondaryColor": "colours",
+    "aColor": "colours", f"{PREFIX}Color": "colours", f"{PREFIX}SecondaryColor": "secondary",
     "aTangent": "tangents", "aBitangent": "bitangents",
 }  # fmt: skip
 """What feeds each attribute that authors use."""
@@ -50,7 +48,7 @@ DIFFUSE_UNIT, _FIRST_FREE_UNIT = _UNITS["diffuseMap"], 11
 
 
 class ShaderError(AdfError):
-    """Shaders of a scene file that cannot be used; ``diagnostics`` say where and why."""
+    """Shaders of a scene file that cannot be used; ``diagnostics`` state where and why."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ def compiled(context: moderngl.Context, files: ShaderFiles, resolver: Resolver) 
 
 
 def findings(log: str, files: ShaderFiles) -> list[Diagnostic]:
-    """What the driver's ``log`` says, by file and line; a program that does not link is blamed on both files."""
+    """What the driver's ``log`` states, by file and line; a program that does not link is blamed on both files."""
     path = files.fragment if "fragment_shader\n" in log else files.vertex
     found = [(int(m[1]), int(m[2]), m[3]) for m in _MESA.finditer(log)]
     found += [(int(m[1]), 1, m[2]) for pattern in (_NVIDIA, _OTHERS) for m in pattern.finditer(log)]
@@ -144,6 +142,8 @@ class LegacyBuffers:
         n = len(t.positions)
         if name == "colours":
             values = np.ones((n, 4))
+        elif name == "secondary":
+            values = np.tile(BLACK, (n, 1))
         elif name == "uvs":
             values = np.hstack([t.uvs, np.zeros((n, 1))])
         elif name in ("tangents", "bitangents"):
@@ -157,42 +157,79 @@ class LegacyBuffers:
 
 
 def _format(name: str) -> str:
-    return "4f" if _ATTRIBUTES[name] == "colours" else "3f"
+    return "4f" if _ATTRIBUTES[name] in ("colours", "secondary") else "3f"
 
 
 def bind_picture(program: Program, picture: Fixed) -> None:
-    """Fill what does not depend on the object: lights, planes of the shadow map, the camera's matrices."""
+    """Fill what does not depend on the object: lights, planes of the shadow map, the camera's matrices.
+
+    What no scene has holds its initial value (OpenGL 2.1, tables 6.7 to 6.17).
+    """
     program.write("viewMat", picture.view)
     program.write("projectionMat", picture.projection)
     program.write("invProjection", np.linalg.inv(picture.projection))
-    program.write(f"{PREFIX}ProjectionMatrix", picture.projection)
-    program.set(f"{PREFIX}LightModel.ambient", (0.0, 0.0, 0.0, 1.0))
-    for i, (settings, T) in enumerate(picture.lights.eye_space()):
-        directional = settings.kind is LightKind.DIRECTIONAL
-        spot = settings.kind is LightKind.SPOT
-        light = f"{PREFIX}LightSource[{i}]."
-        position = (*-T[:3, 0], 0.0) if directional else (*T[:3, 3], 1.0)
-        program.set(light + "position", position)
-        program.set(light + "ambient", (AMBIENT_LIGHT,) * 3 + (1.0,))
-        program.set(light + "diffuse", (1.0,) * 4)
-        program.set(light + "specular", (1.0,) * 4)
-        program.set(light + "halfVector", (*_unit(_unit(np.array(position[:3])) + [0, 0, 1]), 0.0))
-        program.set(light + "spotDirection", tuple(T[:3, 0]))
-        program.set(light + "spotExponent", settings.exponent)
-        program.set(light + "spotCutoff", float(np.degrees(settings.cutoff)) if spot else 180.0)
-        program.set(light + "spotCosCutoff", float(np.cos(settings.cutoff)) if spot else -1.0)
-        for name, value in zip(("constant", "linear", "quadratic"), settings.attenuation, strict=True):
-            program.set(f"{light}{name}Attenuation", value)
+    program.set(f"{PREFIX}LightModel.ambient", (LIGHT_MODEL_AMBIENT,) * 3 + (1.0,))
+    lights = picture.lights.eye_space()
+    for i in range(MAX_LIGHTS):
+        for name, value in (_source(*lights[i]) if i < len(lights) else ABSENT_LIGHT).items():
+            program.set(f"{PREFIX}LightSource[{i}].{name}", value)
+    for name, value in _INITIAL.items():
+        program.set(f"{PREFIX}{name}", value)
     shadow = picture.lights.shadow()
     program.set("uEnableShadow", shadow is not None)
-    if shadow is not None:
-        for row, plane in zip(shadow[1], "STRQ", strict=True):
-            program.set(f"{PREFIX}EyePlane{plane}", _second(tuple(row)))
+    for number, axis in enumerate("STRQ"):
+        planes = [_PLANES[axis]] * MAX_COORDS
+        program.set(f"{PREFIX}ObjectPlane{axis}", planes)
+        if shadow is not None:
+            planes[SHADOW_COORDS] = tuple(map(float, shadow[1][number]))
+        program.set(f"{PREFIX}EyePlane{axis}", planes)
 
 
-def _second(row: tuple[float, ...]) -> list[tuple[float, ...]]:
-    """Eight planes of which the shadow map's, number 1, is ``row``."""
-    return [(0.0,) * 4, row, *[(0.0,) * 4] * 6]
+BLACK, WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
+
+ABSENT_LIGHT: dict[str, Any] = {
+    "ambient": BLACK, "diffuse": BLACK, "specular": BLACK, "position": (0.0, 0.0, 1.0, 0.0),
+    "halfVector": (0.0, 0.0, 1.0, 0.0), "spotDirection": (0.0, 0.0, -1.0), "spotExponent": 0.0, "spotCutoff": 180.0,
+    "spotCosCutoff": -1.0, "constantAttenuation": 1.0, "linearAttenuation": 0.0, "quadraticAttenuation": 0.0,
+}  # fmt: skip
+"""A light that is missing: initial values (OpenGL 2.1, table 2.10), black, so that it adds nothing to any sum."""
+
+_INITIAL: dict[str, Any] = {
+    "Fog.color": (0.0,) * 4, "Fog.density": 1.0, "Fog.start": 0.0, "Fog.end": 1.0, "Fog.scale": 1.0,
+    "Point.size": 1.0, "Point.sizeMin": 0.0, "Point.sizeMax": 1.0, "Point.fadeThresholdSize": 1.0,
+    "Point.distanceConstantAttenuation": 1.0, "Point.distanceLinearAttenuation": 0.0,
+    "Point.distanceQuadraticAttenuation": 0.0,
+    "ClipPlane": [(0.0,) * 4] * MAX_CLIP_PLANES, "TextureEnvColor": [(0.0,) * 4] * MAX_COORDS,
+}  # fmt: skip
+"""State that neither ADF nor AMBF sets."""
+
+_NO_PLANE: tuple[float, ...] = (0.0,) * 4
+_PLANES = {"S": (1.0, 0.0, 0.0, 0.0), "T": (0.0, 1.0, 0.0, 0.0), "R": _NO_PLANE, "Q": _NO_PLANE}
+"""Initial planes of generated texture coordinates."""
+
+SHADOW_COORDS = 1
+"""Texture coordinates whose eye planes lead to the shadow map."""
+
+
+def _source(settings: LightSettings, T_eye_light: Array) -> dict[str, Any]:
+    """The members of ``gl_LightSource[i]`` of a light of the scene; white, as ADF has no colour of lights (§19)."""
+    spot, directional = settings.kind is LightKind.SPOT, settings.kind is LightKind.DIRECTIONAL
+    position = (*-T_eye_light[:3, 0], 0.0) if directional else (*T_eye_light[:3, 3], 1.0)
+    constant, linear, quadratic = (1.0, 0.0, 0.0) if directional else settings.attenuation
+    return ABSENT_LIGHT | {
+        "ambient": (LIGHT_AMBIENT,) * 3 + (1.0,),
+        "diffuse": WHITE,
+        "specular": WHITE,
+        "position": position,
+        "halfVector": (*_unit(_unit(np.array(position[:3])) + [0, 0, 1]), 0.0),
+        "spotDirection": tuple(T_eye_light[:3, 0]),
+        "spotExponent": settings.exponent if spot else 0.0,
+        "spotCutoff": float(np.degrees(settings.cutoff)) if spot else 180.0,
+        "spotCosCutoff": float(np.cos(settings.cutoff)) if spot else -1.0,
+        "constantAttenuation": constant,
+        "linearAttenuation": linear,
+        "quadraticAttenuation": quadratic,
+    }
 
 
 def bind_object(program: Program, model_view: Array, projection: Array) -> None:
@@ -203,13 +240,16 @@ def bind_object(program: Program, model_view: Array, projection: Array) -> None:
         for form, value in (("", matrix), ("Inverse", np.linalg.inv(matrix))):
             program.write(f"{PREFIX}{name}{form}", value)
             program.write(f"{PREFIX}{name}{form}Transpose", value.T)
-    program.write(f"{PREFIX}NormalMatrix", np.linalg.inv(model_view[:3, :3]).T)
-    program.write(f"{PREFIX}TextureMatrix", np.tile(np.eye(4), (8, 1, 1)))
+    inverse = np.linalg.inv(model_view[:3, :3])
+    program.write(f"{PREFIX}NormalMatrix", inverse.T)
+    program.set(f"{PREFIX}NormalScale", float(1.0 / np.linalg.norm(inverse[2])))  # OpenGL 2.1 §2.11.3
+    for form in ("", "Inverse", "Transpose", "InverseTranspose"):
+        program.write(f"{PREFIX}TextureMatrix{form}", np.tile(np.eye(4), (MAX_COORDS, 1, 1)))
 
 
 def bind_surface(program: Program, surface: Surface, textures: Textures, lights: Lights) -> None:
     """Fill the material, its products with the lights, and its textures; white where it has none."""
-    _bind_material(program, surface.colour)
+    _bind_material(program, surface.colour, len(lights.eye_space()))
     look = surface.physical
     maps: dict[str, Path | None] = {
         "diffuseMap": surface.texture, "albedoMap": surface.texture, "normalMap": surface.normal_map,
@@ -226,21 +266,28 @@ def bind_surface(program: Program, surface: Surface, textures: Textures, lights:
         (shadow[0] if shadow else textures.lit).use(_UNITS["shadowMap"])
 
 
-def _bind_material(program: Program, colour: Colour) -> None:
-    ambient, diffuse, specular = ((*rgb, colour.alpha) for rgb in (colour.ambient, colour.diffuse, colour.specular))
-    emission = (*colour.emission, colour.alpha)
+def _bind_material(program: Program, colour: Colour, lights: int) -> None:
+    """Fill both sides of the material and its products with the light model and the first ``lights`` lights.
+
+    Products are of GLSL 1.20 §7.5; the alpha of a lit colour is that of the diffuse colour (OpenGL 2.1 §2.14.1).
+    """
+    ambient, diffuse, specular, emission = (
+        (*rgb, colour.alpha) for rgb in (colour.ambient, colour.diffuse, colour.specular, colour.emission)
+    )
+    given = {"ambient": (LIGHT_AMBIENT, ambient), "diffuse": (1.0, diffuse), "specular": (1.0, specular)}
+    products = {name: (*(level * c for c in values[:3]), colour.alpha) for name, (level, values) in given.items()}
+    black = (0.0, 0.0, 0.0, colour.alpha)
+    scene = (*(e + LIGHT_MODEL_AMBIENT * a for e, a in zip(emission[:3], ambient[:3], strict=True)), colour.alpha)
     for side in ("Front", "Back"):
         for name, value in (("ambient", ambient), ("diffuse", diffuse), ("specular", specular), ("emission", emission)):
             program.set(f"{PREFIX}{side}Material.{name}", value)
         program.set(f"{PREFIX}{side}Material.shininess", float(max(colour.shininess, 1)))
-        program.set(f"{PREFIX}{side}LightModelProduct.sceneColor", emission)
-        for i in range(8):
-            product = f"{PREFIX}{side}LightProduct[{i}]."
-            program.set(product + "ambient", (*(AMBIENT_LIGHT * c for c in colour.ambient), colour.alpha))
-            program.set(product + "diffuse", diffuse)
-            program.set(product + "specular", specular)
+        program.set(f"{PREFIX}{side}LightModelProduct.sceneColor", scene)
+        for i in range(MAX_LIGHTS):
+            for name, product in products.items():
+                program.set(f"{PREFIX}{side}LightProduct[{i}].{name}", product if i < lights else black)
 
 
 def _unit(vector: Array) -> Array:
-    unit: Array = vector / (np.linalg.norm(vector) + 1e-30)
+    unit: Array = vector / max(float(np.linalg.norm(vector)), 1e-9)  # a headlight stands in the eye
     return unit

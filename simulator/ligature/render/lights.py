@@ -31,6 +31,11 @@ WIDEST_SHADOW = np.radians(150.0)
 """Opening of the shadow map of a light that shines wider, 180 degrees having no projection."""
 
 
+LIGHT_MODEL_AMBIENT, LIGHT_AMBIENT = 0.2, 0.15
+"""Shares of a material's ambient colour that the scene gives, and that each light adds, to shaders of scene files: the
+first is OpenGL's initial value, which AMBF leaves; with one light both make up what the built-in shader gives."""
+
+
 class LightKind(enum.Enum):
     """Kinds that the run-time parameter ``type`` of a light may name; files know spot lights only."""
 

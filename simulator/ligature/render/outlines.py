@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.poses import compiled
+from ligature.kernels import compiled
 
 CONTRAST = 20
 """Smallest difference in any channel, of 255, that is an edge."""
@@ -49,7 +49,7 @@ def _jumps(a: NDArray[np.uint8], b: NDArray[np.uint8], step: int) -> NDArray[np.
     return (a - b + np.uint8(step - 1)) > 2 * step - 2 if step else np.ones(a.shape, dtype=np.bool_)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _copy_colours(rgba: NDArray[np.uint8], rgb: NDArray[np.uint8]) -> None:
     height, width = rgba.shape[:2]
     for y in range(height):
@@ -57,7 +57,7 @@ def _copy_colours(rgba: NDArray[np.uint8], rgb: NDArray[np.uint8]) -> None:
             rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = rgba[y, x, 0], rgba[y, x, 1], rgba[y, x, 2]
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _differ(rgba: NDArray[np.uint8], out: NDArray[np.uint8], places: NDArray[np.int64], down: int, along: int) -> None:
     """Write the largest difference of a channel to the pixel ``down`` and ``along``; ``places`` count such pairs."""
     width = out.shape[1] - along
@@ -69,7 +69,7 @@ def _differ(rgba: NDArray[np.uint8], out: NDArray[np.uint8], places: NDArray[np.
         out[y, x] = most
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _edges(below: NDArray[np.uint8], right: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Where an edge lies below a pixel, and where one stands on its right: strong, and not far weaker than others."""
     height, width = below.shape
@@ -89,7 +89,7 @@ def _edges(below: NDArray[np.uint8], right: NDArray[np.uint8]) -> tuple[NDArray[
     return lying, standing
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _mix(
     rgba: NDArray[np.uint8], rgb: NDArray[np.uint8], lying: NDArray[np.bool_], standing: NDArray[np.bool_], turned: bool
 ) -> None:
@@ -121,22 +121,22 @@ def _mix(
                     _blend(rgba, rgb, y, last - i, end * share, turned)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _is_rise(standing: NDArray[np.bool_], y: int, x: int, falls: bool) -> bool:
-    """Whether a run of one pixel only joins two longer runs across it, which say better how the line goes."""
+    """Whether a run of one pixel only joins two longer runs across it, which state better how the line goes."""
     height = len(standing)
     above, below = (x - 1, x) if falls else (x, x - 1)
     return y > 0 and standing[y - 1, above] and y + 2 < height and standing[y + 2, below]
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _area(i: int, reach: float) -> float:
     """Area of pixel ``i`` below a line that falls from 1 at the start to 0 at ``reach`` pixels."""
     u, v = float(i), min(i + 1.0, reach)
     return (v - u) * (1.0 - 0.5 * (v + u) / reach)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _blend(rgba: NDArray[np.uint8], rgb: NDArray[np.uint8], y: int, x: int, area: float, turned: bool) -> None:
     """Give the pixel above the edge a share of the one below; the other way round where ``area`` is negative."""
     if area == 0.0:

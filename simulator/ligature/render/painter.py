@@ -96,7 +96,7 @@ class Painter:
     def paint(self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None) -> None:
         """Draw ``passes``: the opaque from near to far, then the transparent from far to near.
 
-        Middles tell what is near: a table's nearest point is often nearer than all that lies on it.
+        Middles decide what is near: a table's nearest point is often nearer than all that lies on it.
         """
         context, seen = self._context, self._seen
         context.enable_only(moderngl.DEPTH_TEST)
@@ -142,7 +142,9 @@ class Painter:
     def _draw_own(self, program: Program, batch: Batch, rows: NDArray[np.int64]) -> None:
         """Draw with a scene file's program, which knows no instances."""
         view, brushes = self._view, self._brushes
-        legacy.bind_picture(program, legacy.Fixed(view.view, view.projection, brushes.lights))
+        if program not in self._ready:
+            legacy.bind_picture(program, legacy.Fixed(view.view, view.projection, brushes.lights))
+            self._ready.add(program)
         legacy.bind_surface(program, batch.surface, brushes.textures, brushes.lights)
         for row in rows:
             model_view = self._seen.instances["model_view"][row].T.astype(float)

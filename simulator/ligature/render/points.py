@@ -42,8 +42,6 @@ def computed_points(
     stored.use(legacy.DIFFUSE_UNIT)
     legacy.LegacyBuffers(context, _QUAD).array(program).render()
     points = np.frombuffer(written.read(), dtype="f4").reshape(height, width, 4)[::-1, :, :3]
-    for thing in (stored, written, buffer):
-        thing.release()
     return np.ascontiguousarray(points)
 
 

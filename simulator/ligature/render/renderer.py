@@ -5,6 +5,8 @@ Inputs in world axes and metres. Ids are 1 + body index; ghosts follow the bodie
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
@@ -43,11 +45,17 @@ COARSE_BELOW = 24.0
 THREAD = Physical(roughness=0.45)
 """Reflectance of a thread whose material does not ask for another: the sheen of silk or a coated filament."""
 
+MAX_TARGETS = 16
+"""Frame buffers, one for each size and choice of passes, that are kept for the next picture."""
+
 PLACES = ("body_pose", "ghost_world", "light_world")
 """What of a state moves things and their shadows, wherever it is looked at from."""
 
 LARGE = 2.0
 """Radius in metres above which a piece is ground or wall and does not set the extent of shadow maps."""
+
+
+_alive: weakref.WeakSet[Renderer] = weakref.WeakSet()
 
 
 class Renderer:
@@ -61,12 +69,16 @@ class Renderer:
         Samples a pixel of the colour picture; 0 draws colour without anti-aliasing, in one pass with the rest.
         When not given, 4 on a GPU; on a software rasteriser colour is drawn as with 0 and its edges smoothed after.
     context
-        The OpenGL context of a window; one without a display when not given.
+        The OpenGL context of a window; one without a display when not given, which goes with the renderer.
     """
 
     def __init__(self, scene: Scene, samples: int | None = None, context: moderngl.Context | None = None) -> None:
         self._scene = scene
+        if _alive:
+            gc.collect()  # Python counts its own objects, not the tens of megabytes behind a dropped renderer
         self._context = context or create_context()
+        self._end = None if context else weakref.finalize(self, self._context.release)
+        _alive.add(self)
         self._smoothed = samples is None and draws_on_processor(self._context)
         wanted = SAMPLES if samples is None else samples
         self._samples = 0 if self._smoothed else min(wanted, self._context.max_samples)
@@ -120,6 +132,7 @@ class Renderer:
         of the same size that had this pass.
         """
         with self._context:  # several renderers may live in one process
+            self._context.gc()
             return self._drawn(state, view, passes, shaders)
 
     def _drawn(
@@ -153,15 +166,17 @@ class Renderer:
     def points(self, depth: NDArray[np.float32], view: CameraView, shaders: ShaderFiles) -> NDArray[np.float32] | None:
         """What ``depth compute shaders`` make of linear ``depth`` (h, w): the x, y, z (h, w, 3) that they write.
 
-        None when the shaders cannot be used, which `problems` then says.
+        None when the shaders cannot be used, which `problems` then states.
         """
         with self._context:
             program = self._brushes.own(shaders)
             return None if program is None else computed_points(self._context, program, depth, view)
 
     def release(self) -> None:
-        """Give the OpenGL objects back."""
-        self._context.release()
+        """Give the OpenGL context back, unless it is a window's; nothing can be drawn any more."""
+        if self._end is not None:
+            self._end()
+        _alive.discard(self)
 
     def _rod_pieces(self, loader: VisualLoader) -> list[Piece]:
         """The rods as pieces in world axes, looking like their first element's material or ADF colours."""
@@ -242,7 +257,9 @@ class Renderer:
         if unknown or not passes:
             raise ValueError(f"{sorted(unknown) or 'no pass'} cannot be drawn; there are {', '.join(PASSES)}")
         key = (view.width, view.height, tuple(passes), samples)
-        if key not in self._targets:
+        if key in self._targets:
+            self._targets[key] = self._targets.pop(key)  # the newest come last
+        else:
             most = self._context.info["GL_MAX_TEXTURE_SIZE"]
             if not (0 < view.width <= most and 0 < view.height <= most):
                 raise ValueError(f"a picture cannot be {view.width} x {view.height}: each is 1 to {most} pixels here")
@@ -252,4 +269,6 @@ class Renderer:
                 raise ValueError(
                     f"a picture of {view.width} x {view.height} does not fit the memory: {error}"
                 ) from None
+            if len(self._targets) > MAX_TARGETS:
+                del self._targets[next(iter(self._targets))]
         return self._targets[key]

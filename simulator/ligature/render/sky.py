@@ -33,7 +33,7 @@ class Sky:
     def of(
         cls, context: moderngl.Context, scene: Scene, resolver: Resolver | None, problems: list[AdfError]
     ) -> Sky | None:
-        """The sky of a scene; None when it has none, or its pictures cannot be read, which ``problems`` then says."""
+        """The sky of a scene; None when it has none, or its pictures cannot be read, which ``problems`` then states."""
         if scene.world.skybox is None:
             return None
         pictures = []

@@ -21,6 +21,15 @@ PASSES = {
 """What a picture can hold: channels and type of the texture of each."""
 
 
+SATURATED = 255
+"""Level of a colour channel above which the picture holds no more light."""
+
+
+def saturated_share(rgb: NDArray[np.uint8]) -> float:
+    """Share of the pixels of a picture (h, w, 3) with all three channels saturated: white, whatever was lit there."""
+    return float((rgb == SATURATED).all(axis=2).mean()) if rgb.size else 0.0
+
+
 def _nothing(dtype: str, *channels: int) -> Any:
     return field(default_factory=lambda: np.zeros((0, 0, *channels), dtype=dtype))
 

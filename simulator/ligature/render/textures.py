@@ -25,7 +25,7 @@ class Textures:
         self.lit.compare_func = "<="
 
     def get(self, path: Path | None) -> moderngl.Texture | None:
-        """The texture of ``path``; None when it does not exist or is no picture, which the problems then say."""
+        """The texture of ``path``; None when it does not exist or is no picture, which the problems then state."""
         if path is None:
             return None
         if path not in self._loaded:
@@ -37,7 +37,7 @@ class Textures:
             with Image.open(path) as picture:
                 image = _eight_bits(picture).convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
         except FileNotFoundError:
-            return None  # as the mesh reader has said
+            return None  # as the mesh reader has stated
         except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
             message = f"texture '{path.name}' is not a picture that can be read: {error}"
             self._problems.append(AdfError(Diagnostic(Severity.WARNING, message, Mark(path, 1, 1), "", "render")))

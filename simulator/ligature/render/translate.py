@@ -1,7 +1,7 @@
 """Translates GLSL 1.10 and 1.20, as AMBF and CHAI3D users write it, to the core profile of OpenGL 3.3.
 
 Text in, text out: fixed-function names become declarations of their own, so that a core profile
-compiles them; lines keep their numbers. Which uniforms then have to be filled says `legacy`.
+compiles them; lines keep their numbers. Which uniforms then have to be filled states `legacy`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ PREFIX = "ligature_"
 
 MAX_LIGHTS = 8
 MAX_COORDS = 8
+MAX_CLIP_PLANES = 6
 
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _VERSION = re.compile(r"^[ \t]*#[ \t]*version[ \t]+(\d+)([^\n]*)", re.MULTILINE)
@@ -47,6 +48,10 @@ _STRUCTS = {
     "LightModelProducts": "vec4 sceneColor;",
     "LightProducts": "vec4 ambient, diffuse, specular;",
     "FogParameters": "vec4 color; float density, start, end, scale;",
+    "PointParameters": (
+        "float size, sizeMin, sizeMax, fadeThresholdSize, "
+        "distanceConstantAttenuation, distanceLinearAttenuation, distanceQuadraticAttenuation;"
+    ),
 }
 
 _UNIFORMS = {
@@ -61,6 +66,9 @@ _UNIFORMS = {
     "FrontLightProduct": f"ligature_LightProducts {{}}[{MAX_LIGHTS}]",
     "BackLightProduct": f"ligature_LightProducts {{}}[{MAX_LIGHTS}]",
     "Fog": "ligature_FogParameters {}",
+    "Point": "ligature_PointParameters {}",
+    "ClipPlane": f"vec4 {{}}[{MAX_CLIP_PLANES}]",
+    "TextureEnvColor": f"vec4 {{}}[{MAX_COORDS}]",
 }
 """Fixed-function state by name after ``gl_``; the matrices and planes are added below."""
 
@@ -74,12 +82,19 @@ for _plane in "STRQ":
 _ATTRIBUTES = {"Vertex": "vec4", "Normal": "vec3", "Color": "vec4", "SecondaryColor": "vec4"}
 _ATTRIBUTES |= {f"MultiTexCoord{i}": "vec4" for i in range(MAX_COORDS)}
 
-_VARYINGS = {"FrontColor": "vec4", "BackColor": "vec4", "FrontSecondaryColor": "vec4", "FogFragCoord": "float"}
+_VARYINGS = {"FrontColor": "vec4", "BackColor": "vec4", "FrontSecondaryColor": "vec4", "BackSecondaryColor": "vec4",
+             "FogFragCoord": "float"}  # fmt: skip
 _FRAGMENT_INPUTS = {"Color": "FrontColor", "SecondaryColor": "FrontSecondaryColor"}
 """What a fragment shader reads of the vertex shader's colours."""
 
 _CONSTANTS = {"MaxLights": MAX_LIGHTS, "MaxTextureUnits": MAX_COORDS, "MaxTextureCoords": MAX_COORDS,
-              "MaxClipPlanes": 6, "MaxVaryingFloats": 64, "MaxTextureImageUnits": 16, "MaxDrawBuffers": 8}  # fmt: skip
+              "MaxClipPlanes": MAX_CLIP_PLANES, "MaxVaryingFloats": 64, "MaxTextureImageUnits": 16, "MaxDrawBuffers": 8,
+              "MaxVertexAttribs": 16, "MaxVertexUniformComponents": 1024, "MaxVertexTextureImageUnits": 16,
+              "MaxCombinedTextureImageUnits": 32, "MaxFragmentUniformComponents": 1024}  # fmt: skip
+"""What every OpenGL 3.3 has, at least what OpenGL 2.1 demands (GLSL 1.20 §7.4)."""
+
+_IDLE = {"FogCoord": "const float {} = 0.0;", "ClipVertex": "vec4 {};"}
+"""Names of the vertex stage without effect: no object has fog coordinates, no plane clips."""
 
 _FUNCTIONS = """
 float ligature_dot(float a, float b) { return a * b; }
@@ -185,6 +200,7 @@ def _stage(text: str, stage: str, version: int, between: dict[str, str]) -> str:
     header += [f"{direction} {declaration};" for declaration in between.values()]
     if stage == "vertex":
         header += [f"in {_ATTRIBUTES[name]} {PREFIX}{name};" for name in sorted(names & set(_ATTRIBUTES))]
+        header += [_IDLE[name].format(PREFIX + name) for name in sorted(names & set(_IDLE))]
         if re.search(r"\bftransform\b", text):
             header += _transform(names)
     else:

@@ -65,7 +65,7 @@ HELP = (
 
 @dataclass(frozen=True)
 class Figures:
-    """What is told on the screen: frames a second, and simulated over wall time."""
+    """What is reported on the screen: frames a second, and simulated over wall time."""
 
     frame_rate: float = 0.0
     real_time_factor: float = 0.0
@@ -315,7 +315,7 @@ class Viewer:
 
 
 def _tint(index: int) -> Colour:
-    """A colour that tells one body's collision shapes from its neighbours'; hues a golden angle apart."""
+    """A colour that distinguishes one body's collision shapes from its neighbours'; hues a golden angle apart."""
     r, g, b = colorsys.hsv_to_rgb(0.618034 * index % 1.0, 0.55, 0.9)
     return Colour(diffuse=(r, g, b), ambient=(0.5 * r, 0.5 * g, 0.5 * b), specular=(0.2, 0.2, 0.2))
 

@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 class Piece:
     """Triangles of one surface on one owner.
 
-    ``geometry`` equals that of pieces with the same triangles; ``closed`` says that no back face can
+    ``geometry`` equals that of pieces with the same triangles; ``closed`` states that no back face can
     be seen; ``coarse`` are the triangles of the owner's low-resolution mesh, to be drawn when it is far away.
     """
 
@@ -58,7 +58,7 @@ class Piece:
 
 
 class VisualLoader:
-    """Loads the pieces of owners; each mesh file is read once. ``problems`` says which could not be."""
+    """Loads the pieces of owners; each mesh file is read once. ``problems`` states which could not be."""
 
     def __init__(self) -> None:
         self.problems: list[AdfError] = []

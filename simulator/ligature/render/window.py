@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.render.context import RenderUnavailable
+from ligature.render.context import RenderUnavailable, tidy
 from ligature.render.viewer import Viewer
 
 SIZE = (960, 600)
@@ -53,7 +53,7 @@ class Window:
             raise RenderUnavailable("no window: the display has no OpenGL 3.3")
         glfw.make_context_current(self._window)
         glfw.swap_interval(1)
-        self.context = moderngl.create_context(require=330)
+        self.context = tidy(moderngl.create_context(require=330))
         self._program = self.context.program(_VERTEX, _FRAGMENT)
         self._quad = self.context.vertex_array(self._program, [])
         self._texture: moderngl.Texture | None = None

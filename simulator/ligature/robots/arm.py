@@ -9,7 +9,7 @@ simulated time. A command that is not carried out raises `Refused` and changes n
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,6 +71,9 @@ class Arm(Device):
     kinematics
         Of the arm; the others as for `Device`.
     """
+
+    kind: ClassVar[str]
+    """PSM, ECM or MTM."""
 
     def __init__(self, name: str, kinematics: Kinematics, axes: Axes, home: Array, following_bound: ArrayLike) -> None:
         super().__init__(name, axes, home, following_bound)
@@ -152,7 +155,7 @@ class Arm(Device):
         self._require_joints("servo_jv")
         speed = self.joints.checked(velocity, "servo_jv")
         self._stop_for(self.joints)
-        self.joints.stream_velocity(np.clip(speed, -self.joints.fastest, self.joints.fastest))
+        self.joints.stream_velocity(np.clip(speed, -self.joints.max_velocity, self.joints.max_velocity))
 
     def servo_jf(self, effort: ArrayLike) -> None:
         """Drive the joints with efforts (n,)."""
@@ -170,11 +173,12 @@ class Arm(Device):
         self._start_move(axes, axes.checked(goal, what))
 
     def _start_move(self, axes: Axes, goal: Array) -> None:
-        if axes.moving:
+        moving = axes.moving
+        axes.move(goal)
+        if moving:
             self.emit("goal_reached", False)
         if axes is self.joints:
             self._pushing = None
-        axes.move(goal)
         self._begin_busy()
 
     def move_jr(self, step: ArrayLike) -> None:
@@ -266,7 +270,7 @@ class Arm(Device):
         self.joints.servo(q)
 
     def move_cp(self, pose: ArrayLike) -> None:
-        """Move to a tip pose, on the joint trajectory that leads there."""
+        """Move to a tip pose, on the joint trajectory that ends there."""
         self._require_cartesian("move_cp")
         self._start_move(self.joints, self._solve(pose, "move_cp"))
 
@@ -287,7 +291,7 @@ class Arm(Device):
         q = self.joints.setpoint[0]
         speed = self._joint_velocity(q, turned(self.kinematics.forward(q)[:3, :3].T, wanted))
         self._stop_for(self.joints)
-        excess = float(np.max(np.abs(speed) / self.joints.fastest))
+        excess = float(np.max(np.abs(speed) / self.joints.max_velocity))
         self.joints.stream_velocity(speed / max(excess, 1.0))
 
     def _joint_velocity(self, q: Array, twist: Array) -> Array:
@@ -320,7 +324,7 @@ class Arm(Device):
             self.body_servo_cf(np.zeros(6) if wrench is None else wrench)
 
     def _push_with(self, what: str, push: Any) -> None:
-        """Have the joints push as ``what`` says, anew each tick."""
+        """Have the joints push as ``what`` states, anew each tick."""
         self._require_cartesian(what)
         self._stop_for(self.joints)
         self._pushing = what, push
@@ -348,7 +352,7 @@ class Arm(Device):
         return numbers
 
     def set_base_frame(self, pose: ArrayLike, reference: str) -> None:
-        """Say where the base stands in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
+        """State where the base stands in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
         self._T_reference_base = pose_matrix_of(pose, "set_base_frame")
         self.reference = reference
         self.emit("base_frame", reference)

@@ -44,13 +44,13 @@ class Axes:
     """
 
     def __init__(
-        self, names: Sequence[str], limits: Array, fastest: ArrayLike, hardest: ArrayLike, plant: Plant
+        self, names: Sequence[str], limits: Array, max_velocity: ArrayLike, max_acceleration: ArrayLike, plant: Plant
     ) -> None:
         self.names = tuple(names)
         self.n = len(self.names)
         self.limits = limits
-        self.fastest = np.asarray(fastest, dtype=float)
-        self.hardest = np.asarray(hardest, dtype=float)
+        self.max_velocity = np.asarray(max_velocity, dtype=float)
+        self.max_acceleration = np.asarray(max_acceleration, dtype=float)
         self.plant = plant
         self.mode = Mode.OFF
         self.ratio_v = self.ratio_a = 1.0
@@ -121,8 +121,8 @@ class Axes:
     def move(self, goal: Array) -> None:
         """Start a move from the set-point to ``goal`` (n,), which is clipped to the limits."""
         position, velocity, _ = self.setpoint
-        fastest, hardest = self.fastest * self.ratio_v, self.hardest * self.ratio_a
-        trajectory = JointTrajectory(position, velocity, self.clipped(goal), fastest, hardest)
+        max_velocity, max_acceleration = self.max_velocity * self.ratio_v, self.max_acceleration * self.ratio_a
+        trajectory = JointTrajectory(position, velocity, self.clipped(goal), max_velocity, max_acceleration)
         self._enter(Mode.MOVE)
         self._trajectory, self._since = trajectory, 0.0
 
@@ -196,15 +196,15 @@ class Axes:
 
     # --- snapshots --------------------------------------------------------------------------
 
-    def memory(self) -> dict[str, object]:
+    def snapshot(self) -> dict[str, object]:
         """Everything that lasts from tick to tick but the plant's own."""
         names = ("mode", "ratio_v", "ratio_a", "_setpoint", "_trajectory", "_since", "_streaming", "limits")
-        return {**{name: getattr(self, name) for name in names}, "plant": self.plant.memory()}
+        return {**{name: getattr(self, name) for name in names}, "plant": self.plant.snapshot()}
 
-    def recall(self, memory: dict[str, object]) -> None:
-        """Continue from `memory`."""
-        for name, value in memory.items():
+    def restore(self, snapshot: dict[str, object]) -> None:
+        """Continue from `snapshot`."""
+        for name, value in snapshot.items():
             if name == "plant":
-                self.plant.recall(value)
+                self.plant.restore(value)
             else:
                 setattr(self, name, value)

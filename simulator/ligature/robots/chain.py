@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from ligature.kernels import compiled
+
 Array = NDArray[np.float64]
-compiled: Any = njit(cache=True)
 
 HALF_PI = np.pi / 2
 
@@ -130,7 +129,7 @@ class Chain:
         return values.reshape(-1, self.n), values.shape[:-1]
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def identity(T: Array) -> None:
     """Set the pose ``T`` (4, 4) to the identity."""
     T[:] = 0.0
@@ -138,7 +137,7 @@ def identity(T: Array) -> None:
         T[i, i] = 1.0
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def advance(row: Array, modified: bool, q: float, T: Array) -> None:
     """Multiply the pose ``T`` (4, 4) by the transform of one link, in place."""
     ca, sa, a, d, theta = row[0], row[1], row[2], row[3], row[4]
@@ -159,7 +158,7 @@ def advance(row: Array, modified: bool, q: float, T: Array) -> None:
             T[i, 0], T[i, 1], T[i, 2] = turned_x, turned_y * ca + z * sa, z * ca - turned_y * sa
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def append(T: Array, tip: Array) -> None:
     """Multiply the pose ``T`` (4, 4) by the pose ``tip`` (4, 4), in place."""
     for i in range(3):
@@ -169,7 +168,7 @@ def append(T: Array, tip: Array) -> None:
         T[i, 3] += x * tip[0, 3] + y * tip[1, 3] + z * tip[2, 3]
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _forward_rows(table: Array, modified: bool, tip: Array, q: Array, out: Array) -> None:
     for k in range(q.shape[0]):
         identity(out[k])
@@ -178,7 +177,7 @@ def _forward_rows(table: Array, modified: bool, tip: Array, q: Array, out: Array
         append(out[k], tip)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _frame_rows(table: Array, modified: bool, tip: Array, q: Array, out: Array) -> None:
     n = table.shape[0]
     for k in range(q.shape[0]):
@@ -191,7 +190,7 @@ def _frame_rows(table: Array, modified: bool, tip: Array, q: Array, out: Array) 
         append(out[k, n], tip)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _jacobian_rows(table: Array, modified: bool, tip: Array, q: Array, body: bool, out: Array) -> None:
     """Spatial Jacobians of the rows of ``q``, or body Jacobians, into ``out`` (m, 6, n)."""
     T = np.empty((4, 4))
@@ -210,7 +209,7 @@ def _jacobian_rows(table: Array, modified: bool, tip: Array, q: Array, body: boo
                 _into_tip(T, J, j)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _screw(T: Array, prismatic: bool, J: Array, j: int) -> None:
     """Column ``j`` of the spatial Jacobian: the twist of a joint about or along the z axis of ``T``."""
     x, y, z = T[0, 2], T[1, 2], T[2, 2]
@@ -223,7 +222,7 @@ def _screw(T: Array, prismatic: bool, J: Array, j: int) -> None:
         J[3, j], J[4, j], J[5, j] = x, y, z
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _into_tip(T: Array, J: Array, j: int) -> None:
     """Turn column ``j`` from the twist at the base origin in base axes to that of the tip ``T`` in tip axes."""
     wx, wy, wz = J[3, j], J[4, j], J[5, j]

@@ -21,9 +21,12 @@ POWER_UP_SECONDS = 0.2
 SHORTEST_BUSY = 0.05
 """Seconds that a move is busy at least, so that clients see it begin (interface reference §5.2 rule 3)."""
 
-FOLLOWING_PATIENCE = 1.0
+FOLLOWING_TIMEOUT = 1.0
 """Seconds that a following error beyond its bound is suffered before the arm stops with a fault."""
 
+
+MOST_CHARACTERS = 300
+"""Most characters of the reason of a fault."""
 
 MOST_EVENTS = 500
 """Most events that are kept for a front end to fetch; the oldest go first."""
@@ -31,7 +34,7 @@ MOST_EVENTS = 500
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a device; ``name`` is the topic that tells it, ``value`` what it says."""
+    """Something that happened to a device; ``name`` is the topic that reports it, ``value`` what it states."""
 
     device: str
     name: str
@@ -156,9 +159,9 @@ class Device:
             self._move_home()
 
     def _move_home(self) -> None:
+        self.joints.move(self._home)
         self.emit("desired_state", "HOMED")
         self._homing = True
-        self.joints.move(self._home)
         self._begin_busy()
 
     def _powered(self) -> None:
@@ -176,8 +179,9 @@ class Device:
         self._off_all()
 
     def fault(self, why: str) -> None:
-        """Stop with a fault; ``disable`` ends it."""
-        self.emit("error", f"{self.name}: {why}")
+        """Stop with a fault; ``disable`` ends it. A fault that is there already is not reported again."""
+        if self._state is not State.FAULT:
+            self.emit("error", f"{self.name}: {why[:MOST_CHARACTERS]}")
         self._switch_off(State.FAULT)
         self._tell_state()
 
@@ -265,7 +269,7 @@ class Device:
         error = np.abs(q - self.joints.setpoint[0])
         worst = int(np.argmax(error / self._following_bound))
         self._astray = self._astray + seconds if error[worst] > self._following_bound[worst] else 0.0
-        if self._astray > FOLLOWING_PATIENCE:
+        if self._astray > FOLLOWING_TIMEOUT:
             self.fault(f"joint {self.joints.names[worst]} is {error[worst]:.3g} away from its set-point")
 
     # --- snapshots --------------------------------------------------------------------------
@@ -274,14 +278,14 @@ class Device:
         "time", "_state", "_homed", "_busy", "_told", "_pending", "_due", "_busy_until", "_homing", "_astray",
     )  # fmt: skip
 
-    def memory(self) -> dict[str, Any]:
+    def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick, for snapshots."""
         kept = {name: getattr(self, name) for name in self._KEPT}
-        return {**kept, "groups": [axes.memory() for axes in self._groups()]}
+        return {**kept, "groups": [axes.snapshot() for axes in self._groups()]}
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Continue from `memory`."""
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
         for name in self._KEPT:
-            setattr(self, name, memory[name])
-        for axes, kept in zip(self._groups(), memory["groups"], strict=True):
-            axes.recall(kept)
+            setattr(self, name, snapshot[name])
+        for axes, kept in zip(self._groups(), snapshot["groups"], strict=True):
+            axes.restore(kept)

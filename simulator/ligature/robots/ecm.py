@@ -12,8 +12,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ligature.kernels import compiled
 from ligature.model.frames import axis_rotation, frame
-from ligature.robots.chain import HALF_PI, Array, Chain, Convention, Link, advance, compiled, identity
+from ligature.robots.chain import HALF_PI, Array, Chain, Convention, Link, advance, identity
 from ligature.robots.inverse import (
     DEGENERATE,
     Answers,
@@ -149,7 +150,7 @@ class SrcCamera(Chain):
         return out.result()
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _inverse_rows(
     table: Array, tool_to_rcm: float, tip: Array, limits: Array, poses: Array,
     q: Array, code: Integers, joint: Integers, residual: Array,
@@ -177,7 +178,7 @@ def _inverse_rows(
             q[k], joint[k], residual[k] = np.nan, -1, 0.0
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _reached_above(
     table: Array, tool_to_rcm: float, tip: Array, limits: Array, T: Array, below: float,
     T3: Array, R4: Array, q: Array,
@@ -191,7 +192,7 @@ def _reached_above(
     return bool(first_outside(q, limits) < 0)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _branch(
     table: Array, tool_to_rcm: float, tip: Array, T: Array, side: float, T3: Array, R4: Array, q: Array
 ) -> bool:
@@ -208,7 +209,7 @@ def _branch(
     return bool(_roll(table, tip, T, T3, R4, q))
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _roll(table: Array, tip: Array, T: Array, T3: Array, R4: Array, q: Array) -> bool:
     """The roll that comes closest to the orientation of ``T``, into ``q``; False when no roll is closest."""
     identity(T3)
@@ -225,7 +226,7 @@ def _roll(table: Array, tip: Array, T: Array, T3: Array, R4: Array, q: Array) ->
     return bool(sine * sine + cosine * cosine > DEGENERATE**2)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _remaining_angle(R4: Array, T3: Array) -> float:
     """Angle in radians that the closest roll leaves to the orientation asked for: the one between the two shafts."""
     across, along = 0.0, 0.0
@@ -236,7 +237,7 @@ def _remaining_angle(R4: Array, T3: Array) -> float:
     return float(np.arctan2(np.sqrt(across), along))
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _sight_rows(
     table: Array, tip: Array, limits: Array, poses: Array, q: Array, code: Integers, joint: Integers
 ) -> None:

@@ -13,12 +13,12 @@ from ligature.robots.operating_state import Refused
 Array = NDArray[np.float64]
 
 HOME = np.array([0.0, 0.0, 0.12, 0.0])
-FASTEST = np.array([np.pi / 6, np.pi / 6, 0.06, np.pi / 6])
-HARDEST = np.array([np.pi / 2, np.pi / 2, 0.06, np.pi / 2])
+MAX_VELOCITY = np.array([np.pi / 6, np.pi / 6, 0.06, np.pi / 6])
+MAX_ACCELERATION = np.array([np.pi / 2, np.pi / 2, 0.06, np.pi / 2])
 """Limits of moves (interface reference §5.5)."""
 
-SERVO_FASTEST = np.array([4.0, 4.0, 0.6, 4.0])
-SERVO_HARDEST = np.array([50.0, 50.0, 20.0, 100.0])
+SERVO_MAX_VELOCITY = np.array([4.0, 4.0, 0.6, 4.0])
+SERVO_MAX_DECELERATION = np.array([50.0, 50.0, 20.0, 100.0])
 """Speeds and decelerations with which the drives catch up with a set-point at most."""
 
 FOLLOWING_BOUND = np.array([0.6, 0.6, 0.06, 1.5])

@@ -155,7 +155,7 @@ def instrument(tool_type: str | int) -> Instrument:
     Raises
     ------
     ValueError
-        For an unknown instrument, saying which part is not known.
+        For an unknown instrument, stating which part is not known.
     """
     text = str(tool_type).strip()
     match = _TYPE.match(text)

@@ -13,7 +13,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ligature.robots.chain import Array, compiled
+from ligature.kernels import compiled
+from ligature.robots.chain import Array
 
 Integers = NDArray[np.int64]
 
@@ -113,7 +114,7 @@ class Answers:
         self.residual = np.zeros(m)
 
     def result(self) -> InverseResult:
-        """What they say."""
+        """Their readings."""
         if not self.shape:
             return InverseResult(self.q[0], self.code[0], self.joint[0], self.residual[0])
         shape = self.shape
@@ -123,7 +124,7 @@ class Answers:
         )  # fmt: skip
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def is_rigid(T: Array) -> bool:
     """Whether the upper rows of ``T`` are finite and hold a right-handed rotation."""
     for i in range(3):
@@ -143,7 +144,7 @@ def is_rigid(T: Array) -> bool:
     return bool(volume > 0.0)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def first_outside(q: Array, limits: Array) -> int:
     """Index of the first joint of ``q`` (n,) beyond its ``limits`` (2, n), or -1."""
     for i in range(q.shape[0]):
@@ -152,7 +153,7 @@ def first_outside(q: Array, limits: Array) -> int:
     return -1
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def nearest_turn(angle: float, near: float, low: float, high: float) -> float:
     """``angle`` plus whole turns: closest to ``near`` among those within the limits, if there is one."""
     near = min(max(near, low), high)
@@ -164,7 +165,7 @@ def nearest_turn(angle: float, near: float, low: float, high: float) -> float:
     return turned  # type: ignore[no-any-return]
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def aim_shaft(x: float, y: float, z: float, q: Array) -> None:
     """Yaw and pitch, into ``q``, that turn the shaft along x y z (eqs. 8 and 9 of the paper)."""
     q[0] = np.arctan2(x, -z)

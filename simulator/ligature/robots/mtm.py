@@ -12,7 +12,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ligature.robots.chain import HALF_PI, Array, Chain, Convention, Link, advance, compiled, identity
+from ligature.kernels import compiled
+from ligature.robots.chain import HALF_PI, Array, Chain, Convention, Link, advance, identity
 from ligature.robots.inverse import (
     DEGENERATE,
     Answers,
@@ -65,7 +66,7 @@ class Mtm(Chain):
 
     def __init__(self, side: str) -> None:
         if side not in LIMITS:
-            raise ValueError(f"there is no {side} MTM; say left or right")
+            raise ValueError(f"there is no {side} MTM; state left or right")
         self.side = side
         links = (
             Link(alpha=HALF_PI, theta=-HALF_PI),
@@ -92,7 +93,7 @@ class Mtm(Chain):
         return out.result()
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _inverse_rows(
     table: Array, limits: Array, poses: Array, seeds: Array, q: Array, code: Integers, joint: Integers
 ) -> None:
@@ -120,7 +121,7 @@ def _inverse_rows(
             code[k] = Reason.OUTSIDE_LIMITS
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _place(T: Array, q: Array) -> int:
     """Yaw, shoulder and elbow that put the wrist at the position of ``T``, the elbow bent as the limits want it."""
     x, y, z = T[0, 3], T[1, 3], T[2, 3]
@@ -138,7 +139,7 @@ def _place(T: Array, q: Array) -> int:
     return Reason.REACHED
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _wrist(R37: Array, limits: Array, seed: Array, choices: Array, q: Array) -> None:
     """The wrist within its limits whose platform is closest to the seed's, into ``q[3:]``."""
     near = min(max(seed[PLATFORM], limits[0, PLATFORM]), limits[1, PLATFORM])
@@ -154,7 +155,7 @@ def _wrist(R37: Array, limits: Array, seed: Array, choices: Array, q: Array) -> 
     _turn_wrist(R37, best, limits, seed, q)
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _turn_wrist(R37: Array, platform: float, limits: Array, seed: Array, q: Array) -> None:
     """The wrist for a given platform angle, into ``q[3:]``: the branch with cos(wrist yaw) >= 0.
 
@@ -177,7 +178,7 @@ def _turn_wrist(R37: Array, platform: float, limits: Array, seed: Array, q: Arra
     q[ROLL] = nearest_turn(np.arctan2(on_y, on_x) - HALF_PI, seed[ROLL], limits[0, ROLL], limits[1, ROLL])
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _platforms(u: Array, limits: Array, near: float, choices: Array) -> int:
     """Platform angles at the edges of what the wrist allows, and where its yaw is zero; returns how many.
 

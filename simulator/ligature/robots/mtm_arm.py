@@ -1,6 +1,6 @@
 """A master tool manipulator as a CRTK arm: gripper and locked orientation. Metres, radians.
 
-It has no bodies: it goes where it is told, and yields to efforts as a damped inertia.
+It has no bodies: it goes where it is commanded, and yields to efforts as a damped inertia.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from ligature.robots.poses import rotation_vector
 Array = NDArray[np.float64]
 
 HOME = np.zeros(7)
-FASTEST = np.array([np.pi / 2] * 6 + [2 * np.pi])
-HARDEST = np.array([np.pi / 4] * 6 + [2 * np.pi])
+MAX_VELOCITY = np.array([np.pi / 2] * 6 + [2 * np.pi])
+MAX_ACCELERATION = np.array([np.pi / 4] * 6 + [2 * np.pi])
 """Limits of moves (interface reference §5.5)."""
 
 FOLLOWING_BOUND = np.full(7, np.inf)

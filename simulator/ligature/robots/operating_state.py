@@ -20,7 +20,7 @@ class State(enum.IntEnum):
 
 @dataclass(frozen=True)
 class OperatingState:
-    """What ``crtk_msgs/OperatingState`` says: ``is_busy`` during moves and homing, never because of ``servo_``."""
+    """What ``crtk_msgs/OperatingState`` states: ``is_busy`` during moves and homing, never because of ``servo_``."""
 
     state: State = State.DISABLED
     is_homed: bool = False
@@ -40,7 +40,7 @@ class Action(enum.Enum):
 
 
 class Refused(ValueError):
-    """A command that the arm does not carry out; the text says why and what would be right."""
+    """A command that the arm does not carry out; the text states why and what would be right."""
 
 
 _D, _E, _P, _F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT

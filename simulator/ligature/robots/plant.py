@@ -34,11 +34,11 @@ class Plant(Protocol):
     def reset(self) -> None:
         """The scene was put back to its start."""
 
-    def memory(self) -> Any:
+    def snapshot(self) -> Any:
         """What lasts from tick to tick and is not part of the physics, for snapshots."""
 
-    def recall(self, memory: Any) -> None:
-        """Continue from `memory`."""
+    def restore(self, snapshot: Any) -> None:
+        """Continue from `snapshot`."""
 
 
 class IdealPlant:
@@ -83,12 +83,12 @@ class IdealPlant:
     def reset(self) -> None:
         self.free()
 
-    def memory(self) -> Any:
+    def snapshot(self) -> Any:
         return self._pushed, self._state.copy()
 
-    def recall(self, memory: Any) -> None:
-        self._pushed = memory[0]
-        self._state[:] = memory[1]
+    def restore(self, snapshot: Any) -> None:
+        self._pushed = snapshot[0]
+        self._state[:] = snapshot[1]
 
     def step(self, dt: float) -> None:
         """Advance by ``dt`` seconds: implicit in the damping, stopped at the ends of travel."""

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
 from ligature.robots.operating_state import Refused
 
 Array = NDArray[np.float64]
-compiled: Any = njit(cache=True)
 
 
 def pose_matrix_of(pose: ArrayLike, what: str) -> Array:
@@ -48,7 +45,7 @@ def rotation_vector(R: Array) -> Array:
     return np.asarray(np.pi * vectors[:, int(np.argmax(values))])
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def describe_tip(tips: Array, base: Array, twist: Array, wrench: Array, poses: Array, vectors: Array) -> None:
     """What an arm reports of its tip, in the axes in which it reports it.
 
@@ -81,7 +78,7 @@ def describe_tip(tips: Array, base: Array, twist: Array, wrench: Array, poses: A
             )
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _write_pose(T: Array, pose: Array) -> None:
     """Pose (7,) of ``T`` (4, 4), as `ligature.model.frames.matrix_pose7` has it."""
     squares = (T[0, 0] - T[1, 1] - T[2, 2], T[1, 1] - T[0, 0] - T[2, 2],

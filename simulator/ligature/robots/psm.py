@@ -13,7 +13,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ligature.robots.chain import HALF_PI, Array, Chain, Convention, Link, advance, compiled, identity
+from ligature.kernels import compiled
+from ligature.robots.chain import HALF_PI, Array, Chain, Convention, Link, advance, identity
 from ligature.robots.instruments import Instrument, instrument
 from ligature.robots.inverse import (
     DEGENERATE,
@@ -156,7 +157,7 @@ def _lengths(tool: Instrument, model: str) -> PsmLengths:
     return SRC_LENGTHS[tool.id]
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _inverse_rows(
     table: Array, tool_to_rcm: float, tip: Array, limits: Array, poses: Array, seeds: Array,
     q: Array, code: Integers, joint: Integers,
@@ -186,7 +187,7 @@ def _inverse_rows(
             q[k] = np.nan
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _wrist_frame(T: Array, tip: Array, R: Array, x5: Array) -> bool:
     """Rotation R (3, 3) of the wrist yaw link, and the unit vector x5 (3,) from palm to pinch (eqs. 5, 6).
 
@@ -207,7 +208,7 @@ def _wrist_frame(T: Array, tip: Array, R: Array, x5: Array) -> bool:
     return True
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _branch(
     table: Array, tool_to_rcm: float, limits: Array, T: Array, R: Array, x5: Array, towards: float, side: float,
     roll: float, T3: Array, q: Array,
@@ -240,7 +241,7 @@ def _branch(
     return True
 
 
-@compiled  # type: ignore[untyped-decorator]
+@compiled
 def _reached_above(
     table: Array, tool_to_rcm: float, limits: Array, T: Array, R: Array, x5: Array, roll: float, T3: Array, q: Array
 ) -> bool:

@@ -17,15 +17,15 @@ from ligature.robots.psm import INSERTION, Psm
 Array = NDArray[np.float64]
 
 HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
-FASTEST = np.array([np.pi / 2, np.pi / 2, 0.2, 6 * np.pi, 6 * np.pi, 6 * np.pi])
-HARDEST = np.array([np.pi / 2, np.pi / 2, 0.2, 4 * np.pi, 4 * np.pi, 4 * np.pi])
-JAW_FASTEST, JAW_HARDEST = 6 * np.pi, 4 * np.pi
+MAX_VELOCITY = np.array([np.pi / 2, np.pi / 2, 0.2, 6 * np.pi, 6 * np.pi, 6 * np.pi])
+MAX_ACCELERATION = np.array([np.pi / 2, np.pi / 2, 0.2, 4 * np.pi, 4 * np.pi, 4 * np.pi])
+JAW_MAX_VELOCITY, JAW_MAX_ACCELERATION = 6 * np.pi, 4 * np.pi
 """Limits of moves (interface reference §5.5)."""
 
-SERVO_FASTEST = np.array([10.0, 10.0, 1.5, 40.0, 40.0, 40.0])
+SERVO_MAX_VELOCITY = np.array([10.0, 10.0, 1.5, 40.0, 40.0, 40.0])
 """Speeds at which the drives catch up with a set-point at most: beyond those of moves, below those of accidents."""
 
-SERVO_HARDEST = np.array([100.0, 100.0, 50.0, 4000.0, 4000.0, 4000.0])
+SERVO_MAX_DECELERATION = np.array([100.0, 100.0, 50.0, 4000.0, 4000.0, 4000.0])
 """Decelerations with which they do: what the drives can give such masses, so that a step does not overshoot."""
 
 FOLLOWING_BOUND = np.array([0.6, 0.6, 0.06, 1.5, 1.5, 1.5])

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from ruckig import InputParameter, Result, Ruckig, Trajectory
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
+
+from ligature.robots.operating_state import Refused
 
 Array = NDArray[np.float64]
+
+LONGEST = 7000.0
+"""Seconds of the longest trajectory that ruckig calculates reliably (its documentation, "Numerical Stability")."""
 
 
 class JointTrajectory:
@@ -20,22 +25,40 @@ class JointTrajectory:
         Where to end at rest (n,).
     fastest, hardest
         Limits of velocity and acceleration (n,).
+
+    Raises
+    ------
+    Refused
+        When ruckig finds no trajectory: it calculates none of more than `LONGEST` seconds.
     """
 
-    def __init__(self, position: Array, velocity: Array, goal: Array, fastest: Array, hardest: Array) -> None:
+    def __init__(
+        self, position: Array, velocity: Array, goal: Array, max_velocity: Array, max_acceleration: Array
+    ) -> None:
+        self._asked = position.copy(), velocity.copy(), goal.copy(), max_velocity.copy(), max_acceleration.copy()
         n = len(goal)
         request = InputParameter(n)
         request.current_position, request.current_velocity = position.tolist(), velocity.tolist()
         request.current_acceleration = [0.0] * n
         request.target_position = goal.tolist()
         request.target_velocity = request.target_acceleration = [0.0] * n
-        request.max_velocity, request.max_acceleration = fastest.tolist(), hardest.tolist()
+        request.max_velocity, request.max_acceleration = max_velocity.tolist(), max_acceleration.tolist()
         request.max_jerk = [float("inf")] * n
         self._trajectory = Trajectory(n)
-        result = Ruckig(n).calculate(request, self._trajectory)
+        try:
+            result = Ruckig(n).calculate(request, self._trajectory)
+        except (RuckigError, ValueError):  # arithmetic that fails; a result that its Python enumeration lacks
+            result = Result.Error
         if result not in (Result.Working, Result.Finished):
-            raise ValueError(f"no trajectory from {position} to {goal}: {result}")
+            raise Refused(
+                f"ruckig finds no trajectory within {LONGEST:g} s from {np.round(position, 4).tolist()} to"
+                f" {np.round(goal, 4).tolist()}; raise 'trajectory_j/set_ratio'"
+            )
         self.goal = goal
+
+    def __reduce__(self) -> tuple[type[JointTrajectory], tuple[Array, ...]]:
+        """Planned again in another process: the same request has the same trajectory."""
+        return JointTrajectory, self._asked
 
     def __deepcopy__(self, memo: object) -> JointTrajectory:
         """Itself: a trajectory never changes."""

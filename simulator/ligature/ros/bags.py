@@ -24,7 +24,7 @@ REPORTS = "/surgical_robotics_challenge/completion_report"
 
 
 class BagError(ValueError):
-    """A bag that cannot be used; the message says why."""
+    """A bag that cannot be used; the message states why."""
 
 
 @contextmanager
@@ -60,7 +60,7 @@ def reported_pose(message: Any) -> Array:
 def judge(path: Path, scene: Scene, task: str) -> tuple[Score, Attempt]:
     """Score and measures of the ``task`` in a bag of AMBF topics: at its last report, or at its end.
 
-    Only what the topics tell is measured: passages, ways and time. Raises `BagError` when the bag lacks what the task
+    Only what the topics report is measured: passages, ways and time. Raises `BagError` when the bag lacks what the task
     needs, `ligature.tasks.MissingBodies` when the scene does.
     """
     attempt, state = Attempt(scene, task), new_state(scene)
@@ -84,7 +84,7 @@ def judge(path: Path, scene: Scene, task: str) -> tuple[Score, Attempt]:
     if score is None and task == "pose_estimation":
         raise BagError(f"{path}: nobody reports a pose in it, on {REPORTS}/TEAM/task1")
     if len(seen) < len(bodies):
-        raise BagError(f"{path}: says nothing about {', '.join(sorted(set(bodies) - seen))}")
+        raise BagError(f"{path}: states nothing about {', '.join(sorted(set(bodies) - seen))}")
     return score or attempt.judge(), attempt
 
 

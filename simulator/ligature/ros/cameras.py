@@ -1,7 +1,7 @@
 """The camera node: pictures, calibrations, clouds and frames of cameras on ROS (interface reference §2.7).
 
 It publishes what it is given; drawing is another room's. Frames: ``<camera>`` is the camera frame of AMBF,
-``<camera>_optical`` beside it is ROS's, and both hang below ``world``.
+``<camera>_optical`` beside it is ROS's, and both hang below ``world``. All begin with the prefix of the scene.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 
 from ligature.model.frames import frame, matrix_pose7
+from ligature.model.naming import topic_name
 from ligature.model.optics import EYES, R_CAMERA_OPTICAL, Calibration, eye_offset
 from ligature.model.scene import Camera, Scene
 from ligature.ros import pictures
@@ -26,7 +27,7 @@ from ligature.ros.master import node_name, require_free
 from ligature.ros.start import start_node
 
 WORLD = "world"
-"""The frame that world poses are in."""
+"""The frame that world poses are in, after the prefix of the scene."""
 
 _PICTURES = {
     "ImageData": Image,
@@ -129,14 +130,15 @@ class CameraNode:
         name = f"{node_name(scene.world.topic)}_cameras"
         require_free(f"/{name}")
         start_node(name)
-        frames = frame_names(scene.cameras)
+        prefix = scene.world.frame_prefix
+        frames = [prefix + name for name in frame_names(scene.cameras)]
         names = pictures.id_names(scene)
         self.topics = [
             CameraTopics(c, eye, frames[c.index], names, everything or c.publish_image, everything or c.publish_depth)
             for c in shown
             for eye in ("", *(EYES if c.stereo else ()))
         ]
-        self._frames = frames
+        self._frames, self._world = frames, prefix + WORLD
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         self._static.publish(TFMessage([t for topics in self.topics for t in self._fixed(topics)]))
@@ -146,7 +148,9 @@ class CameraNode:
         indices = sorted({camera.index for camera in shown})
         if indices and _heard(self._tf):
             time = rospy.Time.from_sec(stamp)
-            self._tf.publish(TFMessage([pictures.transform(WORLD, self._frames[i], poses[i], time) for i in indices]))
+            self._tf.publish(
+                TFMessage([pictures.transform(self._world, self._frames[i], poses[i], time) for i in indices])
+            )
 
     def _fixed(self, topics: CameraTopics) -> list[Any]:
         """Transforms that never change: from the camera to its eye, and to the optical frame."""
@@ -160,10 +164,12 @@ class CameraNode:
 
 
 def frame_names(cameras: Sequence[Camera]) -> list[str]:
-    """Frame of each camera: its name, or its whole topic where several have one name."""
+    """Frame of each camera: its name, or that after its namespace where several have one name."""
     count = Counter(c.identity.name for c in cameras)
     return [
-        c.identity.name if count[c.identity.name] == 1 else c.identity.topic.strip("/").replace("/", "_")
+        c.identity.name
+        if count[c.identity.name] == 1
+        else topic_name(c.identity.namespace, c.identity.name).strip("/").replace("/", "_")
         for c in cameras
     ]
 

@@ -57,7 +57,7 @@ def pose7(message: Pose) -> tuple[float, ...]:
 
 
 class Template:
-    """One message that is filled again for every publication; ``kind`` and ``index`` say of what."""
+    """One message that is filled again for every publication; ``kind`` and ``index`` state of what."""
 
     kind = ""
 
@@ -167,7 +167,7 @@ class ActuatorTemplate(_Attached):
         self.message.type.data = "CONSTRAINT"
 
     def content(self, message: ActuatorState, state: Record) -> None:
-        """Whether something is held; the reference never says so, clients gain by it."""
+        """Whether something is held; the reference never reports it, clients gain by it."""
         message.actuated = bool(state["actuator_active"][self.index])
 
 

@@ -13,13 +13,17 @@ SLOW = 0.95
 
 
 class Diagnostics:
-    """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take."""
+    """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take.
+
+    ``faults`` are the arms in FAULT, each with the reason.
+    """
 
     def __init__(self, block: Block) -> None:
         self._block = block
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
         self._next = 0.0
         self.missed = 0
+        self.faults: dict[str, str] = {}
 
     def publish(self, now: float) -> None:
         """Publish when a second has passed; ``now`` on the monotonic clock."""
@@ -31,6 +35,10 @@ class Diagnostics:
         status = DiagnosticStatus(name="ligature: physics loop", hardware_id="ligature")
         status.level = DiagnosticStatus.OK if factor >= SLOW or factor == 0.0 else DiagnosticStatus.WARN
         status.message = f"real-time factor {factor:.2f}"
+        alarms, alarm = int(figures["alarms"]), bytes(figures["alarm"]).decode("utf-8", "ignore")
+        if alarms:
+            status.level = DiagnosticStatus.WARN
+            status.message += f"; {alarm}"
         rows = {
             "loop rate (Hz)": f"{figures['loop_hz']:.1f}",
             "real-time factor": f"{factor:.3f}",
@@ -45,11 +53,18 @@ class Diagnostics:
             "messages published": str(figures["published"]),
             "publications dropped": str(figures["publish_late"]),
             "messages missed by slow clients": str(self.missed),
+            "bodies faster than commanded": str(alarms),
             "camera frames drawn": str(figures["frames"]),
             "camera frames dropped": str(figures["frames_dropped"]),
             "camera frame time (ms)": f"{1e3 * figures['frame_seconds']:.1f}",
         }
         status.values = [KeyValue(key=k, value=v) for k, v in rows.items()]
-        array = DiagnosticArray(status=[status])
+        faults = [
+            DiagnosticStatus(
+                level=DiagnosticStatus.ERROR, name=f"ligature: {arm}", hardware_id="ligature", message=f"FAULT: {why}"
+            )
+            for arm, why in self.faults.items()
+        ]
+        array = DiagnosticArray(status=[status, *faults])
         array.header.stamp = rospy.Time.now()
         self._publisher.publish(array)

@@ -22,7 +22,7 @@ PERIOD = 1.0
 """Seconds between looks at the master."""
 
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
-PATIENCE = 2.0
+TIMEOUT = 2.0
 """Seconds that a master or another node is given to answer."""
 
 
@@ -42,7 +42,7 @@ def commanded_topics() -> set[str]:
 
 
 class NameTaken(RuntimeError):
-    """Another simulator of the same world runs on this master; the message says what to do."""
+    """Another simulator of the same world runs on this master; the message states what to do."""
 
 
 def require_free(name: str) -> None:
@@ -59,12 +59,12 @@ def require_free(name: str) -> None:
 
 
 class Hasty(xmlrpc.client.Transport):
-    """A transport that gives up after `PATIENCE`."""
+    """A transport that gives up after `TIMEOUT`."""
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         """A connection with a time limit."""
         connection = super().make_connection(host)
-        connection.timeout = PATIENCE
+        connection.timeout = TIMEOUT
         return connection
 
 
@@ -106,7 +106,7 @@ class MasterWatch(threading.Thread):
 
 
 def register_again() -> None:
-    """Tell the master about every publication, subscription and service of this node; connections stay."""
+    """Report the master about every publication, subscription and service of this node; connections stay."""
     topics, listeners = get_topic_manager(), get_registration_listeners()
     for name, type_ in topics.get_publications():
         listeners.notify_added(name, type_, Registration.PUB)

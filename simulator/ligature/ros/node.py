@@ -16,12 +16,14 @@ import rosgraph.names
 import rospy
 
 from ligature.bus import Block, Outbox
+from ligature.bus.stop import Stop
 from ligature.model.commands import ParentCommand
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from ligature.ros import conversion, names
 from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
+from ligature.ros.intake import oversized
 from ligature.ros.master import MasterWatch, node_name, require_free
 from ligature.ros.parameters import Parameters
 from ligature.ros.publisher import Publisher
@@ -51,7 +53,7 @@ class Node:
         name = node_name(scene.world.topic)
         require_free(f"/{name}")
         start_node(name)
-        prefix, self._outbox = scene.world.topic.rpartition("/ambf/")[0] + "/", Outbox(self._ring)
+        self._outbox = Outbox(self._ring)
         self._reception = Reception(scene, self._outbox, self._wake)
         self._world = conversion.WorldTemplate()
         self._publishers: list[Publisher] = []
@@ -60,14 +62,14 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
-        self._arms = ArmsNode(scene, self._block, self._outbox, prefix, challenge)
+        self._arms = ArmsNode(scene, self._block, self._outbox, challenge)
         arms = ", ".join(arm.name for arm in scene.arms) or "none"
         self.told = f"{2 * len(outlets)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block)
         self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
         self._master = MasterWatch(Parameters(scene, self._adopt).poll)
 
-    def run(self, stop: threading.Event, on_first: Callable[[], None]) -> None:
+    def run(self, stop: Stop, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
         self._master.start()
         told, housekeeping = False, 0.0
@@ -119,7 +121,7 @@ class Node:
         self._woken.set()
 
     def _adopt(self, command: ParentCommand) -> None:
-        """A camera or light gets another parent; its messages say so."""
+        """A camera or light gets another parent; its messages report it."""
         self._outbox.push(command)
         template = self._placed.get((command.kind, command.index))
         if template is not None:
@@ -140,8 +142,9 @@ class Node:
         self._ring.beat()
         self._reception.watch(now)
         figures = self._block.figures
-        figures["malformed"] = self._reception.refused + self._arms.refused
+        figures["malformed"] = self._reception.refused + self._arms.refused + oversized.count
         self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
+        self._diagnostics.faults = self._arms.faults
         self._world.loop_hz = float(figures["loop_hz"][0])
         self._diagnostics.publish(now)
         return self._block.age < PHYSICS_SILENCE

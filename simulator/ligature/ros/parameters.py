@@ -42,7 +42,7 @@ SENSOR: dict[str, Value] = {
 
 @dataclass(frozen=True)
 class LightValues:
-    """What the parameters of a light say: type, half angle in radians, attenuation."""
+    """What the parameters of a light state: type, half angle in radians, attenuation."""
 
     type: str
     cutoff: float
@@ -105,7 +105,7 @@ def camera_with(camera: Camera, values: Values) -> Camera:
 
 
 def light_with(light: Light, values: Values) -> LightValues:
-    """What the parameters say of ``light``; raises ValueError that names what is wrong."""
+    """What the parameters state of ``light``; raises ValueError that names what is wrong."""
     get = {**light_parameters(light), **values}
     cutoff = min(_number(get, "cutoff_angle", 0.0), math.pi / 2)
     attenuation = [_number(get, f"attenuation/{name}", 0.0) for name in ("constant", "linear", "quadratic")]
@@ -186,7 +186,7 @@ class Parameters:
 
 
 class Follower:
-    """Reads the parameters of cameras and lights; what cannot be used is told once and left out."""
+    """Reads the parameters of cameras and lights; what cannot be used is reported once and left out."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -236,7 +236,7 @@ def _below(tree: Any, topic: str, names: Values) -> dict[str, Any]:
 
 
 def _look_up(tree: Any, name: str) -> Any:
-    """The value of a parameter in the tree of all; None when it is not there."""
+    """The value of a parameter in the tree of all; None when it is missing."""
     for part in name.strip("/").split("/"):
         if not isinstance(tree, dict):
             return None

@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 from ligature.ros.bags import BagError, messages, opened
 from ligature.ros.master import commanded_topics
 
-PATIENCE = 20.0
+TIMEOUT = 20.0
 """Seconds to wait for the simulator to be connected, and for an arm to get ready."""
 
 _JOINTS = re.compile(r"(?P<arm>/[^/]+)(?P<jaw>/jaw)?/(?P<kind>measured|setpoint)_js\Z")
@@ -27,7 +27,7 @@ QUEUE = 100
 
 
 class PlaybackError(RuntimeError):
-    """The simulator does not take what a bag holds; the message says why."""
+    """The simulator does not take what a bag holds; the message states why."""
 
 
 def play(path: Path, joints: str, speed: float, say: Callable[[str], None]) -> int:
@@ -86,7 +86,7 @@ def _firsts(bag: rosbag.Bag, routes: dict[str, str]) -> Iterator[tuple[str, Any,
 
 
 def _connect(publishers: dict[str, rospy.Publisher]) -> None:
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     for publisher in publishers.values():
         while publisher.get_num_connections() == 0:
             if time.monotonic() > deadline:
@@ -111,7 +111,7 @@ def _begin(target: str, first: Any) -> None:
 
 
 def _wait_for(arm: str, what: str, ready: Callable[[Any], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     newest: list[Any] = []
     subscriber = rospy.Subscriber(f"{arm}/operating_state", OperatingState, newest.append, queue_size=QUEUE)
     while not (newest and ready(newest[-1])):

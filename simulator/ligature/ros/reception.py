@@ -21,7 +21,7 @@ from std_msgs.msg import Empty
 
 from ligature.bus import Outbox, Throttle, Watchdog
 from ligature.bus.codec import CodecError, Message
-from ligature.model.commands import Command, Release, Reset, check
+from ligature.model.commands import Command, Release, Reset
 from ligature.model.scene import Scene
 from ligature.ros import conversion
 from ligature.ros.schedule import Key
@@ -48,7 +48,7 @@ class Reception:
     """Subscribes command topics and hands what comes in to ``outbox``.
 
     ``on_command(key, at_once)`` is called when an object begins to be commanded, and with ``at_once`` when a
-    command made it tell more of itself.
+    command made it report more of itself.
     """
 
     def __init__(self, scene: Scene, outbox: Outbox, on_command: Callable[[Key, bool], None]) -> None:
@@ -99,7 +99,7 @@ class Reception:
         def take(message: Any) -> None:
             command = self._convert(template, message)
             if command is not None:
-                check(command)
+                command.check()
                 self._push(topic, command)
             self._feed(key, template.kind == "body" and template.ask(*conversion.wishes(message)))
 

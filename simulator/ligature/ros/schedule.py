@@ -62,7 +62,7 @@ class Outlet:
 
 
 class Schedule:
-    """All outlets; ``commanded`` tells whether an object is being commanded."""
+    """All outlets; ``commanded`` reports whether an object is being commanded."""
 
     def __init__(self, outlets: Sequence[Outlet], commanded: Callable[[Key], bool]) -> None:
         self._outlets = list(outlets)
@@ -71,11 +71,11 @@ class Schedule:
         self._woken: deque[tuple[Key, bool]] = deque()
 
     def wake(self, key: Key, at_once: bool) -> None:
-        """An object is commanded from now on, or (``at_once``) has more to tell; for any thread."""
+        """An object is commanded from now on, or (``at_once``) has more to report; for any thread."""
         self._woken.append((key, at_once))
 
     def next_due(self, now: float) -> float:
-        """The earliest deadline, after what `wake` said."""
+        """The earliest deadline, after `wake`."""
         while self._woken:
             key, at_once = self._woken.popleft()
             outlet = self._by_key.get(key)

@@ -12,8 +12,8 @@ LOOKING = 10.0
 """Seconds to look for a simulator that judges."""
 
 
-def next_score(task: str, patience: float) -> tuple[dict[str, object], dict[str, object]]:
-    """The newest score of ``task`` and the newest measures, waiting ``patience`` seconds for a report.
+def next_score(task: str, timeout: float) -> tuple[dict[str, object], dict[str, object]]:
+    """The newest score of ``task`` and the newest measures, waiting ``timeout`` seconds for a report.
 
     Raises RuntimeError when no simulator judges the task, or no report comes.
     """
@@ -28,8 +28,8 @@ def next_score(task: str, patience: float) -> tuple[dict[str, object], dict[str,
         waited = time.monotonic() - begin
         if subscriber.get_num_connections() == 0 and waited > LOOKING:
             raise RuntimeError(f"no simulator judges '{task}'; start it with 'ligature run … --task {task}'")
-        if waited > patience:
-            raise RuntimeError(f"nobody reported the end of '{task}' within {patience:g} s")
+        if waited > timeout:
+            raise RuntimeError(f"nobody reported the end of '{task}' within {timeout:g} s")
         time.sleep(0.02)
     return _values(scores[-1]), _values(measures[-1])
 

@@ -10,13 +10,19 @@ import rospy
 import rospy.impl.tcpros_base as tcpros
 from rosgraph.xmlrpc import ThreadingXMLRPCServer
 
+from ligature.ros.intake import bound_messages
+
 WAITING = 512
 """Connections that may wait; the kernel's own limit is in /proc/sys/net/core/somaxconn."""
 
 
 def start_node(name: str) -> None:
-    """Make this process the node ``name``, which takes `WAITING` connections at once; signals stay the caller's."""
+    """Make this process the node ``name``, which takes `WAITING` connections at once and no message of any length.
+
+    Signals stay the caller's.
+    """
     ThreadingXMLRPCServer.request_queue_size = WAITING
+    bound_messages()
     rospy.init_node(name, disable_signals=True)
     tcpros.start_tcpros_server()
     tcpros._tcpros_server.tcp_ros_server.server_sock.listen(WAITING)

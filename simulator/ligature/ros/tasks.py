@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Bool, Empty
 
 from ligature.bus import Block
+from ligature.bus.stop import Stop
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from ligature.ros.bags import REPORTS, reported_pose
@@ -42,7 +43,7 @@ QUEUE = 10
 
 
 class TaskNode:
-    """Judges one attempt after the other at ``task``; ``say`` is told what a person may want to read.
+    """Judges one attempt after the other at ``task``; ``say`` receives lines for a person.
 
     Raises `ligature.tasks.MissingBodies`, and `ligature.ros.master.NameTaken`.
     """
@@ -55,7 +56,7 @@ class TaskNode:
         name = f"{node_name(scene.world.topic)}_tasks"
         require_free(f"/{name}")
         start_node(name)
-        root = f"{scene.world.topic.rpartition('/ambf/')[0]}/ligature/tasks/{task}"
+        root = f"{scene.world.root}ligature/tasks/{task}"
         self._score = rospy.Publisher(f"{root}/score", DiagnosticStatus, queue_size=QUEUE, latch=True)
         self._measures = rospy.Publisher(f"{root}/measures", DiagnosticStatus, queue_size=QUEUE)
         self._passages = rospy.Publisher(f"{root}/passages", PointStamped, queue_size=QUEUE)
@@ -63,7 +64,7 @@ class TaskNode:
         self._teams: set[str] = set()
         self._told = 0
 
-    def run(self, stop: threading.Event) -> None:
+    def run(self, stop: Stop) -> None:
         """Watch until ``stop`` is set or the physics process is gone."""
         MasterWatch().start()
         telling, looking, tick = 0.0, 0.0, -1

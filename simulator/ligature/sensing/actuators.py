@@ -18,6 +18,8 @@ from ligature.model.commands import ActuatorCommand
 from ligature.model.frames import pose7_matrix
 from ligature.model.lookup import find_by_text
 from ligature.model.scene import Scene, SensorType
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem
 from ligature.sensing.queries import Holds
 from ligature.sensing.rays import Rays
 
@@ -32,7 +34,7 @@ class _Hold:
     handle: Any
 
 
-class Actuators:
+class Actuators(Subsystem):
     """The actuators of a scene and what each of them holds."""
 
     def __init__(self, scene: Scene, holds: Holds, rays: Rays) -> None:
@@ -71,13 +73,22 @@ class Actuators:
             self._holder.remove_fixed(hold.handle)
             self._holds[actuator] = None
 
-    def memory(self) -> list[_Hold | None]:
-        """What every actuator holds, for snapshots."""
-        return list(self._holds)
+    def write_state(self, state: StateRecord) -> None:
+        """Write what every actuator holds."""
+        held = np.array(self.held, dtype=np.int32)
+        state["actuator_body"][0], state["actuator_active"][0] = held, held >= 0
 
-    def recall(self, memory: list[_Hold | None]) -> None:
-        """Continue from `memory`; the constraints themselves are part of the physics."""
-        self._holds = list(memory)
+    def reset(self) -> None:
+        """Go on holding what constraints hold; threads and what pads hold were let go."""
+        self._holds = [hold if hold is not None and self._holder.holds(hold.handle) else None for hold in self._holds]
+
+    def snapshot(self) -> list[_Hold | None]:
+        """What every actuator holds; the constraints themselves are part of the physics."""
+        return self._holds
+
+    def restore(self, snapshot: list[_Hold | None]) -> None:
+        """Continue from `snapshot`."""
+        self._holds = snapshot
 
     def _name(self, actuator: int) -> str:
         return self._scene.actuators[actuator].identity.identifier

@@ -8,10 +8,11 @@ from __future__ import annotations
 from ligature.model.hits import Contact
 from ligature.model.scene import Scene, SensorType
 from ligature.model.state import MAX_CONTACT_EVENTS, StateRecord
+from ligature.model.subsystem import Subsystem
 from ligature.sensing.queries import Queries
 
 
-class Contacts:
+class Contacts(Subsystem):
     """The contact sensors of a scene and the contact points they found last."""
 
     def __init__(self, scene: Scene, queries: Queries) -> None:
@@ -19,16 +20,32 @@ class Contacts:
         self._sensors = [s for s in scene.sensors if s.type is SensorType.CONTACT]
         self.events: list[tuple[int, Contact]] = []
 
-    def update(self) -> None:
-        """Look at the contacts of every sensor's body again."""
+    def sense(self, state: StateRecord) -> None:
+        """Look at the contacts of every sensor's body, and write them."""
+        if self._sensors:
+            self._look()
+            self._write(state)
+
+    def reset(self) -> None:
+        """Nothing: what is sensed follows from the bodies."""
+
+    def snapshot(self) -> None:
+        """Nothing: what is sensed follows from the bodies."""
+
+    def restore(self, snapshot: None) -> None:
+        """Nothing: what is sensed follows from the bodies."""
+
+    def _look(self) -> None:
         self.events = [
             (sensor.index, contact)
             for sensor in self._sensors
             for contact in self._queries.contacts(sensor.parent, sensor.distance_threshold)
         ]
 
-    def write(self, state: StateRecord) -> None:
+    def _write(self, state: StateRecord) -> None:
         """Write the first `MAX_CONTACT_EVENTS` points; ``contact_count`` counts them all."""
+        for name in ("sensor", "body", "distance", "point", "normal"):
+            state[f"contact_{name}"] = 0
         state["contact_count"] = len(self.events)
         for row, (sensor, contact) in enumerate(self.events[:MAX_CONTACT_EVENTS]):
             state["contact_sensor"][0, row] = sensor

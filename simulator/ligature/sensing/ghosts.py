@@ -7,13 +7,15 @@ World axes, metres. A body overlaps a ghost when one of its contact distances to
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
 from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
 from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Scene, Shape, Sphere, TriMesh
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem
 from ligature.sensing.queries import Queries
 
 Array = NDArray[np.float64]
@@ -24,11 +26,18 @@ SAMPLES = 5
 CONVEX = (Box, Sphere, Cylinder, Capsule, Cone, Hull)
 """Shapes that rod elements are tested against."""
 
-STILL = 1e-6
-"""Change of a pose (metres, quaternion) below which a pair is not asked about again."""
+BAND = 1e-4
+"""Distance in metres within which the surfaces of a ghost and a body are measured.
+
+A pair is not measured again before the two can have moved by as much as there is between their surfaces: so what is
+sensed is the same however often somebody looks.
+"""
+
+DOUBT = 0.5
+"""Share of a measured distance that counts on; the engine's distances are not exact."""
 
 
-@njit(cache=True)
+@compiled
 def _elements_inside(
     kinds: NDArray[np.int64],
     sizes: Array,
@@ -73,7 +82,7 @@ def _elements_inside(
                     break
 
 
-@njit(cache=True)
+@compiled
 def _invert(pose: Array, out: Array) -> None:
     """The inverse of a pose (7,)."""
     turn_back, origin = np.zeros(7), np.zeros(7)
@@ -82,7 +91,7 @@ def _invert(pose: Array, out: Array) -> None:
     compose(turn_back, origin, out)
 
 
-@njit(cache=True)
+@compiled
 def _pairs_to_ask(
     ghost_world: Array,
     body_pose: Array,
@@ -91,28 +100,42 @@ def _pairs_to_ask(
     reach: Array,
     seen_ghost: Array,
     seen_body: Array,
-    known: NDArray[np.bool_],
+    room: Array,
+    inside: NDArray[np.bool_],
     ask: NDArray[np.bool_],
 ) -> bool:
-    """Flag in ``ask`` the pairs that are near each other and moved since they were asked about; clear far ones."""
+    """Flag in ``ask`` the pairs that are near each other and may have met or parted since they were asked about.
+
+    ``room`` (g, n) is how far the two may move until then; it is used up for pairs far from each other, which are not
+    ``inside``.
+    """
     found = False
     for g in range(ask.shape[0]):
         for i in range(ask.shape[1]):
-            square, still = 0.0, True
-            pose = body_pose[solid[i]]
-            for a in range(7):
-                if a < 3:
-                    square += (ghost_world[g, a] - pose[a]) ** 2
-                still = (
-                    still
-                    and abs(seen_ghost[g, i, a] - ghost_world[g, a]) <= STILL
-                    and abs(seen_body[g, i, a] - pose[a]) <= STILL
-                )
-            near = square <= (ghost_reach[g] + reach[i]) ** 2
-            known[g, i] = known[g, i] and near
-            ask[g, i] = near and not still
+            square, pose = 0.0, body_pose[solid[i]]
+            for a in range(3):
+                square += (ghost_world[g, a] - pose[a]) ** 2
+            if square > (ghost_reach[g] + reach[i]) ** 2:
+                inside[g, i] = ask[g, i] = False
+                room[g, i] = -1.0
+                continue
+            moved = _moved(seen_ghost[g, i], ghost_world[g], ghost_reach[g])
+            moved += _moved(seen_body[g, i], pose, reach[i])
+            ask[g, i] = not moved <= room[g, i]
             found = found or ask[g, i]
     return found
+
+
+@compiled
+def _moved(before: Array, now: Array, reach: float) -> float:
+    """Bound of the way that any point within ``reach`` of the origin went between two poses (7,)."""
+    way, turn = 0.0, 0.0
+    for a in range(3):
+        way += (now[a] - before[a]) ** 2
+    for a in range(3, 7):
+        turn += (now[a] - before[a]) ** 2
+    # |q − q'| = 2 sin(θ/4) for unit quaternions, and a point at r goes 2 r sin(θ/2) at most
+    return np.sqrt(way) + (2.0 * np.sqrt(turn) * reach if turn > 0.0 else 0.0)
 
 
 def _shape_arrays(shape: Shape) -> tuple[int, Array, Array, float]:
@@ -135,7 +158,7 @@ def _shape_arrays(shape: Shape) -> tuple[int, Array, Array, float]:
     )
 
 
-class Ghosts:
+class Ghosts(Subsystem):
     """All ghosts of a scene; `update` fills ``sensed`` (ghosts, bodies)."""
 
     def __init__(self, scene: Scene, queries: Queries) -> None:
@@ -153,7 +176,10 @@ class Ghosts:
         self._reach = np.array([_reach(scene.bodies[b].colliders) for b in self._solid])
         self._ghost_reach = np.array([_reach(g.colliders) for g in scene.ghosts])
         self.sensed = np.zeros((len(scene.ghosts), len(scene.bodies)), dtype=bool)
-        self.forget()
+        shape = (len(self._probes), len(self._solid))
+        self._seen_ghost, self._seen_body = np.zeros((*shape, 7)), np.zeros((*shape, 7))
+        self._room = np.full(shape, -1.0)
+        self._inside, self._ask = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
 
     def _lay_out_volumes(self, scene: Scene) -> None:
         """The convex pieces of all ghosts, as arrays for the test against rod elements."""
@@ -170,11 +196,19 @@ class Ghosts:
         self._plane_range = np.column_stack([ends[:-1], ends[1:]]).astype(np.int64)
         self._planes = np.vstack([np.zeros((0, 4)), *(planes for _, _, planes, _ in arrays)])
 
-    def forget(self) -> None:
-        """Ask again about every pair at the next update."""
-        shape = (len(self._probes), len(self._solid), 7)
-        self._seen_ghost, self._seen_body = np.full(shape, np.nan), np.full(shape, np.nan)
-        self._known, self._ask = np.zeros(shape[:2], dtype=bool), np.zeros(shape[:2], dtype=bool)
+    def sense(self, state: StateRecord) -> None:
+        """Look what is in the ghosts, and write it."""
+        self.update(state["ghost_world"][0], state["body_pose"][0])
+        state["ghost_sensed"][0] = self.sensed
+
+    def reset(self) -> None:
+        """Nothing: what is sensed follows from where everything is."""
+
+    def snapshot(self) -> None:
+        """Nothing: what is sensed follows from where everything is."""
+
+    def restore(self, snapshot: None) -> None:
+        """Nothing: what is sensed follows from where everything is."""
 
     def update(self, ghost_world: Array, body_pose: Array) -> None:
         """Sense again; ``ghost_world`` (ghosts, 7) and ``body_pose`` (bodies, 7) in world axes."""
@@ -182,11 +216,11 @@ class Ghosts:
             return
         asking = _pairs_to_ask(
             ghost_world, body_pose, self._solid, self._ghost_reach, self._reach, self._seen_ghost, self._seen_body,
-            self._known, self._ask,
+            self._room, self._inside, self._ask,
         )  # fmt: skip
         if asking:
             self._ask_about_bodies(ghost_world, body_pose[self._solid])
-        self.sensed[:, self._solid] = self._known
+        self.sensed[:, self._solid] = self._inside
         if len(self._elements):
             _elements_inside(
                 self._kinds, self._sizes, self._planes, self._plane_range, self._local, self._bounds, self._owner,
@@ -197,8 +231,9 @@ class Ghosts:
         for ghost in np.flatnonzero(self._ask.any(axis=1)):
             asked = np.flatnonzero(self._ask[ghost])
             candidates = self._solid[asked].tolist()
-            found = set(self._queries.probe_overlaps(self._probes[ghost], ghost_world[ghost], candidates))
-            self._known[ghost, asked] = [body in found for body in candidates]
+            gaps = np.array(self._queries.probe_gaps(self._probes[ghost], ghost_world[ghost], candidates, BAND))
+            self._inside[ghost, asked] = gaps <= 0.0
+            self._room[ghost, asked] = DOUBT * np.minimum(np.abs(gaps), BAND)
             self._seen_ghost[ghost, asked] = ghost_world[ghost]
             self._seen_body[ghost, asked] = bodies[asked]
 

@@ -23,14 +23,34 @@ class Queries(Protocol):
     def add_probe(self, colliders: Sequence[Collider], margin: float) -> int:
         """Register a volume that produces no contacts; returns its handle."""
 
-    def probe_overlaps(self, probe: int, pose: Array, bodies: Sequence[int]) -> list[int]:
-        """Those of ``bodies`` that penetrate the probe when it stands at ``pose`` (7,)."""
+    def probe_gaps(self, probe: int, pose: Array, bodies: Sequence[int], within: float) -> list[float]:
+        """Distance of each of ``bodies`` from the probe at ``pose`` (7,), negative where they overlap.
+
+        ``within`` stands for all that is farther.
+        """
 
     def ray_test(self, starts: Array, ends: Array) -> RayHits:
         """Closest hits of the segments ``starts`` to ``ends``, each (n, 3)."""
 
     def contacts(self, body: int, threshold: float) -> list[Contact]:
         """Contact points of ``body`` whose distance is at most ``threshold``."""
+
+
+class Pushable(Queries, Protocol):
+    """Bodies that sensors push."""
+
+    def pose7(self, body: int) -> Array:
+        """Pose (7,) of a body now."""
+
+    def apply_force(self, body: int, force: Array, point: Array) -> None:
+        """Push a body with ``force`` (3,) at ``point`` (3,) during the coming step."""
+
+
+class Touchable(Protocol):
+    """Bodies whose contacts are watched."""
+
+    def touches(self, most: int) -> tuple[Array, Array]:
+        """Where bodies touched in the last step, (n, 3), and the forces on one of the two, (n, 3); ``most`` of them."""
 
 
 class Holds(Protocol):

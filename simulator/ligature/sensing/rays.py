@@ -6,7 +6,7 @@ end, 1 at the origin (ADF specification §17.2).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 from ligature.model.frames import pose7_matrix
 from ligature.model.hits import RayHits
 from ligature.model.scene import Scene, Sensor, SensorType
-from ligature.sensing.queries import Queries
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem, kept, put_back
+from ligature.sensing.queries import Pushable
 
 Array = NDArray[np.float64]
-ApplyForce = Callable[[int, Array, Array], None]
-"""Applies a force (3,) at a point (3,) of a body, both in world axes."""
 
 
-class Rays:
-    """The rays of all sensors of a scene, one after the other, as the state record wants them."""
+class Rays(Subsystem):
+    """The rays of all sensors of a scene, one after the other, as the state record wants them.
 
-    def __init__(self, scene: Scene, queries: Queries) -> None:
+    Resistance sensors push in every tick; what rays measure is looked up when the state is written.
+    """
+
+    def __init__(self, scene: Scene, queries: Pushable) -> None:
         self._queries = queries
         self.sensors = [s for s in scene.sensors if s.type is not SensorType.CONTACT]
         counts = [len(s.rays) for s in self.sensors]
@@ -32,89 +35,126 @@ class Rays:
         self.slices = [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         n = int(ends[-1])
         self.hits = RayHits(np.full(n, -1, dtype=np.int32), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
-        self._stick = [_Stick(sensor) for sensor in self.sensors]
+        pushing = [s for s in self.sensors if s.type is SensorType.RESISTANCE]
+        self._stick = [_Stick(sensor, sensor.parent not in scene.rod_bodies) for sensor in pushing]
+
+    def step(self, tick: int) -> None:
+        """Let every resistance sensor push during the coming step of the bodies."""
+        for stick in self._stick:
+            stick.step(self._queries)
+
+    def sense(self, state: StateRecord) -> None:
+        """Cast every ray with the bodies where the state has them, and write what they hit."""
+        if not self.sensors:
+            return
+        self.update(state["body_pose"][0])
+        hits = self.hits
+        state["ray_measurement"][0] = self.measurement
+        state["ray_body"][0], state["ray_point"][0], state["ray_normal"][0] = hits.body, hits.point, hits.normal
+
+    def reset(self) -> None:
+        """Nothing sticks any more."""
+        for stick in self._stick:
+            stick.reset()
+
+    def snapshot(self) -> dict[str, Any]:
+        """What was hit last, and where the rays of resistance sensors stick."""
+        return {"hits": self.hits._asdict(), "stick": [kept(stick, STICK_KEPT) for stick in self._stick]}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        self.hits = RayHits(**snapshot["hits"])
+        for stick, state in zip(self._stick, snapshot["stick"], strict=True):
+            put_back(stick, state)
 
     @property
     def measurement(self) -> Array:
         """Measurement (n,) of every ray."""
         return np.where(self.hits.body >= 0, 1.0 - self.hits.fraction, 0.0)
 
-    def update(self, body_pose: Array, apply_force: ApplyForce | None = None) -> None:
-        """Cast every ray with the bodies at ``body_pose`` (bodies, 7); resistance pushes by ``apply_force``."""
-        if not self.sensors:
-            return
-        segments = np.concatenate([self._segments(s, body_pose) for s in self.sensors])
+    def update(self, body_pose: Array) -> None:
+        """Cast every ray with the bodies at ``body_pose`` (bodies, 7)."""
+        segments = np.concatenate([_segments(s, pose7_matrix(body_pose[s.parent])) for s in self.sensors])
         self.hits = self._queries.ray_test(segments[:, 0], segments[:, 1])
-        if apply_force is None:
-            return
-        for sensor, part, stick in zip(self.sensors, self.slices, self._stick, strict=True):
-            if sensor.type is SensorType.RESISTANCE:
-                stick.push(segments[part], self.hits.part(part), body_pose, apply_force)
 
-    @staticmethod
-    def _segments(sensor: Sensor, body_pose: Array) -> Array:
-        """Start and end points (n, 2, 3) of one sensor's rays in world axes."""
-        T = pose7_matrix(body_pose[sensor.parent]) @ sensor.T_body_sensor
-        segments: Array = sensor.rays @ T[:3, :3].T + T[:3, 3]
-        return segments
+
+def _segments(sensor: Sensor, T_world_parent: Array) -> Array:
+    """Start and end points (n, 2, 3) of one sensor's rays in world axes."""
+    T = T_world_parent @ sensor.T_body_sensor
+    segments: Array = sensor.rays @ T[:3, :3].T + T[:3, 3]
+    return segments
 
 
 class _Stick:
     """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3)."""
 
-    def __init__(self, sensor: Sensor) -> None:
-        self._sensor = sensor
+    def __init__(self, sensor: Sensor, pushes_back: bool) -> None:
+        self._sensor, self._pushes_back = sensor, pushes_back
         n = len(sensor.rays)
         self._body = np.full(n, -1, dtype=np.int64)
         self._on_sensed, self._on_parent = np.zeros((n, 3)), np.zeros((n, 3))
         self._error = np.zeros((n, 3))
         self._offset = np.zeros((n, 3))
 
-    def push(self, segments: Array, hits: RayHits, body_pose: Array, apply_force: ApplyForce) -> None:
+    def reset(self) -> None:
+        """Stick nowhere."""
+        self._body[:] = -1
+        for array in (self._on_sensed, self._on_parent, self._error, self._offset):
+            array[:] = 0.0
+
+    def step(self, bodies: Pushable) -> None:
         """Push the bodies that the rays hit, and the parent back."""
-        for ray in range(len(segments)):
-            body = int(hits.body[ray])
+        parent = self._sensor.parent
+        T_parent = pose7_matrix(bodies.pose7(parent))
+        segments = _segments(self._sensor, T_parent)
+        hits = bodies.ray_test(segments[:, 0], segments[:, 1])
+        poses = {body: pose7_matrix(bodies.pose7(body)) for body in set(hits.body.tolist()) if body >= 0}
+        for ray, body in enumerate(hits.body.tolist()):
             if body < 0:
                 self._body[ray] = -1
                 continue
-            force = self._force(ray, segments[ray], hits, body_pose)
-            apply_force(body, force, hits.point[ray])
-            apply_force(self._sensor.parent, -force, hits.point[ray])
+            force = self._force(ray, segments[ray], hits, T_parent, poses[body])
+            bodies.apply_force(body, force, hits.point[ray])
+            if self._pushes_back:
+                bodies.apply_force(parent, -force, hits.point[ray])
 
-    def _force(self, ray: int, segment: Array, hits: RayHits, body_pose: Array) -> Array:
+    def _force(self, ray: int, segment: Array, hits: RayHits, T_parent: Array, T_sensed: Array) -> Array:
         """Force (3,) on the sensed body from one ray: normal, sticking and sliding parts."""
         law = self._sensor.resistance
         direction = segment[1] - segment[0]
         direction = direction / np.linalg.norm(direction)
         normal = law.contact_stiffness * (1.0 - hits.fraction[ray]) * direction
         weight = float(np.linalg.norm(normal)) if law.variable else 1.0
-        offset, sliding = self._tangential_offset(ray, direction, hits, body_pose)
+        if self._body[ray] != hits.body[ray]:
+            self._latch(ray, hits, T_parent, T_sensed)
+        offset, sliding = self._tangential_offset(ray, direction, T_parent, T_sensed)
         previous, self._error[ray] = self._error[ray].copy(), offset
         force: Array = normal + law.dynamic_friction * weight * sliding
         if np.linalg.norm(offset) <= law.contact_area:
             force = force + law.static_friction * weight * offset + law.damping * (offset - previous)
         else:
-            self._latch(ray, int(hits.body[ray]), hits.point[ray], body_pose)
+            self._latch(ray, hits, T_parent, T_sensed)
         return force
 
-    def _tangential_offset(self, ray: int, direction: Array, hits: RayHits, body_pose: Array) -> tuple[Array, Array]:
-        """Offset of the stuck points across the ray, and its change since the last call, each (3,)."""
-        body = int(hits.body[ray])
-        if self._body[ray] != body:
-            self._latch(ray, body, hits.point[ray], body_pose)
-        on_parent = pose7_matrix(body_pose[self._sensor.parent]) @ np.append(self._on_parent[ray], 1.0)
-        on_sensed = pose7_matrix(body_pose[body]) @ np.append(self._on_sensed[ray], 1.0)
+    def _tangential_offset(self, ray: int, direction: Array, T_parent: Array, T_sensed: Array) -> tuple[Array, Array]:
+        """Offset of the stuck points across the ray, and its change since the last tick, each (3,)."""
+        on_parent = T_parent @ np.append(self._on_parent[ray], 1.0)
+        on_sensed = T_sensed @ np.append(self._on_sensed[ray], 1.0)
         offset = (on_parent - on_sensed)[:3]
         offset = offset - (offset @ direction) * direction
         sliding = offset - self._offset[ray]
         self._offset[ray] = offset
         return offset, sliding
 
-    def _latch(self, ray: int, body: int, point: Array, body_pose: Array) -> None:
-        """Remember ``point`` (3,) as stuck to both bodies."""
-        self._body[ray] = body
-        world = np.append(point, 1.0)
-        self._on_sensed[ray] = (np.linalg.inv(pose7_matrix(body_pose[body])) @ world)[:3]
-        self._on_parent[ray] = (np.linalg.inv(pose7_matrix(body_pose[self._sensor.parent])) @ world)[:3]
+    def _latch(self, ray: int, hits: RayHits, T_parent: Array, T_sensed: Array) -> None:
+        """Remember the point of a hit as stuck to both bodies."""
+        self._body[ray] = hits.body[ray]
+        world = np.append(hits.point[ray], 1.0)
+        self._on_sensed[ray] = (np.linalg.inv(T_sensed) @ world)[:3]
+        self._on_parent[ray] = (np.linalg.inv(T_parent) @ world)[:3]
         self._error[ray] = 0.0
         self._offset[ray] = 0.0
+
+
+STICK_KEPT = ("_body", "_on_sensed", "_on_parent", "_error", "_offset")
+"""Attributes of a `_Stick` that last from tick to tick."""

@@ -2,5 +2,6 @@
 
 from ligature.suture.holes import Holes, Insertion
 from ligature.suture.rods import Rods
+from ligature.suture.suture import Suture
 
-__all__ = ["Holes", "Insertion", "Rods"]
+__all__ = ["Holes", "Insertion", "Rods", "Suture"]

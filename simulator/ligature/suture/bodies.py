@@ -20,7 +20,7 @@ class Bodies(Protocol):
         """Pose (7,) of a body's inertial frame and its twist (6,), linear part at the centre of mass."""
 
     def driven(self, body: int) -> bool:
-        """Whether a body moves as a command says, whatever pushes it."""
+        """Whether a body moves as a command states, whatever pushes it."""
 
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,)."""
@@ -32,7 +32,7 @@ class HeldBodies(Bodies, Protocol):
     def mobility(self, body: int) -> Array:
         """Change (6, 6) of a body's twist for a unit of impulse and moment at its centre of mass, at the start."""
 
-    def burden(self, body: int) -> tuple[float, Array, Array]:
+    def attached_load(self, body: int) -> tuple[float, Array, Array]:
         """Mass and inertia (3,) of what holds a body, and what pulls at it in the coming tick besides gravity.
 
         The pull (6,) is at its centre of mass.
@@ -47,3 +47,7 @@ class Masses(Protocol):
 
     def is_held(self, body: int) -> bool:
         """Whether something holds a body, so that it does not fall."""
+
+
+class SutureBodies(HeldBodies, Masses, Protocol):
+    """The rigid bodies around threads and holes of a scene."""

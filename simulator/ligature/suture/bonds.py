@@ -1,17 +1,17 @@
-"""Bonds: points of two nodes that stay together, for ties in the middle of a rod, for grips, and for pinches.
+"""Bonds: points of two nodes that stay together, for ties in the middle of a rod, for grips, and for grasps.
 
-A pinch holds whatever element passes between two pads: across them rigidly, along them by friction up to a
+A grasp holds whatever element passes between two pads: across them rigidly, along them by friction up to a
 limit that is given. World axes, SI units.
 """
 
 from __future__ import annotations
 
-from ligature.suture.compiled import inlined
+from ligature.kernels import inlined
 from ligature.suture.coupling import SLIPS
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
 
 PINCH = -2
-"""Key of the first pinch; the next ones have lower keys."""
+"""Key of the first grasp; the next ones have lower keys."""
 
 
 @inlined
@@ -46,7 +46,7 @@ def _bond(nodes, work, touches, i, k, points):
 
 @inlined
 def _pinch(nodes, work, old, touches, g, i, k, points):
-    """Add pinch number ``g`` of the element at node i by node k.
+    """Add grasp number ``g`` of the element at node i by node k.
 
     ``points[0, 1]`` is the middle of the pads and ``points[1, 1]`` their normal, in the frame of node k;
     ``points[2, 0, 0]`` is the largest force along the pads.
@@ -94,7 +94,7 @@ def _pinch(nodes, work, old, touches, g, i, k, points):
 
 @inlined
 def place_bonds(nodes, work, old, touches, grips, points):
-    """Add the bonds of all ``grips`` (g, 3): two nodes and whether it is a pinch, with ``points`` (g, m, 2, 3).
+    """Add the bonds of all ``grips`` (g, 3): two nodes and whether it is a grasp, with ``points`` (g, m, 2, 3).
 
     ``old`` are the contacts of the last tick.
     """

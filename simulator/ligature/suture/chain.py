@@ -16,7 +16,7 @@ first that is loaded and the top follows from these nodes alone. World axes.
 
 from __future__ import annotations
 
-from ligature.suture.compiled import inlined, kernel
+from ligature.kernels import inlined, kernel
 
 
 @inlined

@@ -5,12 +5,15 @@ Shapes stand in body frames; metres. Triangle meshes are touched as their convex
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, HULL, SPHERE, hull_planes
 from ligature.model.frames import inverse, matrix_pose7
 from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Scene, Shape, Sphere, TriMesh
+from ligature.model.subsystem import kept, put_back
 from ligature.suture.bodies import Bodies
 from ligature.suture.layout import Shapes
 from ligature.suture.placing import survey
@@ -135,6 +138,31 @@ class Colliders:
     def restart(self) -> None:
         """Forget when poses were read, so that the next update reads all."""
         self._turn = -1
+
+    def reset(self) -> None:
+        """As at the start: nothing was read."""
+        self.restart()
+        self._still[:] = self._static
+        self._watched, self._nearby = [], []
+        for array in (self._near, self._due, self._placed, self.motion, *(self._common[name] for name in _PLACED)):
+            array[:] = 0
+
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick: what is near, and when and where it was read."""
+        return {**kept(self, _KEPT), "parts": {name: self._common[name] for name in _PLACED}}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+        for name in _PLACED:
+            self._common[name][:] = snapshot["parts"][name]
+
+
+_KEPT = ("_turn", "_still", "_near", "_due", "_placed", "_watched", "_nearby", "motion")
+"""Attributes of `Colliders` that last from tick to tick."""
+
+_PLACED = ("pose", "box", "sweep")
+"""Arrays of all parts that follow their bodies."""
 
 
 def _arrays(shape: Shape) -> tuple[int, Array, Array, Array]:

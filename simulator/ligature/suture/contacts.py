@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import SLIPS
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 
@@ -97,7 +97,7 @@ def _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt):
         sweep = shapes.sweep[c]
         for e in range(n):
             box = work.box[e]
-            # A light taut element is thrown farther in a tick than its motion tells.
+            # A light taut element is thrown farther in a tick than its motion shows.
             thrown = min(abs(tension[e]) * dt * dt / nodes.mass[first + e], THROWN * nodes.radius[first + e])
             margin = sweep + thrown
             outside = False

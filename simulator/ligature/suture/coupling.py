@@ -4,7 +4,7 @@ A contact is a stiff spring along its normal and a bristle across it: elastic wh
 constant force against the motion while it slips, all evaluated at the end of the tick. Which contacts
 touch and which stick is found by repetition (an active-set Newton method), starting from the last
 tick. What each contact does to its two nodes apart goes into their matrices; what ties the nodes
-together is solved in `ligature.suture.ties`. World axes, SI units; `Touches.push` and the matrices K
+together is solved in `ligature.suture.coupled_solve`. World axes, SI units; `Touches.push` and the matrices K
 are times dt².
 """
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from ligature.suture.compiled import inlined, kernel
+from ligature.kernels import inlined, kernel
 from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
 
 SLIPS, STICKS, YIELDS = 0, 1, 2
@@ -132,7 +132,7 @@ def _friction(touches, c, wx, wy, wz, scale, dt):
 
 @inlined
 def rigid(touches, c):
-    """Whether bond ``c`` has no limit; one with friction is a pinch, of which `Touches.press` is given."""
+    """Whether bond ``c`` has no limit; one with friction is a grasp, of which `Touches.press` is given."""
     return touches.bond[c] and touches.friction[c] == 0.0
 
 

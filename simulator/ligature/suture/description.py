@@ -25,7 +25,7 @@ FREE = np.array([[1.0] * 3, [-1.0] * 3])
 
 
 @dataclass(frozen=True, eq=False)
-class Tie:
+class Attachment:
     """Holds element ``element`` to body ``body`` of the scene.
 
     ``T_element_a`` and ``T_body_b`` (4, 4) are the tied frames in the inertial frames of element and
@@ -86,13 +86,13 @@ class RodDescription:
     damping: Array
     pivots: Array
     frames: Array
-    give: Array
+    compliance: Array
     joint_stiffness: Array
     joint_damping: Array
     rest: Array
     low: Array
     high: Array
-    ties: tuple[Tie, ...] = ()
+    attachments: tuple[Attachment, ...] = ()
     bodies: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -123,7 +123,7 @@ def from_material(
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     damping: float = 0.0,
     straight: bool = True,
-    ties: Sequence[Tie] = (),
+    attachments: Sequence[Attachment] = (),
     name: str = "rod",
 ) -> RodDescription:
     """A rod of round section through ``points`` (n + 1, 3), one element between neighbours.
@@ -174,13 +174,13 @@ def from_material(
         damping=np.zeros((n, 2)),
         pivots=np.stack([half[:-1], -half[1:]], axis=1),
         frames=frames,
-        give=between / (youngs_modulus * area),
+        compliance=between / (youngs_modulus * area),
         joint_stiffness=stiffness,
         joint_damping=damping * stiffness,
         rest=np.zeros((n - 1, 3)),
         low=free[0],
         high=free[1],
-        ties=tuple(ties),
+        attachments=tuple(attachments),
     )
 
 
@@ -191,7 +191,7 @@ def from_chain(scene: Scene, chain: RodChain) -> RodDescription:
     n = len(bodies)
     sides = [_sides(joint, chain.bodies[j]) for j, joint in enumerate(joints)]
     springs = [_springs(joint, forward) for joint, (_a, _b, forward) in zip(joints, sides, strict=True)]
-    ties = tuple(_tie(scene.joints[i], chain.bodies) for i in chain.anchors)
+    attachments = tuple(_attachment(scene.joints[i], chain.bodies) for i in chain.anchors)
     pivots = np.array([[a[:3, 3], b[:3, 3]] for a, b, _ in sides])
     T = np.array([body.T_body_inertial for body in bodies])
     return RodDescription(
@@ -200,20 +200,20 @@ def from_chain(scene: Scene, chain: RodChain) -> RodDescription:
         T_body_inertial=T,
         mass=np.array([body.mass for body in bodies]),
         inertia=np.array([body.inertia for body in bodies]),
-        ends=_ends(pivots, ties, chain),
+        ends=_ends(pivots, attachments, chain),
         radius=np.full(n, chain.radius),
         friction=np.array([body.friction for body in bodies]),
         gravity=np.array([body.gravity for body in bodies]),
         damping=np.array([[body.linear_damping, body.angular_damping] for body in bodies]),
         pivots=pivots,
         frames=np.array([[a[:3, :3], b[:3, :3]] for a, b, _ in sides]),
-        give=0.5 * (chain.lengths[:-1] + chain.lengths[1:]) / LOCKED_STIFFNESS,
+        compliance=0.5 * (chain.lengths[:-1] + chain.lengths[1:]) / LOCKED_STIFFNESS,
         joint_stiffness=np.array([s[0] for s in springs]),
         joint_damping=np.array([s[1] for s in springs]),
         rest=np.array([s[2] for s in springs]),
         low=np.array([s[3] for s in springs]),
         high=np.array([s[4] for s in springs]),
-        ties=ties,
+        attachments=attachments,
         bodies=chain.bodies,
     )
 
@@ -237,25 +237,25 @@ def _springs(joint: Joint, forward: bool) -> tuple[Array, Array, Array, Array, A
     return (k, d, rest, low, high) if forward else (k, d, -rest, -high, -low)
 
 
-def _tie(joint: Joint, elements: tuple[int, ...]) -> Tie:
+def _attachment(joint: Joint, elements: tuple[int, ...]) -> Attachment:
     element = elements.index(joint.child if joint.child in elements else joint.parent)
     a, b, forward = _sides(joint, elements[element])
     body = joint.child if forward else joint.parent
     k, d, rest, low, high = _springs(joint, forward)
     if joint.type is JointType.FIXED:
         low = high = np.zeros(3)
-    return Tie(element, body, a, b, k, d, rest, low, high)
+    return Attachment(element, body, a, b, k, d, rest, low, high)
 
 
-def _ends(pivots: Array, ties: tuple[Tie, ...], chain: RodChain) -> Array:
+def _ends(pivots: Array, attachments: tuple[Attachment, ...], chain: RodChain) -> Array:
     """Segment of each element, between its pivots; a free end mirrors the pivot on the other side."""
     n = len(chain.lengths)
     ends = np.empty((n, 2, 3))
     ends[1:, 0], ends[:-1, 1] = pivots[:, 1], pivots[:, 0]
-    tied = {tie.element: tie.T_element_a[:3, 3] for tie in ties}
+    attached = {attachment.element: attachment.T_element_a[:3, 3] for attachment in attachments}
     for i, end, other in ((0, 0, ends[0, 1]), (n - 1, 1, ends[n - 1, 0])):
         mirrored = other * (1.0 - chain.lengths[i] / max(float(np.linalg.norm(other)), 1e-12))
-        near = tied.get(i, mirrored)
+        near = attached.get(i, mirrored)
         ends[i, end] = near if np.linalg.norm(near - other) > 0.5 * chain.lengths[i] else mirrored
     return ends
 

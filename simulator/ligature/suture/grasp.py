@@ -118,9 +118,9 @@ class Hands:
         self._tables = table_of(self.motions), table_of(self._pads), table_of(self._scratch)
 
     def let_free(self, own_mass: float, gravity: Array, dt: float) -> Array:
-        """See `ligature.suture.pads.let_free`; returns `Motions.burden`."""
+        """See `ligature.suture.pads.let_free`; returns `Motions.attached_load`."""
         let_free(self._tables[0], self._tables[2], own_mass, gravity, dt)
-        return self.motions.burden
+        return self.motions.attached_load
 
     def hold(self, grasps: Sequence[Grasp], dt: float) -> Array:
         """Impulses (1 + g, 6) of one tick on the body and on the holders, each about its centre of mass.

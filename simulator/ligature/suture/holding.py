@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
+from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.rotations import cross, matrix_of, multiply, quaternion_of, rotation_vector
 from ligature.suture.tracking import open_passages
 

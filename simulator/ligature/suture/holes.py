@@ -10,6 +10,7 @@ puncture anywhere else in tissue makes another such passage. World axes, SI unit
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from ligature.model.frames import inverse
 from ligature.model.piercing import Hole, Tissue
 from ligature.model.scene import Scene
 from ligature.model.state import MAX_INSERTIONS, StateRecord
+from ligature.model.subsystem import kept, put_back
 from ligature.suture import passages as arrays
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.holding import hold_alone, react
@@ -29,7 +31,7 @@ from ligature.suture.tracking import follow_needle, follow_rod, look_for_needle,
 Array = NDArray[np.float64]
 
 LEAST_FRICTION, LEAST_STRENGTH, LEAST_STIFFNESS = 0.3, 3.0, 4000.0
-"""Friction (N), sideways strength (N) and stiffness (N/m) of tissue whose file says nothing.
+"""Friction (N), sideways strength (N) and stiffness (N/m) of tissue whose file states nothing.
 
 Masses in scenes of AMBF are often a thousand times those of real needles and threads; such a needle would
 fall out of real tissue. So its tissue bears its weight: the following multiples of it. A thread of a kilogram that
@@ -50,6 +52,9 @@ SURPRISE = 0.5
 
 MOST_BLIND = 32
 """Most ticks between two looks."""
+
+_KEPT = ("_blind", "_turn", "_near", "_gaps")
+"""Attributes of `Holes` that last from tick to tick: when to look for new passages, and where."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +155,7 @@ class Holes:
                 self._p, self._s, self._rod_tables[owner], rod.first, self._before[owner], line, owner, self._gaps[line]
             )
         nearest = self._gaps.min(axis=0)
-        self._near = nearest < NEAR
+        self._near[:] = nearest < NEAR
         self._blind = int(min(max(float(nearest.min()), 0.0) / (SURPRISE * self._dt), MOST_BLIND))
 
     def _read_holes(self, holes: list[int]) -> None:
@@ -166,9 +171,9 @@ class Holes:
         for line in sorted(set(p.line[:n].tolist())):
             if line < len(self._needles):
                 self._read_needle(line)
-        kept = [c for c in range(n) if self._follows(c)]
-        if len(kept) < n:
-            self._keep(kept)
+        lasting = [c for c in range(n) if self._follows(c)]
+        if len(lasting) < n:
+            self._keep(lasting)
 
     def _follows(self, c: int) -> bool:
         owner = int(self._passages.line[c]) - len(self._needles)
@@ -188,7 +193,7 @@ class Holes:
         """Motion of a needle, and what will pull at it in this tick, for whoever solves for it."""
         body, bodies = self._scene.bodies[self._needles[line]], self._bodies
         self._lines.pose[line], self._twist[line] = bodies.motion(body.index)
-        mass, inertia, self._pull[line] = bodies.burden(body.index)
+        mass, inertia, self._pull[line] = bodies.attached_load(body.index)
         self._mass[line], self._inertia[line] = body.mass + mass, body.inertia + inertia
         self._pull[line, :3] += body.mass * body.gravity
         owner = int(self._lines.owner[line])
@@ -229,9 +234,8 @@ class Holes:
         if not found and not state["insertion_count"][0]:
             return
         state["insertion_count"] = len(found)
-        state["insertion_hole"], state["insertion_body"] = -1, -1
-        for name in ("depth", "point", "force"):
-            state[f"insertion_{name}"] = 0.0
+        for name in ("hole", "body", "depth", "point", "force"):
+            state[f"insertion_{name}"] = 0
         for row, insertion in enumerate(found):
             for name in ("hole", "body", "depth", "point", "force"):
                 state[f"insertion_{name}"][0, row] = getattr(insertion, name)
@@ -245,27 +249,34 @@ class Holes:
         self._blind = 0
 
     def reset(self) -> None:
-        """Empty all holes."""
-        self._passages.filled[0] = 0
-        self._blind = 0
-
-    def memory(self) -> dict[str, Array]:
-        """Everything that lasts from tick to tick, but when it was last looked for new passages; see `restart`."""
-        n = int(self._passages.filled[0])
-        return {name: np.array(getattr(self._passages, name)[:n]) for name in arrays.MEMORY}
-
-    def recall(self, memory: dict[str, Array]) -> None:
-        """Continue from `memory`."""
-        n = len(memory["hole"])
-        self._passages.filled[0] = n
-        for name in arrays.MEMORY:
-            getattr(self._passages, name)[:n] = memory[name]
-        self.restart()
-
-    def restart(self) -> None:
-        """Look for new passages in the next tick, as after `recall`."""
+        """Empty all holes, and look for new passages in the next tick."""
+        self._clear()
         self._blind, self._turn = 0, -1
         self._near[:] = True
+        self._gaps[:] = 0.0
+        self._read_holes(list(range(len(self._scene.holes))))
+
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        n = int(self._passages.filled[0])
+        rows = {name: np.array(getattr(self._passages, name)[:n]) for name in arrays.ROWS}
+        return {"rows": rows, "pose": self._sites.pose, "twist": self._sites.twist, **kept(self, _KEPT)}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        self._clear()
+        n = len(snapshot["rows"]["hole"])
+        self._passages.filled[0] = n
+        for name in arrays.ROWS:
+            getattr(self._passages, name)[:n] = snapshot["rows"][name]
+        self._sites.pose[:], self._sites.twist[:] = snapshot["pose"], snapshot["twist"]
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+
+    def _clear(self) -> None:
+        """No passages, and none of earlier ones left in the rows behind."""
+        self._passages.filled[0] = 0
+        for name in arrays.ROWS:
+            getattr(self._passages, name)[:] = 0
 
 
 def _sites(scene: Scene, bodies: HeldBodies) -> arrays.Sites:
@@ -283,12 +294,12 @@ def _sites(scene: Scene, bodies: HeldBodies) -> arrays.Sites:
 def _lines(scene: Scene, rods: list[Rod]) -> arrays.Lines:
     """Needles and rods as arrays, with the law that each hole has for each of them."""
     lines = arrays.lines(len(scene.needles) + len(rods), len(scene.holes))
-    tied = {tie.body: owner for owner, rod in enumerate(rods) for tie in rod.description.ties}
+    attached = {attachment.body: owner for owner, rod in enumerate(rods) for attachment in rod.description.attachments}
     for line, needle in enumerate(scene.needles):
         arc = needle.arc
         lines.centre[line], lines.x[line], lines.y[line] = arc.centre, arc.x, arc.y
         lines.radius[line], lines.begin[line], lines.end[line] = arc.radius, arc.begin, arc.end
-        owner = tied.get(needle.body, -1)
+        owner = attached.get(needle.body, -1)
         lines.owner[line] = owner
         lines.node[line] = rods[owner].node_of[needle.body] if owner >= 0 else 0
         weight = _weight(scene, [needle.body]) + (_rod_weight(rods[owner]) if owner >= 0 else 0.0)
@@ -296,8 +307,8 @@ def _lines(scene: Scene, rods: list[Rod]) -> arrays.Lines:
             _set_law(lines, line, hole, weight, arc.radius)
     for owner, rod in enumerate(rods):
         line = len(scene.needles) + owner
-        tied_needles = [needle.body for needle in scene.needles if tied.get(needle.body) == owner]
-        weight = _rod_weight(rod) + _weight(scene, tied_needles)
+        attached_needles = [needle.body for needle in scene.needles if attached.get(needle.body) == owner]
+        weight = _rod_weight(rod) + _weight(scene, attached_needles)
         for hole in scene.holes:
             _set_law(lines, line, hole, weight, 0.0)
     return lines

@@ -20,7 +20,7 @@ class Nodes(NamedTuple):
 
     mass: Array  # (N,)
     inertia: Array  # (N, 3) principal moments
-    fixed: NDArray[np.bool_]  # (N,) moves as told, whatever pulls at it
+    fixed: NDArray[np.bool_]  # (N,) moves as commanded, whatever pulls at it
     gravity: Array  # (N, 3)
     keep: Array  # (N, 2) fraction of linear and angular speed that damping leaves after a tick
     x: Array  # (N, 3) centre of mass
@@ -37,7 +37,7 @@ class Joints(NamedTuple):
 
     pivot: Array  # (n - 1, 2, 3) in I of nodes j, j + 1
     frame: Array  # (n - 1, 2, 4) orientation of the joint frame in I of nodes j, j + 1
-    give: Array  # (n - 1,) compliance of the translation, m/N
+    compliance: Array  # (n - 1,) compliance of the translation, m/N
     stiffness: Array  # (n - 1, 3) N m/rad about the axes of the joint frame
     damping: Array  # (n - 1, 3) N m s/rad
     rest: Array  # (n - 1, 3) rad
@@ -90,7 +90,7 @@ class Shapes(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Scratch of a tick; nothing in it outlives one."""
+    """Scratch of a tick; nothing in it survives one."""
 
     x: Array  # (N, 3) start of the tick
     q: Array  # (N, 4)
@@ -108,7 +108,7 @@ class Work(NamedTuple):
     d: Array  # (N, 6)
     load: Array  # (n - 1, 6)
     cg: Array  # (4, N, 6)
-    tied_load: Array  # (n - 1, 6)
+    coupled_load: Array  # (n - 1, 6)
     rows: NDArray[np.int64]  # (N,) of what contacts tie together
     pushed: NDArray[np.bool_]  # (N,) bodies that contacts push
     K: Array  # (C, 3, 3) contact stiffness times dt²
@@ -144,7 +144,7 @@ def joints(n: int) -> Joints:
     """Room for ``n`` joints."""
     z = np.zeros
     return Joints(
-        pivot=z((n, 2, 3)), frame=z((n, 2, 4)), give=z(n), stiffness=z((n, 3)), damping=z((n, 3)), rest=z((n, 3)),
+        pivot=z((n, 2, 3)), frame=z((n, 2, 4)), compliance=z(n), stiffness=z((n, 3)), damping=z((n, 3)), rest=z((n, 3)),
         low=z((n, 3)), high=z((n, 3)), stop=z(n), angle=z((n, 3)), load=z((n, 6)),
     )  # fmt: skip
 
@@ -166,7 +166,7 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         x=z((total, 3)), q=z((total, 4)), xp=z((total, 3)), qp=z((total, 4)), R=z((total + 1, 3, 3)),
         lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
         Y=z((total, 6, 6)), Z=z((j, 6, 6)), g=z((total, 6)), d=z((total, 6)), load=z((j, 6)),
-        cg=z((4, total, 6)), tied_load=z((j, 6)), rows=np.zeros(total, np.int64),
+        cg=z((4, total, 6)), coupled_load=z((j, 6)), rows=np.zeros(total, np.int64),
         pushed=np.zeros(total, np.bool_), K=z((contacts, 3, 3)), arms=z((contacts, 2, 3)), six=z((6, 6)),
         sum6=z(6), kept_x=z((total, 3)), kept_q=z((total, 4)), kept_v=z((total, 3)), kept_w=z((total, 3)),
         kept_angle=z((j, 3)), kept_load=z((j, 6)),

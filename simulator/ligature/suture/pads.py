@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.rotations import cross, matrix_of, multiply, rotate, rotate_back, rotation_vector
 from ligature.suture.tables import opener
 
@@ -65,12 +65,12 @@ class Motions(NamedTuple):
     holder_twist: Array  # (g, 6)
     ride: Array  # (g, 6) velocity of the holders at the body's centre in the last tick
     pending: Array  # (6,) impulse and moment that the body was given already
-    burden: Array  # (6,) force and moment that move along what was added to the body's mass
+    attached_load: Array  # (6,) force and moment that move along what was added to the body's mass
     impulse: Array  # (1 + g, 6) what jaws give to the body, and to their holders
 
 
 class Scratch(NamedTuple):
-    """What one tick of g jaws works with; nothing in it outlives one."""
+    """What one tick of g jaws works with; nothing in it survives one."""
 
     at: Array  # (g, 3) patches in the world
     R: Array  # (g, 3, 3)
@@ -286,30 +286,32 @@ def let_free(motion_table, room_table, own_mass, gravity, dt):
     """
     moves, room = open_motions(motion_table), open_scratch(room_table)
     pose, twist, inverse = moves.body_pose, moves.body_twist, moves.inverse
-    burden, pending = moves.burden, moves.pending
+    attached_load, pending = moves.attached_load, moves.pending
     n, own = moves.ride.shape[0], own_mass * inverse[0]
     for k in range(6):
-        burden[k], room.step[k] = 0.0, 0.0
+        attached_load[k], room.step[k] = 0.0, 0.0
     for g in range(n):
         h, t, now, ride = moves.holder_pose[g], moves.holder_twist[g], room.ask, moves.ride[g]
         vx, vy, vz = cross(t[3], t[4], t[5], pose[0] - h[0], pose[1] - h[1], pose[2] - h[2])
         now[0], now[1], now[2], now[3], now[4], now[5] = t[0] + vx, t[1] + vy, t[2] + vz, t[3], t[4], t[5]
         for k in range(6):
-            burden[k] += (now[k] - ride[k]) / n
+            attached_load[k] += (now[k] - ride[k]) / n
             ride[k] = now[k]
     for k in range(6):
-        twist[k] += (1.0 - own) * burden[k]
+        twist[k] += (1.0 - own) * attached_load[k]
     matrix_of(pose[3], pose[4], pose[5], pose[6], room.S)
-    ax, ay, az = rotate_back(room.S, burden[3], burden[4], burden[5])
-    burden[3], burden[4], burden[5] = rotate(room.S, ax / inverse[1], ay / inverse[2], az / inverse[3])
+    ax, ay, az = rotate_back(room.S, attached_load[3], attached_load[4], attached_load[5])
+    attached_load[3], attached_load[4], attached_load[5] = rotate(
+        room.S, ax / inverse[1], ay / inverse[2], az / inverse[3]
+    )
     wx, wy, wz = rotate_back(room.S, pending[3], pending[4], pending[5])
     wx, wy, wz = rotate(room.S, wx * inverse[1], wy * inverse[2], wz * inverse[3])
     twist[3], twist[4], twist[5] = twist[3] + wx, twist[4] + wy, twist[5] + wz
     for k in range(3):
         twist[k] += pending[k] * inverse[0] + dt * own * gravity[k]
-        burden[k] /= inverse[0]
+        attached_load[k] /= inverse[0]
     for k in range(6):
-        burden[k] *= (1.0 - own) / dt
+        attached_load[k] *= (1.0 - own) / dt
 
 
 @kernel

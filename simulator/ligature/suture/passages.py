@@ -110,8 +110,8 @@ SIX = ("stretch", "stiffness", "damping", "limit", "secant", "bias", "drift", "l
 ALONE = ("filled", "J", "T", "d", "A", "B")
 """Arrays of `Passages` that are not one row a passage."""
 
-MEMORY = ("hole", "line", "element", "point", "frame", "anchor", "depth", "mode", "force")
-"""What of a passage lasts from tick to tick."""
+ROWS = tuple(name for name in Passages._fields if name not in ALONE)
+"""Arrays of `Passages` with one row a passage."""
 
 
 def sites(n: int) -> Sites:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ligature.suture.compiled import inlined, kernel
+from ligature.kernels import inlined, kernel
 from ligature.suture.rotations import matrix_of, multiply, rotate
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ligature.kernels import inlined
 from ligature.suture.chain import add_joint_force
-from ligature.suture.compiled import inlined
 from ligature.suture.coupling import lever_of
 from ligature.suture.rotations import cross
 

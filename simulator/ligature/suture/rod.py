@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, quaternion_matrix
 from ligature.model.poses import compose_rows
+from ligature.model.subsystem import kept, put_back
 from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.bonds import PINCH
 from ligature.suture.colliders import Colliders
-from ligature.suture.description import RodDescription, Tie, frame_quaternions
+from ligature.suture.description import Attachment, RodDescription, frame_quaternions
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.substeps import run_tick
@@ -95,6 +97,8 @@ class Rod:
         The joints of the chain with their springs, angles and loads, those of the end ties included.
     tension
         (n,) pull along each element in newtons at the last tick.
+    settled_soundly
+        Whether the state after the last tick is finite and below `MAX_SPEED`.
     """
 
     def __init__(
@@ -111,14 +115,16 @@ class Rod:
         self._pads: tuple[Pads, ...] = ()
         n = len(description.mass)
         known = {partner.body: partner for partner in partners}
-        for tie in description.ties:
-            if tie.body not in known:
-                raise ValueError(f"rod '{description.name}' is tied to body {tie.body}, which is no partner of it")
+        for attachment in description.attachments:
+            if attachment.body not in known:
+                raise ValueError(
+                    f"rod '{description.name}' is tied to body {attachment.body}, which is no partner of it"
+                )
         head, tail, others = _ends(description)
         self._first = 1 if head else 0
         self._own = slice(self._first, self._first + n)
         self._chain = n + self._first + (1 if tail else 0)
-        ends = {tie.body: node for tie, node in ((head, 0), (tail, self._chain - 1)) if tie}
+        ends = {attachment.body: node for attachment, node in ((head, 0), (tail, self._chain - 1)) if attachment}
         rest = [partner for partner in partners if partner.body not in ends]
         self.node_of = {**ends, **{p.body: self._chain + k for k, p in enumerate(rest)}}
         self._total = self._chain + len(rest)
@@ -131,11 +137,11 @@ class Rod:
         self._tables = [table_of(group) for group in (self._nodes, self.joints, self._shapes, self._work)]
         self._touch_tables = {id(touches): table_of(touches) for touches in self._touches}
         self._shape_poses = np.zeros_like(self._shapes.pose)
-        self._counts = np.zeros(4, np.int64)
+        self._counts = np.zeros(5, np.int64)
         self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
-        self._permanent = [self._grip_of(tie) for tie in others]
+        self._permanent = [self._grip_of(attachment) for attachment in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
         self._fixed = {p.body: p.fixed for p in partners}
         self._near: list[int] | None = None
@@ -143,14 +149,15 @@ class Rod:
         self._apart: list[int] = []
         self._movable: list[tuple[int, int]] = []
         self._pushed: list[tuple[int, int]] = []
-        self._tied = [tie.body for tie in description.ties]
+        self._pulled: dict[int, tuple[Array, float, Array]] = {}
+        self._attached = [attachment.body for attachment in description.attachments]
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
         self.take_passages(passages(1), 0)
         self.impulse = np.zeros((self._total, 6))
         self.tension = np.zeros(n)
-        self.newton_steps = 0
+        self.newton_steps, self.settled_soundly = 0, True
         self.reset()
 
     # --- building ---------------------------------------------------------------------------
@@ -173,53 +180,66 @@ class Rod:
                 )
         return nodes
 
-    def _grip_of(self, tie: Tie) -> Grip:
+    def _grip_of(self, attachment: Attachment) -> Grip:
         """A tie in the middle of the rod, as three points that stay together."""
-        arm = 0.5 * float(np.linalg.norm(np.diff(self.description.ends[tie.element], axis=0)))
+        arm = 0.5 * float(np.linalg.norm(np.diff(self.description.ends[attachment.element], axis=0)))
         corners = arm * np.array([[1.0, 0.0, 0.0], [-0.5, 0.866, 0.0], [-0.5, -0.866, 0.0]])
         return Grip(
-            tie.element,
-            tie.body,
-            np.stack([corners @ T[:3, :3].T + T[:3, 3] for T in (tie.T_element_a, tie.T_body_b)], axis=1),
+            attachment.element,
+            attachment.body,
+            np.stack([corners @ T[:3, :3].T + T[:3, 3] for T in (attachment.T_element_a, attachment.T_body_b)], axis=1),
         )
 
     # --- state ------------------------------------------------------------------------------
 
     def reset(self) -> None:
         """Put every element back to its initial pose, at rest, and let go of all grips."""
+        nodes, own = self._nodes, self._own
         poses = np.array([matrix_pose7(T) for T in self.description.T_world_inertial])
-        self._nodes.x[self._own], self._nodes.q[self._own] = poses[:, :3], poses[:, 3:]
-        self._nodes.v[:], self._nodes.w[:] = 0.0, 0.0
+        nodes.x[:], nodes.q[:] = 0.0, [0.0, 0.0, 0.0, 1.0]
+        nodes.x[own], nodes.q[own] = poses[:, :3], poses[:, 3:]
+        nodes.v[:], nodes.w[:] = 0.0, 0.0
+        for partner in self.partners:
+            nodes.fixed[self.node_of[partner.body]] = partner.fixed
         self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
         self.grips, self._pads, self._near = [], (), None
         self._bonds = self._gather_bonds()
         self.tension[:], self.impulse[:] = 0.0, 0.0
+        self.newton_steps, self.settled_soundly = 0, True
+        self._clear_touches()
+
+    def _clear_touches(self) -> None:
+        """No contacts, and none of earlier ones left in the rows behind."""
         for touches in self._touches:
-            touches.count[0] = 0
+            for array in touches:
+                array[:] = 0
 
-    def memory(self) -> dict[str, Array]:
+    def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
-        nodes, joints, touches = self._nodes, self.joints, self._touches[0]
-        kept = {name: getattr(nodes, name).copy() for name in ("x", "q", "v", "w")}
-        kept |= {"angle": joints.angle.copy(), "load": joints.load.copy(), "tension": self.tension.copy()}
-        n = int(touches.count[0])
-        kept |= {f"touch_{name}": np.array(getattr(touches, name)[:n]) for name in TOUCH_MEMORY}
-        kept["grips"] = np.array([[g.element, g.body, *g.points.ravel()] for g in self.grips]).reshape(-1, 20)
-        return kept
-
-    def recall(self, memory: dict[str, Array]) -> None:
-        """Continue from `memory`."""
-        for name in ("x", "q", "v", "w"):
-            getattr(self._nodes, name)[:] = memory[name]
-        self.joints.angle[:], self.joints.load[:] = memory["angle"], memory["load"]
-        self.tension[:] = memory["tension"]
         touches = self._touches[0]
-        n = len(memory["touch_key"])
-        touches.count[0] = n
-        for name in TOUCH_MEMORY:
-            getattr(touches, name)[:n] = memory[f"touch_{name}"]
-        self.grips = [Grip(int(g[0]), int(g[1]), g[2:].reshape(3, 2, 3)) for g in memory["grips"]]
-        self._pads, self._near = (), None
+        n = int(touches.count[0])
+        return {
+            **{name: getattr(self._nodes, name) for name in NODES_KEPT},
+            **{name: getattr(self.joints, name) for name in JOINTS_KEPT},
+            **{f"touch_{name}": np.array(getattr(touches, name)[:n]) for name in TOUCHES_KEPT},
+            **kept(self, _KEPT),
+            "skip": self.skip,
+        }
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        for name in NODES_KEPT:
+            getattr(self._nodes, name)[:] = snapshot[name]
+        for name in JOINTS_KEPT:
+            getattr(self.joints, name)[:] = snapshot[name]
+        self._clear_touches()
+        touches = self._touches[0]
+        n = touches.count[0] = len(snapshot["touch_key"])
+        for name in TOUCHES_KEPT:
+            getattr(touches, name)[:n] = snapshot[f"touch_{name}"]
+        put_back(self, {name: snapshot[name] for name in _KEPT})
+        self.skip[:] = snapshot["skip"]
+        self._near = None
         self._bonds = self._gather_bonds()
 
     def finite(self) -> bool:
@@ -259,7 +279,7 @@ class Rod:
 
     def hangs_on(self, body: int) -> bool:
         """Whether ``body`` and nothing else holds the rod."""
-        return {*self._tied, *(grip.body for grip in self.grips)} == {body}
+        return {*self._attached, *(grip.body for grip in self.grips)} == {body}
 
     def carry(self, T: Array) -> None:
         """Move the whole rod by ``T`` (4, 4) in world axes, and leave it at rest, its contacts forgotten."""
@@ -290,9 +310,20 @@ class Rod:
         self._passages, self._passage_table, self._owner = held, table_of(held), owner
 
     def pull_partner(self, body: int, acceleration: Array, mass: float, inertia: Array) -> None:
-        """Let a movable partner fall with ``acceleration`` (3,), and resist with ``mass`` and ``inertia`` (3,)."""
+        """Let a movable partner fall with ``acceleration`` (3,), and resist with ``mass`` and ``inertia`` (3,).
+
+        It does so in the coming tick: what pulls at it or holds it is another from tick to tick.
+        """
         i, nodes = self.node_of[body], self._nodes
+        self._pulled.setdefault(i, (nodes.gravity[i].copy(), float(nodes.mass[i]), nodes.inertia[i].copy()))
         nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = acceleration, mass, inertia
+
+    def _end_pulls(self) -> None:
+        """Let partners resist forces as before `pull_partner`."""
+        nodes = self._nodes
+        for i, (gravity, mass, inertia) in self._pulled.items():
+            nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = gravity, mass, inertia
+        self._pulled.clear()
 
     def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
         """Let an element fall with ``acceleration`` (3,) from now on."""
@@ -324,11 +355,11 @@ class Rod:
         return self._corners
 
     def place(self, body: int, pose: Array, twist: Array) -> None:
-        """Tell where a partner's inertial frame is, (7,), and how it moves, (6,), at the start of the tick."""
+        """Report where a partner's inertial frame is, (7,), and how it moves, (6,), at the start of the tick."""
         i, nodes = self.node_of[body], self._nodes
         nodes.x[i], nodes.q[i], nodes.v[i], nodes.w[i] = pose[:3], pose[3:], twist[:3], twist[3:]
 
-    def weigh(self, partner: Partner, mass: float, inertia: Array, held: bool) -> None:
+    def set_mass(self, partner: Partner, mass: float, inertia: Array, held: bool) -> None:
         """Let a partner resist forces with ``mass`` and principal moments ``inertia`` (3,) from now on."""
         i, nodes = self.node_of[partner.body], self._nodes
         nodes.mass[i], nodes.inertia[i] = mass, inertia
@@ -352,7 +383,7 @@ class Rod:
             self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
         rows = [(colliders.row_of[body], self.node_of[body]) for body in near]
         self._met = np.array(rows, dtype=np.int64).reshape(-1, 2)
-        holding = sorted({*self._tied, *(g.body for g in self.grips), *(p.body for p in self._pads)})
+        holding = sorted({*self._attached, *(g.body for g in self.grips), *(p.body for p in self._pads)})
         self._apart = [body for body in holding if body not in near]
         partners = [(body, self.node_of[body]) for body in (*near, *self._apart)]
         self._movable = [(body, node) for body, node in partners if not self._fixed[body]]
@@ -367,7 +398,7 @@ class Rod:
         partner = next(p for p in self.partners if p.body == body)
         T_b = inverse(partner.T_body_inertial) @ T_body_b
         none = np.zeros(3)
-        self.grips.append(self._grip_of(Tie(element, body, T_a, T_b, none, none, none, none, none)))
+        self.grips.append(self._grip_of(Attachment(element, body, T_a, T_b, none, none, none, none, none)))
         self._near = None
         self._bonds = self._gather_bonds()
 
@@ -385,7 +416,7 @@ class Rod:
         self._bonds = self._gather_bonds()
 
     def _gather_bonds(self) -> tuple[NDArray[np.int64], Array]:
-        """Nodes and kinds (g, 3) and points (g, 3, 2, 3) of all bonds; pinches last."""
+        """Nodes and kinds (g, 3) and points (g, 3, 2, 3) of all bonds; grasps last."""
         held = (*self._permanent, *self.grips)
         nodes = [(self._first + g.element, self.node_of[g.body], 0) for g in held]
         nodes += [(self._first, self.node_of[p.body], 1) for p in self._pads for _ in p.points]
@@ -393,7 +424,7 @@ class Rod:
         return np.array(nodes, dtype=np.int64).reshape(-1, 3), points.reshape(-1, 3, 2, 3)
 
     def _find_pinched(self) -> None:
-        """Give every pinch the element nearest to its point."""
+        """Give every grasp the element nearest to its point."""
         grips, points = self._bonds
         rows = np.flatnonzero(grips[:, 2])
         for row in rows:
@@ -426,9 +457,10 @@ class Rod:
         run_tick(
             self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
             work, self._passage_table, self._owner, grips, points, self._motion, self._met, self._counts,
-            self._self_skip, self._stiffness, self.impulse, self.tension, self.dt,
+            self._self_skip, self._stiffness, self.impulse, self.tension, MAX_SPEED, self.dt,
         )  # fmt: skip
-        self.newton_steps = int(self._counts[2])
+        self.newton_steps, self.settled_soundly = int(self._counts[2]), bool(self._counts[4])
+        self._end_pulls()
         self._touches = (c, a, b) if self._counts[3] else (b, c, a)
 
     def impulse_on(self, body: int) -> Array:
@@ -436,7 +468,13 @@ class Rod:
         return self.impulse[self.node_of[body]]
 
 
-TOUCH_MEMORY = ("node", "key", "slip", "press", "closed", "mode", "bond", "normal", "force", "start")
+NODES_KEPT = ("x", "q", "v", "w", "mass", "inertia", "gravity", "fixed")
+JOINTS_KEPT = ("angle", "load")
+TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bond", "normal", "force", "start")
+"""Arrays of nodes, joints and contact points that last from tick to tick."""
+
+_KEPT = ("tension", "impulse", "grips", "_pads", "newton_steps", "settled_soundly")
+"""Attributes of a `Rod` that do."""
 
 
 def _pinch_rows(pads: Pads) -> list[Array]:
@@ -449,28 +487,30 @@ def _pinch_rows(pads: Pads) -> list[Array]:
     return rows
 
 
-def _ends(description: RodDescription) -> tuple[Tie | None, Tie | None, list[Tie]]:
+def _ends(description: RodDescription) -> tuple[Attachment | None, Attachment | None, list[Attachment]]:
     """The ties that become the chain's first and last node, and the others."""
-    head = next((t for t in description.ties if t.element == 0), None)
+    head = next((t for t in description.attachments if t.element == 0), None)
     last = len(description.mass) - 1
-    tail = next((t for t in description.ties if t.element == last and (head is None or t.body != head.body)), None)
-    return head, tail, [t for t in description.ties if t is not head and t is not tail]
+    tail = next(
+        (t for t in description.attachments if t.element == last and (head is None or t.body != head.body)), None
+    )
+    return head, tail, [t for t in description.attachments if t is not head and t is not tail]
 
 
-def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> layout.Joints:
+def _joints(description: RodDescription, head: Attachment | None, tail: Attachment | None) -> layout.Joints:
     """Joint arrays of the whole chain, those of the ties at its ends included."""
     pivots, frames = list(description.pivots), list(description.frames)
-    give = list(description.give)
+    compliance = list(description.compliance)
     rows = {
         "stiffness": list(description.joint_stiffness), "damping": list(description.joint_damping),
         "rest": list(description.rest), "low": list(description.low), "high": list(description.high),
     }  # fmt: skip
-    stiffest = float(min(description.give))
+    stiffest = float(min(description.compliance))
     if head is not None:
         a, b = head.T_body_b, head.T_element_a
         pivots.insert(0, np.array([a[:3, 3], b[:3, 3]]))
         frames.insert(0, np.array([a[:3, :3], b[:3, :3]]))
-        give.insert(0, stiffest)
+        compliance.insert(0, stiffest)
         seen = {"stiffness": head.stiffness, "damping": head.damping, "rest": -head.rest,
                 "low": -head.high, "high": -head.low}  # fmt: skip
         for name, values in rows.items():
@@ -479,7 +519,7 @@ def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> 
         a, b = tail.T_element_a, tail.T_body_b
         pivots.append(np.array([a[:3, 3], b[:3, 3]]))
         frames.append(np.array([a[:3, :3], b[:3, :3]]))
-        give.append(stiffest)
+        compliance.append(stiffest)
         for name, values in rows.items():
             values.append(getattr(tail, name))
     n = len(pivots)
@@ -491,7 +531,7 @@ def _joints(description: RodDescription, head: Tie | None, tail: Tie | None) -> 
     span = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1).sum()
     bending = np.where(locked, 0.0, arrays["stiffness"]).max(axis=1)
     return layout.Joints(
-        pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), give=np.array(give),
+        pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), compliance=np.array(compliance),
         **arrays, stop=np.maximum(100.0 * bending, 100.0 * weight * span),
         angle=np.zeros((n, 3)), load=np.zeros((n, 6)),
     )  # fmt: skip

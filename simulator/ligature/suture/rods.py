@@ -6,6 +6,7 @@ World axes, SI units; poses and twists as in `ligature.model.state`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 NEXT_TO_PADS = 3
 """Elements next to the one between pads that do not touch the fingers."""
 
-NEXT_TO_TIE = 3
+NEXT_TO_ATTACHMENT = 3
 """Elements next to a tie that do not touch the tied body, in which they begin."""
 
 
@@ -42,18 +43,19 @@ class Rods:
         self._colliders = Colliders(scene, dt)
         self.rods = [self._rod(scene, from_chain(scene, chain), dt) for chain in scene.rods]
         self._skip = [rod.skip.copy() for rod in self.rods]
+        self.problems: list[Diagnostic] = []
         self._of_body = {body: (rod, e) for rod in self.rods for e, body in enumerate(rod.description.bodies)}
 
     def _rod(self, scene: Scene, description: RodDescription, dt: float) -> Rod:
         elements = len(description.mass)
         shapes = self._colliders.shapes(elements)
-        tied = [tie.body for tie in description.ties]
-        bodies = sorted({*tied, *self._colliders.bodies})
+        attached = [attachment.body for attachment in description.attachments]
+        bodies = sorted({*attached, *self._colliders.bodies})
         free = {a.links[0].body for a in scene.articulations if len(a.links) == 1}
         rod = Rod(description, [_partner(scene, b, b in free) for b in bodies], shapes, dt)
-        for tie in description.ties:
-            beside = np.abs(np.arange(elements) - tie.element) < NEXT_TO_TIE
-            shapes.skip[self._colliders.parts_of(tie.body)] |= beside
+        for attachment in description.attachments:
+            beside = np.abs(np.arange(elements) - attachment.element) < NEXT_TO_ATTACHMENT
+            shapes.skip[self._colliders.parts_of(attachment.body)] |= beside
         for e, element in enumerate(description.bodies):
             for other in scene.bodies[element].no_collision_with:
                 shapes.skip[self._colliders.parts_of(other), e] = True
@@ -73,6 +75,8 @@ class Rods:
             rod.step()
             for body, impulse in rod.pushes():
                 bodies.apply_impulse(body, impulse[:3], impulse[3:])
+            if not rod.settled_soundly:
+                self._heal(rod)
 
     def grip(self, body: int, element_body: int, T_body_a: Array, T_element_b: Array) -> None:
         """Hold frame a (4, 4) of a body and frame b of an element together; both are given in body frames B.
@@ -103,7 +107,7 @@ class Rods:
         """Number of the element that a body is in its rod."""
         return self._of_body[body][1]
 
-    def spare(self, number: int, bodies: Sequence[int], element: int | None) -> None:
+    def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
         """Let the elements around ``element`` of a rod pass through ``bodies``; None ends that."""
         rod = self.rods[number]
         beside = np.abs(np.arange(len(rod.positions)) - element) < NEXT_TO_PADS if element is not None else False
@@ -111,46 +115,52 @@ class Rods:
             parts = self._colliders.parts_of(body)
             rod.skip[parts] = self._skip[number][parts] | beside
 
-    def weigh(self, masses: Masses) -> None:
+    def update_masses(self, masses: Masses) -> None:
         """Take over how the bodies that may meet a rod resist forces now, and whether they are held or fall."""
         for rod in self.rods:
             for partner in rod.partners:
                 held = masses.is_held(partner.body)
                 mass, inertia = masses.mass_of(partner.body) if held else (partner.mass, partner.inertia)
                 if not partner.fixed:
-                    rod.weigh(partner, mass, inertia, held)
+                    rod.set_mass(partner, mass, inertia, held)
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists and tension of the elements of every rod into a state record."""
         for rod in self.rods:
             rod.write(state["body_pose"][0], state["body_twist"][0], state["rod_tension"][0])
 
+    def holds(self, body: int, element_body: int) -> bool:
+        """Whether `grip` holds an element."""
+        rod, element = self._of_body[element_body]
+        return any((grip.element, grip.body) == (element, body) for grip in rod.grips)
+
     def reset(self) -> None:
         """Put every rod back to its initial shape, at rest."""
-        for rod in self.rods:
+        for rod, skip in zip(self.rods, self._skip, strict=True):
             rod.reset()
-        self._colliders.restart()
+            rod.skip[:] = skip
+        self._colliders.reset()
 
-    def heal(self) -> list[Diagnostic]:
-        """Put rods that diverged back to their initial shape, and say so."""
-        found = []
-        for rod in self.rods:
-            if not rod.finite():
-                rod.reset()
-                message = f"rod '{rod.description.name}' diverged and was put back to its initial shape"
-                found.append(Diagnostic(Severity.ERROR, message, code="diverged"))
+    def take_problems(self) -> list[Diagnostic]:
+        """What was found since the last call."""
+        found, self.problems = self.problems, []
         return found
 
-    def memory(self) -> list[dict[str, Array]]:
-        """Everything that lasts from tick to tick."""
-        self._colliders.restart()
-        return [rod.memory() for rod in self.rods]
+    def _heal(self, rod: Rod) -> None:
+        """Put a rod that diverged back to its initial shape, and report it."""
+        rod.reset()
+        message = f"rod '{rod.description.name}' diverged and was put back to its initial shape"
+        self.problems.append(Diagnostic(Severity.ERROR, message, code="diverged"))
 
-    def recall(self, memory: list[dict[str, Array]]) -> None:
-        """Continue from `memory`."""
-        for rod, kept in zip(self.rods, memory, strict=True):
-            rod.recall(kept)
-        self._colliders.restart()
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        return {"rods": [rod.snapshot() for rod in self.rods], "colliders": self._colliders.snapshot()}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        for rod, state in zip(self.rods, snapshot["rods"], strict=True):
+            rod.restore(state)
+        self._colliders.restore(snapshot["colliders"])
 
 
 def _partner(scene: Scene, index: int, free: bool) -> Partner:

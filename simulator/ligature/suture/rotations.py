@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ligature.suture.compiled import inlined
+from ligature.kernels import inlined
 
 
 @inlined

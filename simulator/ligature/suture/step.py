@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 
+from ligature.kernels import inlined, kernel
 from ligature.suture.chain import factor, solve
-from ligature.suture.compiled import inlined, kernel
+from ligature.suture.coupled_solve import couple, gather
 from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
 from ligature.suture.holding import add_holds, settle_holds
 from ligature.suture.rotations import (
@@ -23,7 +24,6 @@ from ligature.suture.rotations import (
     rotation_vector,
     turn,
 )
-from ligature.suture.ties import couple, gather
 
 MAX_NEWTON = 8
 """Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
@@ -100,7 +100,7 @@ def linearise(n, total, nodes, joints, work, dt):
             work.lever[j, side, 0], work.lever[j, side, 1], work.lever[j, side, 2] = rx, ry, rz
         for a in range(3):
             work.c[j, a] = nodes.x[j, a] + work.lever[j, 0, a] - nodes.x[j + 1, a] - work.lever[j, 1, a]
-            work.compliance[j, a] = joints.give[j] * per_dt2
+            work.compliance[j, a] = joints.compliance[j] * per_dt2
         vx, vy, vz, ax, ay, az, aw = joint_angle(nodes, joints, j)
         B = work.B[j]
         matrix_of(-ax, -ay, -az, aw, B)

@@ -7,11 +7,12 @@ axes, SI units.
 
 from __future__ import annotations
 
+from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture.bonds import place_bonds
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.contacts import detect
 from ligature.suture.holding import add_hold_impulses, begin_again, begin_holds
+from ligature.suture.placing import sound
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
@@ -104,12 +105,13 @@ def _one_step(
 @kernel
 def run_tick(
     first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, spare, work_table,
-    passage_table, owner, grips, points, motion, met, counts, self_skip, stiffness, impulse, tension, dt,
+    passage_table, owner, grips, points, motion, met, counts, self_skip, stiffness, impulse, tension, max_speed, dt,
 ):  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``spare``.
 
     Groups of arrays come as the tables of `ligature.suture.tables`. ``counts`` returns: contacts found,
-    contacts for which there was no room, Newton steps, and whether the contacts lie in ``spare``.
+    contacts for which there was no room, Newton steps, whether the contacts lie in ``spare``, and whether all
+    elements are finite and slower than ``max_speed``.
     """
     nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
     a, b, c, work = open_touches(last), open_touches(next_), open_touches(spare), open_work(work_table)
@@ -155,3 +157,5 @@ def run_tick(
     _scale_loads(joints, (MAX_PARTS / scale) ** 2)
     find_tension(first, n, joints, work, tension, dt)
     counts[2], counts[3] = steps, 1 if in_c else 0
+    elements = work.segment.shape[0]
+    counts[4] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, max_speed) else 0

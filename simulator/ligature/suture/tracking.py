@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
+from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture import passages as arrays
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.suture.tables import opener
 

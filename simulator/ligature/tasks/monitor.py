@@ -61,7 +61,7 @@ class Measures:
 class Monitor:
     """Takes one state record after the other; any rate of 100 Hz and more will do.
 
-    Raises `ligature.tasks.MissingBodies` for a scene without needle or holes, unless it is told the ``scenery``.
+    Raises `ligature.tasks.MissingBodies` for a scene without needle or holes, unless it gets the ``scenery``.
     """
 
     def __init__(self, scene: Scene, scenery: Scenery | None = None) -> None:

@@ -1,4 +1,4 @@
-"""How well a task was done: the challenge's three tasks, with what its reports say. Metres, seconds.
+"""How well a task was done: the challenge's three tasks, with what its reports state. Metres, seconds.
 
 Success and fields are those of interface reference §4.6; `lines` are what a person reads, `report` what a program does.
 """

@@ -23,7 +23,7 @@ AXES = {
 """Directions in the view by the words of an operator."""
 
 SHORTEST = 0.03
-"""Metres that a motion must span to tell a direction."""
+"""Metres that a motion must span to report a direction."""
 
 SQUARE = np.deg2rad(25.0)
 """How far from a right angle two motions of a hand may be."""
@@ -32,7 +32,7 @@ BROKEN = np.full((4, 4), np.nan)
 
 
 class Unclear(ValueError):
-    """Motions that do not tell the axes; the message says what to do."""
+    """Motions that do not show the axes; the message states what to do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def pose_of(values: Array) -> Array:
 
 
 def axes_of_words(x: str, y: str, z: str) -> Array:
-    """Axes (3, 3) of a device whose x, y and z point to where the words of `AXES` say."""
+    """Axes (3, 3) of a device whose x, y and z point to where the words of `AXES` state."""
     unknown = [word for word in (x, y, z) if word not in AXES]
     if unknown:
         raise Unclear(f"an axis points {', '.join(AXES)}, not '{unknown[0]}'")

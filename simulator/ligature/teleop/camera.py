@@ -1,4 +1,4 @@
-"""The camera led by one or two hands: as if they held the scene before the operator's eyes.
+"""The camera driven by one or two hands: as if they held the scene before the operator's eyes.
 
 Poses are matrices (4, 4), metres and radians. The camera frame looks along +z, x to the right, y down.
 """
@@ -28,18 +28,18 @@ class CameraDrive:
 
     @property
     def engaged(self) -> bool:
-        """Whether hands lead the camera."""
+        """Whether hands drive the camera."""
         return bool(self._hands)
 
     def engage(self, hands: Sequence[Array], T_world_camera: Array) -> None:
         """Begin with the poses (4, 4) of one or two hands in the view; raises ValueError for another number."""
         if len(hands) not in (1, 2):
-            raise ValueError(f"one or two hands lead the camera, not {len(hands)}")
+            raise ValueError(f"one or two hands drive the camera, not {len(hands)}")
         self._hands = [hand.copy() for hand in hands]
         self._T_world_camera = T_world_camera.copy()
 
     def release(self) -> None:
-        """Lead no more."""
+        """Stop driving."""
         self._hands = []
 
     def update(self, hands: Sequence[Array]) -> Array:

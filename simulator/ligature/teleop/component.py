@@ -1,6 +1,6 @@
 """A pair on ROS as the dVRK's teleoperation component: ``MTMR_PSM1/…`` (interface reference §5.4).
 
-Besides the topics of the dVRK there is ``status``, which says in words what a pair does or what stands in its way.
+Besides the topics of the dVRK there is ``status``, which states in words what a pair does or what stands in its way.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ligature.model.frames import matrix_pose7, matrix_quaternion
 from ligature.robots.poses import rotation_vector
 
 Array = NDArray[np.float64]
-Tell = Callable[[str, Any], None]
+Heard = Callable[[str, Any], None]
 
 DISABLED, SETTING, ALIGNING, ENABLED = "DISABLED", "SETTING_ARMS_STATE", "ALIGNING_MTM", "ENABLED"
 WORDS = ("enable", "disable", "align_MTM")
@@ -34,13 +34,13 @@ class Topics:
             name: rospy.Publisher(f"{root}/{name}", type_, latch=True, queue_size=10) for name, type_ in types.items()
         }
         self._types = types
-        self._told: dict[str, Any] = {}
+        self._published: dict[str, Any] = {}
 
-    def tell(self, name: str, value: Any) -> None:
+    def publish(self, name: str, value: Any) -> None:
         """Publish ``value`` unless it was the last one."""
-        if self._told.get(name) == value:
+        if self._published.get(name) == value:
             return
-        self._told[name] = value
+        self._published[name] = value
         type_ = self._types[name]
         message = Joy(buttons=[int(value)]) if type_ is Joy else type_(data=value)
         if type_ is Joy:
@@ -49,9 +49,9 @@ class Topics:
 
 
 class PairTopics(Topics):
-    """What a leader and a follower tell and hear; ``tell`` is handed what was asked for, on rospy's threads."""
+    """Topics of a leader and a follower; ``heard`` receives what a client asks for, on rospy's threads."""
 
-    def __init__(self, root: str, scale: float, align: bool, heard: Tell) -> None:
+    def __init__(self, root: str, scale: float, align: bool, heard: Heard) -> None:
         super().__init__(
             root,
             {
@@ -69,7 +69,7 @@ class PairTopics(Topics):
             "desired_state": DISABLED, "current_state": DISABLED, "following": False, "scale": scale,
             "align_mtm": align, "rotation_locked": False, "translation_locked": False,
         }.items():  # fmt: skip
-            self.tell(name, value)
+            self.publish(name, value)
         listen(root, "state_command", StringStamped, lambda m: heard("state_command", m.string))
         listen(root, "set_scale", Float64, lambda m: heard("scale", m.data))
         listen(root, "lock_rotation", Bool, lambda m: heard("lock_rotation", m.data))
@@ -94,9 +94,9 @@ class PairTopics(Topics):
         for publisher, T in ((self._leader, T_view_hand), (self._follower, T_camera_tip)):
             if publisher.get_num_connections() and T is not None and np.isfinite(T).all():
                 publisher.publish(posed(T, stamp))
-        self._tell_speed(stamp, T_view_hand)
+        self._publish_speed(stamp, T_view_hand)
 
-    def _tell_speed(self, stamp: Any, T: Array | None) -> None:
+    def _publish_speed(self, stamp: Any, T: Array | None) -> None:
         """Publish how the hand (4, 4) moved since the last reading: m/s and rad/s in axes of the view."""
         last, self._last = self._last, None if T is None or not np.isfinite(T).all() else (stamp, T)
         if last is None or self._last is None or T is None or not self._speed.get_num_connections():
@@ -113,15 +113,15 @@ class PairTopics(Topics):
 
 
 class CameraTopics(Topics):
-    """What the leaders of the camera tell and hear: ``MTML_MTMR_ECM/…``."""
+    """Topics of the leaders of the camera: ``MTML_MTMR_ECM/…``."""
 
-    def __init__(self, root: str, scale: float, heard: Tell) -> None:
+    def __init__(self, root: str, scale: float, heard: Heard) -> None:
         words = {"desired_state": String, "current_state": String, "status": String}
         super().__init__(root, {**words, "following": Bool, "scale": Float64})
         for name, value in {
             "desired_state": DISABLED, "current_state": DISABLED, "following": False, "scale": scale,
         }.items():  # fmt: skip
-            self.tell(name, value)
+            self.publish(name, value)
         listen(root, "state_command", StringStamped, lambda m: heard("state_command", m.string))
         listen(root, "set_scale", Float64, lambda m: heard("scale", m.data))
 

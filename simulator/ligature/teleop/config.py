@@ -1,4 +1,4 @@
-"""Who leads whom: the YAML file of a teleoperation, read with a place for everything that is wrong in it.
+"""Who drives whom: the YAML file of a teleoperation, read with a place for everything that is wrong in it.
 
 Metres, radians, newtons, seconds. `docs/teleoperation.md` shows a file.
 """
@@ -27,10 +27,10 @@ from ligature.teleop.pairing import Settings
 Array = NDArray[np.float64]
 
 TOPICS = {"hydra": "/hydra_calib", "joy": "/joy", "spacenav": "/spacenav/joy", "keyboard": ""}
-"""Topics of devices whose name does not tell it."""
+"""Topics of devices whose name does not show it."""
 
 NOBODY = "none"
-"""First in a list of followers: the device waits until it is told whom to lead."""
+"""First in a list of followers: the device waits until a follower is selected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,20 +53,25 @@ GRIP = (0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class ProxySpec:
-    """A proxy's root link on ROS, and limits (2, n) of the joints that the grip leads, in the order of its commands."""
+    """A proxy's root link on ROS, and limits (2, n) of the joints that the grip drives, in the order of its
+    commands."""
 
     topic: str
     limits: Array
+
+
+FORMER_KEYS = {"patience": "timeout", "fastest": "max velocity", "quickest": "max angular velocity"}
+"""Keys as version 0.1 called them, and their names now."""
 
 
 @dataclass(frozen=True, eq=False)
 class TeleopConfig:
     """A whole teleoperation.
 
-    ``pairs`` are the followers that each device may lead, the first one first; those ``waiting`` lead none until they
-    are told to. ``camera`` is the arm whose tip makes the view, or, when there is none, ``T_world_camera`` (4, 4) the
+    ``pairs`` are the followers that each device may drive, the first one first; those ``waiting`` drive none until they
+    are selected. ``camera`` is the arm whose tip makes the view, or, when there is none, ``T_world_camera`` (4, 4) the
     view in the world. ``rcm_guard`` is the least distance of a tip from its remote centre in metres. ``notes`` are
-    lines to tell the user. ``proxies`` are the followers that are no arms.
+    lines for the user. ``proxies`` are the followers that are no arms.
     """
 
     devices: Mapping[str, DeviceSpec]
@@ -82,7 +87,7 @@ class TeleopConfig:
     proxies: Mapping[str, ProxySpec] = field(default_factory=dict)
 
     def begins_with(self, leader: str) -> str:
-        """The follower of ``leader`` at the start; empty when it waits, or leads the camera alone."""
+        """The follower of ``leader`` at the start; empty when it waits, or drives the camera alone."""
         return next(iter(self.pairs[leader]), "") if leader not in self.waiting else ""
 
 
@@ -101,6 +106,7 @@ class _Reader:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._notes: list[str] = []
 
     # --- values
 
@@ -108,6 +114,14 @@ class _Reader:
         return AdfError(Diagnostic(Severity.ERROR, message, mark, hint, "teleop"))
 
     def known(self, block: Block, keys: tuple[str, ...], what: str) -> None:
+        """Raise for keys that ``what`` lacks; keys of version 0.1 get the name that they have now, with a note."""
+        for former, key in FORMER_KEYS.items():
+            if former in block.entries and key in keys:
+                name, value = block.entries.pop(former)
+                if key in block.entries:
+                    raise self.fail(name.mark, f"{what} has both '{former}' and '{key}'", f"keep '{key}'")
+                block.entries[key] = name, value
+                self._notes.append(f"{name.mark}: '{former}' is deprecated; write '{key}'")
         for key, (name, _) in block.entries.items():
             if key not in keys:
                 raise self.fail(name.mark, f"{what} has no key '{key}'", f"known are {', '.join(keys)}")
@@ -170,7 +184,7 @@ class _Reader:
         if (node := root.get("rcm guard")) is not None:
             extra["rcm_guard"] = self.number(node, "rcm guard", 0.0, 0.2)
         pairs, waiting = self.pairs(root, devices)
-        return TeleopConfig(devices, pairs, waiting=waiting, **extra)
+        return TeleopConfig(devices, pairs, waiting=waiting, notes=tuple(self._notes), **extra)
 
     def pairs(
         self, root: Block, devices: Mapping[str, DeviceSpec]

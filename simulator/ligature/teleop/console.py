@@ -50,17 +50,17 @@ class ConsoleTopics:
         rospy.Subscriber(topic, type_, take, queue_size=10, tcp_nodelay=True)
 
     def selected(self, leader: str, follower: str) -> None:
-        """Tell that a leader leads a follower now."""
+        """Report that a leader drives a follower now."""
         self._selected.publish(f"{leader}_{follower}")
         self._old_selected.publish(KeyValue(leader, follower))
 
     def unselected(self, leader: str, follower: str) -> None:
-        """Tell that a leader does not lead a follower any more."""
+        """Report that a leader does not drive a follower any more."""
         self._unselected.publish(f"{leader}_{follower}")
         self._old_unselected.publish(KeyValue(leader, follower))
 
     def scaled(self, scale: float) -> None:
-        """Tell the scale of all pairs."""
+        """Report the scale of all pairs."""
         self._scale.publish(scale)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SMOOTHING = 0.01
-"""Time constant of the velocity that is damped, in seconds: devices tell their places in steps."""
+"""Time constant of the velocity that is damped, in seconds: devices report their places in steps."""
 
 STILL = 1e-6
 """Metres per second below which a hand rests."""
@@ -45,7 +45,7 @@ class Feedback:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past, when leading begins."""
+        """Forget the past, when driving begins."""
         self.energy = 0.0
         self._force = np.zeros(3)
         self._smooth = np.zeros(3)

@@ -1,4 +1,4 @@
-"""An arm that is led, known by its CRTK topics alone: a simulated one, or a real one. Metres, radians, newtons."""
+"""An arm that is driven, known by its CRTK topics alone: a simulated one, or a real one. Metres, radians, newtons."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from ligature.teleop.pairing import Tip
 Array = NDArray[np.float64]
 
 FRESH = 0.5
-"""Seconds after which what an arm told counts as lost."""
+"""Seconds after which what an arm reported counts as lost."""
 
 
 class Arm:
-    """An arm below ``root``; ``rival`` is told the name of another node that sends it servo commands."""
+    """An arm below ``root``; ``rival`` receives the name of another node that sends it servo commands."""
 
     def __init__(self, name: str, root: str, frames: Frames, rival: Callable[[str, str], None]) -> None:
         self.name, self._frames, self._rival = name, frames, rival
@@ -38,48 +38,48 @@ class Arm:
         self._command = rospy.Publisher(f"{root}/state_command", StringStamped, queue_size=5)
         self._servo = rospy.Publisher(f"{root}/servo_cp", PoseStamped, queue_size=1, tcp_nodelay=True)
         self._jaw_servo = rospy.Publisher(f"{root}/jaw/servo_jp", JointState, queue_size=1, tcp_nodelay=True)
-        self._listen(f"{root}/operating_state", OperatingState, self._told_state)
-        self._listen(f"{root}/setpoint_cp", PoseStamped, self._told_setpoint)
-        self._listen(f"{root}/measured_cp", PoseStamped, self._told_measured)
-        self._listen(f"{root}/jaw/setpoint_js", JointState, self._told_jaw)
-        self._listen(f"{root}/body/measured_cf", WrenchStamped, self._told_force)
-        self._listen(f"{root}/servo_cp", rospy.AnyMsg, self._told_command)
+        self._listen(f"{root}/operating_state", OperatingState, self._on_state)
+        self._listen(f"{root}/setpoint_cp", PoseStamped, self._on_setpoint)
+        self._listen(f"{root}/measured_cp", PoseStamped, self._on_measured)
+        self._listen(f"{root}/jaw/setpoint_js", JointState, self._on_jaw)
+        self._listen(f"{root}/body/measured_cf", WrenchStamped, self._on_force)
+        self._listen(f"{root}/servo_cp", rospy.AnyMsg, self._on_command)
 
     def _listen(self, topic: str, type_: type, take: Callable[[Any], None]) -> None:
         rospy.Subscriber(topic, type_, take, queue_size=5, tcp_nodelay=True)
 
-    # --- what it tells
+    # --- reports of it
 
-    def _told_state(self, message: Any) -> None:
+    def _on_state(self, message: Any) -> None:
         self._state = message
 
-    def _told_setpoint(self, message: Any) -> None:
+    def _on_setpoint(self, message: Any) -> None:
         self._setpoint = time.monotonic(), message.header.frame_id, pose_of(np.array(pose_numbers(message)))
 
-    def _told_measured(self, message: Any) -> None:
+    def _on_measured(self, message: Any) -> None:
         T = pose_of(np.array(pose_numbers(message)))
         self._frames.put(message.header.frame_id, self.name, T)
 
-    def _told_jaw(self, message: Any) -> None:
+    def _on_jaw(self, message: Any) -> None:
         if message.position and np.isfinite(message.position[0]):
             self._jaw = message.position[0]
 
-    def _told_force(self, message: Any) -> None:
+    def _on_force(self, message: Any) -> None:
         f = message.wrench.force
         self._force = np.array([f.x, f.y, f.z])
 
-    def _told_command(self, raw: Any) -> None:
+    def _on_command(self, raw: Any) -> None:
         sender = raw._connection_header["callerid"]
         if sender != rospy.get_name():
             self._rival(self.name, sender)
 
     def obstacle(self) -> str:
-        """Why the arm cannot be led; empty when it can."""
+        """Why the arm cannot be driven; empty when it can."""
         state = self._state
         if state is None:
-            return f"{self.name} tells no operating state"
+            return f"{self.name} reports no operating state"
         if self._setpoint is None or time.monotonic() - self._setpoint[0] > FRESH:
-            return f"{self.name} tells no set-point"
+            return f"{self.name} reports no set-point"
         if state.state != "ENABLED":
             return f"{self.name} is {state.state}"
         if not state.is_homed:
@@ -106,7 +106,7 @@ class Arm:
         T = self._frames.between(camera, self.name)
         return np.zeros(3) if T is None else np.asarray(T[:3, :3] @ self._force)
 
-    # --- what it is told
+    # --- commands to it
 
     def make_ready(self) -> None:
         """Ask for power, then for homing, each once."""
@@ -119,7 +119,7 @@ class Arm:
             self._command.publish(message)
 
     @property
-    def tells(self) -> bool:
+    def reports(self) -> bool:
         """Whether the arm was heard of."""
         return self._state is not None
 

@@ -1,6 +1,6 @@
-"""Where the arms' frames stand to each other, from what arms, set-up joints and tf tell. Metres.
+"""Where the arms' frames stand to each other, from what arms, set-up joints and tf report. Metres.
 
-Each frame is known in one parent. What tf tells has preference over the set-up joints, which tell of the same frames.
+Each frame is known in one parent. What tf reports has preference over the set-up joints, which report the same frames.
 """
 
 from __future__ import annotations
@@ -18,14 +18,20 @@ DEEPEST = 32
 
 
 class Frames:
-    """A tree of frames by name; safe to use from several threads."""
+    """A tree of frames by name; safe to use from several threads.
 
-    def __init__(self) -> None:
+    Names are taken with or without a leading slash, and with or without ``prefix`` (such as ``left/``), which the
+    frames of a simulator with a prefix have on ROS.
+    """
+
+    def __init__(self, prefix: str = "") -> None:
+        self._prefix = prefix
         self._parents: dict[str, tuple[str, Array, int]] = {}
         self._lock = threading.Lock()
 
     def put(self, parent: str, child: str, T_parent_child: Array, rank: int = 0) -> None:
-        """Learn where ``child`` is; what was told with a lower ``rank`` counts more."""
+        """Learn where ``child`` is; what was reported with a lower ``rank`` counts more."""
+        parent, child = self._bare(parent), self._bare(child)
         if parent == child or not np.isfinite(T_parent_child).all():
             return
         with self._lock:
@@ -35,6 +41,7 @@ class Frames:
 
     def between(self, target: str, source: str) -> Array | None:
         """T_target_source (4, 4); None while nothing connects them."""
+        target, source = self._bare(target), self._bare(source)
         if target == source:
             return np.eye(4)
         with self._lock:
@@ -43,6 +50,13 @@ class Frames:
             if name in up:
                 return np.asarray(inverse(up[name]) @ T_source_up)
         return None
+
+    def has_prefix(self, name: str) -> bool:
+        """Whether a frame's ``name`` on ROS begins with the prefix."""
+        return name.lstrip("/").startswith(self._prefix)
+
+    def _bare(self, name: str) -> str:
+        return name.lstrip("/").removeprefix(self._prefix)
 
     def _to_root(self, name: str) -> dict[str, Array]:
         """Poses (4, 4) of frame ``name`` in itself and in all frames above."""

@@ -1,4 +1,4 @@
-"""The guided calibration of a device: three motions and a squeeze tell its axes and its grip. Metres, radians."""
+"""The guided calibration of a device: three motions and a squeeze show its axes and its grip. Metres, radians."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ligature.teleop.devices.device import Device, Reading
 
 Array = NDArray[np.float64]
 
-PATIENCE = 5.0
+TIMEOUT = 5.0
 SETTLED = 0.3
 """Seconds over which the median of a device that rests is taken."""
 
@@ -28,9 +28,9 @@ class Ear:
         self.device: Device | None = None
 
     def rest(self) -> tuple[Array, float | None]:
-        """Where the handle is, (3,), and its grip; raises `Unclear` when the device says nothing sensible."""
+        """Where the handle is, (3,), and its grip; raises `Unclear` when the device sends nothing sensible."""
         self.readings.clear()
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         while time.monotonic() < end:
             time.sleep(SETTLED)
             if self.device is not None:
@@ -40,10 +40,10 @@ class Ear:
             if len(places):
                 grips = [reading.grip for reading in list(self.readings) if reading.grip is not None]
                 return np.median(places, axis=0), float(np.median(grips)) if grips else None
-        raise Unclear(f"the device said nothing for {PATIENCE:g} s, or no poses; is its driver running?")
+        raise Unclear(f"the device sent nothing for {TIMEOUT:g} s, or no poses; is its driver running?")
 
 
-def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], tell: Callable[[str], None]) -> str:
+def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], show: Callable[[str], None]) -> str:
     """Ask the operator to move a device; returns the YAML lines for its block in the configuration."""
     if name not in config.devices:
         raise Unclear(f"there is no device '{name}'; there are {', '.join(config.devices)}")
@@ -66,5 +66,5 @@ def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], t
     grips = (before.closed, before.opened)
     if opened is not None and closed is not None and abs(opened - closed) > 1e-3:
         grips = (closed, opened)
-    tell(f"Write this into the block of {name}:")
+    show(f"Write this into the block of {name}:")
     return Calibration(axes, before.handle, *grips).text()

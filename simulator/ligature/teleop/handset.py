@@ -11,7 +11,7 @@ from ligature.teleop.pairing import Hand
 
 ACTIONS = ("clutch", "camera", "close", "toggle", "next", "previous", "present")
 """What a button may do: ``close`` keeps the jaw closed while down, ``toggle`` opens or closes with each press, ``next``
-and ``previous`` select another follower, ``present`` tells that the operator is there while down."""
+and ``previous`` select another follower, ``present`` means that the operator is there while down."""
 
 
 @dataclass(frozen=True)

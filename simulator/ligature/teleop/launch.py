@@ -1,6 +1,6 @@
 """The input devices of a scene's launch file as a teleoperation (§8 of the format).
 
-The hardware's name tells the kind and the topics, the root link the arm. Metres, radians, newtons.
+The hardware's name determines the kind and the topics, the root link the arm. Metres, radians, newtons.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ HAPTIC_GAIN = 10.0
 def of_launch_file(path: Path, indices: tuple[int, ...] | None = None) -> TeleopConfig:
     """The teleoperation of a launch file.
 
-    ``indices`` choose among its devices, as AMBF's ``-i`` does. Raises `AdfError` when none can lead an arm.
+    ``indices`` choose among its devices, as AMBF's ``-i`` does. Raises `AdfError` when none can drive an arm.
     """
     devices = load_scene(path).input_devices
     for index in indices or ():
@@ -64,9 +64,9 @@ def of_launch_file(path: Path, indices: tuple[int, ...] | None = None) -> Teleop
 def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> TeleopConfig:
     """The teleoperation of some devices of a scene.
 
-    A device leads the arm that has its root link, one without a root link the first arm that is free; it may be
-    switched to all others. Where no arm is left it leads its proxy, if the scene has it. Devices that cannot lead are
-    passed over; the notes say why, and what of the others has no effect.
+    A device drives the arm that has its root link, one without a root link the first arm that is free; it may be
+    switched to all others. Where no arm is left it drives its proxy, if the scene has it. Devices that cannot drive are
+    passed over; the notes state why, and what of the others has no effect.
     """
     arms = [arm.name for arm in scene.arms if arm.kind is ArmKind.PSM]
     specs, wanted, notes = _specs(scene, devices)
@@ -82,13 +82,13 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
             specs[number] = device, replace(spec, settings=replace(spec.settings, jaw=GRIP))
             continue
         if first is None or first in taken:
-            why = f"{first} is led already" if first else "no arm is left" if arms else "the scene has no arm"
-            notes.append(f"{device.key}: it leads nothing, because {why}")
+            why = f"{first} is driven already" if first else "no arm is left" if arms else "the scene has no arm"
+            notes.append(f"{device.key}: it drives nothing, because {why}")
             continue
         pairs[spec.name] = (first, *(arm for arm in arms if arm != first))
         notes += [f"{device.key}: {note}" for note in _without_effect(device)]
     if not pairs:
-        raise _problem(path, "none of its input devices can lead an arm", "; ".join(notes) or "it has none")
+        raise _problem(path, "none of its input devices can drive an arm", "; ".join(notes) or "it has none")
     chosen = [(device, spec) for device, spec in specs if spec.name in pairs]
     camera, T_world_camera = _view(scene, [device for device, _ in chosen], notes)
     return TeleopConfig(
@@ -98,7 +98,7 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
 
 
 def _proxy(scene: Scene, device: InputDevice) -> ProxySpec:
-    """The proxy of a device; its grip leads the joints with limits, unless the device says that it does not."""
+    """The proxy of a device; its grip drives the joints with limits, unless the device states that it does not."""
     root = scene.bodies[device.proxy]
     joints = [scene.joints[index] for index in root.joints]
     limits = np.array([[joint.low or 0.0, joint.high or 0.0] for joint in joints]).reshape(-1, 2).T
@@ -110,7 +110,7 @@ def _proxy(scene: Scene, device: InputDevice) -> ProxySpec:
 def _specs(
     scene: Scene, devices: Sequence[InputDevice]
 ) -> tuple[list[tuple[InputDevice, DeviceSpec]], dict[str, str], list[str]]:
-    """Devices that can lead, the arms that some of them name, and why the others cannot."""
+    """Devices that can drive, the arms that some of them name, and why the others cannot."""
     found: list[tuple[InputDevice, DeviceSpec]] = []
     wanted: dict[str, str] = {}
     notes: list[str] = []
@@ -127,7 +127,9 @@ def _specs(
             continue
         arm = _arm_of(scene, device)
         if device.root_link and arm is None and "simulated multibody" not in device.settings:
-            notes.append(f"{device.key}: its root link '{device.root_link}' is of no arm, and nothing else can be led")
+            notes.append(
+                f"{device.key}: its root link '{device.root_link}' is of no arm, and nothing else can be driven"
+            )
             continue
         spec = _spec(device, kind, claimed[one])
         claimed[one] += 1
@@ -138,18 +140,18 @@ def _specs(
 
 
 def _without_effect(device: InputDevice) -> list[str]:
-    """What a device asks for that means nothing where arms are led."""
+    """What a device asks for that means nothing where arms are driven."""
     settings = device.settings
     notes = []
     if settings.get("simulated multibody"):
-        notes.append("it leads the arm itself and not its proxy")
+        notes.append("it drives the arm itself and not its proxy")
     unused = [key for key in ("controller gain", "location", "max force", "max jerk") if key in settings]
     if "angular" in (settings.get("haptic gain") or {}) and float(settings["haptic gain"]["angular"]) != 0.0:
         unused.append("haptic gain: angular")
     if unused:
         notes.append(f"{', '.join(unused)}: no effect on an arm")
     if str(settings.get("enable joint control", True)).lower() in ("false", "0"):
-        notes.append("enable joint control: a grip leads the jaw all the same")
+        notes.append("enable joint control: a grip drives the jaw all the same")
     return notes
 
 

@@ -1,6 +1,6 @@
 """Messages of packages that need not be installed: what is heard brings its own definition along.
 
-A publisher tells the definition of its messages when a subscriber connects, so readings of any driver's generation
+A publisher reports the definition of its messages when a subscriber connects, so readings of any driver's generation
 are understood. To send a message its package must be there; it is imported when the device is asked for.
 """
 
@@ -15,11 +15,11 @@ import rospy
 
 
 class MissingPackage(RuntimeError):
-    """The package of a message type is not installed; the message says which."""
+    """The package of a message type is not installed; the message states which."""
 
 
 def message_class(type_: str, what: str) -> Any:
-    """The class of ``package/Name``; raises `MissingPackage`, which tells that ``what`` needs it."""
+    """The class of ``package/Name``; raises `MissingPackage`, which names ``what`` needs it."""
     package, _, name = type_.partition("/")
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
@@ -56,7 +56,7 @@ class Listener:
         if md5 not in self._classes:
             self._classes[md5] = _generated(type_, definition)
             if self._classes[md5] is None:
-                rospy.logerr(f"{self._topic}: its publisher tells no usable definition of {type_}")
+                rospy.logerr(f"{self._topic}: its publisher reports no usable definition of {type_}")
         return self._classes[md5]
 
     def close(self) -> None:
@@ -65,7 +65,7 @@ class Listener:
 
 
 def _generated(type_: str, definition: str) -> Any:
-    """A class made from a definition as publishers tell it; None when that is not one."""
+    """A class made from a definition as publishers report it; None when that is not one."""
     try:
         return genpy.dynamic.generate_dynamic(type_, definition)[type_]
     except (genpy.MsgGenerationException, KeyError, SyntaxError):

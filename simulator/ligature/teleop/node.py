@@ -1,6 +1,6 @@
 """The teleoperation node: devices and pedals in, goals for arms and forces for hands out, all by CRTK topics.
 
-Everything that comes in waits in one queue, so that what leads is decided on one thread. A reading is answered at once;
+Everything that comes in waits in one queue, so that one thread decides who drives. A reading is answered at once;
 what is slower (readiness, alignment, devices that do not speak by themselves) is looked at every `PERIOD`.
 Metres, radians, seconds, newtons.
 """
@@ -46,7 +46,7 @@ HELD_UP = 0.05
 """Seconds after which this process was kept waiting: what was sent meanwhile is heard before it counts as silence."""
 
 VIEW = "teleoperation view"
-"""Name of the camera's frame as it was when hands began to lead: a camera that trembles must not shake instruments."""
+"""Name of the camera's frame as it was when hands began to drive: a camera that trembles must not shake instruments."""
 
 CAMERA_MOVED = (5e-4, np.deg2rad(0.2))
 """Metres and radians by which the camera may differ from the view before all begin anew."""
@@ -60,14 +60,14 @@ def begin_node() -> None:
 
 
 class Teleop:
-    """All of a teleoperation; `run` leads until it is told to stop.
+    """All of a teleoperation; `run` drives until it is asked to stop.
 
     Parameters
     ----------
     config
         Devices, pairs, camera.
     recorder
-        Writes down what devices and pedals say.
+        Writes down what devices and pedals state.
     replay
         Speaks for the devices, which are not opened then, as soon as the arms are ready.
     """
@@ -80,7 +80,7 @@ class Teleop:
         self._present = not any("present" in spec.buttons.values() for spec in config.devices.values())
         self._warned: dict[str, Status] = {}
         self._next_readings = 0.0
-        self.frames = Frames()
+        self.frames = Frames(config.prefix.lstrip("/"))
         self._hear_frames()
         specs = {name: config.devices[name] for name in config.pairs}
         self.seat = Seat(config.pairs, camera_scale=config.camera_scale, waiting=config.waiting)
@@ -103,7 +103,7 @@ class Teleop:
         self._console = ConsoleTopics(config.prefix, self.put)
         self._camera_topics = CameraTopics(
             config.prefix + "_".join([*list(config.pairs)[:2], config.camera or "camera"]), config.camera_scale,
-            lambda verb, value: self.put("lead camera", (verb, value)),
+            lambda verb, value: self.put("drive camera", (verb, value)),
         )  # fmt: skip
         for pair in self.pairs.values():
             pair.want(self._enabled)
@@ -136,20 +136,21 @@ class Teleop:
         )  # fmt: skip
 
     def _hear_frames(self) -> None:
-        rospy.Subscriber("/tf", TFMessage, self._told_tf, queue_size=10)
-        rospy.Subscriber("/tf_static", TFMessage, self._told_tf, queue_size=10)
+        rospy.Subscriber("/tf", TFMessage, self._on_tf, queue_size=10)
+        rospy.Subscriber("/tf_static", TFMessage, self._on_tf, queue_size=10)
         prefix = self._config.prefix
         names = dict.fromkeys([arm for arms in self._config.pairs.values() for arm in arms] + [self._config.camera])
         for name in filter(None, names):
-            take = partial(self._told_base, f"{name}_base")
+            take = partial(self._on_base, f"{name}_base")
             rospy.Subscriber(f"{prefix}SUJ/{name}/measured_cp", PoseStamped, take, queue_size=1)
 
-    def _told_tf(self, message: Any) -> None:
+    def _on_tf(self, message: Any) -> None:
         for each in message.transforms:
             T = pose_of(np.array(pose_numbers(each)))
-            self.frames.put(each.header.frame_id.lstrip("/"), each.child_frame_id.lstrip("/"), T)
+            rank = 0 if self.frames.has_prefix(each.child_frame_id) else 2  # may be another simulator's on this master
+            self.frames.put(each.header.frame_id, each.child_frame_id, T, rank)
 
-    def _told_base(self, base: str, message: Any) -> None:
+    def _on_base(self, base: str, message: Any) -> None:
         self.frames.put(message.header.frame_id, base, pose_of(np.array(pose_numbers(message))), 1)
 
     # --- time -------------------------------------------------------------------------------
@@ -160,7 +161,7 @@ class Teleop:
         self._wake.set()
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Lead until ``stop`` says so, or a replay has ended."""
+        """Drive until ``stop`` is set, or a replay has ended."""
         last = time.monotonic()
         while not stop() and not (self._replay is not None and self._replay.finished):
             self._wake.wait(PERIOD)
@@ -175,7 +176,7 @@ class Teleop:
             device.close()
 
     def tick(self, now: float) -> None:
-        """Take what came in, and lead."""
+        """Take what came in, and drive."""
         for device in self._devices.values():
             device.poll(now)
         self._look_at_camera()
@@ -186,31 +187,32 @@ class Teleop:
         idle = self._why_idle()
         for pair in self.pairs.values():
             pair.advance(now, tips[pair.arm.name], idle)
-        self._lead(now, tips)
+        self._drive(now, tips)
         for arm in self.arms.values():
             arm.keep()
         self._warn()
         if now >= self._next_readings:
             self._next_readings = now + READINGS_PERIOD
-            self._tell_readings(tips)
+            self._publish_readings(tips)
 
     def _arms_ready(self, tips: dict[str, Tip | None]) -> bool:
-        """Whether all arms that are to be led can be: what was recorded while they were is said no sooner."""
+        """Whether all arms that are to be driven are ready; a replay sends no sooner."""
         led = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
         return all(tips[arm.name] is not None and not arm.obstacle() for arm in led)
 
     def _take_in(self, now: float, tips: dict[str, Tip | None]) -> None:
-        """Empty the queue; of a leader that leads, no reading is passed over but those that came too late to matter."""
-        unled: set[str] = set()
+        """Empty the queue; of a leader that drives, no reading is passed over but those that came too late to
+        matter."""
+        waiting: set[str] = set()
         for _ in range(len(self._inbox)):
             name, value = self._inbox.popleft()
             if name == "reading":
                 leader, reading = value
                 late = now - reading.time > HELD_UP
-                if leader in unled and not late and self.seat.status(leader) is Status.FOLLOWING:
-                    self._lead(now, tips)
-                    unled.clear()
-                unled.add(leader)
+                if leader in waiting and not late and self.seat.status(leader) is Status.FOLLOWING:
+                    self._drive(now, tips)
+                    waiting.clear()
+                waiting.add(leader)
             elif self._recorder is not None and name not in NOT_RECORDED:
                 self._recorder.event(now, name, value)
             self._handle(name, value)
@@ -218,10 +220,10 @@ class Teleop:
     def _why_idle(self) -> str:
         if not self._present:
             return "the operator is not present"
-        return "the camera is led" if self._camera_pressed else ""
+        return "the camera is driven" if self._camera_pressed else ""
 
     def _look_at_camera(self) -> None:
-        """Take the view from where the camera is, when it is not there yet or not there any more."""
+        """Take the view from where the camera is, when it is not known yet, or not any more."""
         if self._camera is None:
             return
         seen = self._camera.setpoint()
@@ -239,7 +241,7 @@ class Teleop:
             if leader.pairing.status is Status.FOLLOWING:
                 leader.pairing.release()
 
-    def _lead(self, now: float, tips: dict[str, Tip | None]) -> None:
+    def _drive(self, now: float, tips: dict[str, Tip | None]) -> None:
         """Send the arms where the hands want them."""
         seen = self._camera.setpoint() if self._camera is not None else None
         if self._camera_pressed and not self._camera_ready():
@@ -254,7 +256,7 @@ class Teleop:
         if orders.camera is not None and self._camera is not None and seen is not None:
             self._camera.go(orders.camera, seen[0])
         if self._camera_pressed:
-            self._tell_camera(orders.camera is not None)
+            self._publish_camera(orders.camera is not None)
         for name, haptics in self._haptics.items():
             leader = self.seat.leaders[name]
             if leader.selected is None or leader.pairing.status is not Status.FOLLOWING or leader.hand is None:
@@ -264,34 +266,34 @@ class Teleop:
             haptics.press(leader.hand, pair.arm.force_in(VIEW), pair.topics.haptic)
 
     def _camera_ready(self) -> bool:
-        """Whether the camera can be led; it is asked for power and homing."""
+        """Whether the camera can be driven; it is asked for power and homing."""
         camera = self._camera
         obstacle = "the camera is fixed" if camera is None else camera.obstacle()
-        if obstacle and camera is not None and camera.tells:
+        if obstacle and camera is not None and camera.reports:
             camera.make_ready()
-        self._camera_topics.tell("current_state", SETTING if obstacle else ENABLED)
+        self._camera_topics.publish("current_state", SETTING if obstacle else ENABLED)
         if obstacle:
-            self._camera_topics.tell("status", obstacle)
+            self._camera_topics.publish("status", obstacle)
         return not obstacle
 
-    def _tell_camera(self, follows: bool) -> None:
-        hands = " and ".join(self.seat.leads_camera)
+    def _publish_camera(self, follows: bool) -> None:
+        hands = " and ".join(self.seat.drives_camera)
         why = "following" if follows else f"{hands} must both speak" if hands else "a hand leapt; press the pedal again"
-        self._camera_topics.tell("following", follows)
-        self._camera_topics.tell("status", why)
+        self._camera_topics.publish("following", follows)
+        self._camera_topics.publish("status", why)
 
     def _leader_of(self, follower: str) -> Leader:
         return next(leader for leader in self.seat.leaders.values() if leader.selected == follower)
 
     def _warn(self) -> None:
-        """Tell once when a leader is not trusted any more."""
+        """Report once when a leader is not trusted any more."""
         for name, leader in self.seat.leaders.items():
             status = leader.pairing.status
             if status is not self._warned.get(name) and status in HOLDING:
                 rospy.logwarn(f"{name}: {status.value}; {leader.selected} holds until the clutch is pressed")
             self._warned[name] = status
 
-    def _tell_readings(self, tips: dict[str, Tip | None]) -> None:
+    def _publish_readings(self, tips: dict[str, Tip | None]) -> None:
         for pair in self.pairs.values():
             tip, hand = tips[pair.arm.name], pair.leader.hand
             pair.topics.read(
@@ -339,7 +341,7 @@ class Teleop:
             raise Conflict(f"a scale is above 0 and at most {MOST_SCALE:g}, not {scale:g}")
         self.seat.change(scale=scale)
         for pair in self.pairs.values():
-            pair.topics.tell("scale", scale)
+            pair.topics.publish("scale", scale)
 
     def _on_select(self, name: str) -> None:
         pair = self._pair_of(name)
@@ -370,13 +372,13 @@ class Teleop:
     def _on_present(self, present: bool) -> None:
         self._present = present
 
-    def _on_lead_camera(self, value: tuple[str, Any]) -> None:
+    def _on_drive_camera(self, value: tuple[str, Any]) -> None:
         verb, what = value
         if verb == "state_command" and what in ("enable", "disable"):
             self._on_camera(what == "enable")
         elif verb == "scale" and 0.0 < what <= MOST_SCALE:
             self.seat.camera_scale = what
-            self._camera_topics.tell("scale", what)
+            self._camera_topics.publish("scale", what)
         else:
             raise Conflict("commands are enable and disable, a scale is above 0 and at most 1")
 
@@ -390,13 +392,13 @@ class Teleop:
             pair.align()
         elif verb == "scale" and 0.0 < what <= MOST_SCALE:
             self.seat.change(leader, scale=what)
-            pair.topics.tell("scale", what)
+            pair.topics.publish("scale", what)
         elif verb in ("lock_rotation", "lock_translation"):
             self.seat.change(leader, **{verb: what})
-            pair.topics.tell("rotation_locked" if verb == "lock_rotation" else "translation_locked", what)
+            pair.topics.publish("rotation_locked" if verb == "lock_rotation" else "translation_locked", what)
         elif verb == "align":
             self.seat.change(leader, align=what)
-            pair.topics.tell("align_mtm", what)
+            pair.topics.publish("align_mtm", what)
         else:
             raise Conflict("states are enable, disable, align_MTM; a scale is above 0 and at most 1")
 
@@ -447,7 +449,7 @@ class Teleop:
         self.seat.camera(pressed, hands)
         if pressed and self._camera is not None:
             self._camera.forget_asking()
-        self._camera_topics.tell("desired_state", ENABLED if pressed else DISABLED)
+        self._camera_topics.publish("desired_state", ENABLED if pressed else DISABLED)
         if not pressed:
-            self._camera_topics.tell("current_state", DISABLED)
-            self._camera_topics.tell("following", False)
+            self._camera_topics.publish("current_state", DISABLED)
+            self._camera_topics.publish("following", False)

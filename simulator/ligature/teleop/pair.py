@@ -18,16 +18,16 @@ from ligature.teleop.proxy import Proxy
 from ligature.teleop.seat import Leader, Seat
 
 ALIGNED = np.deg2rad(5.0)
-"""How far the leader's orientation may be from the follower's when it begins to lead."""
+"""How far the leader's orientation may be from the follower's when it begins to drive."""
 
 TURN_AGAIN = 2.0
-"""Seconds after which a leader that has not turned is told again."""
+"""Seconds after which a leader that has not turned is asked again."""
 
 MOST_SCALE = 1.0
 
 
 class Pair:
-    """A leader that may lead a follower; ``wanted`` says that it should, as far as the pair is selected."""
+    """A leader that may drive a follower; ``wanted`` states that it should, as far as the pair is selected."""
 
     def __init__(
         self, leader: Leader, arm: Arm | Proxy, seat: Seat, handset: Handset, device: Device | None, topics: PairTopics
@@ -36,13 +36,13 @@ class Pair:
         self._seat, self._handset, self._device = seat, handset, device
         self.wanted = False
         self.state = DISABLED
-        self._told_to_turn = -np.inf
+        self._turn_asked = -np.inf
         self._turns = True
         self._kept = False
 
     @property
     def selected(self) -> bool:
-        """Whether the leader leads this follower rather than another one."""
+        """Whether the leader drives this follower rather than another one."""
         return self.leader.selected == self.arm.name
 
     def want(self, on: bool) -> None:
@@ -53,13 +53,13 @@ class Pair:
             self._seat.rearm(self.leader.name)
 
     def align(self) -> None:
-        """Bring the leader to the follower's orientation again before it leads on."""
+        """Bring the leader to the follower's orientation again before it drives on."""
         if self.selected and self.state == ENABLED:
             self._seat.allow(self.leader.name, False)
             self._enter(ALIGNING, "aligning")
 
     def advance(self, now: float, tip: Tip | None, idle: str) -> None:
-        """Take the next step; ``idle`` says why nobody may lead now, and is empty when all may."""
+        """Take the next step; ``idle`` states why nobody may drive now, and is empty when all may."""
         why = "" if self.wanted and self.selected else "not selected" if self.wanted else "disabled"
         if why or idle:
             self._enter(DISABLED, why or idle)
@@ -73,34 +73,34 @@ class Pair:
         if self.selected:
             self._seat.allow(self.leader.name, self.state == ENABLED)
         topics = self.topics
-        topics.tell("desired_state", DISABLED if why else ENABLED)
-        topics.tell("following", self.selected and self.leader.pairing.status is Status.FOLLOWING)
+        topics.publish("desired_state", DISABLED if why else ENABLED)
+        topics.publish("following", self.selected and self.leader.pairing.status is Status.FOLLOWING)
 
     def _enter(self, state: str, status: str) -> None:
         if state == ENABLED and self.state != ENABLED and self._device is not None:
             self._device.begin()
         if state != ALIGNING:
-            self._told_to_turn = -np.inf
+            self._turn_asked = -np.inf
         self.state = state
-        self.topics.tell("current_state", state)
-        self.topics.tell("status", status)
+        self.topics.publish("current_state", state)
+        self.topics.publish("status", status)
 
     def _obstacle(self, now: float, tip: Tip | None) -> str:
         """What is not ready; the follower is asked for power and homing."""
         obstacle = self.arm.obstacle()
         if obstacle:
-            if self.arm.tells:
+            if self.arm.reports:
                 self.arm.make_ready()
             return obstacle
         if tip is None:
-            return f"nothing tells where {self.arm.name} is from the camera"
+            return f"nothing reports where {self.arm.name} is from the camera"
         hand = self.leader.hand
         if self.leader.pairing.status is Status.IDLE and (hand is None or self._old(hand, now)):
             return f"{self.leader.name} is silent"
         return ""
 
     def _old(self, hand: Hand, now: float) -> bool:
-        return now - hand.time > self.leader.pairing.settings.patience
+        return now - hand.time > self.leader.pairing.settings.timeout
 
     def _misaligned(self, now: float, tip: Tip | None) -> str:
         """What keeps the leader from having the follower's orientation; empty when it need not, or has."""
@@ -112,8 +112,8 @@ class Pair:
         angle = float(np.linalg.norm(rotation_vector(hand.T_view_hand[:3, :3].T @ R)))
         if not np.isfinite(angle) or angle <= ALIGNED:
             return ""
-        if now - self._told_to_turn > TURN_AGAIN:
-            self._told_to_turn = now
+        if now - self._turn_asked > TURN_AGAIN:
+            self._turn_asked = now
             goal = self._handset.calibration.orientation_on_device(R)
             self._turns = self._device is not None and self._device.turn_to(goal)
         return f"{self.leader.name} turns to {self.arm.name}" if self._turns else ""
@@ -128,4 +128,4 @@ class Pair:
             self._device.begin()
         elif self.leader.pairing.settings.align and self.leader.hand is not None:
             R = self._handset.calibration.orientation_on_device(self.leader.hand.T_view_hand[:3, :3])
-            self._device.keep_turned(R)
+            self._device.hold_orientation(R)

@@ -23,25 +23,25 @@ Array = NDArray[np.float64]
 class Settings:
     """How a leader moves its follower.
 
-    ``scale`` is follower metres for a leader metre. ``align`` says whether the leader is brought to the follower's
-    orientation before it leads; otherwise the difference at the start is kept. ``fastest`` (m/s) and ``quickest``
-    (rad/s) bound the follower's goal, ``workspace`` two opposite corners of where it may be in the camera's frame.
-    ``jaw`` are the angles of a closed and of an open grip. A leader that is silent for ``patience`` or leaps by
-    more than ``leap`` between two samples leads no more. The operator counts as present after the grip changed by
-    ``presence_grip`` or the hand rolled by ``presence_roll``.
+    ``scale`` is follower metres for a leader metre. ``align`` states whether the leader is brought to the follower's
+    orientation before it drives; otherwise the difference at the start is kept. ``max_velocity`` (m/s) and
+    ``max_angular_velocity`` (rad/s) bound the follower's goal, ``workspace`` two opposite corners of where it may be
+    in the camera's frame. ``jaw`` are the angles of a closed and of an open grip. A leader that is silent for
+    ``timeout`` or leaps by more than ``leap`` between two samples stops driving. The operator counts as present after
+    the grip changed by ``presence_grip`` or the hand rolled by ``presence_roll``.
     """
 
     scale: float = 0.2
     align: bool = True
     lock_translation: bool = False
     lock_rotation: bool = False
-    fastest: float = 0.5
-    quickest: float = 12.0
+    max_velocity: float = 0.5
+    max_angular_velocity: float = 12.0
     workspace: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     jaw: tuple[float, float] = (-0.35, 1.05)
     jaw_speed: float = 4 * np.pi
     jaw_speed_at_first: float = 0.2 * np.pi
-    patience: float = 0.1
+    timeout: float = 0.1
     leap: float = 0.05
     presence_grip: float = 0.0
     presence_roll: float = 0.0
@@ -65,9 +65,9 @@ class Tip:
 
 
 class Status(enum.Enum):
-    """What a pairing does; the words are told to the user."""
+    """What a pairing does; the values are shown to the user."""
 
-    IDLE = "not leading"
+    IDLE = "not driving"
     WAITING = "waiting for the operator's fingers"
     FOLLOWING = "following"
     CLUTCHED = "clutched"
@@ -105,7 +105,7 @@ class Pairing:
         return self._R_hand_tip
 
     def engage(self, hand: Hand, tip: Tip) -> None:
-        """Begin to lead from where both are now; the follower does not jump."""
+        """Begin to drive from where both are now; the follower does not jump."""
         if not is_pose(hand.T_view_hand):
             self.status = Status.BROKEN
             return
@@ -121,11 +121,11 @@ class Pairing:
             self.status = Status.CLUTCHED
 
     def release(self) -> None:
-        """Lead no more."""
+        """Stop driving."""
         self.status = Status.IDLE
 
     def contest(self) -> None:
-        """Lead no more because somebody else wants the follower, until the pairing is engaged again."""
+        """Stop driving because somebody else wants the follower, until the pairing is engaged again."""
         self.status = Status.CONTESTED
 
     def change(self, settings: Settings) -> None:
@@ -139,7 +139,7 @@ class Pairing:
         self._R_hand_tip = hand.T_view_hand[:3, :3].T @ tip.T_camera_tip[:3, :3]
 
     def update(self, hand: Hand) -> Tip:
-        """Goal of the follower for a new sample of the leader; the last one while it does not lead."""
+        """Goal of the follower for a new sample of the leader; the last one while it does not drive."""
         if self.status not in (Status.FOLLOWING, Status.WAITING, Status.CLUTCHED):
             return self._goal
         problem = self._problem(hand)
@@ -156,9 +156,9 @@ class Pairing:
         return self._goal
 
     def watch(self, now: float) -> bool:
-        """Whether the leader is alive at ``now``; a silent one stops leading."""
+        """Whether the leader is alive at ``now``; a silent one stops driving."""
         active = self.status in (Status.FOLLOWING, Status.WAITING)
-        if active and self._last is not None and now - self._last.time > self.settings.patience:
+        if active and self._last is not None and now - self._last.time > self.settings.timeout:
             self.status = Status.SILENT
         return self.status not in HOLDING
 
@@ -190,7 +190,9 @@ class Pairing:
             wanted[:3, :3] = hand.T_view_hand[:3, :3] @ self._R_hand_tip
         if settings.workspace is not None:
             wanted[:3, 3] = np.clip(wanted[:3, 3], *settings.workspace)
-        pose = _approach(self._goal.T_camera_tip, wanted, settings.fastest * dt, settings.quickest * dt)
+        pose = _approach(
+            self._goal.T_camera_tip, wanted, settings.max_velocity * dt, settings.max_angular_velocity * dt
+        )
         self._goal = Tip(pose, self._jaw(hand, dt))
 
     def _jaw(self, hand: Hand, dt: float) -> float:

@@ -23,7 +23,7 @@ from ligature.teleop.pairing import Tip
 Array = NDArray[np.float64]
 
 KEEP = 0.05
-"""Seconds after which the last command is said again: a body that nobody commands is let go."""
+"""Seconds after which the last command is sent again: a body that nobody commands is let go."""
 
 
 class Proxy:
@@ -37,26 +37,26 @@ class Proxy:
         self._grip = GRIP[1]
         self._sent = -np.inf
         self._publisher = rospy.Publisher(f"{spec.topic}/Command", RigidBodyCmd, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber(f"{spec.topic}/State", RigidBodyState, self._told, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber(f"{spec.topic}/State", RigidBodyState, self._on_state, queue_size=1, tcp_nodelay=True)
 
-    def _told(self, message: RigidBodyState) -> None:
+    def _on_state(self, message: RigidBodyState) -> None:
         self._measured = pose_of(np.array(pose_numbers(message)))
         self._heard = time.monotonic()
 
     @property
-    def tells(self) -> bool:
+    def reports(self) -> bool:
         """Whether the proxy was heard of."""
         return bool(np.isfinite(self._heard))
 
     def obstacle(self) -> str:
-        """Why it cannot be led; empty when it can."""
+        """Why it cannot be driven; empty when it can."""
         if time.monotonic() - self._heard > FRESH:
             return f"nothing is heard of the proxy on {self._spec.topic}; run the simulator with the same -i"
         return ""
 
     def setpoint(self) -> tuple[str, Array] | None:
         """The world, and the goal (4, 4) in it; where the proxy is while it has none."""
-        if not self.tells:
+        if not self.reports:
             return None
         return "world", self._measured if self._goal is None else self._goal
 
@@ -70,7 +70,7 @@ class Proxy:
         return np.zeros(3)
 
     def make_ready(self) -> None:
-        """Nothing: it is led as it is."""
+        """Nothing: it is driven as it is."""
 
     def forget_asking(self) -> None:
         """Nothing."""
@@ -87,7 +87,7 @@ class Proxy:
         self._grip = float(np.clip(angle, *GRIP))
 
     def keep(self) -> None:
-        """Say the last command again when it was said long ago, so that the proxy holds."""
+        """Send the last command again when it was sent long ago, so that the proxy holds."""
         if self._goal is not None and time.monotonic() - self._sent > KEEP:
             self._send()
 

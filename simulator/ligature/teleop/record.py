@@ -18,7 +18,7 @@ from ligature.teleop.devices.device import Reading
 
 
 class Recorder:
-    """Writes what devices and pedals say to a text file; the first entry is second zero."""
+    """Writes what devices and pedals state to a text file; the first entry is second zero."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -40,7 +40,7 @@ class Recorder:
 
 
 class Replay:
-    """What a recorded file says, at its pace; raises ValueError with the line that is none."""
+    """What a recorded file states, at its pace; raises ValueError with the line that is none."""
 
     def __init__(self, path: Path) -> None:
         self._rows = list(_rows(path))
@@ -59,11 +59,11 @@ class Replay:
 
     @property
     def finished(self) -> bool:
-        """Whether all was said."""
+        """Whether everything was sent."""
         return self._next >= len(self._rows)
 
     def due(self, now: float) -> Iterator[tuple[str, Any]]:
-        """What is said up to ``now``: ``("reading", (device, Reading))`` or the name and value of an event."""
+        """What is stated up to ``now``: ``("reading", (device, Reading))`` or the name and value of an event."""
         if self._start is None:
             self._start = now
         while self._next < len(self._rows) and self._rows[self._next]["t"] <= now - self._start:

@@ -1,4 +1,4 @@
-"""A running teleoperation from afar: what its pairs tell, what a console may ask (interface reference §5.4)."""
+"""A running teleoperation from afar: what its pairs report, what a console may ask (interface reference §5.4)."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool, Float64, String
 
 _PAIR = re.compile(r"/(?P<leader>[A-Za-z]\w*?)_(?P<follower>[A-Za-z][A-Za-z0-9]*)/align_mtm\Z")
-"""What a pair has and the leading of a camera has not."""
+"""What a pair has, and the driving of a camera lacks."""
 
 PEDALS = ("clutch", "camera")
 
 
 @dataclass
 class PairTold:
-    """What a pair says of itself."""
+    """What a pair states of itself."""
 
     leader: str
     follower: str
@@ -62,7 +62,7 @@ class TeleopRemote:
             self.pairs[pair].selected = selected
 
     def look(self) -> None:
-        """Ask the master for pairs that were not there before; raises `rosgraph.MasterException`, OSError."""
+        """Ask the master for pairs that were missing before; raises `rosgraph.MasterException`, OSError."""
         for topic, type_ in rosgraph.Master(rospy.get_name()).getTopicTypes():
             match = _PAIR.match("/" + topic.removeprefix(self._prefix)) if type_ == "std_msgs/Bool" else None
             if match is None:
@@ -83,15 +83,15 @@ class TeleopRemote:
     # --- what a console asks for ---------------------------------------------------------------
 
     def enable(self, on: bool) -> None:
-        """Let selected pairs lead, or stop them all."""
+        """Let selected pairs drive, or stop them all."""
         self._enable.publish(on)
 
     def select(self, pair: str) -> None:
-        """Let the leader of ``pair`` lead its follower."""
+        """Let the leader of ``pair`` drive its follower."""
         self._select.publish(pair)
 
     def unselect(self, pair: str) -> None:
-        """Let the leader of ``pair`` lead its follower no more."""
+        """Let the leader of ``pair`` drive its follower no more."""
         self._unselect.publish(pair)
 
     def set_scale(self, scale: float) -> None:

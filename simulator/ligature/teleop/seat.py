@@ -1,7 +1,7 @@
 """The operator's seat: which leader moves which follower, pedals, and handing arms over while everything runs.
 
 Names are those of the arms and devices (``MTMR``, ``PSM1``). Any leader may be paired with several followers, of which
-it leads one at a time; a follower obeys one leader only. Seconds, metres, radians.
+it drives one at a time; a follower obeys one leader only. Seconds, metres, radians.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ class Conflict(ValueError):
 
 @dataclass
 class Leader:
-    """A device: the followers it may lead, the one that it leads, and its newest sample.
+    """A device: the followers it may drive, the one that it drives, and its newest sample.
 
-    ``clutched`` says whether its own clutch is pressed, ``allowed`` whether it may lead (its arms are ready),
-    ``led`` is the sample that it led with last.
+    ``clutched`` states whether its own clutch is pressed, ``allowed`` whether it may drive (its arms are ready),
+    ``used`` is the sample that it drove with last.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Leader:
     pairing: Pairing = field(default_factory=Pairing)
     clutched: bool = False
     allowed: bool = True
-    led: Hand | None = None
+    used: Hand | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Seat:
     Parameters
     ----------
     pairs
-        Followers that each leader may lead, the first is selected; of those ``waiting`` none is.
+        Followers that each leader may drive, the first is selected; of those ``waiting`` none is.
     settings
         Of all pairings.
     camera_scale
@@ -93,7 +93,7 @@ class Seat:
         self._camera.scale = scale
 
     @property
-    def leads_camera(self) -> tuple[str, ...]:
+    def drives_camera(self) -> tuple[str, ...]:
         """The leaders that have the camera in hand."""
         return tuple(self._camera_hands)
 
@@ -114,11 +114,11 @@ class Seat:
     # --- pairing ----------------------------------------------------------------------------
 
     def select(self, leader: str, follower: str | None) -> None:
-        """Have a leader lead another follower, or none; it begins where both are at the next `update`."""
+        """Have a leader drive another follower, or none; it begins where both are at the next `update`."""
         chosen = self._leader(leader)
         if follower is not None:
             if follower not in chosen.followers:
-                raise Conflict(f"{leader} may lead {', '.join(chosen.followers)}, not {follower}")
+                raise Conflict(f"{leader} may drive {', '.join(chosen.followers)}, not {follower}")
             other = next((each for each in self._leaders.values() if each.selected == follower), None)
             if other is not None and other is not chosen:
                 raise Conflict(f"{follower} obeys {other.name}; unselect it there first")
@@ -143,7 +143,7 @@ class Seat:
             chosen.pairing.change(settings)
 
     def allow(self, leader: str, on: bool) -> None:
-        """Whether a leader may lead its follower; it begins where both are then."""
+        """Whether a leader may drive its follower; it begins where both are then."""
         chosen = self._leader(leader)
         chosen.allowed = on
         if not on and chosen.pairing.status not in HOLDING:
@@ -152,7 +152,7 @@ class Seat:
     # --- pedals -----------------------------------------------------------------------------
 
     def enable(self, on: bool) -> None:
-        """Whether hands lead at all."""
+        """Whether hands drive at all."""
         self._enabled = on
         if not on:
             for leader in self._leaders.values():
@@ -162,7 +162,7 @@ class Seat:
     def clutch(self, pressed: bool, leader: str | None = None) -> None:
         """The clutch pedal, or the clutch of one leader: hands move without followers while it is pressed.
 
-        A leader that is not trusted any more (`HOLDING`) leads again after its clutch was pressed and released.
+        A leader that is not trusted any more (`HOLDING`) drives again after its clutch was pressed and released.
         """
         if leader is None:
             self._clutched = pressed
@@ -179,14 +179,14 @@ class Seat:
         return self._clutched or self._leader(leader).clutched
 
     def camera(self, pressed: bool, hands: Sequence[str] = ()) -> None:
-        """The camera pedal: ``hands`` (all leaders, at most two, when empty) lead the camera instead of followers."""
+        """The camera pedal: ``hands`` (all leaders, at most two, when empty) drive the camera instead of followers."""
         self._camera.release()
         self._camera_hands = [self._leader(name).name for name in hands or list(self._leaders)[:2]] if pressed else []
         for leader in self._leaders.values():
             leader.pairing.release()
 
     def rearm(self, leader: str) -> None:
-        """Let a leader that fell silent, leapt or was broken lead again."""
+        """Let a leader that fell silent, leapt or was broken drive again."""
         self._leader(leader).pairing.release()
 
     # --- time -------------------------------------------------------------------------------
@@ -200,36 +200,36 @@ class Seat:
         if not self._enabled:
             return Orders({})
         if self._camera_hands:
-            return Orders({}, self._lead_camera(now, T_world_camera))
+            return Orders({}, self._drive_camera(now, T_world_camera))
         goals = {}
         for leader in self._leaders.values():
-            goal = self._lead(leader, now, tips)
+            goal = self._drive(leader, now, tips)
             if goal is not None and leader.selected is not None:
                 goals[leader.selected] = goal
         return Orders(goals)
 
-    def _lead(self, leader: Leader, now: float, tips: Mapping[str, Tip]) -> Tip | None:
+    def _drive(self, leader: Leader, now: float, tips: Mapping[str, Tip]) -> Tip | None:
         if leader.hand is None or leader.selected is None or leader.selected not in tips:
             return None
         pairing = leader.pairing
         if pairing.status is Status.IDLE:
             ready = leader.allowed and not self.is_clutched(leader.name)
-            if ready and now - leader.hand.time <= pairing.settings.patience:
+            if ready and now - leader.hand.time <= pairing.settings.timeout:
                 pairing.engage(leader.hand, tips[leader.selected])
             return None
         goal = pairing.update(leader.hand)
-        new, leader.led = leader.hand is not leader.led, leader.hand
+        new, leader.used = leader.hand is not leader.used, leader.hand
         if not pairing.watch(now) or pairing.status is not Status.FOLLOWING or not new:
             return None
         return goal
 
-    def _lead_camera(self, now: float, T_world_camera: Array) -> Array | None:
+    def _drive_camera(self, now: float, T_world_camera: Array) -> Array | None:
         """Goal of the camera; None while a hand is missing, silent or no pose, and from there on it begins anew."""
         poses = []
         for name in self._camera_hands:
             leader = self._leaders[name]
-            hand, patience = leader.hand, leader.pairing.settings.patience
-            if hand is not None and now - hand.time <= patience and is_pose(hand.T_view_hand):
+            hand, timeout = leader.hand, leader.pairing.settings.timeout
+            if hand is not None and now - hand.time <= timeout and is_pose(hand.T_view_hand):
                 poses.append(hand.T_view_hand)
         if len(poses) != len(self._camera_hands):
             self._camera.release()

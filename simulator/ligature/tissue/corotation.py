@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ligature.tissue.compiled import inlined, kernel
+from ligature.kernels import inlined, kernel
 
 MOST_TURNS = 8
 """Iterations of a frame at most; from the last step's frame one to three suffice."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from ligature.tissue.compiled import kernel
+from ligature.kernels import kernel
 from ligature.tissue.dense import invert, subtract_product
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ FACES: Integers = np.array([[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 
 class Cut:
     """A slit along lattice faces: the faces between the cells ``index - 1`` and ``index`` of ``axis``.
 
-    ``mask`` says which of them are cut, over the cells of the two other axes in their order.
+    ``mask`` states which of them are cut, over the cells of the two other axes in their order.
     """
 
     axis: int

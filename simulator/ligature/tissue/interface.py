@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.tissue.compiled import kernel
+from ligature.kernels import kernel
 from ligature.tissue.elastic import ElasticGrid
 from ligature.tissue.material import TissueMaterial
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.tissue.compiled import kernel
+from ligature.kernels import kernel
 from ligature.tissue.elastic import ElasticGrid
 
 Array = NDArray[np.float64]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ligature.tissue.compiled import kernel
+from ligature.kernels import kernel
 
 NEWTON = 12
 """Iterations for the place within a cell; three suffice in cells near their shape at rest."""

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.tissue.compiled import inlined, kernel
+from ligature.kernels import inlined, kernel
 from ligature.tissue.dense import cholesky, solve_cholesky
 
 Array = NDArray[np.float64]

@@ -208,7 +208,7 @@ RECIPES = {
 
 
 def undone(name, arguments, prepare):
-    """Runs an operator on the authored scene, takes it back, and tells how the scene compares."""
+    """Runs an operator on the authored scene, takes it back, and reports how the scene compares."""
     prepare()
     bpy.ops.ed.undo_push(message="before")
     before = scene_print()
@@ -326,7 +326,7 @@ def over_the_phantom():
 
 @step
 def quality():
-    """Five convex pieces are few for a ring: numbers tell it, and colours where."""
+    """Five convex pieces are few for a ring: numbers and colours show it."""
     bpy.ops.mesh.primitive_torus_add(major_radius=0.05, minor_radius=0.015, location=(1.0, 1.0, 0.1))
     bpy.context.object.name = "Ring"
     select(bpy.context.object)

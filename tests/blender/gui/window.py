@@ -125,7 +125,7 @@ def scroll_sidebar(times):
 
 
 def run():
-    """The next step; a failure ends the session with its traceback told."""
+    """The next step; a failure ends the session with its traceback."""
     if not STEPS:
         finish()
         return None
@@ -143,7 +143,7 @@ def run():
 
 
 def finish():
-    """Tell the result and quit."""
+    """Report the result and quit."""
     sys.stdout.write(f"RESULT {json.dumps(RESULT)}\n")
     sys.stdout.flush()
     sys.stderr.flush()

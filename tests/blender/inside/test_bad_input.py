@@ -1,4 +1,4 @@
-"""Bad input is told with the object or file that it is about, and leaves the scene and all files as they were."""
+"""Bad input is reported with the object or file that it is about, and leaves the scene and all files as they were."""
 
 import resource
 import signal
@@ -21,7 +21,7 @@ def snapshot(folder):
 
 
 def fails(operator, words, **arguments):
-    """Runs an operator that must report an error which says ``words``; returns the report."""
+    """Runs an operator that must report an error which states ``words``; returns the report."""
     before = scene_print()
     with pytest.raises(RuntimeError, match=words) as told:
         operator(**arguments)
@@ -54,7 +54,7 @@ def test_a_folder_is_no_scene_file(tmp_path):
 
 
 def opened(path):
-    """Brings a file in and returns its collection with what was told about it."""
+    """Brings a file in and returns its collection with what was reported about it."""
     from adf_studio.read_file import import_file
 
     done = import_file(path, bpy.context.scene)
@@ -66,7 +66,7 @@ def opened(path):
     ["v a b c\nf 1 1 1\n", "v 0 0 0\nf 1 2 9\n", "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n", "", "\x00\x01\x02", "f 1 2 3\n"],
     ids=["words", "index", "nan", "empty", "binary", "no vertex"],
 )  # fmt: skip
-def test_a_malformed_mesh_is_told_with_its_body_and_never_overwritten(tmp_path, text):
+def test_a_malformed_mesh_is_reported_with_its_body_and_never_overwritten(tmp_path, text):
     (tmp_path / "m.yaml").write_text(MODEL)
     (tmp_path / "part.OBJ").write_text(text)
     before = snapshot(tmp_path)
@@ -87,7 +87,7 @@ def test_one_bad_object_costs_itself_only(tmp_path):
     assert (tmp_path / "out.yaml").read_bytes() == (tmp_path / "m.yaml").read_bytes()
 
 
-def test_a_missing_texture_is_told_with_its_body_and_its_name_stays_in_the_file(tmp_path):
+def test_a_missing_texture_is_reported_with_its_body_and_its_name_stays_in_the_file(tmp_path):
     (tmp_path / "m.yaml").write_text(MODEL)
     (tmp_path / "part.OBJ").write_text("mtllib part.mtl\nusemtl skin\n" + GOOD_OBJ)
     (tmp_path / "part.mtl").write_text("newmtl skin\nKd 1 0 0\nmap_Kd gone.png\n")
@@ -98,7 +98,7 @@ def test_a_missing_texture_is_told_with_its_body_and_its_name_stays_in_the_file(
     assert snapshot(tmp_path) == before
 
 
-def test_a_texture_that_cannot_be_read_is_told_with_its_body(tmp_path):
+def test_a_texture_that_cannot_be_read_is_reported_with_its_body(tmp_path):
     collection = model()
     part = body()
     material = bpy.data.materials.new("skin")

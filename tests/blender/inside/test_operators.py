@@ -99,7 +99,7 @@ def test_a_preview_moves_every_type_of_joint_along_its_own_axis(kind, axis, move
     assert scene_print() == before
 
 
-def test_a_locked_axis_is_told_with_those_that_move():
+def test_a_locked_axis_is_reported_with_those_that_move():
     model()
     parent, child = body("parent"), body("child", location=(1, 0, 0))
     select(child, parent)
@@ -191,7 +191,7 @@ def test_what_is_being_edited_is_written_as_it_is_seen(tmp_path, modified):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_a_joint_whose_body_was_deleted_is_told_and_nothing_is_written(tmp_path):
+def test_a_joint_whose_body_was_deleted_is_reported_and_nothing_is_written(tmp_path):
     collection = model()
     parent, child = body("parent"), body("child", location=(1, 0, 0))
     select(child, parent)
@@ -229,7 +229,7 @@ def test_a_joint_to_a_body_of_another_file_names_it_with_its_namespace(tmp_path)
     assert (tmp_path / "two.yaml").read_bytes() == text
 
 
-def test_what_would_not_be_written_as_it_looks_is_told():
+def test_what_would_not_be_written_as_it_looks_is_reported():
     model()
     bpy.ops.curve.primitive_bezier_circle_add()
     bpy.context.object.name = "rim"

@@ -42,7 +42,7 @@ def test_figures_of_convex_pieces_are_those_of_the_command_line(pieces, volume, 
     assert quality.kept_figures(part) == pytest.approx(found, abs=1e-6)
 
 
-def test_primitives_are_measured_with_their_exact_volume_and_the_colours_tell_which_side_errs():
+def test_primitives_are_measured_with_their_exact_volume_and_the_colours_report_which_side_errs():
     model()
     part = body("block")  # a cube of one metre
     making.add_shape(part, Shape("BOX", size=(1.2, 1.2, 1.0)))
@@ -71,7 +71,7 @@ def test_a_concave_collision_mesh_is_measured_as_it_is():
     assert quality.measure(part) == pytest.approx((1, 0.0, 0.0), abs=1e-5)
 
 
-def test_the_operator_tells_the_figures_and_what_is_written_says_when_they_are_old():
+def test_the_operator_reports_the_figures_and_what_is_written_states_when_they_are_old():
     part = ell()
     making.add_hull(part, ELL)
     select(part)
@@ -93,7 +93,7 @@ def test_the_operator_tells_the_figures_and_what_is_written_says_when_they_are_o
     assert len(quality_overlay.words_of(part)) == 5
 
 
-def test_a_body_that_cannot_be_measured_is_told_why():
+def test_a_body_that_cannot_be_measured_is_reported_why():
     model()
     part = body("bare")
     select(part)

@@ -20,7 +20,7 @@ def files(corpus):
     return [file for file in found if file.name != "compound_example.yaml"]
 
 
-def test_every_real_file_comes_back_byte_for_byte_and_its_bodies_stand_where_it_says(corpus):
+def test_every_real_file_comes_back_byte_for_byte_and_its_bodies_stand_where_it_states(corpus):
     kinds, worst = set(), 0.0
     for file in files(corpus):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ligature.adf.schema.blocks import PLUGINS, F, N, P, T, U, V, gains, shaders
 from ligature.adf.schema.bodies import ROD
-from ligature.adf.schema.keys import ZERO, Fault, Key, Status, Type, each, ignored
+from ligature.adf.schema.keys import STRONGEST, ZERO, Fault, Key, Status, Type, each, ignored
 
 MAP = Type.MAP
 
@@ -36,7 +36,7 @@ MODEL = (
     Key("low resolution path", P, "", doc="folder of collision meshes"),
     Key("namespace", T, "", doc="prefix of every object of the file"),
     Key("ignore inter-collision", F, False, doc="bodies of this file do not collide with each other"),
-    Key("gravity", V, unit="m/s²", doc="gravity of the bodies of this file"),
+    Key("gravity", V, unit="m/s²", doc="gravity of the bodies of this file", most=STRONGEST),
     *shaders("shaders"),
     PLUGINS,
     VERSION,
@@ -48,7 +48,7 @@ WORLD = (
     Key("environment", P, "", doc="model file used as environment"),
     *ignored(("enclosure",), "walls where no environment is"),
     Key("namespace", T, "", doc="namespace of the world's topics, lights and cameras"),
-    Key("gravity", V, (0.0, 0.0, -9.8), "m/s²", "gravity"),
+    Key("gravity", V, (0.0, 0.0, -9.8), "m/s²", "gravity", most=STRONGEST),
     Key("max iterations", U, 10, doc="most sub-steps of 1 ms of an update"),
     Key("lights", Type.TEXTS, (), doc="lights that exist, in order"),
     Key("cameras", Type.TEXTS, (), doc="cameras that exist, in order"),

@@ -1,4 +1,4 @@
-"""What one row of the schema says: a key's path, type, unit, default, choices, meaning and what becomes of it."""
+"""What one row of the schema states: a key's path, type, unit, default, choices, meaning and what becomes of it."""
 
 from __future__ import annotations
 
@@ -67,8 +67,9 @@ class Key:
         Accepted spellings and what each means.
     fault
         What AMBF gives up when the value is bad or missing.
-    least
-        Smallest value that makes sense; a smaller one is an error.
+    least, most
+        Smallest value and largest magnitude that can be simulated; a value beyond is an error. ``most`` holds for each
+        component of a vector, and for the position of a pose.
     """
 
     path: str
@@ -81,6 +82,7 @@ class Key:
     status: Status = Status.USED
     fault: Fault = Fault.FILE
     least: float | None = None
+    most: float | None = None
 
     @property
     def block(self) -> str:
@@ -108,6 +110,12 @@ def spellings(*names: str) -> dict[str, str]:
     """Each name in lower case, Capitalised and UPPER case, mapped to UPPER case."""
     return {form: n.upper() for n in names for form in (n.lower(), n.capitalize(), n.upper())}
 
+
+FARTHEST = 1e4
+"""Largest length in metres: beyond it collisions of things of millimetres lose their precision."""
+
+HEAVIEST, STRONGEST = 1e6, 1e3
+"""Largest mass in kg and gravity in m/s² that can be simulated."""
 
 ZERO = (0.0, 0.0, 0.0)
 POSE_ZERO = (ZERO, ZERO)

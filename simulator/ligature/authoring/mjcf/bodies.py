@@ -2,7 +2,7 @@
 
 The compiled model has all defaults, includes, units and inertias worked out; what is read of it are the
 arrays of `mjModel` that MuJoCo documents ("API reference: mjModel"). Bodies stand where they are in MuJoCo's
-reference configuration ``qpos0``. What ADF cannot express is told by name, never dropped in silence.
+reference configuration ``qpos0``. What ADF cannot express is reported by name, never dropped in silence.
 Metres, kilograms, radians.
 """
 
@@ -95,7 +95,7 @@ def _body(
     drawn = [g for g in geoms if model.geom_group[g] < _HIDDEN_GROUPS and _colour(model, g)[3] > 0.0]
     touched = [g for g in geoms if _collides(model, g)]
     for prefix, chosen in (("", drawn), ("collision ", touched)):
-        told = notes if prefix or not touched else []  # what is drawn and collides is told once
+        told = notes if prefix or not touched else []  # what is drawn and collides is reported once
         values.update(shape_keys(name, prefix, *_shapes(model, chosen, poses[body], poses, told), meshes))
     if "mesh" in values:
         values["use material"] = False
@@ -135,7 +135,7 @@ def _need_groups(model: Any, notes: list[str]) -> bool:
         return False
     one_per_body = {(int(model.geom_bodyid[g]), int(model.geom_contype[g])) for g in touched}
     if any(a != b for a, b in masks) or len(one_per_body) > len({body for body, _ in one_per_body}):
-        note = "contype and conaffinity differ in a way that collision groups cannot say; everything collides"
+        note = "contype and conaffinity differ in a way that collision groups cannot state; everything collides"
         if note not in notes:
             notes.append(note)
         return False

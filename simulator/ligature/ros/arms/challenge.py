@@ -1,6 +1,6 @@
 """The arms under the names that the suturing challenge's own CRTK node gives them: ``/CRTK/psm1/…`` and the like.
 
-That node (interface reference §4.7) knows no operating states: its arms move when told to, and closing a jaw on
+That node (interface reference §4.7) knows no operating states: its arms move when asked to, and closing a jaw on
 something takes hold of it by the actuator of the tool. Radians, metres; frames as in §4.7.
 """
 
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
-from ligature.model.commands import ActuatorCommand, ArmCommand, BodyCommand, Command, CommandType, Release
+from ligature.model.commands import ActuatorCommand, BodyCommand, Command, CommandType, Release
 from ligature.model.frames import frame, matrix_pose7, pose7_matrix, rpy_matrix
 from ligature.model.scene import ArmDescription, ArmKind, Scene
+from ligature.robots.commands import VERBS, Adopt
 from ligature.robots.ecm import SrcCamera
 from ligature.ros.arms.outlet import ArmOutlet
 from ligature.ros.arms.readings import set_pose
@@ -53,13 +54,11 @@ ARRIVED = 5e-4
 class ChallengeFace:
     """Topics of the challenge's node over the same arms; ``push`` sends commands to the physics."""
 
-    def __init__(
-        self, prefix: str, scene: Scene, outlets: Sequence[ArmOutlet], push: Callable[[Command], None]
-    ) -> None:
+    def __init__(self, scene: Scene, outlets: Sequence[ArmOutlet], push: Callable[[Command], None]) -> None:
         self._scene, self._push = scene, push
         self._state: Any = None
         self._due = 0.0
-        root = f"{prefix}CRTK"
+        root, self._world = f"{scene.world.root}CRTK", f"{scene.world.frame_prefix}world"
         self._arms = [
             _Psm(
                 f"{root}/{outlet.description.name.lower()}", scene, outlet.index, outlet.description, self._newest, push
@@ -92,7 +91,7 @@ class ChallengeFace:
         if self._camera is not None:
             self._camera.publish(state, stamp)
         for body, publisher in self._poses.items():
-            publisher.publish(_posed("world", state["body_pose"][body], stamp))
+            publisher.publish(_posed(self._world, state["body_pose"][body], stamp))
 
     def _set_up_task_3(self, message: Any) -> None:
         """The needle is brought into the jaw of the second arm; runs beside everything else."""
@@ -137,7 +136,8 @@ class _Psm:
     ) -> None:
         self.name, self.description = description.name, description
         self._index, self._newest, self._push, self._scene = index, newest, push, scene
-        self._frame = f"{description.name.lower()}/baselink"
+        frames = scene.world.frame_prefix
+        self._world, self._frame = f"{frames}world", f"{frames}{description.name.lower()}/baselink"
         joints = (*description.joints, *description.jaw)
         self._names = [scene.joints[joint].identity.name.replace(" ", "") for joint in joints]
         self._actuator = _near(scene.actuators, description.name)
@@ -164,8 +164,8 @@ class _Psm:
         """Send a command, after having the arm take it where it stands."""
         record = self._newest()["arm"][self._index]
         if not (record["operating"] == 1 and record["homed"]):
-            self._push(ArmCommand(self._index, "state_command", (), "adopt"))
-        self._push(ArmCommand(self._index, verb, values))
+            self._push(Adopt(self._index))
+        self._push(VERBS[verb](self._index, values))
 
     def jaw(self, value: float) -> None:
         """Both fingers to ``value``, which opens the jaw by twice that; holds what both feel when nearly closed."""
@@ -197,7 +197,7 @@ class _Psm:
         message.header.stamp = stamp
         self._measured_js.publish(message)
         self._measured_cp.publish(_posed(self._frame, record["local_measured_cp"], stamp))
-        self._base.publish(_posed("world", state["body_pose"][self.description.base], stamp))
+        self._base.publish(_posed(self._world, state["body_pose"][self.description.base], stamp))
 
 
 class _Camera:
@@ -207,6 +207,7 @@ class _Camera:
         self._body, self._push = body, push
         self._start = scene.bodies[body].T_world_body
         self._kinematics = SrcCamera()
+        self._frame = f"{scene.world.frame_prefix}ecm/baselink"
         self._measured_js = rospy.Publisher(f"{root}/measured_js", JointState, queue_size=QUEUE)
         self._measured_cp = rospy.Publisher(f"{root}/measured_cp", PoseStamped, queue_size=QUEUE)
         _listen(f"{root}/servo_jp", JointState, self._servo_jp)
@@ -224,7 +225,7 @@ class _Camera:
         message = JointState(name=[f"j{i}" for i in range(4)], position=[0.0] * 4)
         message.header.stamp = stamp
         self._measured_js.publish(message)
-        self._measured_cp.publish(_posed("ecm/baselink", state["body_pose"][self._body], stamp))
+        self._measured_cp.publish(_posed(self._frame, state["body_pose"][self._body], stamp))
 
 
 def _listen(topic: str, type_: type, take: Callable[[Any], None]) -> None:

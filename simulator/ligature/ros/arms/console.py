@@ -15,9 +15,9 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Bool, Empty, Float64, Float64MultiArray, String
 
-from ligature.model.commands import ArmCommand
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
-from ligature.model.scene import ArmKind
+from ligature.model.scene import ArmKind, WorldSettings
+from ligature.robots.commands import ArmCommand, StateCommand
 from ligature.ros.arms.outlet import ArmOutlet
 from ligature.ros.arms.readings import set_pose
 
@@ -62,13 +62,13 @@ class Console:
             self._listen(f"{root}/home", Empty, lambda _: self._all("home"))
             self._listen(f"{root}/set_volume", Float64, lambda m: self._volume.publish(m.data))
             self._listen(f"{root}/beep", Float64MultiArray, lambda m: rospy.loginfo(f"beep {list(m.data)}"))
-            self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"says: {m.data}"))
+            self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"states: {m.data}"))
 
     def _listen(self, topic: str, type_: type, take: Callable[[Any], None]) -> None:
         rospy.Subscriber(topic, type_, take, queue_size=QUEUE)
 
     def _pedals(self, prefix: str, console: str) -> None:
-        """Pedals are pressed by ``emulate_…`` messages, and told under their new and old names."""
+        """Pedals are pressed by ``emulate_…`` messages, and reported under their new and old names."""
         for pedal in PEDALS:
             names = (f"{console}/{pedal}", f"{prefix}{ALIASES[pedal]}")
             self._listen(f"{console}/emulate_{pedal}", Joy, _relay([_latched(name, Joy) for name in names]))
@@ -82,7 +82,7 @@ class Console:
 
     def _all(self, command: str) -> None:
         for arm in self._arms:
-            self._push(ArmCommand(arm, "state_command", (), command))
+            self._push(StateCommand(arm, command))
 
 
 def _relay(publishers: Sequence[Any]) -> Callable[[Any], None]:
@@ -101,18 +101,18 @@ def _press(message: Any) -> Joy:
 
 
 class SetupJoints:
-    """Where the bases of the arms stand: fixed in a scene, told as the set-up joints of the cart tell it."""
+    """Where the bases of the arms stand: fixed in a scene, published as the set-up joints of the cart."""
 
-    def __init__(self, prefix: str, outlets: Sequence[ArmOutlet]) -> None:
+    def __init__(self, world: WorldSettings, outlets: Sequence[ArmOutlet]) -> None:
         self._outlets = [outlet for outlet in outlets if outlet.description.kind is not ArmKind.MTM]
-        self._reference = "ECM"
+        self._reference, self._frame_prefix = "ECM", world.frame_prefix
         self._joints: dict[str, Any] = {}
         self._local: dict[str, Any] = {}
         self._poses: dict[str, Any] = {}
-        rospy.Subscriber(f"{prefix}SUJ/set_reference_arm", String, self._refer, queue_size=QUEUE)
+        rospy.Subscriber(f"{world.root}SUJ/set_reference_arm", String, self._refer, queue_size=QUEUE)
         for outlet in self._outlets:
             name = outlet.description.name
-            root = f"{prefix}SUJ/{name}"
+            root = f"{world.root}SUJ/{name}"
             state = _latched(f"{root}/operating_state", OperatingState)
             message = OperatingState(state="ENABLED", is_homed=True)
             message.header.stamp = rospy.Time.now()
@@ -153,9 +153,8 @@ class SetupJoints:
             joints.header.stamp = stamp
             self._joints[name].publish(joints)
 
-    @staticmethod
-    def _publish(publisher: Any, T: Any, frame: str, stamp: Any) -> None:
+    def _publish(self, publisher: Any, T: Any, frame: str, stamp: Any) -> None:
         message = PoseStamped()
-        message.header.frame_id, message.header.stamp = frame, stamp
+        message.header.frame_id, message.header.stamp = self._frame_prefix + frame, stamp
         set_pose(message.pose, matrix_pose7(T))
         publisher.publish(message)

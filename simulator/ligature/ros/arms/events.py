@@ -1,4 +1,4 @@
-"""What an arm tells when it happens: latched topics, each with its newest message."""
+"""What an arm reports when it happens: latched topics, each with its newest message."""
 
 from __future__ import annotations
 
@@ -72,6 +72,7 @@ class EventTopics:
         }
         self._types = topics
         self._logged: dict[str, float] = {}
+        self.error = ""
 
     def tell(self, name: str, value: Any) -> None:
         """Publish an event."""
@@ -79,9 +80,16 @@ class EventTopics:
             self._state = value
             self.beat()
         elif name in self._publishers:
+            if name == "error":
+                self.error = value
             type_ = self._types[name]
             self._publishers[name].publish(type_() if type_ is Empty else type_(data=value))
             self._log(name, value)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the arm is in FAULT; ``error`` is why."""
+        return STATES[int(self._state[0])] == "FAULT"
 
     def beat(self) -> None:
         """Publish the operating state again, with a fresh stamp."""

@@ -15,12 +15,12 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from ligature.bus import Block, Outbox
-from ligature.bus.bounds import check_bounds
 from ligature.bus.codec import CodecError
 from ligature.bus.events import RUN
-from ligature.model.commands import ArmCommand, Command, check
+from ligature.model.commands import Command
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
+from ligature.robots.commands import ArmCommand
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.ros.arms.challenge import ChallengeFace
 from ligature.ros.arms.commands import listeners
@@ -37,7 +37,7 @@ HEARTBEAT = 0.7
 """Seconds between two publications of an operating state that does not change."""
 
 STALE = 0.1
-"""Seconds after which a state counts as that of a resting simulation, and is told with the time of now."""
+"""Seconds after which a state counts as that of a resting simulation, and is reported with the time of now."""
 
 QUEUE = 10
 
@@ -45,12 +45,14 @@ QUEUE = 10
 class ArmsNode:
     """The arms of a scene on ROS.
 
-    Topics begin with ``prefix``, which ends in a slash; with ``challenge`` they are there a second time, under the
-    names of the suturing challenge's own node.
+    Topics and frames begin with the prefix of the scene; with ``challenge`` topics are there a second time, under
+    the names of the suturing challenge's own node.
     """
 
-    def __init__(self, scene: Scene, block: Block, outbox: Outbox, prefix: str, challenge: bool) -> None:
+    def __init__(self, scene: Scene, block: Block, outbox: Outbox, challenge: bool) -> None:
         self._block, self._outbox = block, outbox
+        prefix = scene.world.root
+        self._frame_prefix = scene.world.frame_prefix
         self._base_body = [arm.base for arm in scene.arms]
         self._outlets: list[ArmOutlet] = []
         self.refused = 0
@@ -64,8 +66,8 @@ class ArmsNode:
         self._tf = Publisher("/tf", TFMessage) if self._outlets else None
         if self._outlets:
             self._console = Console(prefix, self._outlets, self.push)
-            self._setup_joints = SetupJoints(prefix, self._outlets)
-        self._challenge = ChallengeFace(prefix, scene, self._outlets, self.push) if challenge else None
+            self._setup_joints = SetupJoints(scene.world, self._outlets)
+        self._challenge = ChallengeFace(scene, self._outlets, self.push) if challenge else None
 
     @property
     def outlets(self) -> list[ArmOutlet]:
@@ -77,8 +79,13 @@ class ArmsNode:
         """Messages that slow clients missed."""
         return sum(outlet.dropped for outlet in self._outlets)
 
+    @property
+    def faults(self) -> dict[str, str]:
+        """The arms in FAULT by name, each with its newest error."""
+        return {outlet.description.name: outlet.events.error for outlet in self._outlets if outlet.events.failed}
+
     def start(self, state: Any) -> None:
-        """Tell the operating states that a running simulation has already; events before this are old."""
+        """Report the operating states that a running simulation has already; events before this are old."""
         self._block.events.skip()
         for outlet, record in zip(self._outlets, state["arm"], strict=True):
             outlet.follow(record)
@@ -95,7 +102,7 @@ class ArmsNode:
         """Readings, then events; returns how many readings were sent.
 
         ``state`` is an element of the node's state record, which ``refresh`` reads anew. Whoever hears that a move has
-        ended finds readings that are no older than its end: the bus holds a state before it tells the state's events.
+        ended finds readings that are no older than its end: the bus holds a state before it reports the state's events.
         """
         self._due = max(self._due + PERIOD, now + PERIOD / 5)
         self._count += 1
@@ -132,12 +139,12 @@ class ArmsNode:
             return
         frames = []
         for outlet, body in zip(self._outlets, self._base_body, strict=True):
-            record, name = state["arm"][outlet.index], outlet.description.name
+            record, name = state["arm"][outlet.index], f"{self._frame_prefix}{outlet.description.name}"
             parent = record["reference"].decode("utf-8", "replace") or outlet.base_frame
             frames.append(_transform(parent, name, record["measured_cp"], stamp))
             if outlet.description.kind is not ArmKind.MTM:
                 pose = state["body_pose"][body] if body >= 0 else matrix_pose7(outlet.T_base)
-                frames.append(_transform("world", outlet.base_frame, pose, stamp))
+                frames.append(_transform(f"{self._frame_prefix}world", outlet.base_frame, pose, stamp))
         self._tf.publish(TFMessage(frames))
 
     # --- commands ---------------------------------------------------------------------------
@@ -161,8 +168,7 @@ class ArmsNode:
 
     def push(self, command: Command) -> None:
         """Send a command to the physics; raises ValueError when it may not go there."""
-        check(command)
-        check_bounds(command)
+        command.check()
         self._outbox.push(command)
 
 

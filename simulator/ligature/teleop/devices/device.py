@@ -1,6 +1,6 @@
 """What every input device gives: readings of a hand and of buttons, and perhaps a force in return.
 
-Devices speak in their own axes, metres and radians; `ligature.teleop.calibration` says what they mean.
+Devices speak in their own axes, metres and radians; `ligature.teleop.calibration` states what they mean.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ class Device:
         """Press the hand with a force (3,) in the device's axes, in N."""
 
     def begin(self) -> None:
-        """The hand begins to lead."""
+        """The hand begins to drive."""
 
     def turn_to(self, R: Array) -> bool:
         """Turn the handle to an orientation (3, 3) in the device's axes; False for a device that has no motors."""
         return False
 
-    def keep_turned(self, R: Array) -> None:
-        """Keep an orientation (3, 3) in the device's axes while the hand moves, until it begins to lead again."""
+    def hold_orientation(self, R: Array) -> None:
+        """Keep an orientation (3, 3) in the device's axes while the hand moves, until it begins to drive again."""
 
     def close(self) -> None:
         """Listen no more."""
@@ -61,11 +61,11 @@ class RateHand:
     """A hand that never was: a stick's velocities, integrated.
 
     ``speed`` (m/s) and ``turn`` (rad/s) are those of a full deflection. A deflected stick that is silent for
-    ``patience`` gives no more readings, as a hand that disappeared; one at rest may be silent.
+    ``timeout`` yields no more readings, as a hand that disappeared; one at rest may be silent.
     """
 
-    def __init__(self, speed: float, turn: float, patience: float = 0.2, deadband: float = 0.05) -> None:
-        self.speed, self.turn, self.patience, self.deadband = speed, turn, patience, deadband
+    def __init__(self, speed: float, turn: float, timeout: float = 0.2, deadband: float = 0.05) -> None:
+        self.speed, self.turn, self.timeout, self.deadband = speed, turn, timeout, deadband
         self._T = np.eye(4)
         self._deflection = np.zeros(6)
         self._heard = self._last = -np.inf
@@ -82,7 +82,7 @@ class RateHand:
         if not np.isfinite(self._deflection).all():
             return np.full(7, np.nan)
         moving = bool(self._deflection.any())
-        if moving and now - self._heard > self.patience:
+        if moving and now - self._heard > self.timeout:
             return None
         dt = min(max(now - self._last, 0.0), 0.05)
         self._last = now

@@ -1,6 +1,6 @@
 """Game controllers and other sticks: the deflections of ``sensor_msgs/Joy`` are speeds of the hand.
 
-A stick that is held still must be told again and again: `joy_node` needs ``autorepeat_rate`` 20 or more. The hand moves
+A stick that is held still must be sent again and again: `joy_node` needs ``autorepeat_rate`` 20 or more. The hand moves
 in the axes of the view: right, down, away. Metres and radians per second.
 """
 
@@ -20,7 +20,7 @@ from ligature.teleop.devices.device import Device, RateHand, Reading, Take
 DEFAULTS = Calibration()
 OPTIONS: dict[str, Any] = {
     "moves": ["-0", "-1", "+7"], "turns": ["+4", "-3", "-6"], "speed": 0.1, "turn": 0.8, "deadband": 0.08,
-    "patience": 0.2,
+    "timeout": 0.2,
 }  # fmt: skip
 """``moves`` and ``turns``: the axis with its sign that moves right, down, away, and that turns about these; as of a
 common game pad: left stick, cross up and down; right stick, cross left and right."""
@@ -34,7 +34,7 @@ class Adapter(Device):
         self._axes = [_axis(text) for text in (*options["moves"], *options["turns"])]
         if len(self._axes) != 6:
             raise ValueError("moves and turns name three axes each")
-        self._hand = RateHand(options["speed"], options["turn"], options["patience"], options["deadband"])
+        self._hand = RateHand(options["speed"], options["turn"], options["timeout"], options["deadband"])
         self._buttons: dict[str, bool] = {}
         self._subscriber = rospy.Subscriber(topic, Joy, self._deflected, queue_size=10, tcp_nodelay=True)
 

@@ -84,7 +84,7 @@ class Adapter(Device):
         self._move.publish(message)
         return True
 
-    def keep_turned(self, R: Array) -> None:
+    def hold_orientation(self, R: Array) -> None:
         """Keep an orientation while the hand moves."""
         self._lock.publish(Quaternion(*matrix_quaternion(R)))
 

@@ -9,7 +9,7 @@ from ligature.teleop.devices import joy
 from ligature.teleop.devices.device import Take
 
 DEFAULTS = Calibration()
-OPTIONS: dict[str, Any] = {**joy.OPTIONS, "moves": ["-1", "-2", "+0"], "turns": ["-4", "-5", "+3"], "patience": 0.5}
+OPTIONS: dict[str, Any] = {**joy.OPTIONS, "moves": ["-1", "-2", "+0"], "turns": ["-4", "-5", "+3"], "timeout": 0.5}
 """The driver's axes are x forward, y left, z up, then turns about these."""
 
 

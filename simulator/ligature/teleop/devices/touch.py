@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 DEFAULTS = Calibration(axes=axes_of_words("right", "up", "near"))
 OPTIONS: dict[str, Any] = {"unit": 1.0, "force type": "omni_msgs/OmniFeedback"}
-"""``unit``: metres of one unit of the driver's positions, 0.001 for those that tell millimetres."""
+"""``unit``: metres of one unit of the driver's positions, 0.001 for those that report millimetres."""
 
 
 class Adapter(Device):
@@ -45,7 +45,7 @@ class Adapter(Device):
         self._buttons = {"grey": bool(message.grey_button), "white": bool(message.white_button)}
 
     def feel(self, force: Array) -> None:
-        """Press the hand, in the driver's axes; without the driver's messages a line says what is missing."""
+        """Press the hand, in the driver's axes; without the driver's messages a line states what is missing."""
         if self._message is None:
             self._message = self._force_message()
         if self._message:

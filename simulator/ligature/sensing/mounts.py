@@ -10,17 +10,19 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
 from ligature.model.scene import Attachment, Scene
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem
 
 KINDS = ("ghost", "camera", "light")
 
 
-@njit(cache=True)
+@compiled
 def _update(
     body_pose: NDArray[np.float64],
     local: NDArray[np.float64],
@@ -39,7 +41,7 @@ def _update(
             compose(world[parent - n_bodies], local[i], world[i])
 
 
-class Attachments:
+class Mounts(Subsystem):
     """The attached objects of a scene, ghosts first, then cameras, then lights.
 
     ``local`` and ``world`` are (n, 7) arrays over all of them; `of` gives the slice of one kind.
@@ -49,11 +51,12 @@ class Attachments:
         counts = [len(scene.ghosts), len(scene.cameras), len(scene.lights)]
         starts = np.concatenate([[0], np.cumsum(counts)])
         self._slices = {kind: slice(int(starts[i]), int(starts[i + 1])) for i, kind in enumerate(KINDS)}
-        attachments = [item.attachment for items in (scene.ghosts, scene.cameras, scene.lights) for item in items]
+        mounts = [item.attachment for items in (scene.ghosts, scene.cameras, scene.lights) for item in items]
         self._n_bodies = len(scene.bodies)
-        self._parents = np.array([self._parent_index(a) for a in attachments], dtype=np.int64)
+        self._parents = np.array([self._parent_index(a) for a in mounts], dtype=np.int64)
+        self._initial_parents = self._parents.copy()
         self._order = self._parents_first()
-        self._initial = np.array([matrix_pose7(a.T_parent_object) for a in attachments]).reshape(-1, 7)
+        self._initial = np.array([matrix_pose7(a.T_parent_object) for a in mounts]).reshape(-1, 7)
         self.local = self._initial.copy()
         self.world = self._initial.copy()
 
@@ -76,16 +79,26 @@ class Attachments:
         self._order = self._parents_first()
 
     def reset(self) -> None:
-        """Put every object back to where the scene says."""
+        """Put every object back to where the scene states, on the parent that it states."""
         self.local[:] = self._initial
+        self._parents[:] = self._initial_parents
+        self._order = self._parents_first()
 
-    def memory(self) -> dict[str, NDArray[Any]]:
-        """What `recall` needs to continue from here."""
-        return {"local": self.local.copy(), "parents": self._parents.copy()}
+    def sense(self, state: StateRecord) -> None:
+        """Move every object with its parent, and write where it is."""
+        self.update(state["body_pose"][0])
+        state["ghost_world"][0] = self.world[self.of("ghost")]
+        for kind in ("camera", "light"):
+            state[f"{kind}_pose"][0] = self.local[self.of(kind)]
+            state[f"{kind}_world"][0] = self.world[self.of(kind)]
 
-    def recall(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from a `memory`."""
-        self.local[:], self._parents[:] = memory["local"], memory["parents"]
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """Everything that lasts from tick to tick."""
+        return {"local": self.local, "parents": self._parents}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Continue from `snapshot`."""
+        self.local[:], self._parents[:] = snapshot["local"], snapshot["parents"]
         self._order = self._parents_first()
 
     def _parent_index(self, attachment: Attachment) -> int:

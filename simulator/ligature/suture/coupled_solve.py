@@ -8,8 +8,8 @@ axes, SI units.
 
 from __future__ import annotations
 
+from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6, solve, solve_within
-from ligature.suture.compiled import inlined, kernel
 from ligature.suture.coupling import push
 from ligature.suture.rotations import cross, rotate
 
@@ -54,7 +54,7 @@ def gather(n, total, nodes, touches, work):
 
 
 @inlined
-def _apply_ties(rows, nodes, touches, work, p, out):
+def _apply_coupling(rows, nodes, touches, work, p, out):
     """out = E p: what each movable node of a contact feels of the other's motion."""
     for m in range(rows):
         i = work.rows[m]
@@ -77,7 +77,9 @@ def _apply_ties(rows, nodes, touches, work, p, out):
 @inlined
 def _precondition(n, low, high, rows, work, g, d):
     """d = S⁻¹ g: the chain by its direct solver, every body alone."""
-    solve_within(low, high, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, g, d, work.tied_load, work.six)
+    solve_within(
+        low, high, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, g, d, work.coupled_load, work.six
+    )
     _move_bodies(n, rows, work, g, d)
 
 
@@ -117,7 +119,7 @@ def couple(n, low, high, rows, nodes, touches, work):
         return
     _iterate(n, low, high, rows, nodes, touches, work)
     felt = work.cg[0]
-    _apply_ties(rows, nodes, touches, work, work.d, felt)
+    _apply_coupling(rows, nodes, touches, work, work.d, felt)
     for i in range(low, high + 1):
         for a in range(6):
             work.g[i, a] -= felt[i, a]
@@ -129,7 +131,7 @@ def couple(n, low, high, rows, nodes, touches, work):
 def _iterate(n, low, high, rows, nodes, touches, work):
     """Conjugate gradients for ``work.d`` of the tied nodes."""
     p, r, z, s = work.cg[0], work.cg[1], work.cg[2], work.cg[3]
-    _apply_ties(rows, nodes, touches, work, work.d, r)
+    _apply_coupling(rows, nodes, touches, work, work.d, r)
     for m in range(rows):
         i = work.rows[m]
         for a in range(6):
@@ -146,7 +148,7 @@ def _iterate(n, low, high, rows, nodes, touches, work):
         if energy <= enough:
             break
         q = z
-        _apply_ties(rows, nodes, touches, work, p, q)
+        _apply_coupling(rows, nodes, touches, work, p, q)
         for m in range(rows):
             i = work.rows[m]
             for a in range(6):

@@ -3,8 +3,17 @@
 from __future__ import annotations
 
 import pytest
-from ligature.bus.bounds import FARTHEST, FASTEST, STRONGEST, check_bounds
-from ligature.model.commands import ActuatorCommand, BodyCommand, Command, CommandType, PlaceCommand, Release
+from ligature.model.commands import (
+    MAX_FORCE,
+    MAX_POSITION,
+    MAX_VELOCITY,
+    ActuatorCommand,
+    BodyCommand,
+    Command,
+    CommandType,
+    PlaceCommand,
+    Release,
+)
 
 HERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 FAR = (0.0, -2e4, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -14,7 +23,7 @@ REST = (0.0,) * 6
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (BodyCommand(0, CommandType.POSITION, FAR), "the command must stay within 10000 m, not -20000"),
+        (BodyCommand(0, CommandType.POSITION, FAR), "a POSITION command must stay within 10000 m, not -20000"),
         (BodyCommand(0, CommandType.VELOCITY, (2e4, 0, 0, 0, 0, 0)), "within 10000 m/s or rad/s, not 20000"),
         (BodyCommand(0, CommandType.FORCE, (0, 0, 0, 0, -2e6, 0)), "within 1e\\+06 N or N m, not -2e\\+06"),
         (BodyCommand(0, CommandType.FORCE, REST, (), (0.0, 2e6)), "joint commands must stay within 1e\\+06"),
@@ -24,15 +33,15 @@ REST = (0.0,) * 6
 )
 def test_too_large_numbers_are_refused(command: Command, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        check_bounds(command)
+        command.check()
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        BodyCommand(0, CommandType.POSITION, (FARTHEST, -FARTHEST, *HERE[2:])),
-        BodyCommand(0, CommandType.VELOCITY, (FASTEST,) * 6),
-        BodyCommand(0, CommandType.FORCE, (STRONGEST,) * 6, (CommandType.FORCE,), (-STRONGEST,)),
+        BodyCommand(0, CommandType.POSITION, (MAX_POSITION, -MAX_POSITION, *HERE[2:])),
+        BodyCommand(0, CommandType.VELOCITY, (MAX_VELOCITY,) * 6),
+        BodyCommand(0, CommandType.FORCE, (MAX_FORCE,) * 6, (CommandType.FORCE,), (-MAX_FORCE,)),
         ActuatorCommand(0, True, "Needle", None),
         ActuatorCommand(0, True, "Needle", HERE),
         PlaceCommand("light", 0, None),
@@ -40,4 +49,4 @@ def test_too_large_numbers_are_refused(command: Command, message: str) -> None:
     ],
 )
 def test_numbers_up_to_the_bound_pass(command: Command) -> None:
-    check_bounds(command)
+    command.check()

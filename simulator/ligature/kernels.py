@@ -1,0 +1,150 @@
+"""Compiles kernels and keeps their machine code: the decorators that all rooms share.
+
+The code lies below `ligature.mesh.cache.cache_folder`, in a folder named by the digest of all sources that kernels
+are made of: Numba itself looks at one source file each, and would keep a kernel whose callee has changed. So only the
+first start after an installation compiles, which is logged every few seconds while it lasts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import re
+import threading
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core import event
+
+from ligature.mesh.cache import CacheError, cache_folder
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+FIRST_REPORT, REPORT_EVERY = 1.0, 4.0
+"""Seconds of compilation before the first line about it, and between lines."""
+
+_PACKAGE = Path(__file__).parent
+_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic)\b", re.MULTILINE)
+_CONSTANTS = ("kernels.py", "suture/layout.py", "suture/passages.py")
+"""Sources without kernels whose contents are compiled into kernels."""
+
+_log = logging.getLogger(__name__)
+
+
+def sources() -> list[Path]:
+    """The files that kernels are made of, sorted."""
+    found = {path for path in _PACKAGE.rglob("*.py") if _KERNEL_SOURCE.search(path.read_bytes())}
+    return sorted(found | {_PACKAGE / name for name in _CONSTANTS})
+
+
+@cache
+def kernel_folder() -> Path | None:
+    """Where the machine code of this version of the sources lies; None where nothing can be written."""
+    try:
+        root = cache_folder()
+    except CacheError as error:
+        _log.warning("%s; kernels are compiled again at every start", error)
+        return None
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources())).hexdigest()[:16]
+    return root / "kernels" / digest
+
+
+def compiled(function: Function) -> Function:
+    """Compile ``function`` on its first call and keep the code on disk.
+
+    No fast-math and no threads: the same input gives the same bits.
+    """
+    return compile_with(function)
+
+
+def kernel(function: Function) -> Function:
+    """Like `compiled`, for what allocates nothing.
+
+    It needs no reference counts then: counting took half of a tick.
+    """
+    return compile_with(function, error_model="numpy", _nrt=False)
+
+
+def inlined(function: Function) -> Function:
+    """Like `kernel`, for the small functions of inner loops: LLVM folds them into their callers."""
+    return compile_with(function, error_model="numpy", _nrt=False, forceinline=True)
+
+
+def compile_with(function: Function, **options: Any) -> Function:
+    """Like `compiled`, with options of `numba.njit`."""
+    folder = kernel_folder()
+    if folder is None:
+        return numba.njit(**options)(function)
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
+    try:
+        dispatcher = numba.njit(cache=True, **options)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    _survive_failed_writes(dispatcher)
+    return dispatcher
+
+
+def _survive_failed_writes(dispatcher: Any) -> None:
+    """Log instead of raising when machine code cannot be kept, for instance on a disk that has become full."""
+    save = dispatcher._cache.save_overload
+
+    def save_if_possible(signature: Any, data: Any) -> None:
+        try:
+            save(signature, data)
+        except OSError as error:
+            _warn_of_writes(str(error))
+
+    dispatcher._cache.save_overload = save_if_possible
+
+
+@cache
+def _warn_of_writes(reason: str) -> None:
+    _log.warning("kernels cannot be kept and will be compiled again at the next start: %s", reason)
+
+
+class _Progress(event.Listener):
+    """Logs a line every few seconds while Numba compiles."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._depth = self._kernels = 0
+        self._seconds = self._since = 0.0
+        self._watched = False
+
+    def on_start(self, event: Any) -> None:
+        with self._lock:
+            if not self._depth:
+                self._since = time.monotonic()
+            self._depth += 1
+            if not self._watched:
+                self._watched = True
+                threading.Thread(target=self._watch, name="compilation", daemon=True).start()
+
+    def on_end(self, event: Any) -> None:
+        with self._lock:
+            self._kernels += 1
+            self._depth -= 1
+            if not self._depth:
+                self._seconds += time.monotonic() - self._since
+
+    def _watch(self) -> None:
+        """Report until a whole period passes without compilation."""
+        pause, before = FIRST_REPORT, -1
+        while True:
+            time.sleep(pause)
+            pause = REPORT_EVERY
+            with self._lock:
+                if not self._depth and self._kernels == before:
+                    self._watched = False
+                    return
+                before = self._kernels
+                seconds = self._seconds + (time.monotonic() - self._since if self._depth else 0.0)
+            _log.warning("compiling for this machine, once: %d kernels after %.0f s", before, seconds)
+
+
+event.register("numba:compile", _Progress())

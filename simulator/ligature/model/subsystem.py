@@ -1,0 +1,64 @@
+"""What a tick is made of: subsystems that step in turn, and keep themselves in snapshots.
+
+`ligature.simulation.Simulation` advances one list of them. All that a subsystem changes in `Subsystem.step` is in its
+snapshot; a test walks the attributes of every one and fails on what a restore leaves as it was.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ligature.adf import Diagnostic
+from ligature.model.state import StateRecord
+
+
+class Subsystem(ABC):
+    """One part of a running simulation.
+
+    `step` alone changes how the simulation goes on. `write_state` and `sense` are called whenever somebody wants
+    to look, however often that is, so they are pure functions of the state.
+    """
+
+    def step(self, tick: int) -> None:  # noqa: B027 - some do nothing in a tick
+        """Do this part of a tick; ``tick`` counts from the last reset, for what is done every few ticks only."""
+
+    def write_state(self, state: StateRecord) -> None:  # noqa: B027
+        """Write what this part of the simulation is like now."""
+
+    def sense(self, state: StateRecord) -> None:  # noqa: B027
+        """Evaluate what follows from the written state of all subsystems, and write it."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Go back to the start of the scene, to the bit; what commands hold on to stays."""
+
+    @abstractmethod
+    def snapshot(self) -> Any:
+        """Everything that lasts from tick to tick, as plain data; the caller copies it."""
+
+    @abstractmethod
+    def restore(self, snapshot: Any) -> None:
+        """Continue from a copy of a `snapshot`, which is now this subsystem's own."""
+
+    def take_problems(self) -> list[Diagnostic]:
+        """What went wrong since the last call."""
+        return []
+
+
+def kept(owner: object, names: Iterable[str]) -> dict[str, Any]:
+    """The named attributes of ``owner``, for a snapshot."""
+    return {name: getattr(owner, name) for name in names}
+
+
+def put_back(owner: object, values: dict[str, Any]) -> None:
+    """Set attributes to what `kept` gave; arrays are filled in place, for compiled code knows their addresses."""
+    for name, value in values.items():
+        now = getattr(owner, name)
+        if isinstance(value, np.ndarray) and isinstance(now, np.ndarray) and now.shape == value.shape:
+            now[...] = value
+        else:
+            setattr(owner, name, value)

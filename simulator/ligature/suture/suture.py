@@ -1,0 +1,52 @@
+"""Threads and the holes they pass through as one subsystem: in a tick their steps interleave. World axes, SI units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ligature.adf import Diagnostic
+from ligature.model.scene import Scene
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem
+from ligature.suture.bodies import SutureBodies
+from ligature.suture.holes import Holes
+from ligature.suture.rods import Rods
+
+
+class Suture(Subsystem):
+    """All rods and holes of a scene among its rigid bodies."""
+
+    def __init__(self, scene: Scene, bodies: SutureBodies, dt: float) -> None:
+        self._bodies = bodies
+        self.rods = Rods(scene, dt)
+        self.holes = Holes(scene, self.rods, bodies, dt)
+
+    def step(self, tick: int) -> None:
+        """Exchange impulses between rods, holes and bodies; the coming step of the bodies moves by them."""
+        self.holes.begin()
+        self.rods.step(self._bodies)
+        self.holes.end()
+
+    def write_state(self, state: StateRecord) -> None:
+        """Write elements and insertions."""
+        self.rods.write_state(state)
+        self.holes.write_state(state)
+
+    def reset(self) -> None:
+        """Put the rods back to their initial shapes and empty the holes."""
+        self.rods.reset()
+        self.rods.update_masses(self._bodies)
+        self.holes.reset()
+
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that lasts from tick to tick."""
+        return {"rods": self.rods.snapshot(), "holes": self.holes.snapshot()}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`."""
+        self.rods.restore(snapshot["rods"])
+        self.holes.restore(snapshot["holes"])
+
+    def take_problems(self) -> list[Diagnostic]:
+        """What diverged since the last call."""
+        return self.rods.take_problems()

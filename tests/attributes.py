@@ -1,0 +1,164 @@
+"""All that a running simulation holds, attribute by attribute: for tests that look for what a snapshot forgets."""
+
+from __future__ import annotations
+
+import enum
+from collections import deque
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from ligature import Simulation
+from ligature.robots.ecm import Ecm
+from ligature.robots.mtm import Mtm
+from ligature.robots.psm import Psm
+
+CACHES: dict[str, str] = {
+    # what a rod or hole works with within one tick; every row is written before it is read
+    "Rod._work": "scratch of a tick",
+    "Rod._counts": "written by every tick",
+    "Rod._shape_poses": "written by every tick",
+    "Rod._tables": "addresses of arrays",
+    "Rod._touch_tables": "addresses of arrays",
+    "Rod._passage_table": "addresses of arrays",
+    "Rod._scratch": "scratch",
+    "Rod._corners": "written by every call of `box`",
+    "Rod._bonds": "follows from grips, ties and pads",
+    "Rod._motion": "the colliders' array",
+    **dict.fromkeys(
+        ("Rod._near", "Rod._met", "Rod._apart", "Rod._movable", "Rod._pushed", "Shapes.node"),
+        "gathered anew in the tick after a restore",
+    ),
+    **dict.fromkeys(
+        (
+            f"Touches.{name}"
+            for name in ("local", "arm", "gap", "target", "friction", "switches", "room", "begun", "ended", "push")
+        ),
+        "written for every contact before it is read",
+    ),  # fmt: skip
+    "Colliders._R": "scratch",
+    "Holes._p": "addresses of arrays",
+    "Holes._s": "addresses of arrays",
+    "Holes._l": "addresses of arrays",
+    "Holes._rod_tables": "addresses of arrays",
+    **dict.fromkeys(
+        (
+            "Holes._scratch",
+            "Holes._reaction",
+            "Holes._twist",
+            "Holes._pull",
+            "Holes._mass",
+            "Holes._inertia",
+            "Lines.pose",
+            "Sites.shared",
+            "Passages.J",
+            "Passages.T",
+            "Passages.d",
+            "Passages.A",
+            "Passages.B",
+        ),
+        "written before it is read in every tick",
+    ),  # fmt: skip
+    "Exchange._hands": "scratch of a tick",
+    # what is read from Bullet when somebody asks
+    **dict.fromkeys(
+        (
+            f"Motions.{name}"
+            for name in (
+                "pose",
+                "twist",
+                "_frame",
+                "_speed",
+                "_joints",
+                "position",
+                "velocity",
+                "effort",
+                "reaction",
+                "push",
+                "_load",
+                "_bases",
+                "_paces",
+                "_jointed",
+                "_linked",
+            )
+        ),
+        "read from Bullet, or computed, before it is used",
+    ),  # fmt: skip
+    **dict.fromkeys(
+        ("TreeControl._motor", "TreeControl._effort", "TreeControl.position", "TreeControl.velocity"),
+        "parts of `Motions`, or written by every tick",
+    ),
+    **dict.fromkeys(
+        (
+            "World.client",
+            "World._end",
+            "Placement.client",
+            "Motions._client",
+            "TreeControl._client",
+            "Lift._client",
+            "Closures._client",
+            "_Held.constraint",
+        ),
+        "Bullet's own numbers",
+    ),  # fmt: skip
+    # what sensors make of the state
+    **dict.fromkeys(
+        ("Ghosts._seen_ghost", "Ghosts._seen_body", "Ghosts._room", "Ghosts._inside", "Ghosts._ask", "Ghosts.sensed"),
+        "saves asking again; `sense` fills it from the state",
+    ),
+    "Mounts.world": "`sense` fills it from the state",
+    "Contacts.events": "`sense` fills it from the state",
+    "ArmSet._records": "what of the state record is up to date",
+    "Axes._setpoint": "of an arm whose drives are off it is read from the joints",
+    # what waits for whoever reports it
+    "Device.events": "an outbox",
+    **dict.fromkeys(("World.problems", "Rods.problems", "ArmSet.problems"), "an outbox"),
+}
+"""Attributes that a snapshot need not hold, as ``Class.attribute``, each with the reason."""
+
+
+def attributes(simulation: Simulation) -> dict[str, bytes]:
+    """Every value that the subsystems of a simulation reach, by its path; `CACHES` are left out."""
+    found: dict[str, bytes] = {}
+    seen = {id(simulation): simulation}
+    for subsystem in simulation._subsystems:
+        found |= dict(_walk(type(subsystem).__name__, subsystem, seen))
+    return found
+
+
+def _walk(path: str, value: Any, above: dict[int, Any]) -> Iterator[tuple[str, bytes]]:
+    """Paths and values below ``value``; what is ``above`` was walked already."""
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        yield path, value.tobytes()
+        return
+    if isinstance(value, bool | int | float | str | bytes | enum.Enum | np.generic | None):
+        yield path, repr(value).encode()
+        return
+    if id(value) in above:
+        return
+    if not isinstance(value, Ecm | Mtm | Psm):  # never changed, only replaced; some are shared until they are copied
+        above[id(value)] = value
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        counter = {"Touches": "count", "Passages": "filled"}.get(type(value).__name__)
+        rows = None if counter is None else int(getattr(value, counter)[0])
+        for name, item in zip(value._fields, value, strict=True):
+            yield from _attribute(path, value, name, item if rows is None or name == counter else item[:rows], above)
+    elif isinstance(value, Mapping) and not hasattr(value, "__dict__"):
+        for key in sorted(value, key=repr):
+            yield from _walk(f"{path}[{key!r}]", value[key], above)
+    elif isinstance(value, set | frozenset):
+        yield path, repr(sorted(value, key=repr)).encode()
+    elif isinstance(value, list | tuple | deque):
+        yield f"{path}.len", str(len(value)).encode()
+        items = value[:1] if path.endswith("_touches") else value
+        for i, item in enumerate(items):
+            yield from _walk(f"{path}[{i}]", item, above)
+    elif hasattr(value, "__dict__") and type(value).__module__.startswith("ligature."):
+        if type(value).__module__ != "ligature.model.scene":
+            for name, item in sorted(vars(value).items()):
+                yield from _attribute(path, value, name, item, above)
+
+
+def _attribute(path: str, owner: Any, name: str, item: Any, above: dict[int, Any]) -> Iterator[tuple[str, bytes]]:
+    if not any(f"{kind.__name__}.{name}" in CACHES for kind in type(owner).__mro__):
+        yield from _walk(f"{path}.{name}", item, above)

@@ -1,0 +1,131 @@
+"""Bodies that move as no command asks for are reported once, with the likely cause; commanded ones are not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import ligature
+import numpy as np
+import pytest
+from ligature.adf import Diagnostic
+from ligature.model.commands import CommandType
+
+BALL = "{name: ball, mass: 0.1, collision shape: SPHERE, collision geometry: {radius: 0.02}}"
+ZERO, UP = "{x: 0, y: 0, z: 0}", "{x: 0, y: 0, z: 1}"
+
+
+def scene(folder: Path, bodies: dict[str, str], joints: dict[str, str] | None = None) -> ligature.Simulation:
+    """A simulation of ``bodies`` and ``joints`` without gravity, each given as an inline block."""
+    joints = joints or {}
+    lines = [f"bodies: [{', '.join(bodies)}]", f"joints: [{', '.join(joints)}]", f"gravity: {ZERO}"]
+    lines += [f"{key}: {block}" for key, block in (bodies | joints).items()]
+    file = folder / "model.yaml"
+    file.write_text("\n".join(lines) + "\n")
+    return ligature.Simulation(ligature.load(file))
+
+
+def alarms(simulation: ligature.Simulation) -> list[Diagnostic]:
+    return [problem for problem in simulation.problems if problem.code == "speed"]
+
+
+def test_a_body_that_is_thrown_is_reported_once_with_its_name(tmp_path: Path) -> None:
+    simulation = scene(tmp_path, {"BODY ball": BALL, "BODY other": BALL})
+    simulation.bodies["BODY ball"].command_wrench([300.0, 0, 0, 0, 0, 0])
+    simulation.step(20)
+    assert not alarms(simulation), "pushed by command"
+    simulation.bodies["BODY ball"].release()
+    simulation.step(200)
+    (alarm,) = alarms(simulation)
+    assert "BODY ball' moves at" in alarm.message and alarm.mark is not None
+
+
+def test_energy_from_nowhere_is_reported_below_fifty_metres_a_second(tmp_path: Path) -> None:
+    simulation = scene(tmp_path, {"BODY ball": BALL})
+    simulation.step(20)
+    place = simulation._world.place_of[0]
+    place.set_twist(np.array([15.0, 0.0, 0.0]), np.zeros(3))
+    simulation.step(10)
+    (alarm,) = alarms(simulation)
+    assert "moves at 15 m/s, which no command asks for" in alarm.message
+
+
+def test_a_body_that_is_hit_is_not_reported(tmp_path: Path) -> None:
+    heavy = "{name: heavy, mass: 10, collision shape: SPHERE, collision geometry: {radius: 0.1}, restitution: 1}"
+    light = BALL.replace("}}", "}, restitution: 1, location: {position: {x: 0.5, y: 0, z: 0}}}")
+    simulation = scene(tmp_path, {"BODY heavy": heavy, "BODY light": light})
+    simulation.bodies["BODY heavy"].command_twist([9.0, 0, 0, 0, 0, 0])
+    simulation.step(20)
+    simulation.bodies["BODY heavy"].release()
+    simulation.step(100)
+    assert simulation.bodies["BODY light"].twist[0] > 10.0
+    assert alarms(simulation) == []
+
+
+@pytest.mark.parametrize("drive", ["command_twist", "command_pose", "joint"])
+def test_what_is_commanded_moves_as_fast_as_it_likes(drive: str, tmp_path: Path) -> None:
+    hinge = (
+        f"{{name: hinge, type: revolute, parent: BODY base, child: BODY ball, parent pivot: {ZERO}, "
+        f"child pivot: {{x: 2, y: 0, z: 0}}, parent axis: {UP}, child axis: {UP}, max motor impulse: 1000}}"
+    )
+    joined = drive == "joint"
+    bodies = {"BODY base": "{name: base, mass: 0}", "BODY ball": BALL}
+    simulation = scene(tmp_path, bodies, {"hinge": hinge} if joined else {})
+    ball = simulation.bodies["BODY ball"]
+    if joined:
+        simulation.bodies["BODY base"].command_joints([40.0], CommandType.VELOCITY)
+    elif drive == "command_twist":
+        ball.command_twist([80.0, 0, 0, 0, 0, 0])
+    else:
+        ball.command_pose([10.0, 0, 0, 0, 0, 0, 1])
+    fastest = 0.0
+    for _ in range(10):
+        simulation.step(10)
+        fastest = max(fastest, float(np.linalg.norm(ball.twist[:3])))
+    assert fastest > 10.0
+    assert alarms(simulation) == []
+
+
+def _gravity(folder: Path) -> tuple[ligature.Simulation, str]:
+    body = BALL.replace("}}", "}, gravity: {x: 0, y: 0, z: -900}}")
+    return scene(folder, {"BODY ball": body}), "gravity of 900 m/s²"
+
+
+def _masses(folder: Path) -> tuple[ligature.Simulation, str]:
+    joint = (
+        f"{{name: hinge, type: fixed, parent: BODY a, child: BODY b, parent pivot: {ZERO}, child pivot: {ZERO}, "
+        f"parent axis: {UP}, child axis: {UP}}}"
+    )
+    bodies = {"BODY a": "{name: a, mass: 1000}", "BODY b": "{name: b, mass: 0.001}"}
+    simulation = scene(folder, bodies, {"hinge": joint})
+    simulation._world.place_of[0].set_twist(np.array([70.0, 0.0, 0.0]), np.zeros(3))
+    return simulation, "joined bodies of 0.001 kg and 1000 kg"
+
+
+def _overlap(folder: Path) -> tuple[ligature.Simulation, str]:
+    box = "{name: %s, mass: 1, collision shape: BOX, collision geometry: {x: 1, y: 1, z: 1}}"
+    simulation = scene(folder, {"BODY a": box % "a", "BODY b": box % "b"})
+    simulation._world.place_of[0].set_twist(np.array([60.0, 0.0, 0.0]), np.zeros(3))
+    return simulation, "it overlaps"
+
+
+@pytest.mark.parametrize("make", [_gravity, _masses, _overlap], ids=lambda make: make.__name__[1:])
+def test_the_likely_cause_is_named(make: Callable[[Path], tuple[ligature.Simulation, str]], tmp_path: Path) -> None:
+    simulation, cause = make(tmp_path)
+    simulation.step(10)
+    simulation.step(90)
+    (alarm,) = alarms(simulation)
+    assert cause in alarm.message
+
+
+def test_the_guard_changes_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    hashes = []
+    for watched in (True, False):
+        simulation = _overlap(tmp_path)[0]
+        if not watched:
+            monkeypatch.setattr(simulation, "_watch", lambda: None)
+        simulation.step(10)
+        simulation.step(90)
+        assert bool(alarms(simulation)) == watched
+        hashes.append(simulation.state_hash())
+    assert hashes[0] == hashes[1]

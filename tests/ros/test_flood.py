@@ -1,0 +1,157 @@
+"""A flood on every topic that the simulator listens to: of every message class, with every content, and far too long.
+
+The topics and their types are asked of the master, so that a new command is flooded too.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import random
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.ros.conftest import BIN, SMALL, Program
+
+pytestmark = pytest.mark.ros
+FLOAT = (0.0, -0.0, 5e-324, 1e-5, 1.0, -1.0, 0.3, 1e3, -1e6, 1e12, 1.7e308, float("inf"), float("-inf"), float("nan"))
+WORDS = ("", "enable", "disable", "home", "unhome", "pause", "resume", "adopt", "\0", "é" * 90, "x" * 5000)
+LENGTHS = (0, 1, 3, 4, 6, 7, 8, 40, 500)
+MESSAGES = 12
+"""Messages on each topic of the short form."""
+
+LONG = 1_000_000
+GROWTH = 60
+"""Megabytes by which the ROS process may grow while it connects some 190 publishers and refuses 190 MB."""
+
+
+def filled(class_: Any, rng: random.Random, long: bool = False) -> Any:
+    """A message with random content, in all its fields; ``long`` ones are far beyond what is taken."""
+    message = class_()
+    for name, type_ in zip(message.__slots__, message._slot_types, strict=True):
+        setattr(message, name, _value(getattr(message, name), type_, rng, long))
+    return message
+
+
+def _value(default: Any, type_: str, rng: random.Random, long: bool) -> Any:
+    base, _, rest = type_.partition("[")
+    if rest:
+        if "/" in base:
+            return default
+        count = int(rest[:-1]) if rest != "]" else LONG // 8 if long else rng.choice(LENGTHS)
+        return bytes(count) if base in ("uint8", "char") else [_value(0, base, rng, False) for _ in range(count)]
+    if hasattr(default, "_slot_types"):
+        return filled(type(default), rng, long)
+    if base.startswith("float"):
+        return rng.choice(FLOAT[:-4]) if base == "float32" else rng.choice(FLOAT)
+    if base == "string":
+        return "x" * LONG if long else rng.choice(WORDS)
+    if base == "bool":
+        return rng.random() < 0.5
+    if base.startswith(("int", "uint")):
+        return rng.choice((0, 1, 2, 127))
+    return default
+
+
+@pytest.fixture(scope="module")
+def simulator(start: Callable[..., Program]) -> Program:
+    program = start(BIN / "ligature", "run", SMALL, "-p", "200")
+    program.wait_for("first state published")
+    return program
+
+
+def commands(node: Any) -> dict[str, Any]:
+    """Topics that the simulator subscribes, with the classes of their messages."""
+    import rosgraph
+    import roslib.message
+
+    master = rosgraph.Master("/flood")
+    types = dict(master.getTopicTypes())
+    _, subscribers, _ = master.getSystemState()
+    heard = [topic for topic, nodes in subscribers if "/ligature" in nodes]
+    return {topic: roslib.message.get_message_class(types[topic]) for topic in heard}
+
+
+def megabytes(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/statm").read_text().split()
+    return int(fields[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@pytest.mark.slow
+def test_nothing_that_a_client_sends_ends_the_run_or_fills_its_memory(
+    simulator: Program, node: Any, listen: Callable[..., Any], publish: Callable[..., Any]
+) -> None:
+    from ambf_msgs.msg import WorldState
+
+    topics, rng = commands(node), random.Random(7)
+    assert any(topic.endswith("/trajectory_j/set_ratio") for topic in topics)
+    assert len(topics) > 150 and all(topics.values())
+    pids = simulator.children()
+    before = megabytes(pids["ros_process"])
+    for topic, class_ in topics.items():
+        publisher = publish(topic, class_)
+        for _ in range(MESSAGES):
+            publisher.publish(filled(class_, rng))
+        publisher.publish(filled(class_, rng, long=True))
+    time.sleep(1.0)
+    world = listen("/ambf/env/World/State", WorldState)
+    # a world command of the flood may have stopped its clock; the watchdog lets it go on
+    step = world.wait().sim_step
+    world.wait(lambda message: message.sim_step > step, 20.0)
+    assert simulator.children() == pids, simulator.output
+    assert megabytes(pids["ros_process"]) < before + GROWTH
+    assert "bytes is refused; at most" in simulator.output
+
+
+@pytest.mark.slow
+def test_a_ratio_that_no_trajectory_bears_and_homing_leave_the_run_alive(
+    simulator: Program, listen: Callable[..., Any], publish: Callable[..., Any]
+) -> None:
+    from crtk_msgs.msg import OperatingState, StringStamped
+    from std_msgs.msg import Float64
+
+    state = listen("/PSM1/operating_state", OperatingState)
+    publish("/PSM1/trajectory_j/set_ratio", Float64).publish(Float64(1e-5))
+    words = publish("/PSM1/state_command", StringStamped)
+    for word in ("disable", "home"):
+        words.publish(StringStamped(string=word))
+        time.sleep(0.5)
+    state.wait(lambda message: message.state in ("FAULT", "ENABLED"), 20.0)
+    assert simulator.process.poll() is None, simulator.output
+
+
+class Connection:
+    """What `read_bounded` uses of rospy's connection; the class of messages is `std_msgs/String`."""
+
+    skipping, queue_size, resolved_name = 0, None, "/topic"
+
+    def __init__(self) -> None:
+        from std_msgs.msg import String
+
+        self.recv_data_class = String
+
+
+def test_long_messages_between_short_ones_are_passed_over_however_they_are_cut(node: Any) -> None:
+    from ligature.ros import intake
+
+    rng = random.Random(3)
+    for _ in range(60):
+        texts = ["x" * rng.choice((0, 5, 300, intake.MOST_BYTES - 4, 200_000)) for _ in range(6)]
+        parts = [struct.pack("<II", len(text) + 4, len(text)) + text.encode() for text in texts]
+        stream = b"".join(parts)
+        connection, buffer, found, largest = Connection(), io.BytesIO(), [], 0
+        while stream:
+            size = rng.randrange(1, rng.choice((10, 5_000, 65_536)))
+            size = max(size, len(stream) // 400)
+            buffer.write(stream[:size])
+            stream = stream[size:]
+            if buffer.tell() >= 4:
+                intake.read_bounded(connection, buffer, found, None)
+            largest = max(largest, len(buffer.getvalue()))
+        assert [len(m.data) for m in found] == [len(t) for t in texts if len(t) + 4 <= intake.MOST_BYTES]
+        assert largest <= intake.MOST_BYTES + 65_536 + 4

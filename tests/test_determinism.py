@@ -1,0 +1,219 @@
+"""The state after n ticks is a function of scene, commands and n alone; snapshots and resets are exact to the bit."""
+
+from __future__ import annotations
+
+import multiprocessing
+from functools import cache
+from typing import Any
+
+import ligature
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ligature import Simulation
+from ligature.model.scene import Scene
+from ligature.model.subsystem import Subsystem
+from ligature.physics import control, world
+from ligature.sensing import rays
+from ligature.simulation import Snapshot
+from ligature.suture import colliders, rod
+
+from tests.attributes import attributes
+from tests.conftest import CORPUS, ROOT
+from tests.driving import Driver
+
+TICKS = 120
+OURS = sorted(path.parent.name for path in ROOT.glob("scenes/*/launch.yaml"))
+THEIRS = sorted(
+    str(path.relative_to(CORPUS))
+    for path in (*CORPUS.rglob("grippers/**/*.yaml"), *CORPUS.rglob("suturing_scene/launch.yaml"))
+)
+QUICK = ["needle_pick", "suturing_small", *(name for name in THEIRS if "gripper2/" in name or "gripper3/" in name)]
+"""Scenes of which many examples are tried."""
+
+
+@cache
+def scene_of(name: str) -> Scene:
+    path = ROOT / "scenes" / name / "launch.yaml" if name in OURS else CORPUS / name
+    try:
+        return ligature.load(path, roots=[CORPUS])
+    except ligature.SceneError as error:
+        pytest.skip(f"{name} does not load: {error.diagnostics[0]}")
+
+
+@cache
+def driven(name: str) -> tuple[Simulation, Snapshot, str]:
+    """A simulation, a snapshot of its start, and its hash after `TICKS` ticks one by one."""
+    simulation = Simulation(scene_of(name))
+    start = simulation.snapshot()
+    Driver(simulation.scene, 0).run(simulation, 0, TICKS, list(range(TICKS)))
+    return simulation, start, simulation.state_hash()
+
+
+@pytest.mark.parametrize("name", QUICK)
+@settings(max_examples=5)
+@given(calls=st.lists(st.integers(1, TICKS - 1), max_size=20))
+def test_how_ticks_are_shared_out_over_calls_changes_nothing(name: str, calls: list[int]) -> None:
+    simulation, start, expected = driven(name)
+    simulation.restore(start)
+    Driver(simulation.scene, 0).run(simulation, 0, TICKS, calls)
+    assert simulation.state_hash() == expected
+
+
+@pytest.mark.parametrize("rate", [1, 30, 200, 1000])
+@pytest.mark.parametrize("name", QUICK[:3])
+def test_the_rate_of_updates_changes_nothing(name: str, rate: int) -> None:
+    simulation = Simulation(scene_of(name), update=1.0 / rate)
+    simulation.restore(driven(name)[1])
+    Driver(simulation.scene, 0).run(simulation, 0, TICKS)
+    assert simulation.state_hash() == driven(name)[2]
+
+
+@pytest.mark.parametrize("name", QUICK[:3])
+def test_looking_changes_nothing(name: str) -> None:
+    simulation, start, expected = driven(name)
+    simulation.restore(start)
+    for tick in range(0, TICKS, 7):
+        Driver(simulation.scene, 0).run(simulation, tick, min(tick + 7, TICKS))
+        simulation.state_hash(), simulation.insertions, dict(simulation.grasps), simulation.step(0)
+    assert simulation.state_hash() == expected
+
+
+@pytest.mark.parametrize("name", [*OURS, *THEIRS])
+def test_snapshots_and_resets_are_exact_at_random_times(name: str) -> None:
+    scene, rng = scene_of(name), np.random.default_rng(len(name))
+    at, more, seed = (int(k) for k in rng.integers(20, 60, 3))
+    driver, one = Driver(scene, seed), Simulation(scene)
+    fresh = one.state_hash()
+    driver.run(one, 0, at)
+    before = one.state_hash()
+    taken = one.snapshot()
+    assert one.state_hash() == before
+    driver.run(one, at, at + more)
+    expected = one.state_hash()
+    for other in (one, Simulation(scene)):
+        other.restore(taken)
+        assert other.state_hash() == before
+        driver.run(other, at, at + more)
+        assert other.state_hash() == expected
+    untouched = Simulation(scene)
+    untouched.step(at)
+    untouched.reset()
+    assert untouched.state_hash(clock=False) == Simulation(scene).state_hash(clock=False)
+    assert untouched.state_hash() != fresh
+    again = Simulation(scene)
+    for simulation in (untouched, again):
+        simulation.step(more)
+    assert untouched.state_hash(clock=False) == again.state_hash(clock=False)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_reset_scene_stands_as_a_fresh_one_whatever_was_commanded(name: str) -> None:
+    scene = scene_of(name)
+    simulation = Simulation(scene)
+    Driver(scene, 3).run(simulation, 0, TICKS)
+    simulation.reset()
+    fresh = Simulation(scene).state
+    for field in ("body_pose", "body_twist", "joint_position", "joint_velocity", "rod_tension", "insertion_count"):
+        assert simulation.state[field].tobytes() == fresh[field].tobytes(), field
+
+
+def test_commands_that_hold_over_a_reset_act_as_if_they_were_sent_again() -> None:
+    scene = scene_of("suturing_small")
+    hashes = []
+    for ticks in (0, 333):
+        simulation = Simulation(scene)
+        base, needle = simulation.bodies["psm1/baselink"], simulation.bodies["BODY Needle"]
+        above = [*(needle.pose[:3] + [0, 0, 0.02]), *needle.pose[3:]]
+        base.command_joints([0.1, -0.1, 0.12, 0.3, 0.2, -0.2, 0.4, 0.4])
+        needle.command_pose(above)
+        if ticks:
+            simulation.step(ticks)
+            simulation.reset()
+        simulation.step(200)
+        hashes.append(simulation.state_hash(clock=False))
+    assert hashes[0] == hashes[1]
+
+
+def _continue_elsewhere(name: str, taken: Snapshot, seed: int, begin: int, end: int) -> str:
+    simulation = Simulation(scene_of(name))
+    simulation.restore(taken)
+    Driver(simulation.scene, seed).run(simulation, begin, end)
+    return simulation.state_hash()
+
+
+def test_a_snapshot_goes_on_in_another_process() -> None:
+    jobs, expected = [], []
+    for name in QUICK[1:3]:
+        simulation = Simulation(scene_of(name))
+        driver = Driver(simulation.scene, 5)
+        driver.run(simulation, 0, 70)
+        jobs.append((name, simulation.snapshot(), 5, 70, 130))
+        driver.run(simulation, 70, 130)
+        expected.append(simulation.state_hash())
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.starmap(_continue_elsewhere, jobs) == expected
+
+
+# --- nothing that steps can lack a snapshot ---------------------------------------------------
+
+
+def forgotten(name: str, begin: int = 60, ticks: int = 60, seed: int = 1) -> set[str]:
+    """Attributes that a step changed and a restore did not put back, here or in another simulation."""
+    simulation = Simulation(scene_of(name))
+    driver = Driver(simulation.scene, seed)
+    driver.run(simulation, 0, begin)
+    before = attributes(simulation)
+    taken = simulation.snapshot()
+    driver.run(simulation, begin, begin + ticks)
+    moved = attributes(simulation)
+    assert sum(moved.get(path) != value for path, value in before.items()) > 5, "nothing moved"
+    simulation.restore(taken)
+    other = Simulation(simulation.scene)
+    other.restore(taken)
+    return {
+        path
+        for restored in (attributes(simulation), attributes(other))
+        for path in before.keys() | restored.keys()
+        if restored.get(path) != before.get(path)
+    }
+
+
+@pytest.mark.parametrize("name", [*OURS, *(name for name in QUICK if name in THEIRS)])
+def test_a_restore_puts_back_every_attribute_that_steps_change(name: str) -> None:
+    assert forgotten(name) == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "table", "field"),
+    [
+        ("suturing_small", control, "_KEPT", "_last_error"),
+        ("suturing_small", control, "_KEPT", "target"),
+        ("suturing_small", rod, "JOINTS_KEPT", "load"),
+        ("suturing_small", rod, "NODES_KEPT", "w"),
+        ("suturing_small", rod, "_KEPT", "tension"),
+        ("suturing_small", colliders, "_KEPT", "_watched"),
+        ("suturing_small", world, "_KEPT", "_impulses"),
+        (next((n for n in QUICK if "gripper2/" in n), ""), rays, "STICK_KEPT", "_on_sensed"),
+    ],
+)
+def test_a_field_that_is_left_out_of_a_snapshot_is_found(
+    monkeypatch: pytest.MonkeyPatch, name: str, module: Any, table: str, field: str
+) -> None:
+    if not name:
+        pytest.skip("the corpus is absent")
+    monkeypatch.setattr(module, table, tuple(f for f in getattr(module, table) if f != field))
+    assert any(field in path for path in forgotten(name))
+
+
+def test_a_subsystem_cannot_be_made_without_a_snapshot() -> None:
+    class Forgetful(Subsystem):
+        def step(self, tick: int) -> None:
+            self.count = tick
+
+        def reset(self) -> None:
+            self.count = 0
+
+    with pytest.raises(TypeError, match="snapshot"):
+        Forgetful()  # type: ignore[abstract]

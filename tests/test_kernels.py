@@ -1,0 +1,123 @@
+"""Kernels: all their sources decide which machine code is taken, and it is kept where the user can write."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+from ligature import kernels
+
+PACKAGE = Path(kernels.__file__).parent
+PROGRAM = """
+import logging, sys
+from ligature import kernels
+@kernels.compiled
+def twice(x):
+    return 2 * x
+print(twice(21), kernels.kernel_folder(), sum(twice.stats.cache_hits.values()))
+"""
+
+
+def constants_of(source: Path) -> set[Path]:
+    """The modules of the package whose constants the kernels of ``source`` read."""
+    tree = ast.parse(source.read_text())
+    read = {
+        name.id
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef)
+        and any(isinstance(d, ast.Name) and d.id in ("compiled", "kernel", "inlined") for d in function.decorator_list)
+        for name in ast.walk(function)
+        if isinstance(name, ast.Name) and name.id.isupper()
+    }
+    return {
+        PACKAGE.joinpath(*node.module.split(".")[1:]).with_suffix(".py")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("ligature.")
+        if read & {alias.asname or alias.name for alias in node.names}
+    }
+
+
+def test_no_kernel_is_compiled_but_by_the_decorators_of_all_rooms() -> None:
+    """Numba's own would keep code below the sources, and take no notice of a callee that changed."""
+    for path in PACKAGE.rglob("*.py"):
+        if path.name != "kernels.py":
+            assert "njit" not in path.read_text(), path
+
+
+def test_all_files_that_kernels_take_constants_from_decide_which_code_is_taken() -> None:
+    known = set(kernels.sources())
+    missing = {module for source in known for module in constants_of(source)} - known
+    assert not missing, missing
+
+
+def run(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    env = {**os.environ, **environment}
+    return subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> str:
+    """Defines a kernel in a file: Numba keeps no code of what has no source."""
+    (tmp_path / "doubling.py").write_text(PROGRAM)
+    return f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import doubling"
+
+
+@pytest.mark.parametrize("variable", ["LIGATURE_CACHE", "XDG_CACHE_HOME", "HOME"])
+def test_who_can_write_nowhere_gets_a_private_folder_and_one_line(program: str, tmp_path: Path, variable: str) -> None:
+    (tmp_path / "file").write_text("")
+    wishes = {"LIGATURE_CACHE": "", "XDG_CACHE_HOME": "", variable: str(tmp_path / "file" / "below")}
+    (tmp_path / "temporary").mkdir()
+    done = run(program, **wishes, TMPDIR=str(tmp_path / "temporary"))
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "temporary" / f"ligature-{os.getuid()}"
+    assert done.stdout.startswith(f"42 {folder}/kernels/")
+    assert len(done.stderr.splitlines()) == 1
+    assert f"cannot be written (Not a directory): {folder} is used; set LIGATURE_CACHE" in done.stderr
+    assert folder.stat().st_mode & 0o777 == 0o700 and list(folder.rglob("*.nbc"))
+    again = run(program, **wishes, TMPDIR=str(tmp_path / "temporary"))
+    assert done.stdout.split()[2] == "0" and again.stdout.split() == [*done.stdout.split()[:2], "1"]
+
+
+def test_a_temporary_folder_that_others_can_write_is_not_taken(program: str, tmp_path: Path) -> None:
+    """What lies in a cache runs as code."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / f"ligature-{os.getuid()}").mkdir()
+    (tmp_path / f"ligature-{os.getuid()}").chmod(0o777)
+    done = run(program, LIGATURE_CACHE=str(tmp_path / "file" / "below"), TMPDIR=str(tmp_path))
+    assert done.returncode == 0 and f"{tmp_path}/ligature-{os.getuid()} is used" not in done.stderr
+    assert list((tmp_path / f"ligature-{os.getuid()}").iterdir()) == []
+    assert [path.name for path in tmp_path.glob("ligature-*")] == [f"ligature-{os.getuid()}"]
+
+
+def test_a_disk_that_becomes_full_costs_the_cache_and_not_the_run(program: str, tmp_path: Path) -> None:
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); "
+    done = run("import ligature.kernels; " + limit + program, LIGATURE_CACHE=str(tmp_path / "cache"))
+    assert done.returncode == 0 and done.stdout.startswith("42 "), done.stderr
+    assert "kernels cannot be kept and will be compiled again at the next start" in done.stderr
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become somebody else")
+def test_somebody_who_owns_nothing_can_simulate() -> None:
+    words = ["setpriv", "--reuid=65534", "--clear-groups", sys.executable]
+    if subprocess.run([*words, "-c", "import ligature"], capture_output=True, check=False).returncode:
+        pytest.skip("nobody cannot read this checkout")
+    with TemporaryDirectory() as place:
+        scene, temporary = Path(place, "ball.yaml"), Path(place, "temporary")
+        scene.write_text(
+            "bodies: [BODY a]\nBODY a: {name: a, mass: 1, collision shape: SPHERE, collision geometry: {radius: 0.1}}\n"
+        )
+        temporary.mkdir()
+        temporary.chmod(0o777)
+        Path(place).chmod(0o755)
+        env = {**os.environ, "LIGATURE_CACHE": "", "XDG_CACHE_HOME": "", "HOME": "/root", "TMPDIR": str(temporary)}
+        done = subprocess.run(
+            [*words, "-m", "ligature.cli.main", "bench", str(scene), "--seconds", "0.1"],
+            env=env, capture_output=True, text=True, timeout=280, cwd="/",
+        )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "/root/.cache/ligature cannot be written (Permission denied)" in done.stderr
