@@ -51,7 +51,8 @@ class SprungNeedle:
     def tip(self):
         return self.centre - self.R @ self.lever
 
-    def tick(self):
+    def equations(self):
+        """The needle's own equations H δ = g, with its springs."""
         damping, twist = 2 * np.sqrt(self.stiffness * self.mass), 2 * np.sqrt(self.turning * self.inertia)
         away = Rotation.from_matrix(self.goal_R @ self.R.T).as_rotvec()
         H, g = np.zeros((6, 6)), np.zeros(6)
@@ -59,12 +60,19 @@ class SprungNeedle:
         H[3:, 3:] = np.eye(3) * (self.inertia / DT**2 + twist / DT + self.turning)
         g[:3] = self.mass * self.v / DT + self.stiffness * (self.goal - self.centre)
         g[3:] = self.inertia * self.w / DT + self.turning * away
-        delta, self.wrench = self.needle.couple(self.tip, self.R[:, 0], self.R[:, 1], self.centre, H, g)
-        self.force = -float(self.wrench[:3] @ self.R[:, 0])
-        self.impulse += self.wrench[:3] * DT
+        return H, g
+
+    def move(self, delta):
         self.centre = self.centre + delta[:3]
         self.R = Rotation.from_rotvec(delta[3:]).as_matrix() @ self.R
         self.v, self.w = delta[:3] / DT, delta[3:] / DT
+
+    def tick(self):
+        H, g = self.equations()
+        delta, self.wrench = self.needle.couple(self.tip, self.R[:, 0], self.R[:, 1], self.centre, H, g)
+        self.force = -float(self.wrench[:3] @ self.R[:, 0])
+        self.impulse += self.wrench[:3] * DT
+        self.move(delta)
 
     def advance(self, length, speed):
         """Push the goal along the needle by ``length`` (negative: back); returns the force along the needle by tick."""

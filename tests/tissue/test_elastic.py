@@ -175,16 +175,17 @@ def test_turned_cell_has_no_force_and_turned_stretch_turns_its_force():
     rng = np.random.default_rng(3)
     bent = grid.nodes + 3e-4 * rng.normal(size=grid.nodes.shape)
     elastic.x[:] = bent
-    force = elastic.elastic_forces()
+    for _ in range(10):  # until the frames have turned all the way
+        force = elastic.elastic_forces()
     assert np.abs(force.sum(axis=0)).max() < 1e-12 * np.abs(force).max()
     for angle in (0.3, 1.5, 3.0):
         R = Rotation.from_rotvec(angle * np.array([0.6, -0.48, 0.64])).as_matrix()
         elastic.x[:] = grid.nodes @ R.T
-        for _ in range(60):
+        for _ in range(10):
             rigid = elastic.elastic_forces()
         assert np.abs(rigid).max() < 1e-9 * np.abs(force).max()
         elastic.x[:] = bent @ R.T
-        for _ in range(60):
+        for _ in range(10):
             turned = elastic.elastic_forces()
         np.testing.assert_allclose(turned, force @ R.T, atol=1e-6 * np.abs(force).max())
 
@@ -236,7 +237,7 @@ def test_lips_pressed_together_close_and_do_not_pass_each_other():
     # The nodes at its two ends hang on the cells beyond.
     along, _, up = elastic.grid.nodes[lips.pairs[:, 0]].T
     top = (up > 0.007) & (along > 0.014) & (along < 0.036)
-    middle = top & (along > 0.019) & (along < 0.031)
+    middle = (up > 0.009) & (along > 0.019) & (along < 0.031)
     for a, b in lips.pairs[top]:
         load[a, 1], load[b, 1] = 0.4, -0.4
     for step in range(250):

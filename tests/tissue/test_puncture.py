@@ -69,7 +69,7 @@ def test_second_peak_stands_at_the_far_surface_and_leaves_friction_alone(through
     limit = MATERIAL.cutting_force + MATERIAL.exit_force
     peak = out - 3 + int(np.argmax(force[out - 3 : out + 2]))
     assert force[peak] == pytest.approx(limit + MATERIAL.friction * depth[tents[-1]], rel=0.01)
-    assert (where[out + 1 :] == states.OUTSIDE).all()
+    assert (where[out + 40 :] == states.OUTSIDE).all()
     assert force[-1] == pytest.approx(MATERIAL.friction * depth[-1], rel=0.01)
     assert depth[-1] == pytest.approx(0.01, rel=0.1)
 
@@ -97,9 +97,9 @@ def test_bite_broken_off_and_resumed_cuts_on_from_where_it_was(kit):
     deep = needle.needle.depth
     needle.advance(-0.003, 0.04)
     assert needle.needle.depth < deep - 0.002
-    resumed = needle.advance(0.0025, 0.04)
+    resumed = needle.advance(0.0018, 0.04)
     assert resumed[-1] == pytest.approx(MATERIAL.friction * needle.needle.depth, rel=0.03)
-    further = needle.advance(0.0015, 0.04)
+    further = needle.advance(0.0025, 0.04)
     assert further[-1] == pytest.approx(MATERIAL.cutting_force + MATERIAL.friction * needle.needle.depth, rel=0.03)
     # And withdrawn half-way through, nothing of it stays but the way.
     needle.advance(-0.01, 0.04)
@@ -112,10 +112,9 @@ def test_forces_do_not_depend_on_tissue_step_or_speed(kit, through, ticks, speed
     _, force, depth, _ = through
     block = kit.pad(MATERIAL, ticks=ticks)
     needle = _down(kit, block)
-    other, deep, _ = _pass(needle, speed)
-    other = np.append(other, needle.rest(1))
+    other, deep, _ = _pass(needle, speed, length=0.0185)
     assert other[: len(other) // 3].max() == pytest.approx(MATERIAL.puncture_force, rel=0.01)
-    assert other[-2] == pytest.approx(force[-1], rel=0.02)
+    assert other[-1] == pytest.approx(force[-1], rel=0.02)
     assert other.max() == pytest.approx(force.max(), rel=0.01)
     middle = other[len(other) // 2] - MATERIAL.friction * deep[len(other) // 2]
     assert middle == pytest.approx(MATERIAL.cutting_force, rel=0.03)

@@ -11,9 +11,11 @@ from ligature.tissue.elastic import STEP, ElasticGrid
 from ligature.tissue.grid import Grid
 from ligature.tissue.interface import Interface
 from ligature.tissue.lips import Lips
+from ligature.tissue.location import locate
 from ligature.tissue.material import TissueMaterial
-from ligature.tissue.paths import paths
+from ligature.tissue.paths import begin_path, extend_path, paths
 from ligature.tissue.puncture import NeedleInTissue
+from ligature.tissue.thread import ThreadInTissue
 
 Array = NDArray[np.float64]
 
@@ -21,7 +23,8 @@ Array = NDArray[np.float64]
 class TissueBlock:
     """Tissue that deforms, is punctured and closes again.
 
-    In each tick, first every needle is coupled (`NeedleInTissue.couple`), then `step` ends the tick.
+    In each tick, first every needle (`NeedleInTissue.couple`) and thread (`ThreadInTissue.springs`,
+    `settle`) is coupled, then `step` ends the tick.
 
     Parameters
     ----------
@@ -53,6 +56,7 @@ class TissueBlock:
         self.interface = Interface(self.elastic, ticks)
         self.paths = paths()
         self.needles: list[NeedleInTissue] = []
+        self.threads: list[ThreadInTissue] = []
         self._begin()
 
     def add_needle(self, curvature: float, length: float, radius: float) -> NeedleInTissue:
@@ -60,6 +64,44 @@ class TissueBlock:
         needle = NeedleInTissue(self.interface, self.paths, curvature, length, radius)
         self.needles.append(needle)
         return needle
+
+    def add_thread(self, radius: float, friction: float = 1.0) -> ThreadInTissue:
+        """Let a thread run through the paths of needles; see `ThreadInTissue`."""
+        thread = ThreadInTissue(self.interface, self.paths, radius, friction)
+        self.threads.append(thread)
+        return thread
+
+    def lay_path(self, places: Array, radius: float) -> int:
+        """Make a way through the tissue, for needles and threads of ``radius`` metres; returns the path.
+
+        Parameters
+        ----------
+        places
+            Its nodes now, (k, 3) in order from its entry to its exit.
+
+        Raises
+        ------
+        ValueError
+            When a node lies outside the tissue.
+        """
+        weights, grid = np.zeros(8), self.elastic.grid
+        cells = []
+        for place in np.ascontiguousarray(places, dtype=np.float64):
+            cells.append(int(locate(self.elastic.x, grid.cells, place, 1e-6, weights)))
+            if cells[-1] < 0:
+                raise ValueError(f"the node {place} of a path lies outside the tissue")
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+        path = -1
+        for place, cell, along in zip(places, cells, s.tolist(), strict=True):
+            locate(self.elastic.x, grid.cells, np.ascontiguousarray(place), 1e-6, weights)
+            point = self.interface.add(grid.cells[cell], weights)
+            self.interface.equip(point, cell, radius)
+            if path < 0:
+                path = begin_path(self.paths, point)
+            else:
+                extend_path(self.paths, path, point, along)
+        self.paths.length[path] = self.paths.cut[path] = s[-1]
+        return path
 
     def step(self) -> None:
         """End a tick; every few of them the nodes move."""
@@ -70,8 +112,8 @@ class TissueBlock:
         self.lips.close(d)
         self.elastic.advance(d)
         self._begin()
-        for needle in self.needles:
-            needle.follow()
+        for _, line in self._lines():
+            line.follow()
 
     def _begin(self) -> None:
         d = self.elastic.predict()
@@ -93,8 +135,8 @@ class TissueBlock:
         for array in self.paths:
             array[:] = 0
         self.paths.length[:] = np.inf
-        for needle in self.needles:
-            needle.reset()
+        for _, line in self._lines():
+            line.reset()
         self._begin()
 
     def snapshot(self) -> dict[str, Array]:
@@ -103,8 +145,8 @@ class TissueBlock:
         kept["lip_force"] = self.lips.force.copy()
         kept.update({f"point_{name}": array for name, array in self.interface.snapshot().items()})
         kept.update({f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)})
-        for number, needle in enumerate(self.needles):
-            kept.update({f"needle_{number}_{name}": array for name, array in needle.snapshot().items()})
+        for prefix, line in self._lines():
+            kept.update({prefix + name: array for name, array in line.snapshot().items()})
         return kept
 
     def restore(self, snapshot: dict[str, Array]) -> None:
@@ -113,7 +155,7 @@ class TissueBlock:
         Raises
         ------
         KeyError
-            When the snapshot is of a block with fewer needles.
+            When the snapshot is of a block with fewer needles or threads.
         """
         for name in ("x", "v", "frames"):
             getattr(self.elastic, name)[:] = snapshot[name]
@@ -121,8 +163,13 @@ class TissueBlock:
         self.interface.restore(_with_prefix(snapshot, "point_"))
         for name, array in zip(self.paths._fields, self.paths, strict=True):
             array[:] = snapshot[f"path_{name}"]
-        for number, needle in enumerate(self.needles):
-            needle.restore(_with_prefix(snapshot, f"needle_{number}_"))
+        for prefix, line in self._lines():
+            line.restore(_with_prefix(snapshot, prefix))
+
+    def _lines(self) -> list[tuple[str, NeedleInTissue | ThreadInTissue]]:
+        """Needles and threads, with what their arrays' names begin with in a snapshot."""
+        needles = [(f"needle_{number}_", needle) for number, needle in enumerate(self.needles)]
+        return [*needles, *((f"thread_{number}_", thread) for number, thread in enumerate(self.threads))]
 
 
 def _with_prefix(snapshot: dict[str, Array], prefix: str) -> dict[str, Array]:

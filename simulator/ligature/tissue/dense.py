@@ -9,7 +9,7 @@ from ligature.kernels import kernel
 
 @kernel
 def cholesky(A, n):
-    """Replace the lower triangle of the driving ``n`` rows of ``A`` by its factor L, A = L Lᵀ.
+    """Replace the lower triangle of the leading ``n`` rows of ``A`` by its factor L, A = L Lᵀ.
 
     Returns False, with ``A`` partly overwritten, where A is not positive definite.
     """
@@ -30,7 +30,7 @@ def cholesky(A, n):
 
 @kernel
 def solve_cholesky(L, n, b):
-    """Replace the driving ``n`` values of ``b`` by the solution of L Lᵀ x = b."""
+    """Replace the leading ``n`` values of ``b`` by the solution of L Lᵀ x = b."""
     for i in range(n):
         s = b[i]
         for k in range(i):

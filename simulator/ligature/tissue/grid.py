@@ -103,7 +103,8 @@ def build_grid(
     ValueError
         When the lattice is empty or not increasing, or a cut lies outside.
     """
-    lines = tuple(np.asarray(a, dtype=np.float64) for a in axes)
+    x, y, z = (np.asarray(a, dtype=np.float64) for a in axes)
+    lines = (x, y, z)
     for name, line in zip("xyz", lines, strict=True):
         if line.ndim != 1 or len(line) < 2 or not (np.diff(line) > 0).all():
             raise ValueError(f"lattice planes of {name} must be two or more increasing coordinates, not {line}")

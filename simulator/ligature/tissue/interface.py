@@ -18,12 +18,19 @@ from numpy.typing import NDArray
 
 from ligature.kernels import kernel
 from ligature.tissue.elastic import ElasticGrid
+from ligature.tissue.material import TissueMaterial
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 CAPACITY = 96
 """Most points at one time."""
+
+SPACING = 1.6e-3
+"""Length of a path between its nodes, m."""
+
+HARD = 1e-5
+"""Least compliance of a bristle, m/N."""
 
 UNUSED, USED, LEAVING = 0, 1, 2
 """A point that leaves has forces of this step to hand over, and pushes no more."""
@@ -45,6 +52,9 @@ class Points(NamedTuple):
     soft: Array  # (N,) local compliance of the bristle, m/N
     friction: Array  # (N,) N for each metre of needle
     strength: Array  # (N,) N for each metre of needle or thread
+    puncture: Array  # (N,) force at which a tip enters, N
+    cutting: Array  # (N,) and gets further
+    exit: Array  # (N,) beyond that, and leaves
 
 
 def points(capacity: int = CAPACITY) -> Points:
@@ -52,7 +62,7 @@ def points(capacity: int = CAPACITY) -> Points:
     N, z = capacity, np.zeros
     return Points(
         np.zeros(N, np.int64), np.zeros((N, 8), np.int64), z((N, 8)), z((N, 3)), z((N, 3)), z((N, 3)), z((N, 3)),
-        z((N, 3)), z((N, 3)), z((N, N, 3, 3)), z(N), z(N), z(N),
+        z((N, 3)), z((N, 3)), z((N, N, 3, 3)), z(N), z(N), z(N), z(N), z(N), z(N),
     )  # fmt: skip
 
 
@@ -124,21 +134,37 @@ class Interface:
         p.C[i, used] = block.transpose(0, 2, 1)
 
     def release(self, i: int) -> None:
-        """Let a point go; what it pushed in this step still counts."""
-        self.points.force[i] = 0.0
+        """Let a point go when this tick ends; what it pushed in this step still counts."""
         self.points.status[i] = LEAVING
+
+    def equip(self, i: int, cell: int, radius: float) -> None:
+        """Give a point the strength of its cell's material, for a needle or thread of ``radius`` metres.
+
+        Around a slender inclusion of radius r tissue yields by (ln(d / r) + 0.19) / (4 π G d) under a force on a
+        length d, Kelvin's solution integrated along it; the grid has a part of it, the bristle has the rest.
+        """
+        self.cell_of[i] = cell
+        material, p = self.material_of(i), self.points
+        p.friction[i], p.strength[i] = material.friction, material.strength
+        p.puncture[i], p.cutting[i], p.exit[i] = material.puncture_force, material.cutting_force, material.exit_force
+        target = (np.log(SPACING / radius) + 0.19) / (4.0 * np.pi * material.shear * SPACING)
+        p.soft[i] = max(target - float(np.trace(p.C[i, i])) / 3.0, HARD)
+
+    def material_of(self, i: int) -> TissueMaterial:
+        """What the tissue around a point is made of."""
+        return self.elastic.materials[int(self.elastic.grid.layer[self.cell_of[i]])]
 
     # --- the tick -----------------------------------------------------------------------------
 
     def count(self) -> bool:
         """End a tick: add its forces up; True when the step is complete."""
         place_points(self.points, self.fraction)
+        self.points.force[self.points.status == LEAVING] = 0.0
         self.tick += 1
         return self.tick == self.ticks
 
     def push(self, d: Array) -> None:
-        """Add to the displacements ``d`` (n, 3) of a step what the points' mean forces do, and forget those that
-        left."""
+        """Add to a step's displacements ``d`` (n, 3) what the points' mean forces do, and forget those that left."""
         p = self.points
         self.tick = 0
         used = np.flatnonzero(p.status)

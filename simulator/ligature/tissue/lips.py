@@ -56,8 +56,7 @@ class Lips:
 
     def expect(self, d: Array) -> None:
         """Add to the displacements ``d`` (n, 3) of the next step what the forces of the last one will do."""
-        for i in np.flatnonzero(self.force):
-            d += self.force[i] * self._response[i]
+        add_responses(self.force, self._response, d)
 
     def close(self, d: Array) -> None:
         """Find the forces of a step with displacements ``d`` (n, 3) and add what they change since `expect`."""
@@ -66,8 +65,7 @@ class Lips:
             self._elastic.x, d, self.pairs, self._axis, self._B, MARGIN, self._aside, SWEEPS, self._near, self._gap,
             self.force,
         )  # fmt: skip
-        for i in np.flatnonzero(self.force != before):
-            d += (self.force[i] - before[i]) * self._response[i]
+        add_responses(self.force - before, self._response, d)
 
     def gaps(self) -> Array:
         """Distances across the lips, negative where they overlap, (p,) m."""
@@ -110,3 +108,16 @@ def relax(x, d, pairs, axis, B, margin, far, sweeps, near, gap, force):
                     for j in range(n):
                         gap[j] += B[j, i] * change
                     force[i] = p
+
+
+@kernel
+def add_responses(force, response, d):
+    """d += the displacements that the forces (p,) make by their responses (p, n, 3)."""
+    for i in range(force.shape[0]):
+        f = force[i]
+        if f != 0.0:
+            R = response[i]
+            for k in range(d.shape[0]):
+                d[k, 0] += f * R[k, 0]
+                d[k, 1] += f * R[k, 1]
+                d[k, 2] += f * R[k, 2]

@@ -33,12 +33,18 @@ AXIAL, ACROSS, TIP, ENTRY, ENTRY_ACROSS, SLIDE, RUB = 0, 1, 2, 3, 4, 5, 6
 """Rows: friction along a node, hold across it, cutting at the tip, pressure of the tip on the surface along it and
 across it, pressure and friction of a tip that slides over the surface."""
 
-OUTSIDE, TOUCHES, SLIDES, CUTS, TENTS, OPEN = 0, 1, 2, 3, 4, 5
-"""Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, in an old
-path."""
+OUTSIDE, TOUCHES, SLIDES, CUTS, TENTS, LEAVES, OPEN = 0, 1, 2, 3, 4, 5, 6
+"""Where the tip is: free, held by the surface, sliding over it, cutting, pushing out the far surface, breaking through
+it, in an old path."""
 
-HYSTERESIS = 2e-4
+HYSTERESIS = 5e-4
 """Length in metres by which a tip may stand before a node and still be held by it."""
+
+LEFT = 5e-3
+"""Force in newtons below which a tip that leaves is out."""
+
+LEAST_SHARE = 8e-4
+"""Length in metres for which a node holds across at least."""
 
 CAPTURE = 1e-3
 """Distance in metres from an old path, or from its opening, at which a tip follows it."""
@@ -60,7 +66,7 @@ class Rows(NamedTuple):
     C: Array  # (M, M)
     A: Array  # (M, M)
     X: Array  # (7, M)
-    index: Integers  # (M,)
+    elastic: Integers  # (M,) the rows that are
     H: Array  # (6, 6)
     g: Array  # (6,)
 
@@ -69,6 +75,7 @@ class Held(NamedTuple):
     """What a needle's passages keep from tick to tick, by point of the interface."""
 
     engaged: Integers  # (N,)
+    left: Integers  # (N,) the tail has passed it, and no thread has taken it over yet
     anchor: Array  # (N,) length from the tip that friction holds
     sigma: Array  # (N,) length from the tip to the node
     share: Array  # (N,) length of needle that the node holds
@@ -99,9 +106,10 @@ def rows(capacity: int = MOST_ROWS) -> Rows:
 def held(capacity: int, paths: int) -> Held:
     """A needle that is outside."""
     N, z = capacity, np.zeros
+    i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     return Held(
-        np.zeros(N, np.int64), z(N), z(N), z(N), z((N, 3)), z((N, 3)), np.zeros((N, 3), np.int64), z((N, 3)),
-        np.zeros(3, np.int64), np.zeros(paths, np.int64), np.array([OUTSIDE, -1, -1]), z(1), z(1), z(3), z(1), z(4),
+        i(N), i(N), z(N), z(N), z(N), z((N, 3)), z((N, 3)), i(N, 3), z((N, 3)), i(3), i(paths),
+        np.array([OUTSIDE, -1, -1]), z(1), z(1), z(3), z(1), z(4),
     )  # fmt: skip
 
 
@@ -168,6 +176,8 @@ def engage(points, paths, held, shape):
                     held.offset[i, 0], held.offset[i, 1], held.offset[i, 2] = dx, dy, dz
                     for a in range(3):
                         held.side[i, a], held.torn[i, a], held.across[i, a] = 0, 0.0, 0.0
+            if held.engaged[i] and sigma > shape[10] + margin:
+                held.left[i] = 1
             held.engaged[i] = 1 if within else 0
             held.sigma[i] = sigma
             if not within:
@@ -191,6 +201,56 @@ def engage(points, paths, held, shape):
             held.share[i] = max(before, 0.0) + max(after, 0.0)
             inside += held.share[i]
     held.load[3] = inside
+
+
+@inlined
+def _end_of(paths, held, p):
+    """Node of a path that the needle's tip passes last."""
+    return paths.node[p, paths.count[p] - 1 if held.passing[p] > 0 else 0]
+
+
+@kernel
+def follow_tip(points, paths, held, dt, drop):
+    """Where the tip is after `engage`, and the force at which it gets further; the path that it has left, or -1."""
+    for p in range(paths.count.shape[0]):
+        if held.passing[p] == 0:
+            continue
+        inside = False
+        for k in range(paths.count[p]):
+            inside = inside or held.engaged[paths.node[p, k]] == 1
+        if not inside:
+            held.passing[p] = 0
+            if held.tip[1] == p:
+                held.tip[0], held.tip[1] = OUTSIDE, -1
+    if held.tip[1] < 0:
+        # Of the paths that the needle is still in, the tip left last the one that it has got least beyond.
+        best = math.inf
+        for p in range(paths.count.shape[0]):
+            if held.passing[p] != 0:
+                sigma = held.sigma[_end_of(paths, held, p)]
+                if 0.0 <= sigma < best:
+                    held.tip[1], best = p, sigma
+    p, where = held.tip[1], held.tip[0]
+    if where == TOUCHES:
+        held.limit[0] = points.puncture[held.tip[2]]
+    if p < 0 or held.passing[p] == 0 or where in (TOUCHES, SLIDES):
+        return -1
+    if where in (CUTS, TENTS):
+        lead = paths.node[p, paths.count[p] - 1]
+        if paths.cut[p] >= held.room[0]:
+            held.tip[0] = TENTS
+        resists = points.cutting[lead] + (points.exit[lead] if held.tip[0] == TENTS else 0.0)
+        # Or what is left of what the tip has just broken.
+        held.limit[0] = max(resists, held.limit[0] * math.exp(-dt / drop))
+    elif where == LEAVES:
+        held.limit[0] *= math.exp(-dt / drop)
+        if held.limit[0] < LEFT:
+            held.tip[0] = OUTSIDE
+            return p
+    elif paths.length[p] < math.inf:
+        end = _end_of(paths, held, p)
+        held.tip[0] = OUTSIDE if held.engaged[end] and held.sigma[end] >= 0.0 else OPEN
+    return -1
 
 
 @inlined
@@ -226,11 +286,9 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
             continue
         qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, held.sigma[i])
         rx, ry, rz = qx - shape[11], qy - shape[12], qz - shape[13]
-        bx, by, bz = (
-            _base(points, held, contact, i, s, 0),
-            _base(points, held, contact, i, s, 1),
-            _base(points, held, contact, i, s, 2),
-        )
+        bx = _base(points, held, contact, i, s, 0)
+        by = _base(points, held, contact, i, s, 1)
+        bz = _base(points, held, contact, i, s, 2)
         dx, dy, dz = qx - bx, qy - by, qz - bz
         # Along: what friction holds, and how the tissue moves by itself.
         at = points.at[i]
@@ -247,12 +305,10 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
         size = math.sqrt(fx * fx + fy * fy + fz * fz)
         if size > 1e-9:
             nx, ny, nz = fx / size, fy / size, fz / size
-        ox, oy, oz = (
-            held.offset[i, 0] + held.torn[i, 0],
-            held.offset[i, 1] + held.torn[i, 1],
-            held.offset[i, 2] + held.torn[i, 2],
-        )
-        limit = points.strength[i] * held.share[i]
+        offset, torn = held.offset[i], held.torn[i]
+        ox, oy, oz = offset[0] + torn[0], offset[1] + torn[1], offset[2] + torn[2]
+        # A node that has just been passed stands for no length yet; it tears no sooner than half of the others.
+        limit = points.strength[i] * max(held.share[i], LEAST_SHARE)
         for turn in range(2):
             if turn == 1:
                 nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
@@ -263,7 +319,7 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
             m += 1
     tx, ty, tz, nx, ny, nz = shape[3], shape[4], shape[5], shape[6], shape[7], shape[8]
     rx, ry, rz = shape[0] - shape[11], shape[1] - shape[12], shape[2] - shape[13]
-    if where == CUTS or where == TENTS:
+    if where in (CUTS, TENTS, LEAVES):
         lead = -1
         for k in range(paths.count[tip_path]):
             if held.engaged[paths.node[tip_path, k]]:
@@ -278,7 +334,7 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
             rows.rest[m] = paths.s[tip_path, lead] + held.sigma[i] - paths.cut[tip_path] + slid
             rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = 0.0, held.limit[0], points.soft[i], held.tip_side[0]
             m += 1
-    elif where == TOUCHES or where == SLIDES:
+    elif where in (TOUCHES, SLIDES):
         i = contact
         dx = shape[0] - _base(points, held, contact, i, s, 0)
         dy = shape[1] - _base(points, held, contact, i, s, 1)
@@ -326,7 +382,7 @@ def solve_rows(rows, m, H, g, delta):
         n = 0
         for a in range(m):
             if rows.side[a] == 0:
-                rows.index[n] = a
+                rows.elastic[n] = a
                 n += 1
             else:
                 rows.force[a] = rows.high[a] if rows.side[a] > 0 else rows.low[a]
@@ -339,7 +395,7 @@ def solve_rows(rows, m, H, g, delta):
                 for i in range(6):
                     rows.g[i] -= rows.J[a, i] * rows.force[a]
         for p in range(n):
-            a = rows.index[p]
+            a = rows.elastic[p]
             b = rows.rest[a]
             for c in range(m):
                 if rows.side[c] != 0:
@@ -348,7 +404,7 @@ def solve_rows(rows, m, H, g, delta):
             for i in range(6):
                 rows.X[i, p] = rows.J[a, i]
             for q in range(p + 1):
-                rows.A[p, q] = rows.C[a, rows.index[q]]
+                rows.A[p, q] = rows.C[a, rows.elastic[q]]
             rows.A[p, p] += rows.soft[a]
         if not cholesky(rows.A, n):
             return -1
@@ -377,8 +433,8 @@ def solve_rows(rows, m, H, g, delta):
             for i in range(6):
                 total += rows.X[i, p] * delta[i]
             for q in range(p + 1, n):
-                total -= rows.A[q, p] * rows.force[rows.index[q]]
-            rows.force[rows.index[p]] = total / rows.A[p, p]
+                total -= rows.A[q, p] * rows.force[rows.elastic[q]]
+            rows.force[rows.elastic[p]] = total / rows.A[p, p]
         changed = False
         for a in range(m):
             side = rows.side[a]
@@ -409,8 +465,7 @@ def _stretch(rows, m, a, delta):
 
 @kernel
 def conclude(points, paths, held, rows, m, delta):
-    """Keep what the rows leave behind: forces on the tissue, anchors, tears, what was cut; True if the tip got
-    through."""
+    """Keep what the rows leave: forces on the tissue, anchors, tears, what was cut; True if the tip got through."""
     through = False
     held.load[0], held.load[1], held.load[2] = 0.0, 0.0, 0.0
     for i in range(points.status.shape[0]):
@@ -447,7 +502,7 @@ def conclude(points, paths, held, rows, m, delta):
             if rows.side[a] > 0:
                 paths.cut[held.tip[1]] += excess
                 through = True
-        elif kind == ENTRY or kind == SLIDE:
+        elif kind in (ENTRY, SLIDE):
             turn = 0
             held.tip_side[0] = rows.side[a]
             held.load[0] = force
@@ -458,3 +513,19 @@ def conclude(points, paths, held, rows, m, delta):
             for b in range(3):
                 held.offset[i, b] += excess * rows.e[a, b]
     return through
+
+
+@kernel
+def couple(points, paths, held, rows, shape, tip_friction, s, dt, drop, H, g, delta, wrench):
+    """A needle's tick: (path that the tip has left or -1, what became of it: 1 got through, 0 stayed, -1 failed)."""
+    engage(points, paths, held, shape)
+    left = follow_tip(points, paths, held, dt, drop)
+    m = gather(points, paths, held, rows, shape, tip_friction, s)
+    if solve_rows(rows, m, H, g, delta) < 0:
+        return left, -1
+    through = conclude(points, paths, held, rows, m, delta)
+    for i in range(6):
+        wrench[i] = 0.0
+        for a in range(m):
+            wrench[i] -= rows.force[a] * rows.J[a, i]
+    return left, (1 if through else 0)

@@ -21,7 +21,7 @@ MOST_PATHS, MOST_NODES = 16, 32
 class Paths(NamedTuple):
     """P paths of up to K nodes."""
 
-    count: Integers  # (P,) nodes; 0 for a path that is not in use
+    count: Integers  # type: ignore[assignment]  # (P,) nodes; 0 for a path that is not in use
     node: Integers  # (P, K) points of the interface, in order from the entry
     s: Array  # (P, K) length of the path up to the node, m
     cut: Array  # (P,) length up to which it is cut
@@ -56,3 +56,15 @@ def extend_path(paths: Paths, path: int, point: int, s: float) -> None:
     k = int(paths.count[path])
     paths.node[path, k], paths.s[path, k] = point, s
     paths.count[path] = k + 1
+
+
+def remove_node(paths: Paths, point: int) -> None:
+    """Take a point out of the path that it belongs to; a path without nodes is not in use any more."""
+    for path in np.flatnonzero(paths.count).tolist():
+        n = int(paths.count[path])
+        at = np.flatnonzero(paths.node[path, :n] == point)
+        if len(at):
+            k = int(at[0])
+            for array in (paths.node, paths.s):
+                array[path, k : n - 1] = array[path, k + 1 : n]
+            paths.count[path] = n - 1

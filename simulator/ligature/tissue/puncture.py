@@ -8,26 +8,28 @@ tip at less than the least angle to the surface slides over it instead. World ax
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.tissue import needle as states
-from ligature.tissue.interface import Interface
+from ligature.tissue.interface import HARD, SPACING, USED, Interface
 from ligature.tissue.location import cross_surface, locate
-from ligature.tissue.material import TissueMaterial
-from ligature.tissue.needle import conclude, engage, gather, held, rows, solve_rows
+from ligature.tissue.needle import couple, held, rows
 from ligature.tissue.paths import MOST_NODES, MOST_PATHS, Paths, begin_path, extend_path
+from ligature.tissue.tearing import tear
 
 Array = NDArray[np.float64]
 
-SPACING = 1.6e-3
-"""Length of a path between its nodes, m."""
-
-HARD = 1e-5
-"""Least compliance of a bristle, m/N."""
-
 FADE = 0.05
 """Time in seconds in which tissue takes the shape of a needle that passes beside a node."""
+
+DROP = 6e-3
+"""Time in seconds in which the force of a tip that got through falls to what resists it next."""
+
+AROUND = 5e-3
+"""Distance in metres within which the surface says at which angle a tip meets it, not the dent that the tip makes."""
 
 TIP_FRICTION = 0.2
 """Coulomb coefficient of a tip that slides over the surface."""
@@ -58,14 +60,14 @@ class NeedleInTissue:
         self._rows = rows()
         self._shape = np.zeros(14)
         self._shape[9], self._shape[10] = curvature, length
-        self._delta = np.zeros(6)
+        self._delta, self._wrench = np.zeros(6), np.zeros(6)
         self._weights8, self._weights4, self._normal = np.zeros(8), np.zeros(4), np.zeros(3)
         self._before = np.full(3, np.nan)
 
     # --- the tick -----------------------------------------------------------------------------
 
     def couple(
-        self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array
+        self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array, dt: float = 1e-3
     ) -> tuple[Array, Array]:
         """Solve for the needle's motion in this tick, together with the tissue.
 
@@ -79,6 +81,8 @@ class NeedleInTissue:
         H, g
             The needle's own equations, H δ = g, for its displacement and turn δ (6,) about the centre of mass in this
             tick: for a free needle the spatial mass over dt², and momentum over dt with the forces on it.
+        dt
+            Length of the tick, s.
 
         Returns
         -------
@@ -90,25 +94,23 @@ class NeedleInTissue:
             When the needle's equations are singular or not finite.
         """
         h, p = self._held, self._interface.points
-        self._shape[:9], self._shape[11:] = np.concatenate([tip, tangent, normal]), centre
+        self._shape[:3], self._shape[3:6], self._shape[6:9], self._shape[11:] = tip, tangent, normal, centre
         if h.tip[0] == states.OUTSIDE:
             self._look_for_surface()
-        engage(p, self._paths, h, self._shape)
-        self._follow_tip()
-        self._set_limit()
-        m = gather(p, self._paths, h, self._rows, self._shape, TIP_FRICTION, self._interface.fraction)
-        if solve_rows(self._rows, m, H, g, self._delta) < 0 or not np.isfinite(self._delta).all():
+        left, fate = couple(
+            p, self._paths, h, self._rows, self._shape, TIP_FRICTION, self._interface.fraction, dt, DROP, H, g,
+            self._delta, self._wrench,
+        )  # fmt: skip
+        if fate < 0 or not math.isfinite(self._delta.sum()):
             raise FloatingPointError("the equations of the needle in tissue have no finite solution")
-        through = conclude(p, self._paths, h, self._rows, m, self._delta)
-        if through:
+        if left >= 0:
+            self._lay_exit(left)
+        if fate > 0:
             self._get_through()
         elif h.tip[0] in (states.TOUCHES, states.SLIDES) and h.tip_side[0] < 0:
             self._let_go()
         self._before[:] = tip
-        wrench = np.zeros(6)
-        for a in range(m):
-            wrench -= self._rows.force[a] * self._rows.J[a]
-        return self._delta.copy(), wrench
+        return self._delta.copy(), self._wrench.copy()
 
     def _look_for_surface(self) -> None:
         """Begin a contact where the tip came through the surface in the last tick."""
@@ -130,17 +132,28 @@ class NeedleInTissue:
         if path >= 0:
             h.passing[path], h.tip[1] = sense, path
             h.tip[0] = states.OPEN if np.isfinite(self._paths.length[path]) else states.CUTS
+            end = int(self._paths.node[path, 0 if sense > 0 else self._paths.count[path] - 1])
+            self._hold(end)
             return
         point = self._interface.add(grid.faces[face], self._weights4)
-        self._equip(point, int(grid.face_cell[face]))
+        self._interface.equip(point, int(grid.face_cell[face]), self.radius)
         self._interface.points.soft[point] = HARD
         h.offset[point], h.torn[point], h.tip_side[:] = 0.0, 0.0, 0
-        h.normal[:], h.pressed[0], h.tip[2] = self._normal, 0.0, point
+        h.normal[:], h.pressed[0], h.tip[2] = self._normal_around(crossing), 0.0, point
         h.tip[0] = states.TOUCHES if self._steep() else states.SLIDES
 
     def _steep(self) -> bool:
         sine = -float((self._shape[3:6] * self._held.normal).sum())
-        return sine >= float(np.sin(self._material_of(self._held.tip[2]).least_angle))
+        return sine >= float(np.sin(self._interface.material_of(self._held.tip[2]).least_angle))
+
+    def _normal_around(self, at: Array) -> Array:
+        """Outward normal of the surface near a point of it, (3,)."""
+        corner = self._interface.elastic.x[self._interface.elastic.grid.faces]
+        area = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+        away = ((corner.mean(axis=1) - at) ** 2).sum(axis=1)
+        facing = (area * self._normal).sum(axis=1) > 0.0
+        total = (area * (facing * np.exp(-away / AROUND**2))[:, None]).sum(axis=0)
+        return np.asarray(total / np.sqrt((total**2).sum()))
 
     def _opening(self, at: Array) -> tuple[int, int]:
         """Path that opens within reach of a point of the surface, and 1 at its entry, -1 at its exit."""
@@ -157,48 +170,6 @@ class NeedleInTissue:
                     best, found = away, (path, sense)
         return found
 
-    def _follow_tip(self) -> None:
-        """Bring where the tip is up to date with the nodes that hold the needle."""
-        h, paths = self._held, self._paths
-        for path in np.flatnonzero(h.passing).tolist():
-            nodes = paths.node[path, : paths.count[path]]
-            if not h.engaged[nodes].any():
-                h.passing[path] = 0
-                if h.tip[1] == path:
-                    h.tip[0], h.tip[1] = states.OUTSIDE, self._last_exit()
-        path = int(h.tip[1])
-        if path < 0 or not h.passing[path] or h.tip[0] in (states.TOUCHES, states.SLIDES):
-            return
-        if np.isfinite(paths.length[path]):
-            end = paths.node[path, paths.count[path] - 1 if h.passing[path] > 0 else 0]
-            out = h.engaged[end] and h.sigma[end] >= 0.0
-            h.tip[0] = states.OUTSIDE if out else states.OPEN
-
-    def _last_exit(self) -> int:
-        """The path that the tip left last of those that the needle is still in, or -1."""
-        h, paths = self._held, self._paths
-        found, best = -1, np.inf
-        for path in np.flatnonzero(h.passing).tolist():
-            end = paths.node[path, paths.count[path] - 1 if h.passing[path] > 0 else 0]
-            if 0.0 <= h.sigma[end] < best:
-                found, best = path, float(h.sigma[end])
-        return found
-
-    def _set_limit(self) -> None:
-        """Force at which the tip gets further."""
-        h, paths = self._held, self._paths
-        where = int(h.tip[0])
-        if where == states.TOUCHES:
-            h.limit[0] = self._material_of(h.tip[2]).puncture_force
-        elif where in (states.CUTS, states.TENTS):
-            lead = paths.node[h.tip[1], paths.count[h.tip[1]] - 1]
-            material = self._material_of(lead)
-            if paths.cut[h.tip[1]] >= h.room[0]:
-                h.tip[0] = states.TENTS
-            h.limit[0] = material.cutting_force
-            if h.tip[0] == states.TENTS:
-                h.limit[0] += material.exit_force
-
     def _get_through(self) -> None:
         """The tip's force reached its limit: it enters, cuts on, or leaves."""
         h, paths = self._held, self._paths
@@ -207,18 +178,23 @@ class NeedleInTissue:
             path = begin_path(paths, point)
             h.passing[path], h.tip[:] = 1, [states.CUTS, path, -1]
             h.engaged[point], h.anchor[point], h.sigma[point], h.share[point] = 1, 0.0, 0.0, 0.0
-            self._equip(point, self._cell_of[point])
+            self._interface.equip(point, self._interface.cell_of[point], self.radius)
+            # The bristle takes over the force that is left, so that the tip does not leap by what it yields.
+            paths.cut[path] = -float(h.limit[0] * self._interface.points.soft[point])
             self._find_far_surface()
         elif h.tip[0] == states.TENTS:
-            path = int(h.tip[1])
-            paths.length[path] = max(float(h.room[0]), float(paths.s[path, paths.count[path] - 1]) + 1e-6)
-            h.tip[0] = states.OUTSIDE
-            self._lay_exit(path)
+            h.tip[0] = states.LEAVES
 
     def _let_go(self) -> None:
         """The tip has left the surface."""
         self._interface.release(int(self._held.tip[2]))
         self._held.tip[0], self._held.tip[2] = states.OUTSIDE, -1
+
+    def take_left_behind(self) -> list[tuple[int, float]]:
+        """Points that the tail has passed since the last call, and how far beyond it they are, m."""
+        left = np.flatnonzero(self._held.left).tolist()
+        self._held.left[:] = 0
+        return [(i, float(self._held.sigma[i] - self._shape[10])) for i in left]
 
     # --- the tissue step ----------------------------------------------------------------------
 
@@ -226,7 +202,8 @@ class NeedleInTissue:
         """Lay and move nodes; after the tissue has moved."""
         h = self._held
         h.offset[:] *= np.exp(-self._interface.elastic.h / FADE)
-        self._tear()
+        tear(self._interface, self._paths, h.torn)
+        h.engaged[self._interface.points.status != USED] = 0
         if h.tip[0] in (states.CUTS, states.TENTS):
             self._lay_node()
             self._find_far_surface()
@@ -235,13 +212,8 @@ class NeedleInTissue:
         elif h.tip[0] == states.OUTSIDE and not np.isnan(self._before).any():
             self._look_inside()
 
-    def _tip_now(self) -> Array:
-        """The tip after the last tick."""
-        theta, r = self._delta[3:], self._shape[:3] - self._shape[11:14]
-        return self._shape[:3] + self._delta[:3] + np.cross(theta, r)
-
     def _lay_node(self) -> None:
-        h, paths, points = self._held, self._paths, self._interface.points
+        h, paths = self._held, self._paths
         path = int(h.tip[1])
         k = int(paths.count[path]) - 1
         lead = int(paths.node[path, k])
@@ -253,27 +225,32 @@ class NeedleInTissue:
             return
         point = self._add(cell)
         extend_path(paths, path, point, s)
+        self._hold(point)
+
+    def _hold(self, point: int) -> None:
+        """Let a node where the tip is hold the needle from now on."""
+        h = self._held
         h.engaged[point], h.anchor[point], h.sigma[point] = 1, 0.0, 0.0
-        h.offset[point] = self._shape[:3] - points.at[point]
+        h.offset[point] = self._shape[:3] - self._interface.points.at[point]
         h.torn[point], h.side[point], h.across[point] = 0.0, 0, 0.0
 
     def _lay_exit(self, path: int) -> None:
-        h, x, grid = self._held, self._interface.elastic.x, self._interface.elastic.grid
-        lead = int(self._paths.node[path, self._paths.count[path] - 1])
-        tip, tangent = self._shape[:3], self._shape[3:6]
-        back = min(max(float(h.sigma[lead]), 0.0), 1e-3)
-        face, _ = cross_surface(
-            x, grid.faces, tip - back * tangent, tangent, back + 5e-3, 1.0, self._weights4, self._normal
+        """End a path where the needle comes through the far surface; `engage` finds how far it has."""
+        x, grid, paths = self._interface.elastic.x, self._interface.elastic.grid, self._paths
+        k = int(paths.count[path]) - 1
+        behind = max(float(self._held.sigma[paths.node[path, k]]), 0.0)
+        start = self._shape[:3] - behind * self._shape[3:6]
+        face, ahead = cross_surface(
+            x, grid.faces, start, self._shape[3:6], behind + 5e-3, 1.0, self._weights4, self._normal
         )
-        s = float(self._paths.length[path])
-        if face < 0 or s - self._paths.s[path, self._paths.count[path] - 1] < 0.25 * SPACING:
+        s = float(paths.s[path, k]) + (ahead if face >= 0 else 0.0)
+        paths.length[path] = max(s, 1e-6)
+        if face < 0 or ahead < 0.25 * SPACING:
             return
         point = self._interface.add(grid.faces[face], self._weights4)
-        self._equip(point, int(grid.face_cell[face]))
-        extend_path(self._paths, path, point, s)
-        h.engaged[point], h.anchor[point], h.sigma[point] = 1, 0.0, 0.0
-        h.offset[point] = tip - self._interface.points.at[point]
-        h.torn[point], h.side[point], h.across[point] = 0.0, 0, 0.0
+        self._interface.equip(point, int(grid.face_cell[face]), self.radius)
+        extend_path(paths, path, point, s)
+        self._held.engaged[point] = 0
 
     def _find_far_surface(self) -> None:
         """Length of the path at which the line ahead of the tip leaves the tissue."""
@@ -298,12 +275,12 @@ class NeedleInTissue:
         if face < 0:
             self._let_go()
             return
-        h.normal[:] = self._normal
+        h.normal[:] = self._normal_around(self._weights4 @ x[grid.faces[face]])
         if h.tip[0] == states.SLIDES:
             # A point on the normal through the tip keeps the pressure; its place across starts anew.
             self._interface.place(point, grid.faces[face], self._weights4)
             h.offset[point] = 0.0
-            self._cell_of[point] = int(grid.face_cell[face])
+            self._interface.cell_of[point] = int(grid.face_cell[face])
         steep = states.TOUCHES if self._steep() else states.SLIDES
         if steep != h.tip[0]:
             h.tip[0], h.tip_side[:] = steep, 0
@@ -316,42 +293,14 @@ class NeedleInTissue:
             return
         self._meet(tip - 2e-3 * tangent, tangent, 2e-3)
 
-    def _tear(self) -> None:
-        """Move nodes in the material by what has torn."""
-        h, p = self._held, self._interface.points
-        for i in np.flatnonzero((h.torn != 0.0).any(axis=1)).tolist():
-            cell = self._locate(p.start[i] + h.torn[i])
-            if cell >= 0:
-                self._interface.place(i, self._interface.elastic.grid.cells[cell], self._weights8)
-                self._cell_of[i] = cell
-                h.torn[i] = 0.0
-
     def _locate(self, at: Array) -> int:
         elastic = self._interface.elastic
         return int(locate(elastic.x, elastic.grid.cells, np.ascontiguousarray(at), 1e-6, self._weights8))
 
     def _add(self, cell: int) -> int:
         point = self._interface.add(self._interface.elastic.grid.cells[cell], self._weights8)
-        self._equip(point, cell)
+        self._interface.equip(point, cell, self.radius)
         return point
-
-    def _equip(self, point: int, cell: int) -> None:
-        """Give a point the properties of its cell's material, and the compliance that the grid leaves out."""
-        self._cell_of[point] = cell
-        material, p = self._material_of(point), self._interface.points
-        p.friction[point], p.strength[point] = material.friction, material.strength
-        # Around a slender inclusion of radius r tissue yields (ln(d / r) + 0.19) / (4 π G d) under a force on the
-        # length d; specs derive it from Kelvin's solution. The grid has a part of it.
-        target = (np.log(SPACING / self.radius) + 0.19) / (4.0 * np.pi * material.shear * SPACING)
-        p.soft[point] = max(target - float(np.trace(p.C[point, point])) / 3.0, HARD)
-
-    @property
-    def _cell_of(self) -> NDArray[np.int64]:
-        return self._interface.cell_of
-
-    def _material_of(self, point: int) -> TissueMaterial:
-        elastic = self._interface.elastic
-        return elastic.materials[int(elastic.grid.layer[self._cell_of[point]])]
 
     # --- state --------------------------------------------------------------------------------
 
@@ -359,6 +308,11 @@ class NeedleInTissue:
     def where(self) -> int:
         """Where the tip is, one of the states of `ligature.tissue.needle`."""
         return int(self._held.tip[0])
+
+    @property
+    def passages(self) -> int:
+        """Nodes of paths that hold the needle."""
+        return int(self._held.engaged.sum())
 
     @property
     def depth(self) -> float:

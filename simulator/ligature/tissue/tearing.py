@@ -1,0 +1,33 @@
+"""Tearing: where a load across a path exceeds the tissue's strength, the node moves through the material."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.tissue.interface import Interface
+from ligature.tissue.location import locate
+from ligature.tissue.paths import Paths, remove_node
+
+Array = NDArray[np.float64]
+
+SLACK = 0.02
+"""How far outside a cell, in edges, a point still belongs to it: those of the surface lie on its very face."""
+
+
+def tear(interface: Interface, paths: Paths, torn: Array) -> None:
+    """Move the points of paths by what has torn since the last step, (N, 3) m; one that is torn out is let go.
+
+    ``torn`` is cleared. Positions are those at the start of a step.
+    """
+    weights = np.zeros(8)
+    elastic, points = interface.elastic, interface.points
+    for i in np.flatnonzero((torn != 0.0).any(axis=1)).tolist():
+        cell = int(locate(elastic.x, elastic.grid.cells, points.start[i] + torn[i], SLACK, weights))
+        torn[i] = 0.0
+        if cell >= 0:
+            interface.place(i, elastic.grid.cells[cell], weights)
+            interface.cell_of[i] = cell
+        else:
+            remove_node(paths, i)
+            interface.release(i)

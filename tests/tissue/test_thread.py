@@ -1,0 +1,230 @@
+"""Thread in tissue: friction along its path, lips pulled together, tearing; with a string of masses and springs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ligature.tissue.block import TissueBlock
+from ligature.tissue.grid import build_grid
+from ligature.tissue.material import TissueMaterial
+
+DT = 1e-3
+
+
+class String:
+    """Point masses on springs, each tick by Newton's method for its implicit equations, with a thread's springs."""
+
+    def __init__(self, block, thread, points, stiffness=500.0, mass=2e-6):
+        self.block, self.thread = block, thread
+        self.x = np.array(points, dtype=float)
+        self.v = np.zeros_like(self.x)
+        self.rest = np.linalg.norm(np.diff(self.x, axis=0), axis=1)
+        self.stiffness, self.mass = stiffness, mass
+        self.load = np.zeros_like(self.x)
+        self.held = {}
+        self.pull = {}
+
+    def _forces(self, x):
+        """Forces of the springs, and their stiffness."""
+        n = len(x)
+        f, K = np.zeros((n, 3)), np.zeros((n, 3, n, 3))
+        for i, rest in enumerate(self.rest):
+            d = x[i + 1] - x[i]
+            size = np.linalg.norm(d)
+            t = d / size
+            k = self.stiffness * 1e-3 / rest  # of a segment; `stiffness` is that of a millimetre
+            tension = max(k * (size - rest), 0.0)
+            block = (k if size > rest else 1e-3 * k) * np.outer(t, t) + tension / size * (np.eye(3) - np.outer(t, t))
+            f[i] += tension * t
+            f[i + 1] -= tension * t
+            K[i, :, i] += block
+            K[i + 1, :, i + 1] += block
+            K[i, :, i + 1] -= block
+            K[i + 1, :, i] -= block
+        return f, K
+
+    def _solve(self, springs):
+        x, n = self.x.copy(), len(self.x)
+        guess = x + DT * self.v
+        for _ in range(6):
+            f, K = self._forces(guess)
+            f += self.load - self.mass * ((guess - x) / DT - self.v) / DT - 2e-3 * (guess - x) / DT
+            K += np.einsum("ij,ab->iajb", np.eye(n) * (self.mass / DT**2 + 2e-3 / DT), np.eye(3))
+            for s, u, k, bias, start in zip(*springs, strict=True):
+                w = {int(s): 1.0 - u, int(s) + 1: u}
+                force = bias - k @ (sum(w[i] * guess[i] for i in w) - start)
+                for i in w:
+                    f[i] += w[i] * force
+                    for j in w:
+                        K[i, :, j] += w[i] * w[j] * k
+            for i, goal in self.held.items():
+                K[i, :, i] += 1e6 * np.eye(3)
+                f[i] += 1e6 * (goal - guess[i])
+            step = np.linalg.solve(K.reshape(3 * n, 3 * n), f.reshape(-1)).reshape(n, 3)
+            guess = guess + step
+            if np.abs(step).max() < 1e-12:
+                break
+        return guess
+
+    def tick(self):
+        springs = self.thread.springs(self.x)
+        while springs is not None:
+            ends = self._solve(springs)
+            springs = self.thread.settle(ends)
+        self.v, self.x = (ends - self.x) / DT, ends
+        for i, goal in self.held.items():
+            self.pull[i] = 1e6 * (goal - ends[i])
+
+
+def _block(kit, material):
+    block = kit.pad(material, cells=(12, 8, 3))
+    y, z = 0.0155, 0.0052
+    path = block.lay_path(np.column_stack([np.linspace(0.008, 0.032, 13), np.full(13, y), np.full(13, z)]), 1e-4)
+    points = np.column_stack([np.linspace(0.058, -0.002, 31), np.full(31, y), np.full(31, z)])
+    thread = block.add_thread(1e-4)
+    # The path's exit, x = 0.032, stands at this length from the thread's first point.
+    thread.insert(path, 0.058 - 0.032)
+    return block, String(block, thread, points)
+
+
+def test_thread_pulled_along_its_path_feels_friction_for_each_metre(kit):
+    material = TissueMaterial(1e5, friction=10.0)
+    block, string = _block(kit, material)
+    for _ in range(120):
+        string.held[0] = string.held.get(0, string.x[0]) + [2e-5, 0.0, 0.0]
+        string.tick()
+        block.step()
+    assert string.pull[0][0] == pytest.approx(10.0 * 0.024, rel=0.02)
+    assert string.thread.engaged.sum() == 13
+
+
+def test_thread_can_be_pulled_out_and_leaves_the_tissue_at_rest(kit):
+    block, string = _block(kit, TissueMaterial(1e5, friction=10.0))
+    for _ in range(400):
+        string.held[0] = string.held.get(0, string.x[0]) + [1.2e-4, 0.0, 0.0]
+        string.tick()
+        block.step()
+    assert string.thread.engaged.sum() == 0
+    np.testing.assert_allclose(block.positions, block.elastic.grid.nodes, atol=2e-5)
+
+
+@pytest.mark.parametrize("strength", [20.0, 40.0])
+def test_thread_pulled_across_tears_the_tissue_at_its_strength(kit, strength):
+    block, string = _block(kit, TissueMaterial(1e5, strength=strength))
+    last = len(string.x) - 1
+    expected = strength * 0.024
+    # All of the thread is pulled across, as by the bar of a loop.
+    string.held = {i: string.x[i].copy() for i in range(last + 1)}
+    loads = []
+    for _ in range(100):
+        for i in string.held:
+            string.held[i] = string.held[i] + [0.0, 4e-5, 0.0]
+        string.tick()
+        block.step()
+        loads.append(sum(pull[1] for pull in string.pull.values()))
+    assert max(loads) == pytest.approx(expected, rel=0.15)
+    assert loads[-1] == pytest.approx(expected, rel=0.15)
+    nodes = string.thread.engaged.nonzero()[0]
+    material = np.einsum("ik,ika->ia", block.interface.points.weights[nodes],
+                         block.elastic.grid.nodes[block.interface.points.nodes[nodes]])  # fmt: skip
+    assert (material[:, 1] > 0.0155 + 1e-3).all()
+
+
+def _wound(gap):
+    """A pad with a gaping wound."""
+    y = np.concatenate([np.linspace(0.0, 0.015, 5), np.linspace(0.015 + gap, 0.03 + gap, 5)])
+    filled = np.ones((12, len(y) - 1, 4), dtype=bool)
+    filled[2:10, 4, 1:] = False
+    grid = build_grid([np.linspace(0.0, 0.045, 13), y, np.linspace(0.0, 0.008, 5)], filled, closing=(1,))
+    rim = (grid.nodes[:, 2] < 1e-9) | (grid.nodes[:, 1] < 1e-9) | (grid.nodes[:, 1] > y[-1] - 1e-9)
+    return TissueBlock(grid, [TissueMaterial(1e5, friction=2.0, strength=1e4)], rim)
+
+
+def _stitch(block, x, middle, gap):
+    """A loop of thread through both lips, over the wound, whose ends are drawn together there."""
+    deep, top, reach = 0.0035, 0.0079, 0.5 * gap + 0.0045
+    thread = block.add_thread(1e-4)
+    place = lambda y, z: np.array([x, middle + y, z])  # noqa: E731
+    right = [place(reach, top), place(reach - 4e-4, 0.006), place(reach - 1.3e-3, 0.0044),
+             place(reach - 2.6e-3, deep), place(0.5 * gap + 2e-4, deep)]  # fmt: skip
+    left = [[x, 2 * middle - p[1], p[2]] for p in reversed(right)]
+    over = [place(y, 0.0088) for y in np.linspace(0.0, reach, 5)]
+    points = [*over, *right, place(0.0, deep), *left, *([x, 2 * middle - p[1], p[2]] for p in reversed(over))]
+    points = np.array(points)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    thread.insert(block.lay_path(np.array(right)[::-1], 1e-4), length[5])
+    thread.insert(block.lay_path(np.array(left)[::-1], 1e-4), length[11])
+    fine = np.column_stack(
+        [np.interp(np.arange(0.0, len(points) - 0.99, 0.5), np.arange(len(points)), column) for column in points.T]
+    )
+    return String(block, thread, fine, stiffness=3e4)
+
+
+@pytest.mark.slow
+def test_stitches_draw_the_lips_of_a_wound_together_without_overlap(kit):
+    gap = 0.002
+    block = _wound(gap)
+    middle = 0.015 + 0.5 * gap
+    strings = [_stitch(block, x, middle, gap) for x in (0.0135, 0.0225, 0.0315)]
+    assert block.lips.gaps().min() == pytest.approx(gap)
+    for tick in range(180):
+        for string in strings:
+            # Two hands draw the ends past each other over the wound.
+            drawn = np.array([0.0, 1.1e-2 * tick / 250, 0.0])
+            above = np.array([string.x[0, 0], middle, 0.0088])
+            string.held = {0: above - drawn, len(string.x) - 1: above + drawn}
+            string.tick()
+        block.step()
+    gaps = block.lips.gaps()
+    assert gaps.min() < 1e-4
+    assert gaps.min() > -5e-5
+
+
+def test_thread_follows_the_needle_into_its_path(kit):
+    block = kit.pad(TissueMaterial(1e5, friction=10.0))
+    tip = np.array([0.021, 0.0155, kit.SIZE[2] + 5e-4])
+    needle = kit.SprungNeedle(block, tip, (0.0, 0.0, -1.0), length=0.015)
+    thread = block.add_thread(1e-4)
+    needle.advance(0.014, 0.1)
+    assert needle.needle.depth > 0.008
+    points = None
+    for _ in range(300):
+        needle.goal = needle.goal + [0.0, 0.0, -1e-4]
+        needle.tick()
+        tail = needle.tip + [0.0, 0.0, 0.015]
+        thread.draw_in(needle.needle)
+        points = tail + np.outer(np.arange(0.0, 0.06, 0.002), [0.0, 0.0, 1.0])
+        while thread.settle(points) is not None if thread.springs(points) is not None else False:
+            pass
+        block.step()
+    assert needle.needle.depth == 0.0
+    assert thread.engaged.sum() == block.paths.count[0] > 4
+    force = block.interface.points.force[thread.engaged.nonzero()[0]]
+    assert -force[:, 2].sum() == pytest.approx(10.0 * block.paths.length[0], rel=0.03)
+
+
+def test_snapshot_of_a_thread_restores_to_the_bit(kit):
+    block, string = _block(kit, TissueMaterial(1e5, friction=10.0))
+
+    def pull(ticks):
+        for _ in range(ticks):
+            string.held[0] = string.held.get(0, string.x[0]) + [3e-5, 1e-5, 0.0]
+            string.tick()
+            block.step()
+
+    pull(57)
+    kept, x, v, held = block.snapshot(), string.x.copy(), string.v.copy(), string.held[0].copy()
+    pull(50)
+    expected = [string.x.copy(), block.positions.copy()]
+    pull(21)
+    block.reset()
+    block.restore(kept)
+    string.x, string.v, string.held[0] = x, v, held
+    pull(50)
+    np.testing.assert_array_equal(string.x, expected[0])
+    np.testing.assert_array_equal(block.positions, expected[1])
+
+
+def test_path_outside_the_tissue_is_rejected(kit):
+    with pytest.raises(ValueError, match="lies outside the tissue"):
+        kit.pad().lay_path(np.array([[0.01, 0.01, 0.005], [0.01, 0.01, 0.015]]), 1e-4)
