@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 
 import ligature
-from ligature.in_process import Simulation
+from ligature.camera_simulation import Simulation
 from ligature.model.scene import ArmDescription, ArmKind
 
 FORMAT = "ligature dataset 1"

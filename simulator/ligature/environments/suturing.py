@@ -13,8 +13,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from ligature.camera_simulation import Simulation
 from ligature.environments.goals import GOALS, Goal, tip_position
-from ligature.in_process import Simulation
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.load import load
 from ligature.robots.operating_state import Refused
