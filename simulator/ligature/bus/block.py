@@ -66,6 +66,9 @@ _STATE_AT = 4096
 RETRIES = 1000
 """Attempts of one reading; the writer is at it for a microsecond of every update."""
 
+PHYSICS_TIMEOUT = 5.0
+"""Seconds without a sign of life of the physics process after which the other processes of its run end."""
+
 TIMEOUT = 120.0
 """Seconds to wait for the first state: the first start of all compiles the solvers."""
 
@@ -118,8 +121,8 @@ class Block:
     ) -> Block:
         """Map the block ``name`` once it holds a state.
 
-        Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True
-        waiting, or when the block is of another layout.
+        Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True meanwhile, or
+        when the block has another layout.
         """
         deadline = time.monotonic() + timeout
         while True:
@@ -158,6 +161,11 @@ class Block:
     def age(self) -> float:
         """Seconds since the physics process last gave a sign of life."""
         return time.monotonic() - float(self.figures["physics_beat"][0])
+
+    @property
+    def active(self) -> bool:
+        """Whether the physics process gave a sign of life within `PHYSICS_TIMEOUT`."""
+        return self.age < PHYSICS_TIMEOUT
 
     def beat(self) -> None:
         """Give a sign of life of the physics process."""

@@ -143,7 +143,7 @@ class Supervisor:
         return self._over or self._signalled.is_set()
 
     def _start(self) -> None:
-        self._say(f"loading [bold]{escape(self._options.scene)}[/bold]")
+        self._print(f"loading [bold]{escape(self._options.scene)}[/bold]")
         for note in self._options.notes:
             self._console.print(note, style="dim", markup=False)
         self._progress.start()
@@ -171,13 +171,13 @@ class Supervisor:
         """Whether a ROS master answers, after one was started where there was none."""
         uri = self._env["ROS_MASTER_URI"] = self._env.get("ROS_MASTER_URI") or master.DEFAULT_MASTER
         if master.master_answers(uri):
-            self._say(f"using the ROS master at {uri}")
+            self._print(f"using the ROS master at {uri}")
             return True
         problem = master.obstacle(uri)
         if problem:
             self._fail(problem)
             return False
-        self._say(f"no ROS master answers at {uri}: starting one")
+        self._print(f"no ROS master answers at {uri}: starting one")
         child = self._children["master"] = Child("master", master.command(uri), self._events, self._env)
         deadline = time.monotonic() + MASTER_TIMEOUT
         while time.monotonic() < deadline and not self._stopping and child.process.poll() is None:
@@ -190,7 +190,7 @@ class Supervisor:
 
     def _handle(self, process: str, event: str, text: str) -> None:
         if event == "ready":
-            self._say(f"{process} ready: {text}")
+            self._print(f"{process} ready: {text}")
             if process == "physics" and self._options.window:
                 self._start_drawing("window", "ligature.cli.window_process")
             if process == "physics" and self._options.cockpit:
@@ -206,7 +206,7 @@ class Supervisor:
         elif event == "first-state":
             self._progress.stop()
             if not self._published:
-                self._say(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
+                self._print(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
             self._published = True
         elif event in _STYLES:
             self._console.print(text, style=_STYLES[event], markup=False)
@@ -231,14 +231,14 @@ class Supervisor:
         lived = time.monotonic() - child.started
         child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_DEATH else 0
         if child.quick_deaths > MAX_QUICK_DEATHS and process in _DRAWING:
-            self._say(
+            self._print(
                 f"[yellow]the {process} process dies again and again (status {status}): no more pictures[/yellow]"
             )
             return
         if child.quick_deaths > MAX_QUICK_DEATHS:
             self._fail(f"the {process} process dies again and again (status {status})")
             return
-        self._say(f"[yellow]the {process} process ended with status {status}; starting it again[/yellow]")
+        self._print(f"[yellow]the {process} process ended with status {status}; starting it again[/yellow]")
         time.sleep(RESTART_PAUSE if child.quick_deaths else 0.0)
         child.start()
 
@@ -258,7 +258,7 @@ class Supervisor:
         for child in order:
             child.end(deadline - time.monotonic())
         remove(self._options.bus)
-        self._say("ended")
+        self._print("ended")
 
-    def _say(self, text: str) -> None:
+    def _print(self, text: str) -> None:
         self._console.print(text)

@@ -89,10 +89,10 @@ class ArmsNode:
         self._block.events.skip()
         for outlet, record in zip(self._outlets, state["arm"], strict=True):
             outlet.follow(record)
-            outlet.events.tell("operating_state", [record["operating"], record["homed"], record["busy"]])
-            outlet.events.tell("trajectory_j/ratio", float(record["ratio"][0]))
+            outlet.events.publish("operating_state", [record["operating"], record["homed"], record["busy"]])
+            outlet.events.publish("trajectory_j/ratio", float(record["ratio"][0]))
             if outlet.description.kind is ArmKind.PSM and int(record["tool"]) in INSTRUMENTS:
-                outlet.events.tell("tool_type", INSTRUMENTS[int(record["tool"])].type)
+                outlet.events.publish("tool_type", INSTRUMENTS[int(record["tool"])].type)
 
     def next_due(self) -> float:
         """When `publish` has something to do, on the monotonic clock."""
@@ -119,7 +119,7 @@ class ArmsNode:
         for outlet in self._outlets:
             sent += outlet.publish(state["arm"][outlet.index], stamp, 0 if outlet.index in settled else self._count)
         for event in events:
-            self._outlets[event.arm].events.tell(event.name, event.value)
+            self._outlets[event.arm].events.publish(event.name, event.value)
         if now > self._beat:
             self._beat = now + HEARTBEAT
             for outlet in self._outlets:
@@ -160,9 +160,9 @@ class ArmsNode:
                 self.push(take(message))
             except (ValueError, CodecError) as error:
                 self.refused += 1
-                outlet.events.tell("warning", f"{topic}: command refused: {error}")
+                outlet.events.publish("warning", f"{topic}: command refused: {error}")
                 if topic.startswith("move"):
-                    outlet.events.tell("goal_reached", False)
+                    outlet.events.publish("goal_reached", False)
 
         return listen
 
