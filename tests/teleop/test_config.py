@@ -81,16 +81,16 @@ def test_what_is_wrong_is_reported_with_its_place_and_what_would_be_right(wrong:
 
 def test_keys_of_version_0_1_are_accepted_with_a_note(tmp_path: Path) -> None:
     text = (
-        "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {timeout: 2.0, fastest: 0.3, quickest: 4.0}\n"
+        "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {patience: 2.0, fastest: 0.3, quickest: 4.0}\n"
     )
     config = from_text(text, tmp_path / "old.yaml")
     settings = config.devices["MTMR"].settings
     assert (settings.timeout, settings.max_velocity, settings.max_angular_velocity) == (2.0, 0.3, 4.0)
     assert len(config.notes) == 3
-    assert config.notes[0].endswith("old.yaml:3:12: 'timeout' is deprecated; write 'timeout'")
+    assert config.notes[0].endswith("old.yaml:3:12: 'patience' is deprecated; write 'timeout'")
 
 
 def test_a_key_and_its_former_name_together_are_rejected(tmp_path: Path) -> None:
-    text = "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {timeout: 2.0, timeout: 1.0}\n"
-    with pytest.raises(AdfError, match="both 'timeout' and 'timeout'"):
+    text = "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {patience: 2.0, timeout: 1.0}\n"
+    with pytest.raises(AdfError, match="both 'patience' and 'timeout'"):
         from_text(text, tmp_path / "both.yaml")

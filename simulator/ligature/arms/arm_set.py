@@ -15,7 +15,7 @@ from ligature.model.subsystem import Subsystem
 from ligature.physics import World
 from ligature.robots.arm import Arm
 from ligature.robots.commands import ArmCommand
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 from ligature.robots.record import ArmRecord
 
 _BUILDERS = {ArmKind.PSM: build_psm, ArmKind.ECM: build_ecm, ArmKind.MTM: build_mtm}
@@ -49,11 +49,11 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         return len(self._arms)
 
     def apply(self, command: ArmCommand) -> None:
-        """Carry out a command; what the arm refuses becomes its warning, whatever else it raises its FAULT."""
+        """Carry out a command; what the arm rejects becomes its warning, whatever else it raises its FAULT."""
         arm = self._arms[command.arm]
         try:
             command.carry_out(arm)
-        except Refused as error:
+        except Rejected as error:
             arm.emit("warning", str(error))
             if command.moves:
                 arm.emit("goal_reached", False)
@@ -117,4 +117,4 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
 
 def _words(error: Exception) -> str:
     """What an exception states, and of which kind it is unless the arm itself raised it."""
-    return str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
+    return str(error) if isinstance(error, Rejected) else f"{type(error).__name__}: {error}"

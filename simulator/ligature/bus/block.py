@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ligature.bus.events import LOG_BYTES, EventLog
 from ligature.bus.ring import RING_BYTES, Ring
+from ligature.deprecation import warn_deprecated
 from ligature.model.state import StateDtype, StateRecord
 
 FOLDER = Path("/dev/shm")
@@ -117,13 +118,21 @@ class Block:
 
     @classmethod
     def attach(
-        cls, name: str, dtype: StateDtype, timeout: float = TIMEOUT, cancelled: Callable[[], bool] = lambda: False
+        cls,
+        name: str,
+        dtype: StateDtype,
+        timeout: float = TIMEOUT,
+        cancelled: Callable[[], bool] = lambda: False,
+        patience: float | None = None,
     ) -> Block:
         """Map the block ``name`` once it holds a state.
 
         Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True meanwhile, or
-        when the block has another layout.
+        when the block has another layout. ``patience`` is the former name of ``timeout``.
         """
+        if patience is not None:
+            warn_deprecated("patience", "timeout")
+            timeout = patience
         deadline = time.monotonic() + timeout
         while True:
             with suppress(FileNotFoundError):

@@ -349,11 +349,18 @@ def score(
     scene: Annotated[Optional[Path], typer.Option(help="Launch file; of a record, instead of its own.")] = None,  # noqa: UP045
     timeout: Annotated[float, typer.Option(help="Seconds to wait for a report.", min=1)] = 3600.0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    patience: Annotated[Optional[float], typer.Option(hidden=True, min=1)] = None,  # noqa: UP045
 ) -> None:
     """Report how well a task was done; exit status 0 done, 1 not done, 2 not judged."""
     from ligature.cli.score import score as run_score
 
-    raise typer.Exit(run_score(task, file, scene, timeout, json, Console(highlight=False, soft_wrap=True)))
+    if patience is not None:
+        Console(stderr=True, highlight=False).print("'--patience' is deprecated; write '--timeout'", style="yellow")
+    raise typer.Exit(
+        run_score(
+            task, file, scene, timeout if patience is None else patience, json, Console(highlight=False, soft_wrap=True)
+        )
+    )
 
 
 @app.command()

@@ -46,10 +46,10 @@ def record(out: Path, exclude: str, seconds: float, keep_free: float, console: C
     reason = _reason(lines)
     if reason or status != 0 or not part.is_file():
         free = shutil.disk_usage(out.parent).free / 1e9
-        said = (
+        line = (
             f"the recording failed: {reason or f'the recorder ended with {status}'}; {free:.3g} GB of the disk are free"
         )
-        console.print(said, style="red", markup=False)
+        console.print(line, style="red", markup=False)
         _tell_rest(part, console)
         return 1
     part.replace(out)

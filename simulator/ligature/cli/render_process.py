@@ -84,7 +84,7 @@ class Studio:
         self._node = CameraNode(scene, self.cameras, bool(options.cameras))
         self._follower = Follower(scene)
         MasterWatch(self._follower.poll).start()
-        self._refused: set[str] = set()
+        self._rejected: set[str] = set()
         self._exposures = [_Exposure(topics) for topics in self._node.topics]
 
     def turn(self, now: float) -> None:
@@ -145,14 +145,14 @@ class Studio:
         """The sensor of a camera by its parameters; one without faults, with one warning, when they are invalid."""
         values = self._follower.sensors[camera.index]
         wrong = f"{camera.identity.topic}: {values}"
-        if wrong in self._refused:
+        if wrong in self._rejected:
             return IDEAL
         try:
             sensor = ImageSensor(**values)
             sensor.view(view)
         except ValueError as error:
             report("warning", f"{camera.identity.topic}/sensor: {error}; its pictures have no faults")
-            self._refused.add(wrong)
+            self._rejected.add(wrong)
             return IDEAL
         return sensor
 

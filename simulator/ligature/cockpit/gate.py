@@ -39,13 +39,13 @@ class Gate:
         self._token = token
         self._local = address.loopback and not token
         self._pass = hmac.new(token.encode(), COOKIE.encode(), hashlib.sha256).hexdigest()
-        self.refused = 0
+        self.rejected = 0
 
     def answer(self, request: Request) -> Response | None:
         """The response that ends a request here; None lets it in."""
         found = self._answer(request)
         if found is not None and found.status_code >= http.HTTPStatus.BAD_REQUEST:
-            self.refused += 1
+            self.rejected += 1
         return found
 
     def _answer(self, request: Request) -> Response | None:

@@ -139,7 +139,7 @@ class Node:
         self._ring.beat()
         self._reception.watch(now)
         figures = self._block.figures
-        figures["malformed"] = self._reception.refused + self._arms.refused + oversized.count
+        figures["malformed"] = self._reception.rejected + self._arms.rejected + oversized.count
         self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
         self._diagnostics.faults = self._arms.faults
         self._world.loop_hz = float(figures["loop_hz"][0])

@@ -30,7 +30,7 @@ class PlaybackError(RuntimeError):
     """The simulator does not take what a bag holds; the message states why."""
 
 
-def play(path: Path, joints: str, speed: float, say: Callable[[str], None]) -> int:
+def play(path: Path, joints: str, speed: float, log: Callable[[str], None]) -> int:
     """Play ``path``; returns how many messages were sent.
 
     With ``joints`` empty, these are the messages on topics that the simulator subscribes; with ``measured`` or
@@ -47,7 +47,7 @@ def play(path: Path, joints: str, speed: float, say: Callable[[str], None]) -> i
             raise BagError(
                 f"{path}: holds no {what} that the running simulator takes; '--joints measured' plays joint states"
             )
-        say(f"playing {', '.join(routes)}")
+        log(f"playing {', '.join(routes)}")
         types = {topic: message for topic, message, _ in _firsts(bag, routes)}
         publishers = {
             topic: rospy.Publisher(

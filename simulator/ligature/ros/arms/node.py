@@ -55,7 +55,7 @@ class ArmsNode:
         self._frame_prefix = scene.world.frame_prefix
         self._base_body = [arm.base for arm in scene.arms]
         self._outlets: list[ArmOutlet] = []
-        self.refused = 0
+        self.rejected = 0
         self._count = 0
         self._beat = 0.0
         self._due = -math.inf
@@ -131,8 +131,8 @@ class ArmsNode:
         return sent
 
     def _stamp(self, state: Any) -> Any:
-        now, told = rospy.Time.now(), rospy.Time.from_sec(float(state["stamp"]))
-        return now if (now - told).to_sec() > STALE else told
+        now, stamp = rospy.Time.now(), rospy.Time.from_sec(float(state["stamp"]))
+        return now if (now - stamp).to_sec() > STALE else stamp
 
     def _publish_tf(self, state: Any, stamp: Any) -> None:
         if self._tf is None or not self._tf.heard:
@@ -159,8 +159,8 @@ class ArmsNode:
             try:
                 self.push(take(message))
             except (ValueError, CodecError) as error:
-                self.refused += 1
-                outlet.events.publish("warning", f"{topic}: command refused: {error}")
+                self.rejected += 1
+                outlet.events.publish("warning", f"{topic}: command rejected: {error}")
                 if topic.startswith("move"):
                     outlet.events.publish("goal_reached", False)
 
