@@ -40,7 +40,7 @@ def test_a_taken_port_is_reported() -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
-        with pytest.raises(AddressError, match="cannot be served at 127.0.0.1:.*: Address already in use"):
+        with pytest.raises(AddressError, match="cannot serve the cockpit at 127.0.0.1:.*: Address already in use"):
             check_free(Address("127.0.0.1", other.getsockname()[1]))
 
 

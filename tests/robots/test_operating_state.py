@@ -175,7 +175,7 @@ def test_every_accepted_command_is_answered_by_a_new_event(state):
 def test_a_word_that_is_no_command_is_refused(state):
     arm = MADE[state]()
     before = arm.operating_state
-    with pytest.raises(Rejected, match="'dance' is no state command; there are enable, disable, "):
+    with pytest.raises(Rejected, match="'dance' is not a state command; use one of enable, disable, "):
         arm.state_command("dance")
     assert arm.operating_state == before
 

@@ -76,15 +76,15 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def step(self, tick: int) -> None:
         """Advance all arms by a tick."""
         for arm in self._arms:
-            self._guarded("the motion", arm, arm.tick, self._dt)
+            self._guarded("motion", arm, arm.tick, self._dt)
         if (tick + 1) % WATCH_PERIOD == 0:
             for arm in self._arms:
-                self._guarded("the watch over following errors", arm, arm.watch, WATCH_PERIOD * self._dt)
+                self._guarded("following-error check", arm, arm.watch, WATCH_PERIOD * self._dt)
 
     def write_state(self, state: StateRecord) -> None:
         """Write the state of all arms."""
         for arm, arm_record, record in zip(self._arms, self._records, state["arm"][0], strict=True):
-            self._guarded("the reading", arm, arm_record.write, record)
+            self._guarded("write_state", arm, arm_record.write, record)
 
     def take_problems(self) -> list[Diagnostic]:
         """What was found since the last call."""
@@ -102,7 +102,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def reset(self) -> None:
         """The scene was put back to its start: moves end, and arms hold where they are now."""
         for arm in self._arms:
-            self._guarded("the reset", arm, arm.settle)
+            self._guarded("reset", arm, arm.settle)
 
     def snapshot(self) -> list[dict[str, Any]]:
         """Everything that lasts from tick to tick."""
@@ -116,5 +116,5 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
 
 
 def _words(error: Exception) -> str:
-    """What an exception states, and of which kind it is unless the arm itself raised it."""
+    """The message of an exception, with its type unless the arm itself raised it."""
     return str(error) if isinstance(error, Rejected) else f"{type(error).__name__}: {error}"

@@ -75,7 +75,7 @@ TIMEOUT = 120.0
 
 
 class BusError(RuntimeError):
-    """The shared memory block is missing or belongs to another scene; the message states which."""
+    """The shared memory block is missing or belongs to another scene; the message says which."""
 
 
 class Block:
@@ -197,7 +197,9 @@ def _reserve(descriptor: int, path: Path, size: int) -> None:
         os.posix_fallocate(descriptor, 0, size)
     except OSError as error:
         path.unlink(missing_ok=True)
-        raise BusError(f"no {size / 1e6:.0f} MB of shared memory for '{path}': {error.strerror}") from error
+        raise BusError(
+            f"cannot allocate {size / 1e6:.0f} MB of shared memory for '{path}': {error.strerror}"
+        ) from error
 
 
 def remove(name: str) -> None:

@@ -41,7 +41,7 @@ class Recorder:
         self._since = 0.0
         self._copying: list[threading.Thread] = []
         self._copied: deque[tuple[str, bool]] = deque()
-        self._why_not = "the run was begun without a page and without --record"
+        self._why_not = "the run was started without --cockpit and without --record"
         header = Header(options.to_text(), simulation.state_hash())
         if options.record:
             self._begin_record(Path(options.record), header)
@@ -55,7 +55,7 @@ class Recorder:
         try:
             self._journal = self._writer = RecordWriter(path, header)
         except OSError as error:
-            report("error", f"the run cannot be recorded: {_why(error)}: '{path}'")
+            report("error", f"cannot record the run: {_why(error)}: '{path}'")
             sys.exit(1)
 
     # --- while the run goes on ------------------------------------------------------------------
@@ -82,7 +82,7 @@ class Recorder:
         """Begin a recording, or end the one that goes on."""
         name = file_name(recording.name)
         if name and self._excerpt is not None:
-            self._report(f"'{self._excerpt.path}' is recorded already", True)
+            self._report(f"'{self._excerpt.path}' is being recorded already", True)
         elif name:
             self._begin(update, FOLDER / name)
         elif self._excerpt is not None:
@@ -107,17 +107,17 @@ class Recorder:
 
     def _begin(self, update: int, path: Path) -> None:
         if self._journal is None:
-            self._report(f"nothing can be recorded in this run: {self._why_not}", True)
+            self._report(f"cannot record this run: {self._why_not}", True)
             return
         try:
             path.parent.mkdir(exist_ok=True)
             self._excerpt = Excerpt(path, self._journal, self._moment(self._journal, update))
         except OSError as error:
-            self._report(f"nothing is recorded: {_why(error)}: '{path}'", True)
+            self._report(f"cannot record: {_why(error)}: '{path}'", True)
             return
         self._since = self._simulation.time
         self._block.figures["recording"] = 1
-        self._report(f"recording to '{path}' from {self._since:.1f} s on")
+        self._report(f"recording to '{path}' from {self._since:.1f} s")
 
     def _end(self, update: int) -> None:
         assert self._excerpt is not None and self._journal is not None
@@ -147,11 +147,11 @@ class Recorder:
         return journal.moment(update, self._simulation.state_hash())
 
     def _give_up(self, error: OSError) -> None:
-        """Go on without records, and report it: a run matters more than its records."""
+        """Warn and continue without records: a run matters more than its records."""
         assert self._journal is not None
         if self._writer is not None:
             part = self._writer.abandon()
-            report("error", f"the run is not recorded any more: {_why(error)}; '{part}' ends before the run does")
+            report("error", f"recording of the run stopped: {_why(error)}; '{part}' holds the part before")
         self._journal.close()
         self._journal = self._writer = None
         self._why_not = _why(error)

@@ -151,7 +151,7 @@ class Studio:
             sensor = ImageSensor(**values)
             sensor.view(view)
         except ValueError as error:
-            report("warning", f"{camera.identity.topic}/sensor: {error}; its pictures have no faults")
+            report("warning", f"{camera.identity.topic}/sensor: {error}; rendering without sensor faults")
             self._rejected.add(wrong)
             return IDEAL
         return sensor

@@ -25,7 +25,7 @@ from ligature.cli.options import RunOptions
 
 MASTER_TIMEOUT = 15.0
 LAST_TIMEOUT = 1.8
-"""Seconds after a signal at which the supervisor itself ends, should whoever reads its output no longer do so."""
+"""Seconds after a signal at which the supervisor ends even when nobody reads its output any more."""
 
 RESTART_PAUSE = 0.3
 QUICK_DEATH, MAX_QUICK_DEATHS = 5.0, 5
@@ -37,11 +37,10 @@ _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",
 }
 _DRAWING = ("window", "render", "cockpit")
-"""Processes that a run can do without; status 0 means that they have nothing to draw, or nowhere."""
+"""Processes that a run can do without; status 0 means that they cannot draw here or have nothing to draw."""
 
 _DRAWING_NICE = 10
-"""How far the processes that draw have a lower scheduling priority: software would leave no processor time to physics
-otherwise."""
+"""Nice level of the processes that draw: software rendering at normal priority starves physics."""
 
 _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
@@ -161,8 +160,7 @@ class Supervisor:
                 )
 
     def _start_drawing(self, name: str, module: str, nice: int = _DRAWING_NICE) -> None:
-        """Start a process that draws, with a lower priority unless set otherwise; without a ROS master the run is
-        over."""
+        """Start a process that draws, by default at a lower scheduling priority; without a master the run is over."""
         if "ros" in self._children or not self._options.ros:
             command = [sys.executable, "-m", module, self._options.to_text()]
             self._children[name] = Child(name, command, self._events, self._env, nice)
@@ -185,7 +183,7 @@ class Supervisor:
                 return True
             time.sleep(0.05)
         if not self._stopping:
-            self._fail(f"the ROS master that was started for {uri} does not answer; start 'roscore' and try again")
+            self._fail(f"the ROS master started for {uri} does not answer; start 'roscore' and try again")
         return False
 
     def _handle(self, process: str, event: str, text: str) -> None:
@@ -194,8 +192,7 @@ class Supervisor:
             if process == "physics" and self._options.window:
                 self._start_drawing("window", "ligature.cli.window_process")
             if process == "physics" and self._options.cockpit:
-                # an arm is driven from the page, which has its pictures drawn by a process that has a lower scheduling
-                # priority
+                # the page drives arms; a process of lower priority draws its pictures
                 self._start_drawing("cockpit", "ligature.cli.cockpit_process", 0)
             if self._options.ros:
                 self._progress.update("connecting to ROS")
@@ -232,13 +229,13 @@ class Supervisor:
         child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_DEATH else 0
         if child.quick_deaths > MAX_QUICK_DEATHS and process in _DRAWING:
             self._print(
-                f"[yellow]the {process} process dies again and again (status {status}): no more pictures[/yellow]"
+                f"[yellow]the {process} process keeps failing (status {status}); continuing without it[/yellow]"
             )
             return
         if child.quick_deaths > MAX_QUICK_DEATHS:
-            self._fail(f"the {process} process dies again and again (status {status})")
+            self._fail(f"the {process} process keeps failing (status {status}); the run is over")
             return
-        self._print(f"[yellow]the {process} process ended with status {status}; starting it again[/yellow]")
+        self._print(f"[yellow]the {process} process ended with status {status}; restarting it[/yellow]")
         time.sleep(RESTART_PAUSE if child.quick_deaths else 0.0)
         child.start()
 

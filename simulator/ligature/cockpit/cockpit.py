@@ -162,7 +162,7 @@ class Cockpit:
             self._teleop_controls = TeleopControls(client, self._ros, act)
 
     def _end_operating(self, why: str, there: bool) -> None:
-        """Nobody operates any more; ``there`` states whether the browser still shows the controls."""
+        """Nobody operates any more; ``there``: whether the browser still shows the controls."""
         self._stop_all(why)
         if there:
             for controls in (*self._controls, self._run_controls, self._camera_controls, self._teleop_controls):
@@ -232,7 +232,7 @@ class Cockpit:
                 self._outbox.push(command)
 
     def _stop_all(self, why: str) -> None:
-        """Hold every arm that the operator drives, and state why."""
+        """Hold every arm that the operator drives, and show why."""
         for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
             dragged = arm < len(self._controls) and self._controls[arm].dragging
             if pursuits.stop() or dragged:
@@ -254,7 +254,7 @@ class Cockpit:
             else:
                 self._clockwork.end_record()
         except ValueError as error:
-            self._recorded = f"nothing is recorded: {error}"
+            self._recorded = f"cannot record: {error}"
 
     # --- what is shown -------------------------------------------------------------------------
 

@@ -77,7 +77,7 @@ class Pictures:
             self._try(lambda: self._pipe.send(sight))
 
     def newest(self) -> NDArray[np.uint8] | None:
-        """The newest picture (height, width, 3) that was not taken yet; `problem` states why there are none."""
+        """The newest picture (height, width, 3) that was not taken yet; `problem` is the reason why there are none."""
         picture = None
         while not self.problem and self._try(self._pipe.poll):
             got = self._try(self._pipe.recv)
@@ -91,7 +91,7 @@ class Pictures:
         try:
             return call()
         except (EOFError, OSError):
-            self.problem = self.problem or "the process that draws has ended"
+            self.problem = self.problem or "the rendering process has ended"
             return None
 
     def close(self) -> None:

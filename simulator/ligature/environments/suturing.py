@@ -104,7 +104,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         arm = arm or self._goal.arm
         found = self._simulation.arms[arm]
         if not isinstance(found, PsmArm):
-            raise ValueError(f"'{arm}' is no PSM")
+            raise ValueError(f"'{arm}' is not a PSM")
         self._arm = found
         self._scenery = Scenery.of(self._simulation.scene, self._goal.holes)
         self._action, self._observation, self._dense = action, observation, reward == "dense"

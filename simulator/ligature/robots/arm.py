@@ -324,7 +324,7 @@ class Arm(Device):
             self.body_servo_cf(np.zeros(6) if wrench is None else wrench)
 
     def _push_with(self, what: str, push: Any) -> None:
-        """Have the joints push as ``what`` states, anew each tick."""
+        """Have the joints push as ``what`` computes, anew each tick."""
         self._require_cartesian(what)
         self._stop_for(self.joints)
         self._pushing = what, push
@@ -352,7 +352,7 @@ class Arm(Device):
         return numbers
 
     def set_base_frame(self, pose: ArrayLike, reference: str) -> None:
-        """State where the base stands in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
+        """Set the pose of the base in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
         self._T_reference_base = pose_matrix_of(pose, "set_base_frame")
         self.reference = reference
         self.emit("base_frame", reference)

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from ligature.robots.arm import Arm
 
 _WHAT_IS_MISSING = {
-    ArmKind.PSM: "is no PSM: it has neither jaw nor tool",
-    ArmKind.ECM: "is no ECM: it has no endoscope",
+    ArmKind.PSM: "is not a PSM: it has neither jaw nor tool",
+    ArmKind.ECM: "is not an ECM: it has no endoscope",
     ArmKind.MTM: "is no MTM",
 }
 

@@ -34,7 +34,7 @@ MOST_EVENTS = 500
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a device; ``name`` is the topic that reports it, ``value`` what it states."""
+    """Something that happened to a device; ``name`` is the topic that reports it, ``value`` its content."""
 
     device: str
     name: str

@@ -23,7 +23,7 @@ class State(enum.IntEnum):
 
 @dataclass(frozen=True)
 class OperatingState:
-    """What ``crtk_msgs/OperatingState`` states: ``is_busy`` during moves and homing, never because of ``servo_``."""
+    """The content of ``crtk_msgs/OperatingState``: ``is_busy`` during moves and homing, never because of ``servo_``."""
 
     state: State = State.DISABLED
     is_homed: bool = False
@@ -61,7 +61,7 @@ TRANSITIONS: dict[str, dict[State, Action]] = {
 def action(command: str, state: State) -> Action:
     """What ``command`` leads to in ``state``; raises `Rejected` for an unknown command or one that is not allowed."""
     if command not in TRANSITIONS:
-        raise Rejected(f"'{command}' is no state command; there are {', '.join(TRANSITIONS)}")
+        raise Rejected(f"'{command}' is not a state command; use one of {', '.join(TRANSITIONS)}")
     found = TRANSITIONS[command].get(state)
     if found is None:
         allowed = ", ".join(s.name for s in TRANSITIONS[command])

@@ -100,7 +100,9 @@ class Node:
             if topic is None:
                 hidden.append(identity.topic)
             elif not rosgraph.names.is_legal_name(topic):
-                rospy.logwarn(f"'{topic}' is no name for ROS and is not advertised; use letters, digits, '_' and '/'")
+                rospy.logwarn(
+                    f"'{topic}' is not a valid ROS name and is not advertised; use letters, digits, '_' and '/'"
+                )
             else:
                 low, high = min_hz or max(identity.publish_low, 1), max_hz or max(identity.publish_high, 1)
                 outlets.append(self._outlet(template, topic, low, high))
@@ -118,7 +120,7 @@ class Node:
         self._woken.set()
 
     def _adopt(self, command: ParentCommand) -> None:
-        """A camera or light gets another parent; its messages report it."""
+        """A camera or light gets another parent; its messages name the new one."""
         self._outbox.push(command)
         template = self._placed.get((command.kind, command.index))
         if template is not None:
