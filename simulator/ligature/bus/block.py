@@ -75,7 +75,7 @@ TIMEOUT = 120.0
 
 
 class BusError(RuntimeError):
-    """The shared memory block is missing or belongs to another scene; the message says which."""
+    """The shared memory block is missing or belongs to another scene; the message names which."""
 
 
 class Block:

@@ -44,7 +44,7 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
 
 
 class MissingReaderError(Exception):
-    """A package that reads the format is not installed; the message says how to get it."""
+    """A package that reads the format is not installed; the message names the command that installs it."""
 
 
 def _is_mjcf(source: Path) -> bool:

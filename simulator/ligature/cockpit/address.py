@@ -16,7 +16,7 @@ LEAST_TOKEN = 12
 
 
 class AddressError(ValueError):
-    """An address that cannot be served; the message says what would be right."""
+    """An address that cannot be served; the message gives what would be right."""
 
 
 @dataclass(frozen=True)

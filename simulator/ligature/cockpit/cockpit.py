@@ -220,14 +220,14 @@ class Cockpit:
 
     def _follow(self, now: float, dt: float) -> None:
         """Send the next goals of what is pursued, as long as the operator's browser answers."""
-        led = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
+        driven = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
         dragged = any(controls.dragging for controls in self._controls)
-        self._deadman.watch(self._audience.desk.operator if led or dragged else None)
+        self._deadman.watch(self._audience.desk.operator if driven or dragged else None)
         if self._deadman.silence > TIMEOUT:
             silent = 1e3 * self._deadman.silence
             self._stop_all(f"the operator's browser has not answered for {silent:.0f} ms")
             return
-        for arm in led:
+        for arm in driven:
             for command in self._pursuits[arm].advance(min(dt, 0.05)):
                 self._outbox.push(command)
 

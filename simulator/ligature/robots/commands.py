@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _WHAT_IS_MISSING = {
     ArmKind.PSM: "is not a PSM: it has neither jaw nor tool",
     ArmKind.ECM: "is not an ECM: it has no endoscope",
-    ArmKind.MTM: "is no MTM",
+    ArmKind.MTM: "is not an MTM",
 }
 
 _GAINS = Numbers(12)

@@ -31,7 +31,7 @@ class OperatingState:
 
 
 class Action(enum.Enum):
-    """What an allowed command leads to."""
+    """The effect of an allowed command."""
 
     NOTHING = enum.auto()
     POWER_UP = enum.auto()
@@ -43,7 +43,7 @@ class Action(enum.Enum):
 
 
 class Rejected(ValueError):
-    """A command that an arm does not carry out; the message says why, and what would be right."""
+    """A command that an arm does not carry out; the message gives the reason and what would be right."""
 
 
 _D, _E, _P, _F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
@@ -59,7 +59,7 @@ TRANSITIONS: dict[str, dict[State, Action]] = {
 
 
 def action(command: str, state: State) -> Action:
-    """What ``command`` leads to in ``state``; raises `Rejected` for an unknown command or one that is not allowed."""
+    """The effect of ``command`` in ``state``; raises `Rejected` for an unknown command or one that is not allowed."""
     if command not in TRANSITIONS:
         raise Rejected(f"'{command}' is not a state command; use one of {', '.join(TRANSITIONS)}")
     found = TRANSITIONS[command].get(state)

@@ -42,7 +42,7 @@ def commanded_topics() -> set[str]:
 
 
 class NameTaken(RuntimeError):
-    """Another simulator of the same world runs on this master; the message says what to do."""
+    """Another simulator of the same world runs on this master; the message lists what to do."""
 
 
 def require_free(name: str) -> None:

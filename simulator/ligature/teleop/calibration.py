@@ -32,7 +32,7 @@ BROKEN = np.full((4, 4), np.nan)
 
 
 class Unclear(ValueError):
-    """Motions that do not show the axes; the message says what to do."""
+    """Motions that do not show the axes; the message describes the right motion."""
 
 
 @dataclass(frozen=True, eq=False)

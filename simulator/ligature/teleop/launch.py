@@ -66,7 +66,7 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
 
     A device drives the arm that has its root link, one without a root link the first arm that is free; it may be
     switched to all others. Where no arm is left it drives its proxy, if the scene has it. Devices that cannot drive are
-    passed over; the notes say why, and what of the others has no effect.
+    passed over; the notes give the reason, and what of the others has no effect.
     """
     arms = [arm.name for arm in scene.arms if arm.kind is ArmKind.PSM]
     specs, wanted, notes = _specs(scene, devices)

@@ -197,8 +197,8 @@ class Teleop:
 
     def _arms_ready(self, tips: dict[str, Tip | None]) -> bool:
         """Whether all arms that are to be driven are ready; a replay sends no sooner."""
-        led = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
-        return all(tips[arm.name] is not None and not arm.obstacle() for arm in led)
+        driven = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
+        return all(tips[arm.name] is not None and not arm.obstacle() for arm in driven)
 
     def _take_in(self, now: float, tips: dict[str, Tip | None]) -> None:
         """Empty the queue; of a leader that drives, no reading is passed over but those that came too late to
