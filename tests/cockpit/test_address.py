@@ -18,7 +18,7 @@ def test_addresses_are_read() -> None:
 
 @pytest.mark.parametrize("text", ["8080", "localhost", ":8080", "host:", "host:99999", "host:8a"])
 def test_what_is_no_address_is_reported(text: str) -> None:
-    with pytest.raises(AddressError, match="is no ADDRESS:PORT such as 127.0.0.1:8080"):
+    with pytest.raises(AddressError, match="is not ADDRESS:PORT; write for example 127.0.0.1:8080"):
         read_address(text)
 
 

@@ -47,7 +47,7 @@ def test_devices_that_nobody_knows_are_passed_over_and_none_at_all_is_reported(s
     config = of_devices(scene, [device("a", "Abacus"), device("b", "Razer Hydra")], SMALL)
     assert list(config.pairs) == ["b"]
     assert config.notes[0].startswith("a: hardware 'Abacus' is unknown; known names contain mtm")
-    with pytest.raises(AdfError, match="none of its input devices can drive an arm; a: no hardware 'Abacus' is known"):
+    with pytest.raises(AdfError, match="none of its input devices can drive an arm; a: hardware 'Abacus' is unknown"):
         of_devices(scene, [device("a", "Abacus")], SMALL)
 
 
@@ -133,10 +133,10 @@ def test_each_input_device_of_others_is_understood_or_refused_with_a_reason(
                 config = of_devices(scene, [each], file)
             except AdfError as error:
                 assert each.root_link, each
-                assert f"{each.key}: its root link '{each.root_link}' is of no arm" in str(error)
+                assert f"{each.key}: its root link '{each.root_link}' belongs to no arm" in str(error)
                 continue
             (spec,) = config.devices.values()
             assert spec.settings.scale == float(each.settings["workspace scaling"])
             assert spec.force is not None
         notes = "\n".join(of_devices(scene, devices, file).notes)
-        assert notes.count("because no arm is left") + notes.count("is of no arm") == 5, file
+        assert notes.count("because no arm is left") + notes.count("belongs to no arm") == 5, file

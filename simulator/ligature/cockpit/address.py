@@ -58,7 +58,7 @@ def check_token(address: Address, token: str) -> None:
         raise AddressError(f"the cockpit's token has {len(token)} characters; it must have at least {LEAST_TOKEN}")
     if not token and not address.loopback:
         raise AddressError(
-            f"the cockpit at {address.host} could be reached by other machines: "
+            f"the cockpit at {address.host} is reachable from other machines: "
             f"set a token of at least {LEAST_TOKEN} characters in {TOKEN_VARIABLE}, or serve 127.0.0.1"
         )
 
