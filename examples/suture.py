@@ -16,7 +16,7 @@ from pathlib import Path
 import ligature
 import numpy as np
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks import Measures, Monitor, SutureScore, judge_suture
@@ -98,8 +98,8 @@ class Surgeon:
         arm = self.arms[name]
         try:
             arm.move_cp(inverse(self._base[name]) @ T_world_tool)
-        except Refused as refused:
-            raise Failure(str(refused)) from refused
+        except Rejected as rejection:
+            raise Failure(str(rejection)) from rejection
         while arm.is_busy:
             self.wait(0.02)
 
@@ -109,8 +109,8 @@ class Surgeon:
         for T in poses:
             try:
                 arm.servo_cp(inverse(self._base[name]) @ T)
-            except Refused as refused:
-                raise Failure(str(refused)) from refused
+            except Rejected as rejection:
+                raise Failure(str(rejection)) from rejection
             self.wait(STREAM)
 
     def line(self, name: str, goal: Array, speed: float = 0.045) -> None:

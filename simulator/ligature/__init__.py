@@ -6,7 +6,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ligature.in_process import Simulation
+    from ligature.camera_simulation import Simulation
     from ligature.model.load import SceneError, load
     from ligature.model.scene import Scene
 
@@ -17,7 +17,7 @@ __all__ = ["Scene", "SceneError", "Simulation", "load"]
 _HOMES = {
     "Scene": "ligature.model.scene",
     "SceneError": "ligature.model.load",
-    "Simulation": "ligature.in_process",
+    "Simulation": "ligature.camera_simulation",
     "load": "ligature.model.load",
 }
 

@@ -53,6 +53,15 @@ def test_a_reader_gets_the_newest_state(block: Block) -> None:
     reader.close()
 
 
+def test_attach_takes_the_former_name_of_its_timeout() -> None:
+    with pytest.warns(DeprecationWarning, match="'patience' is deprecated; write 'timeout'") as warned:
+        begin = time.monotonic()
+        with pytest.raises(BusError, match="no simulator writes to shared memory"):
+            Block.attach("ligature-1-00", DTYPE, patience=0.0)
+    assert time.monotonic() - begin < 60.0, "the default timeout was used"
+    assert warned[0].filename == __file__
+
+
 def test_states_are_never_torn() -> None:
     name = f"ligature-{os.getpid()}-0000beef"
     with subprocess.Popen([sys.executable, "-c", WRITER, name], stdout=subprocess.PIPE, text=True) as writer:
@@ -110,7 +119,9 @@ def test_too_little_shared_memory_is_reported_before_anything_runs(monkeypatch: 
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "posix_fallocate", full)
-    with pytest.raises(BusError, match=r"no 7 MB of shared memory for '/dev/shm/ligature-\d+-0+2': No space left"):
+    with pytest.raises(
+        BusError, match=r"cannot allocate 7 MB of shared memory for '/dev/shm/ligature-\d+-0+2': No space left"
+    ):
         Block.create(f"ligature-{os.getpid()}-00000002", DTYPE)
     assert not (FOLDER / f"ligature-{os.getpid()}-00000002").exists()
 

@@ -36,7 +36,7 @@ def test_other_bytes_are_rejected_or_are_a_message(data: bytes) -> None:
     try:
         decode(data)
     except CodecError as error:
-        assert "no command" in str(error)
+        assert "invalid command bytes" in str(error)
 
 
 @given(messages(), st.data())

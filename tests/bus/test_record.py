@@ -88,7 +88,7 @@ def test_a_part_that_the_disk_does_not_take_leaves_nothing(tmp_path: Path) -> No
 def test_a_journal_that_is_too_short_is_reported(tmp_path: Path) -> None:
     writer = RecordWriter(tmp_path / "run.record", HEADER)
     part = Excerpt(tmp_path / "part.record", writer, writer.moment(1, "ef" * 32))
-    with pytest.raises(OSError, match="shorter than it was"):
+    with pytest.raises(OSError, match="has been truncated"):
         part.finish(Moment(2, "01" * 32, 100_000))
     assert not list(tmp_path.glob("part*"))
 
@@ -98,19 +98,19 @@ def test_a_record_that_is_cut_off_is_reported(whole: Path, share: float) -> None
     data = whole.read_bytes()
     begin = data.index(b"\n") + 1
     whole.write_bytes(data[: begin + int(share * (len(data) - begin))])
-    with pytest.raises(RecordError, match=r"cut off after \d commands: the run that wrote it did not come to its end"):
+    with pytest.raises(RecordError, match=r"cut off after \d commands: the recorded run did not end properly"):
         Record.read(whole)
 
 
 def test_what_is_no_record_is_reported(tmp_path: Path, whole: Path) -> None:
     other = tmp_path / "other"
     for data, message in (
-        (b"", "is no record of a run"),
-        (b"#ROSBAG V2.0\nabc", "is no record of a run"),
+        (b"", "not a record of a run"),
+        (b"#ROSBAG V2.0\nabc", "not a record of a run"),
         (b'{"format": "ligature record 9", "options": "", "begin": ""}\n', "this version reads 'ligature record 2'"),
-        (b'{"format": "ligature record 2", "begin": ""}\n', "is no record of a run"),
-        (whole.read_bytes()[:-44] + struct.pack("<QI", 9, 70_000), "no frame of a record"),
-        (whole.read_bytes()[:-44] + struct.pack("<QI", 2, 8), "no frame of a record"),
+        (b'{"format": "ligature record 2", "begin": ""}\n', "not a record of a run"),
+        (whole.read_bytes()[:-44] + struct.pack("<QI", 9, 70_000), "invalid frame"),
+        (whole.read_bytes()[:-44] + struct.pack("<QI", 2, 8), "invalid frame"),
     ):
         other.write_bytes(data)
         with pytest.raises(RecordError, match=message):
@@ -121,13 +121,13 @@ def test_bytes_that_are_no_command_are_reported_with_their_place(whole: Path) ->
     data = whole.read_bytes()
     begin = data.index(b"\n") + 1
     whole.write_bytes(data[:begin] + struct.pack("<QI", 1, 3) + b"\xfe\x00\x00" + data[begin:])
-    with pytest.raises(RecordError, match=rf"at byte {begin + 12}: these bytes are no command"):
+    with pytest.raises(RecordError, match=rf"at byte {begin + 12}: invalid command bytes"):
         Record.read(whole)
 
 
 def test_records_replace_nothing(whole: Path) -> None:
     before = whole.read_bytes()
-    with pytest.raises(FileExistsError, match="records replace nothing"):
+    with pytest.raises(FileExistsError, match="choose another name"):
         RecordWriter(whole, HEADER)
     assert whole.read_bytes() == before
 

@@ -57,17 +57,19 @@ def test_flags_without_effect_are_accepted_and_reported() -> None:
     assert run.notes == (
         "-n (number of input devices) has no effect here",
         "--plugins (simulator plug-ins) has no effect here",
-        "-t 0: the step is fixed all the same; simulated time falls behind on a machine that is too slow",
+        "-t 0: the step is fixed here anyway; simulated time falls behind on a machine that is too slow",
     )
 
 
 def test_a_rate_of_no_whole_ticks_is_rounded_and_reported() -> None:
-    assert options("-p 120").notes == ("-p 120: an update has whole ticks of 1 ms: 8 ms, 125 a second",)
+    assert options("-p 120").notes == (
+        "-p 120: an update is a whole number of 1 ms ticks; using 8 ms, 125 updates per second",
+    )
 
 
 def test_a_rate_beyond_one_tick_is_capped_and_reported() -> None:
     run = options("-p 2000")
-    assert run.rate == 1000 and run.notes == ("-p 2000: a tick has 1 ms; 1000 updates per second are made",)
+    assert run.rate == 1000 and run.notes == ("-p 2000: a tick lasts 1 ms; using 1000 updates per second",)
 
 
 @pytest.mark.parametrize(

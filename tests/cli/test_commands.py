@@ -50,6 +50,18 @@ def test_bench_of_a_bad_file_ends_with_two(tmp_path: Path) -> None:
     assert done.returncode == 2 and "does not exist" in " ".join(done.stdout.split())  # rich wraps long paths
 
 
+def test_score_takes_the_former_name_of_its_timeout(tmp_path: Path) -> None:
+    bag = tmp_path / "none.bag"
+    former, current = (
+        ligature("score", "suture", bag, "--patience", "2"),
+        ligature("score", "suture", bag, "--timeout", "2"),
+    )
+    assert "'--patience' is deprecated; write '--timeout'" in former.stderr
+    assert "deprecated" not in current.stderr
+    assert (former.returncode, former.stdout) == (current.returncode, current.stdout)
+    assert "--patience" not in ligature("score", "--help").stdout
+
+
 def test_a_list_of_indices_that_is_none_is_reported() -> None:
     done = ligature("bench", SMALL, "-l", "1,x")
     assert done.returncode == 2 and "'1,x' is not a list of whole numbers" in done.stdout + done.stderr

@@ -41,7 +41,7 @@ def test_fmt_orders_keys_and_keeps_what_it_cannot_hold(tmp_path: Path) -> None:
     assert "collision geometry: {x: 1.0, y: 2.0, z: 3.0}\n" in text
     run("fmt", "--check", file)
     file.write_text(MODEL + "# a remark\n")
-    assert "left alone, since its comments would be lost" in run("fmt", file, status=1)
+    assert "not written, because its comments would be lost" in run("fmt", file, status=1)
     assert file.read_text().endswith("# a remark\n")
     run("fmt", "--lossy", file)
     assert file.read_text() == text

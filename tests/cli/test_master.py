@@ -46,14 +46,14 @@ def test_a_program_that_never_answers_is_given_up_soon(listener: socket.socket) 
 def test_a_taken_port_is_reported(listener: socket.socket) -> None:
     port = listener.getsockname()[1]
     assert master.obstacle(f"http://localhost:{port}") == (
-        f"port {port} is taken by another program that is no ROS master; set ROS_MASTER_URI to a free port"
+        f"another program, not a ROS master, uses port {port}; set ROS_MASTER_URI to a free port"
     )
 
 
 @pytest.mark.parametrize("uri", ["foo", "http://", "http://localhost:notaport", "http://localhost:99999", "ftp://a:1"])
 def test_a_text_that_is_no_address_is_reported(uri: str) -> None:
     assert not master.master_answers(uri)
-    assert master.obstacle(uri) == f"ROS_MASTER_URI '{uri}' is no address such as http://127.0.0.1:11311"
+    assert master.obstacle(uri) == f"ROS_MASTER_URI '{uri}' is not an address; write one such as http://127.0.0.1:11311"
 
 
 def test_a_master_elsewhere_is_not_started_here() -> None:

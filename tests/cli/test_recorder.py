@@ -110,7 +110,7 @@ def test_two_parts_of_a_run_are_simulated_again_bit_for_bit(start: Callable[...,
         status, said = again(Path("recordings", f"{name.removesuffix('.record')}.record"))
         assert status == 0, said
         assert "the same bits: " in said
-        found = re.search(r"recorded were the last (\S+) s", said)
+        found = re.search(r"the recording covers the last (\S+) s", said)
         assert found and float(found[1]) == pytest.approx(length, abs=0.01)
         run.said.clear()
     assert sorted(path.name for path in Path("recordings").iterdir()) == ["first.record", "second.record"]
@@ -151,15 +151,15 @@ def test_what_cannot_be_recorded_is_reported_and_the_run_goes_on(
     if what == "exists":
         Path("recordings").mkdir()
         Path("recordings/mine.record").write_text("mine")
-        words = "nothing is recorded: 'recordings/mine.record' exists already"
+        words = "cannot record: 'recordings/mine.record' exists already"
     elif what == "folder":
         Path("recordings").write_text("a file")
-        words = "nothing is recorded: File exists: 'recordings/mine.record'"
+        words = "cannot record: File exists: 'recordings/mine.record'"
     elif what == "no page":
-        words = "nothing can be recorded in this run: the run was begun without a page"
+        words = "cannot record this run: the run was begun without a page"
     if what == "name":
         run.push(Recording("../mine"))
-        assert run.loop._mailbox.last_rejection.startswith("'../mine' is no name of a recording")
+        assert run.loop._mailbox.last_rejection.startswith("'../mine' is not a valid name of a recording")
     else:
         run.push(Recording("mine"))
         run.hears(words)
@@ -196,10 +196,10 @@ def test_a_journal_without_room_is_reported_when_a_recording_is_asked_for(
         os.dup2(full.fileno(), run.loop._recorder._journal._file.fileno())  # type: ignore[union-attr]
     run.push(PlaceJp(0, HOME))
     run.push(Recording("part"))
-    run.hears("nothing is recorded: No space left on device: 'recordings/part.record'")
+    run.hears("cannot record: No space left on device: 'recordings/part.record'")
     run.loop._recorder.flush()
     run.push(Recording("part"))
-    run.hears("nothing can be recorded in this run: No space left on device")
+    run.hears("cannot record this run: No space left on device")
     run.updates(5)
     run.loop.end()
     assert not list(Path("recordings").iterdir())

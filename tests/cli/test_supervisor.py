@@ -85,7 +85,7 @@ def test_a_run_that_cannot_have_a_master_states_why_and_leaves_nothing(
     assert lines == [
         f"loading {tmp_path}/[red]launch.yaml",
         "-t 0: the step is fixed",
-        "ROS_MASTER_URI 'foo' is no address such as http://127.0.0.1:11311",
+        "ROS_MASTER_URI 'foo' is not an address; write one such as http://127.0.0.1:11311",
         "ended",
     ]
     assert not list(FOLDER.glob(f"ligature-{os.getpid()}-*"))

@@ -184,7 +184,7 @@ def test_a_number_that_is_not_finite_leaves_the_last_command(bad: float, caplog:
     body.set_rot([0, 0, 0, bad])
     assert body._cmd.joint_cmds == [0, 0.5] and body._cmd.wrench.force.x == 1 and body._cmd.twist.linear.y == 0
     assert body._cmd.cartesian_cmd_type == FORCE
-    assert f"/ambf/env/arm: {bad} cannot be commanded; the last command holds" in caplog.text
+    assert f"/ambf/env/arm: {bad} are not valid commands; keeping the previous command" in caplog.text
 
 
 def test_active_bodies_ask_for_their_lists() -> None:

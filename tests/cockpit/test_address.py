@@ -18,7 +18,7 @@ def test_addresses_are_read() -> None:
 
 @pytest.mark.parametrize("text", ["8080", "localhost", ":8080", "host:", "host:99999", "host:8a"])
 def test_what_is_no_address_is_reported(text: str) -> None:
-    with pytest.raises(AddressError, match="is no ADDRESS:PORT such as 127.0.0.1:8080"):
+    with pytest.raises(AddressError, match="is not ADDRESS:PORT; write for example 127.0.0.1:8080"):
         read_address(text)
 
 
@@ -40,7 +40,7 @@ def test_a_taken_port_is_reported() -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
-        with pytest.raises(AddressError, match="cannot be served at 127.0.0.1:.*: Address already in use"):
+        with pytest.raises(AddressError, match="cannot serve the cockpit at 127.0.0.1:.*: Address already in use"):
             check_free(Address("127.0.0.1", other.getsockname()[1]))
 
 

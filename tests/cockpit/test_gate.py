@@ -113,7 +113,7 @@ def look_in(person: Person, port: int) -> None:
     field = person.find("//input[@name='token']")
     field.send_keys("guess of a stranger")
     field.submit()
-    person.sees("This is not the token")
+    person.sees("The token is wrong")
     assert SECRET not in person.driver.page_source
     field = person.find("//input[@name='token']")
     field.send_keys(TOKEN)

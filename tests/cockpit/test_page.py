@@ -61,7 +61,7 @@ def test_what_the_page_records_is_simulated_again_bit_for_bit(served: Served, op
             until(lambda: answer in operator.text, answer, 10.0)
         return answer in operator.text
 
-    until(lambda: told("../mine", "'../mine' is no name of a recording"), "a bad name is refused")
+    until(lambda: told("../mine", "'../mine' is not a valid name of a recording"), "a bad name is rejected")
     until(lambda: told("mine", "recording to 'recordings/mine.record' from"), "what happens is recorded")
     before = served.arm("PSM1")["measured_js"][0, 0]
     operator.drags(operator.slider("yaw °"), 8)
@@ -75,7 +75,7 @@ def test_what_the_page_records_is_simulated_again_bit_for_bit(served: Served, op
     assert again.state["arm"][0][served.names.index("PSM1")]["homed"]
     again.close()
     operator.clicks("Record")
-    operator.sees("nothing is recorded: 'recordings/mine.record' exists already; records replace nothing")
+    operator.sees("cannot record: 'recordings/mine.record' exists already; choose another name")
     assert [path.name for path in folder.rglob("*.*")] == ["mine.record"]
 
 
@@ -152,7 +152,7 @@ def test_who_watches_cannot_command(served: Served, operator: Person) -> None:
         operator.opens(served.url)
         operator.sees("operated")
         operator.clicks("Operate")
-        operator.sees("Somebody operates already")
+        operator.sees("Another browser has control")
         assert not driver.find_elements("css selector", "[role=slider]")
         assert "Give up control" not in operator.text
     finally:

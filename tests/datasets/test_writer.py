@@ -99,7 +99,7 @@ def test_an_error_leaves_nothing_behind(simulation: ligature.Simulation, tmp_pat
 def test_what_exists_is_not_replaced(simulation: ligature.Simulation, tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     path.write_text("mine")
-    with pytest.raises(DatasetError, match="exists already; datasets replace nothing"):
+    with pytest.raises(DatasetError, match="exists already; choose another name"):
         DatasetWriter(path, simulation)
     assert path.read_text() == "mine"
 
@@ -140,5 +140,5 @@ def test_a_file_that_cannot_grow_is_reported_and_leaves_nothing(tmp_path: Path) 
         timeout=120,
     )
     assert done.returncode == 7, done.stderr[-2000:]
-    assert f"the dataset '{path}' cannot be written" in done.stdout
+    assert f"cannot write the dataset '{path}'" in done.stdout
     assert list(tmp_path.iterdir()) == []

@@ -135,7 +135,7 @@ def test_what_the_arm_refuses_is_reported_and_the_episode_goes_on() -> None:
     [
         ({"task": "knit"}, "task must be one of reach, pick, insert"),
         ({"action": "torque"}, "action must be one of cartesian, joint"),
-        ({"arm": "MTML"}, "'MTML' is no PSM"),
+        ({"arm": "MTML"}, "'MTML' is not a PSM"),
         ({"arm": "PSM9"}, "no arm is called 'PSM9'"),
     ],
 )

@@ -10,7 +10,7 @@ import pytest
 from ligature.model.frames import frame, matrix_pose7, pose7_matrix, rpy_matrix
 from ligature.robots.arm import Arm
 from ligature.robots.impedance import CartesianImpedance
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 from ligature.robots.psm_arm import LEAST_DEPTH, MAX_ACCELERATION, MAX_VELOCITY, PsmArm
 
 from tests.robots.conftest import DT, advance
@@ -34,7 +34,7 @@ def test_set_points_are_clipped_to_the_limits(ready: PsmArm) -> None:
 def test_wrong_joint_arrays_are_refused_and_change_nothing(ready: PsmArm, values: list[float]) -> None:
     before = ready.setpoint_js().position
     for request in (ready.servo_jp, ready.move_jp, ready.servo_jr, ready.move_jr, ready.servo_jf, ready.servo_jv):
-        with pytest.raises(Refused, match="takes"):
+        with pytest.raises(Rejected, match="takes"):
             request(values)
     assert ready.setpoint_js().position == pytest.approx(before)
     assert not ready.is_busy
@@ -133,7 +133,7 @@ def test_a_pose_that_cannot_be_reached_is_refused_with_the_reason(ready: PsmArm)
     above = ready.setpoint_cp()
     above[2] = 0.1
     for request in (ready.servo_cp, ready.move_cp):
-        with pytest.raises(Refused, match=r"no inverse kinematics of PSM1 at .*0\.1\].*above the remote centre"):
+        with pytest.raises(Rejected, match=r"no inverse kinematics of PSM1 at .*0\.1\].*above the remote centre"):
             request(above)
     assert not ready.is_busy
 
@@ -147,7 +147,7 @@ def test_a_pose_that_cannot_be_reached_is_refused_with_the_reason(ready: PsmArm)
     ],
 )
 def test_what_is_no_pose_is_refused(ready: PsmArm, pose: list[float], why: str) -> None:
-    with pytest.raises(Refused, match=why):
+    with pytest.raises(Rejected, match=why):
         ready.servo_cp(pose)
 
 
@@ -157,7 +157,7 @@ def test_cartesian_motion_needs_depth_and_keeps_it(ready: PsmArm) -> None:
     ready.servo_cp(goal)
     assert ready.depth == pytest.approx(LEAST_DEPTH, abs=1e-9)
     ready.servo_jp(np.zeros(6))
-    with pytest.raises(Refused, match="is 35 mm below the remote centre; insert it to 45 mm first"):
+    with pytest.raises(Rejected, match="is 35 mm below the remote centre; insert it to 45 mm first"):
         ready.servo_cp(goal)
 
 
@@ -233,14 +233,14 @@ def test_another_instrument_brings_its_own_limits(ready: PsmArm, told: Told) -> 
     assert told(ready, "tool_type") == ["MEGA_NEEDLE_DRIVER:420194"]
     ready.servo_jp([0, 0, 0.12, 0, 1.39, 0])
     assert ready.setpoint_js().position[4] == pytest.approx(1.2217)
-    with pytest.raises(Refused, match="set_tool_type: there is no instrument 1"):
+    with pytest.raises(Rejected, match="set_tool_type: there is no instrument 1"):
         ready.set_tool_type("SPOON:1")
 
 
 def test_without_its_tool_an_arm_is_not_homed(ready: PsmArm) -> None:
     ready.emulate_tool_present(False)
     assert not ready.is_homed
-    with pytest.raises(Refused, match="not homed"):
+    with pytest.raises(Rejected, match="not homed"):
         ready.move_jp(np.zeros(6))
     ready.emulate_tool_present(True)
     ready.home()
@@ -250,7 +250,7 @@ def test_without_its_tool_an_arm_is_not_homed(ready: PsmArm) -> None:
 
 @pytest.mark.parametrize("ratio", [0.0, -1.0, 1.5])
 def test_ratios_outside_their_range_are_refused(ready: PsmArm, ratio: float) -> None:
-    with pytest.raises(Refused, match="above 0 and at most 1"):
+    with pytest.raises(Rejected, match="above 0 and at most 1"):
         ready.trajectory_j_set_ratio(ratio)
     assert ready.joints.ratio_v == 1.0
 
@@ -263,7 +263,7 @@ def test_a_lasting_following_error_is_a_fault_that_disable_ends(ready: PsmArm, t
     assert ready.operating_state.state.name == "FAULT"
     (error,) = told(ready, "error")
     assert "joint yaw is 0.9 away from its set-point" in str(error)
-    with pytest.raises(Refused):
+    with pytest.raises(Rejected):
         ready.enable()
     ready.disable()
     ready.enable()
@@ -276,9 +276,9 @@ def test_forward_and_inverse_kinematics_on_demand(ready: PsmArm) -> None:
     pose = ready.forward_kinematics(q, local=True)
     assert ready.inverse_kinematics(np.zeros(6), pose) == pytest.approx(q, abs=1e-9)
     assert ready.forward_kinematics(q[:3]) == pytest.approx(ready.forward_kinematics([*q[:3], 0, 0, 0]))
-    with pytest.raises(Refused, match="too many joints"):
+    with pytest.raises(Rejected, match="too many joints"):
         ready.forward_kinematics(np.zeros(8))
-    with pytest.raises(Refused, match="incorrect number of joints"):
+    with pytest.raises(Rejected, match="incorrect number of joints"):
         ready.inverse_kinematics(np.zeros(4), pose)
 
 

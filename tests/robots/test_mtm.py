@@ -108,5 +108,5 @@ def test_left_and_right_differ_in_their_limits_only():
     q = np.linspace(-0.2, 0.3, 7)
     np.testing.assert_array_equal(left.forward(q), right.forward(q))
     assert left.lower[3] == -right.upper[3]
-    with pytest.raises(ValueError, match="there is no middle MTM; state left or right"):
+    with pytest.raises(ValueError, match="'middle' is not a side of the console; use 'left' or 'right'"):
         Mtm("middle")

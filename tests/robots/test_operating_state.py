@@ -10,7 +10,7 @@ from ligature.model.frames import matrix_pose7
 from ligature.robots import psm_arm
 from ligature.robots.axes import Axes
 from ligature.robots.impedance import CartesianImpedance
-from ligature.robots.operating_state import Refused, State
+from ligature.robots.operating_state import Rejected, State, action
 from ligature.robots.plant import IdealPlant
 from ligature.robots.psm import Psm
 from ligature.robots.psm_arm import PsmArm
@@ -150,7 +150,7 @@ def test_a_state_command_drives_where_the_table_states(state, command):
     arm, expected = MADE[state](), COMMANDS[state, command]
     before = arm.operating_state
     if expected is REFUSED:
-        with pytest.raises(Refused, match=f"'{command}' is not allowed in state {before.state.name}, only in "):
+        with pytest.raises(Rejected, match=f"'{command}' is not allowed in state {before.state.name}, only in "):
             arm.state_command(command)
         settle(arm)
         assert arm.operating_state == before
@@ -175,7 +175,7 @@ def test_every_accepted_command_is_answered_by_a_new_event(state):
 def test_a_word_that_is_no_command_is_refused(state):
     arm = MADE[state]()
     before = arm.operating_state
-    with pytest.raises(Refused, match="'dance' is no state command; there are enable, disable, "):
+    with pytest.raises(Rejected, match="'dance' is not a state command; use one of enable, disable, "):
         arm.state_command("dance")
     assert arm.operating_state == before
 
@@ -193,7 +193,7 @@ def test_motion_is_for_homed_arms_only(state, motion):
         assert arm.operating_state == before
         assert told(arm, "goal_reached") == ([True] if motion in MOVES else [])
         return
-    with pytest.raises(Refused, match="not ready"):
+    with pytest.raises(Rejected, match="not ready"):
         MOTIONS[motion](arm)
     run(arm, 0.1)
     assert arm.operating_state == before
@@ -214,7 +214,7 @@ def test_a_moving_arm_stops_for_a_state_command(command, motion):
         stopped = arm.setpoint_js().position
         run(arm, 0.5)
         np.testing.assert_allclose(arm.setpoint_js().position, stopped, atol=1e-12)
-    with pytest.raises(Refused):
+    with pytest.raises(Rejected):
         MOTIONS[motion](arm)
 
 
@@ -268,7 +268,7 @@ def test_relative_moves_add_to_the_goal_of_the_running_move():
 def test_numbers_that_do_not_fit_change_nothing(motion, bad):
     arm = homed()
     before = arm.setpoint_js().position
-    with pytest.raises(Refused, match=rf"{motion} takes|move_jp takes"):
+    with pytest.raises(Rejected, match=rf"{motion} takes|move_jp takes"):
         getattr(arm, motion)(bad)
     run(arm, 0.05)
     np.testing.assert_array_equal(arm.setpoint_js().position, before)
@@ -280,5 +280,12 @@ def test_a_tool_too_high_takes_no_cartesian_motion():
     arm.move_jp(np.where(np.arange(6) == 2, arm.kinematics.insertion_at(0.03), psm_arm.HOME))
     settle(arm)
     for motion in ("servo_cp", "move_cp", "servo_cv"):
-        with pytest.raises(Refused, match="30 mm below the remote centre; insert it to 45 mm first"):
+        with pytest.raises(Rejected, match="30 mm below the remote centre; insert it to 45 mm first"):
             MOTIONS[motion](arm)
+
+
+def test_the_former_name_of_a_rejection_warns_and_catches_it() -> None:
+    with pytest.warns(DeprecationWarning, match="'Refused' is deprecated; write 'Rejected'"):
+        from ligature.robots.operating_state import Refused
+    with pytest.raises(Refused):
+        action("dance", State.ENABLED)

@@ -74,7 +74,7 @@ class Link:
     def talk(self, name: str, type_: Any, latch: bool = False) -> None:
         self._said[name] = self.rospy.Publisher(self.topic(name), type_, latch=latch, queue_size=10, tcp_nodelay=True)
 
-    def tell(self, name: str, message: Any) -> None:
+    def publish(self, name: str, message: Any) -> None:
         """Publish a message as it is."""
         self._said[name].publish(message)
 
@@ -82,7 +82,7 @@ class Link:
         """Publish a message, stamped with now."""
         if hasattr(message, "header"):
             message.header.stamp = self.rospy.Time.now()
-        self.tell(name, message)
+        self.publish(name, message)
 
     def hear(self, name: str) -> Any:
         """The newest fresh message of ``name``; a zero stamp is an error."""

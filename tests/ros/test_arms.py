@@ -452,7 +452,7 @@ def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     base.header.frame_id = "table"
     local, reference = arm.hear("local/measured_cp"), arm.hear("measured_cp").header.frame_id
     before = arm.measured_cp()
-    arm.tell("set_base_frame", base)
+    arm.publish("set_base_frame", base)
     deadline = time.monotonic() + 5.0
     while any(arm.hear(reading).header.frame_id != "table" for reading in ("measured_cp", "setpoint_cp")):
         assert time.monotonic() < deadline
@@ -465,7 +465,7 @@ def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     assert arm.move_cp(there).wait()
     back = PoseStamped(pose=pose_message(between(before, pose7(local.pose))))
     back.header.frame_id = reference
-    arm.tell("set_base_frame", back)
+    arm.publish("set_base_frame", back)
     time.sleep(0.3)
 
 

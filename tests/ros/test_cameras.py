@@ -209,7 +209,7 @@ def test_parameters_change_lenses_and_faults_of_a_running_camera(
     infos = listen(f"{NS}/cameraR/CameraInfo", CameraInfo)
     assert infos.wait().K[0] == pytest.approx(240 / np.tan(0.45))
     node.set_param(f"{NS}/cameraR/near_plane", -1.0)
-    simulator.wait_for("near_plane is -1.0; expected a number not below 0")
+    simulator.wait_for("near_plane is -1.0; expected a number of at least 0")
     node.set_param(f"{NS}/cameraR/near_plane", 0.05)
     node.set_param(f"{NS}/cameraR/field_view_angle", 0.6)
     node.set_param(f"{NS}/cameraR/sensor/distortion", [-0.1, 0, 0, 0, 0])
@@ -268,7 +268,7 @@ def test_a_killed_camera_process_comes_back(simulator: Program, listen: Callable
     images.wait()
     before = world.wait().sim_time
     os.kill(simulator.children()["render_process"], signal.SIGKILL)
-    simulator.wait_for("the render process ended with status -9; starting it again")
+    simulator.wait_for("the render process ended with status -9; restarting it")
     seen = images.messages[-1].header.stamp
     images.wait(lambda m: m.header.stamp.to_sec() > seen.to_sec() + 0.5, seconds=30)
     assert world.messages[-1].sim_time > before + 0.5

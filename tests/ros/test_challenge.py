@@ -128,7 +128,7 @@ def test_a_script_of_the_second_generation_runs_with_the_systems_python(stage: S
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "joints 8 at 0.1 0.1\nleft []" in done.stdout
-    assert "Traceback" not in done.stderr and "cannot be sent" not in done.stderr + done.stdout
+    assert "Traceback" not in done.stderr and "cannot send the command" not in done.stderr + done.stdout
 
 
 def test_an_arm_is_found_with_its_tool_and_knows_its_joints_within_half_a_second(psm1: Psm, psm2: Psm) -> None:

@@ -295,7 +295,7 @@ def test_handles_live_on_when_the_simulator_dies_and_comes_back(
     world.reset()
     arm.set_joint_pos(0, 0.2)
     assert time.monotonic() - begin < 2.0
-    assert "nobody listens to /ambf/env/World/Command/Reset: is the simulator running?" in caplog.text
+    assert "no subscriber of /ambf/env/World/Command/Reset: is the simulator running?" in caplog.text
     last = arm.get_sim_step()
     again = start(BIN / "ligature", "run", SMALL, "-p", "500")
     again.wait_for("first state published")

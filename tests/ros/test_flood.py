@@ -105,7 +105,7 @@ def test_nothing_that_a_client_sends_ends_the_run_or_fills_its_memory(
     world.wait(lambda message: message.sim_step > step, 20.0)
     assert simulator.children() == pids, simulator.output
     assert megabytes(pids["ros_process"]) < before + GROWTH
-    assert "bytes is refused; at most" in simulator.output
+    assert "bytes; the maximum is" in simulator.output
 
 
 @pytest.mark.slow

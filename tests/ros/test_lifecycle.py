@@ -102,7 +102,7 @@ def test_a_killed_ros_process_is_back_within_three_seconds_and_physics_never_pau
     wall, simulated = back[0][0] - before[0], back[0][1] - before[1]
     # a pause would leave it near zero; a busy machine may be slower than the wall clock meanwhile
     assert simulated > 0.5 * wall
-    assert "the ros process ended with status -9; starting it again" in program.output
+    assert "the ros process ended with status -9; restarting it" in program.output
     assert program.end() == 0
 
 

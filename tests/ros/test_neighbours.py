@@ -17,7 +17,7 @@ def first(start: Callable[..., Program]) -> Iterator[Program]:
     program = start(BIN / "ligature", "run", SMALL, "-p", "100")
     program.wait_for("first state published")
     yield program
-    assert "starting it again" not in program.output
+    assert "restarting it" not in program.output
 
 
 def test_a_second_simulator_of_the_same_world_ends_and_states_what_to_do(

@@ -49,10 +49,10 @@ def test_projection_and_mode_switch(camera: Camera, light: Light) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"near_plane": -1.0}, "near_plane is -1.0; expected a number not below 0"),
+        ({"near_plane": -1.0}, "near_plane is -1.0; expected a number of at least 0"),
         ({"near_plane": 5.0, "far_plane": 2.0}, "near_plane 5 and far_plane 2 must satisfy 0 < near < far"),
         ({"field_view_angle": 4.0}, "field_view_angle 4 must be below pi"),
-        ({"field_view_angle": "wide"}, "field_view_angle is 'wide'; expected a number not below 0"),
+        ({"field_view_angle": "wide"}, "field_view_angle is 'wide'; expected a number of at least 0"),
         ({"projection": "FISHEYE"}, "projection is 'FISHEYE'; expected PERSPECTIVE or ORTHOGRAPHIC"),
         ({"mode": True}, "mode is True; expected MONO or STEREO"),
     ],
@@ -66,7 +66,7 @@ def test_a_camera_parameter_that_is_invalid_is_named(camera: Camera, values: dic
     ("values", "message"),
     [
         ({"sensor/distortion": [1, 2]}, r"sensor/distortion is \[1, 2\]; expected the 5 numbers k1, k2, p1, p2, k3"),
-        ({"sensor/noise": -0.1}, "sensor/noise is -0.1; expected a number not below 0"),
+        ({"sensor/noise": -0.1}, "sensor/noise is -0.1; expected a number of at least 0"),
         ({"sensor/exposure": float("nan")}, "sensor/exposure is nan; expected a finite number"),
     ],
 )

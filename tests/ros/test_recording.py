@@ -137,7 +137,7 @@ def test_a_record_is_not_replayed_on_another_scene(session: Session) -> None:
     other = ROOT / "scenes" / "suturing_small" / "launch.yaml"
     status, said = replayed(session.record, other)
     assert status == 1
-    assert "begins otherwise than when the run was recorded" in said
+    assert "starts in another state than the recorded run" in said
 
 
 def test_the_task_is_scored_from_the_record_and_from_the_bag(session: Session) -> None:
@@ -161,7 +161,7 @@ def test_what_cannot_be_scored_is_reported(session: Session, tmp_path: Path) -> 
         (("insertion", cut, SCENE), "the bag is cut off"),
         (("insertion", session.bag), "name the launch file"),
         (("insertion", session.bag, small), "has 0 pairs of holes"),
-        (("pose_estimation", session.bag, SCENE), "nobody reports a pose in it"),
+        (("pose_estimation", session.bag, SCENE), "no pose is reported on"),
         (("pose_estimation", session.record), "holds no reports"),
         (("insertion", tmp_path / "none.bag"), "No such file"),
     ):
@@ -204,7 +204,7 @@ def test_recordings_that_cannot_be_made_are_reported_and_leave_nothing(session: 
         (tmp_path / "a.bag", 1e9, "space free on disk"),
         (there, 1.0, "exists already"),
         (tmp_path / "a.txt", 1.0, "must end in .bag"),
-        (tmp_path / "no" / "a.bag", 1.0, "nothing can be written to the folder"),
+        (tmp_path / "no" / "a.bag", 1.0, "is not writable"),
     ):
         console = Console(file=io.StringIO(), soft_wrap=True)
         assert record(out, "", 2.0, free, console) == 1
@@ -216,4 +216,4 @@ def test_recordings_that_cannot_be_made_are_reported_and_leave_nothing(session: 
 def test_a_run_whose_record_exists_ends_and_reports_it(session: Session) -> None:
     done = session.ligature(*RUN, "--record", session.record)
     assert done.returncode != 0
-    assert "cannot be recorded" in done.stdout
+    assert "cannot record the run" in done.stdout

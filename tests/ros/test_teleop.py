@@ -164,8 +164,8 @@ def test_the_white_button_closes_the_jaw(pen: Pen, arms: dict[str, Any]) -> None
 @pytest.mark.parametrize(
     ("values", "says"),
     [
-        ([np.nan, 0, 0, 0, 0, 0, 1], "numbers that are no pose"),
-        ([0, 0, 0, 0, 0, 0, 0], "numbers that are no pose"),
+        ([np.nan, 0, 0, 0, 0, 0, 1], "sends invalid poses"),
+        ([0, 0, 0, 0, 0, 0, 0], "sends invalid poses"),
         ([5.0, 3.0, 0, 0, 0, 0, 1], "leapt"),
         (None, "silent"),
     ],

@@ -106,7 +106,7 @@ def test_messages_of_a_type_that_is_no_pose_are_reported_and_the_pen_is_heard_on
     wrong = publish("/mixed/pose", String)
     until(lambda: wrong.publish("here") or told)
     assert "/mixed/pose: /ligature_tests" in told[0]
-    assert "sends std_msgs/String, which is not understood here" in told[0]
+    assert "sends std_msgs/String, which cannot be read here" in told[0]
     assert not readings
     wrong.unregister()
     pose = publish("/mixed/pose", PoseStamped)

@@ -75,7 +75,7 @@ def test_a_reset_of_the_scene_begins_anew(scene: Scene) -> None:
     attempt.observe(state)
     assert attempt.time == 0.0
     assert attempt.judge().report() == {
-        "success": False, "completion_time": 0.0, "why": "the tip went through 0 holes, two are needed",
+        "success": False, "completion_time": 0.0, "why": "the tip went through 0 holes; two are needed",
     }  # fmt: skip
 
 

@@ -60,12 +60,12 @@ def test_an_insertion_is_judged_with_its_figures(scenery: Scenery) -> None:
 def test_an_insertion_that_is_not_done_states_why(scenery: Scenery) -> None:
     poses = hole_poses()
     poses[scenery.needle, :3] = poses[scenery.exits[0], :3] - scenery.points[2]
-    assert judge_insertion(scenery, poses, [], 1.0).why == "the tip went through 0 holes, two are needed"
+    assert judge_insertion(scenery, poses, [], 1.0).why == "the tip went through 0 holes; two are needed"
     watch, _ = watched(scenery, [2])
     assert judge_insertion(scenery, poses, watch.passages, 1.0).why == "the last hole was not exit 1"
     poses[scenery.needle, :3] = poses[scenery.entries[0], :3] - scenery.points[2]
     assert judge_insertion(scenery, poses, watch.passages, 1.0).lines() == [
-        "not done: the hole closest to the tip is no exit"
+        "not done: the hole closest to the tip is not an exit"
     ]
 
 

@@ -59,12 +59,12 @@ def test_a_fixed_camera_stands_in_the_world() -> None:
 @pytest.mark.parametrize(
     ("wrong", "right", "message"),
     [
-        ("kind: mtm", "kind: glove", "6:16: error: device MTMR is of no known kind 'glove'; known are mtm, touch"),
+        ("kind: mtm", "kind: glove", "6:16: error: device MTMR has the unknown kind 'glove'; known are mtm, touch"),
         ("scale: 0.3", "size: 0.3", "settings has no key 'size'; known are scale"),
         ("scale: 0.3", "scale: big", "4:19: error: scale must be a number, not 'big'"),
         ("scale: 0.3", "scale: -1", "scale must be within 0"),
         ("grey: clutch", "grey: fly", "a button cannot 'fly'; it can clutch, camera"),
-        ("[right, up, near]", "[right, up, away]", "axes right, up, away are no right-handed frame"),
+        ("[right, up, near]", "[right, up, away]", "axes right, up, away do not form a right-handed frame"),
         ("pen: PSM2", "pen: PSM1", "pen and MTMR would both begin with PSM1"),
         ("pen: PSM2", "pan: PSM2", "there is no device 'pan'; there are MTMR, pen, pad"),
         ('["-0", "-1", "+7"]', '["-0", "-1"]', "moves must be a list of 3"),
@@ -81,16 +81,16 @@ def test_what_is_wrong_is_reported_with_its_place_and_what_would_be_right(wrong:
 
 def test_keys_of_version_0_1_are_accepted_with_a_note(tmp_path: Path) -> None:
     text = (
-        "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {timeout: 2.0, fastest: 0.3, quickest: 4.0}\n"
+        "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {patience: 2.0, fastest: 0.3, quickest: 4.0}\n"
     )
     config = from_text(text, tmp_path / "old.yaml")
     settings = config.devices["MTMR"].settings
     assert (settings.timeout, settings.max_velocity, settings.max_angular_velocity) == (2.0, 0.3, 4.0)
     assert len(config.notes) == 3
-    assert config.notes[0].endswith("old.yaml:3:12: 'timeout' is deprecated; write 'timeout'")
+    assert config.notes[0].endswith("old.yaml:3:12: 'patience' is deprecated; write 'timeout'")
 
 
 def test_a_key_and_its_former_name_together_are_rejected(tmp_path: Path) -> None:
-    text = "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {timeout: 2.0, timeout: 1.0}\n"
-    with pytest.raises(AdfError, match="both 'timeout' and 'timeout'"):
+    text = "devices: {MTMR: {kind: mtm}}\npairs: {MTMR: [PSM1]}\nsettings: {patience: 2.0, timeout: 1.0}\n"
+    with pytest.raises(AdfError, match="both 'patience' and 'timeout'"):
         from_text(text, tmp_path / "both.yaml")

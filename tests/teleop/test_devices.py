@@ -117,5 +117,5 @@ def test_what_was_recorded_is_replayed_at_its_pace(tmp_path: Path) -> None:
 @pytest.mark.parametrize("line", ["{", '{"t": 0, "device": "pen", "pose": [1, 2], "buttons": {}}', '{"t": 0}', "[1]"])
 def test_a_file_that_is_no_record_is_reported_with_its_line(tmp_path: Path, line: str) -> None:
     (tmp_path / "record.jsonl").write_text('{"t": 0, "event": "clutch", "value": true}\n' + line + "\n")
-    with pytest.raises(ValueError, match=r"record.jsonl:2: no reading of a device and no event"):
+    with pytest.raises(ValueError, match=r"record.jsonl:2: neither a reading of a device nor an event"):
         Replay(tmp_path / "record.jsonl")

@@ -34,4 +34,4 @@ def test_the_command_reports_what_a_file_states_and_what_is_wrong(tmp_path: Path
     (tmp_path / "bad.yaml").write_text("devices: {a: {kind: glove}}\npairs: {a: PSM1}\n")
     bad = CliRunner().invoke(app, ["teleop", str(tmp_path / "bad.yaml"), "--check"])
     assert bad.exit_code == 1
-    assert "bad.yaml:1:21: error: device a is of no known kind 'glove'" in bad.output
+    assert "bad.yaml:1:21: error: device a has the unknown kind 'glove'" in bad.output

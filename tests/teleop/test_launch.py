@@ -46,8 +46,8 @@ def test_a_device_drives_the_arm_of_its_root_link_with_its_gains_and_buttons(sce
 def test_devices_that_nobody_knows_are_passed_over_and_none_at_all_is_reported(scene: ligature.Scene) -> None:
     config = of_devices(scene, [device("a", "Abacus"), device("b", "Razer Hydra")], SMALL)
     assert list(config.pairs) == ["b"]
-    assert config.notes[0].startswith("a: no hardware 'Abacus' is known; known names hold mtm")
-    with pytest.raises(AdfError, match="none of its input devices can drive an arm; a: no hardware 'Abacus' is known"):
+    assert config.notes[0].startswith("a: hardware 'Abacus' is unknown; known names contain mtm")
+    with pytest.raises(AdfError, match="none of its input devices can drive an arm; a: hardware 'Abacus' is unknown"):
         of_devices(scene, [device("a", "Abacus")], SMALL)
 
 
@@ -64,8 +64,8 @@ def test_a_root_link_that_is_of_no_arm_is_refused_and_too_many_devices_are_repor
     lost = device("lost", "Falcon", "/ambf/env/BODY gripper palm link")
     config = of_devices(scene, [lost, *(device(f"pen{k}", "Falcon") for k in range(3))], SMALL)
     assert config.notes == (
-        "lost: its root link '/ambf/env/BODY gripper palm link' is of no arm, and nothing else can be driven",
-        "pen2: it drives nothing, because no arm is left",
+        "lost: its root link '/ambf/env/BODY gripper palm link' belongs to no arm; only arms can be driven",
+        "pen2: not used, because no arm is left",
     )
 
 
@@ -78,7 +78,7 @@ def test_what_has_no_effect_on_an_arm_is_reported(scene: ligature.Scene) -> None
     assert config.notes == (
         "pen: it drives the arm itself and not its proxy",
         "pen: controller gain, max force: no effect on an arm",
-        "pen: enable joint control: a grip drives the jaw all the same",
+        "pen: enable joint control: ignored, the grip always drives the jaw",
         "pair cameras: the scene has no camera 'nowhere'",
     )
     assert config.camera == "ECM"
@@ -93,7 +93,7 @@ def test_where_no_arm_is_left_a_device_drives_its_proxy(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert config.proxies["Proxy0"].limits.tolist() == [[-0.3, 0.0], [0.5, 0.7]]
     assert (config.devices["arm1"].settings.jaw, config.devices["arm1"].settings.scale) == ((0.0, 1.0), 0.5)
-    assert "third: it drives nothing, because the scene has no arm" in config.notes
+    assert "third: not used, because the scene has no arm" in config.notes
     (tmp_path / "devices.yaml").write_text(
         (tmp_path / "devices.yaml").read_text().replace("  workspace", "  enable joint control: false\n  workspace")
     )
@@ -133,10 +133,10 @@ def test_each_input_device_of_others_is_understood_or_refused_with_a_reason(
                 config = of_devices(scene, [each], file)
             except AdfError as error:
                 assert each.root_link, each
-                assert f"{each.key}: its root link '{each.root_link}' is of no arm" in str(error)
+                assert f"{each.key}: its root link '{each.root_link}' belongs to no arm" in str(error)
                 continue
             (spec,) = config.devices.values()
             assert spec.settings.scale == float(each.settings["workspace scaling"])
             assert spec.force is not None
         notes = "\n".join(of_devices(scene, devices, file).notes)
-        assert notes.count("because no arm is left") + notes.count("is of no arm") == 5, file
+        assert notes.count("because no arm is left") + notes.count("belongs to no arm") == 5, file

@@ -59,12 +59,12 @@ def test_a_leader_takes_over_another_follower_without_a_jump(seat: Seat) -> None
 
 def test_a_follower_obeys_one_leader(seat: Seat) -> None:
     seat.select("MTMR", "PSM3")
-    with pytest.raises(Conflict, match="PSM3 obeys MTMR; unselect it there first"):
+    with pytest.raises(Conflict, match="PSM3 follows MTMR; unselect it there first"):
         seat.select("MTML", "PSM3")
     assert seat.next_follower("MTML") == "PSM2"
     with pytest.raises(Conflict, match="MTML may drive PSM2, PSM3, not PSM1"):
         seat.select("MTML", "PSM1")
-    with pytest.raises(Conflict, match="PSM1 obeys A"):
+    with pytest.raises(Conflict, match="PSM1 follows A"):
         Seat({"A": ("PSM1",), "B": ("PSM1",)})
 
 

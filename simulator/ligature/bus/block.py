@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ligature.bus.events import LOG_BYTES, EventLog
 from ligature.bus.ring import RING_BYTES, Ring
+from ligature.deprecation import warn_deprecated
 from ligature.model.state import StateDtype, StateRecord
 
 FOLDER = Path("/dev/shm")
@@ -66,12 +67,15 @@ _STATE_AT = 4096
 RETRIES = 1000
 """Attempts of one reading; the writer is at it for a microsecond of every update."""
 
+PHYSICS_TIMEOUT = 5.0
+"""Seconds without a sign of life of the physics process after which the other processes of its run end."""
+
 TIMEOUT = 120.0
 """Seconds to wait for the first state: the first start of all compiles the solvers."""
 
 
 class BusError(RuntimeError):
-    """The shared memory block is missing or belongs to another scene; the message states which."""
+    """The shared memory block is missing or belongs to another scene; the message names which."""
 
 
 class Block:
@@ -114,13 +118,21 @@ class Block:
 
     @classmethod
     def attach(
-        cls, name: str, dtype: StateDtype, timeout: float = TIMEOUT, cancelled: Callable[[], bool] = lambda: False
+        cls,
+        name: str,
+        dtype: StateDtype,
+        timeout: float = TIMEOUT,
+        cancelled: Callable[[], bool] = lambda: False,
+        patience: float | None = None,
     ) -> Block:
         """Map the block ``name`` once it holds a state.
 
-        Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True
-        waiting, or when the block is of another layout.
+        Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True meanwhile, or
+        when the block has another layout. ``patience`` is the former name of ``timeout``.
         """
+        if patience is not None:
+            warn_deprecated("patience", "timeout")
+            timeout = patience
         deadline = time.monotonic() + timeout
         while True:
             with suppress(FileNotFoundError):
@@ -159,6 +171,11 @@ class Block:
         """Seconds since the physics process last gave a sign of life."""
         return time.monotonic() - float(self.figures["physics_beat"][0])
 
+    @property
+    def active(self) -> bool:
+        """Whether the physics process gave a sign of life within `PHYSICS_TIMEOUT`."""
+        return self.age < PHYSICS_TIMEOUT
+
     def beat(self) -> None:
         """Give a sign of life of the physics process."""
         self.figures["physics_beat"] = time.monotonic()
@@ -180,7 +197,9 @@ def _reserve(descriptor: int, path: Path, size: int) -> None:
         os.posix_fallocate(descriptor, 0, size)
     except OSError as error:
         path.unlink(missing_ok=True)
-        raise BusError(f"no {size / 1e6:.0f} MB of shared memory for '{path}': {error.strerror}") from error
+        raise BusError(
+            f"cannot allocate {size / 1e6:.0f} MB of shared memory for '{path}': {error.strerror}"
+        ) from error
 
 
 def remove(name: str) -> None:

@@ -33,4 +33,4 @@ def decode(data: bytes) -> Message:
             values.append(value)
         return message(*values)
     except (struct.error, LookupError, ValueError, UnicodeDecodeError) as error:
-        raise CodecError(f"these bytes are no command: {error}") from error
+        raise CodecError(f"invalid command bytes: {error}") from error

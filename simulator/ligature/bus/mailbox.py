@@ -64,4 +64,4 @@ class Mailbox:
             for item in sorted(self._owned[producer]):
                 box.put(Throttle(False, False, 0) if item == WORLD else Release(*item))
             self._owned[producer].clear()
-            ring.forget()
+            ring.reset()

@@ -1,4 +1,4 @@
-"""What every process of a run does: end with its parent, inform its parent.
+"""What every process of a run does: end with its parent, report to its parent.
 
 A process reports by lines on standard output: ``@event text``; everything else is a log line.
 """
@@ -49,7 +49,7 @@ def lower_priority(nice: int) -> None:
             return
 
 
-def tell(event: str, text: str = "") -> None:
-    """Report the parent about ``event``."""
+def report(event: str, text: str = "") -> None:
+    """Report ``event`` to the parent."""
     sys.stdout.write(f"@{event} {text}\n")
     sys.stdout.flush()

@@ -29,7 +29,7 @@ _CHUNK = 1 << 20
 
 
 class RecordError(ValueError):
-    """A file that is no whole record; the message states why, and where."""
+    """A file that is no whole record; the message gives the reason and the place."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Journal:
         while begin < end:
             data = os.pread(self._file.fileno(), min(_CHUNK, end - begin), begin)
             if not data:
-                raise OSError(0, "the journal of the run is shorter than it was")
+                raise OSError(0, "the journal of the run has been truncated")
             into.write(data)
             begin += len(data)
 
@@ -141,7 +141,7 @@ class Excerpt:
 def part_of(path: Path) -> Path:
     """What the record ``path`` is called until it is whole; raises FileExistsError when there is one."""
     if path.exists():
-        raise FileExistsError(f"'{path}' exists already; records replace nothing")
+        raise FileExistsError(f"'{path}' exists already; choose another name")
     return path.with_name(f"{path.name}.active")
 
 
@@ -179,11 +179,9 @@ class Record:
             except CodecError as error:
                 raise RecordError(f"{path}: at byte {at}: {error}") from error
             if not isinstance(command, Command):
-                raise RecordError(f"{path}: at byte {at}: no command of a record")
+                raise RecordError(f"{path}: at byte {at}: invalid command")
             commands.append((update, command))
-        raise RecordError(
-            f"{path}: cut off after {len(commands)} commands: the run that wrote it did not come to its end"
-        )
+        raise RecordError(f"{path}: cut off after {len(commands)} commands: the recorded run did not end properly")
 
     def replay(
         self, updated: Callable[[], None], take: Callable[[Command], None], started: Callable[[], None] = lambda: None
@@ -220,7 +218,7 @@ def _header(data: bytes, path: Path) -> tuple[Header, int]:
             raise RecordError(f"{path}: is a '{head['format']}'; this version reads '{FORMAT}'")
         header = Header(str(head["options"]), str(head["begin"]))
     except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError):
-        raise RecordError(f"{path}: is no record of a run") from None
+        raise RecordError(f"{path}: not a record of a run") from None
     return header, len(line) + len(newline)
 
 
@@ -232,7 +230,7 @@ def _frames(data: bytes, at: int, path: Path) -> Iterator[tuple[int, int, int]]:
         at += _HEAD.size
         size = _HASH_BYTES if length in (BEGIN, END) else length
         if size > MOST_BYTES or update < before:
-            raise RecordError(f"{path}: at byte {at}: no frame of a record")
+            raise RecordError(f"{path}: at byte {at}: invalid frame")
         if at + size > len(data):
             return
         yield update, length, at

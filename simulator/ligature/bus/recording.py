@@ -22,11 +22,11 @@ class Recording(Message, code=11):
 
 
 def file_name(text: str) -> str:
-    """The file that a person means by ``text``, a name without folders; raises ValueError that states what is
-    allowed."""
+    """The file that a person means by ``text``, a name without folders; raises ValueError with the allowed
+    names."""
     name = text.strip()
     if "/" in name or name.startswith(".") or not name.isprintable():
-        raise ValueError(f"'{text[:40]}' is no name of a recording; write letters and digits, without folders")
+        raise ValueError(f"'{text[:40]}' is not a valid name of a recording; use letters and digits, without folders")
     if len(name.encode()) > MOST_BYTES:
-        raise ValueError(f"the name of a recording has {MOST_BYTES} bytes at most, not {len(name.encode())}")
+        raise ValueError(f"the name of a recording must have at most {MOST_BYTES} bytes, not {len(name.encode())}")
     return name if not name or name.endswith(SUFFIX) else name + SUFFIX

@@ -1,6 +1,6 @@
 """A ring of messages in shared memory with one producer and one consumer.
 
-Each side moves only its own counter. A full ring refuses the newest message; `Outbox` keeps it until
+Each side moves only its own counter. A full ring rejects the newest message; `Outbox` keeps it until
 there is room.
 """
 
@@ -53,7 +53,7 @@ class Ring:
         self._counters[2] += 1
 
     @property
-    def refused(self) -> int:
+    def dropped(self) -> int:
         """Messages that the producer gave up."""
         return int(self._counters[2])
 
@@ -66,7 +66,7 @@ class Ring:
         """Seconds since the producer's last sign of life; 0 when there never was one."""
         return time.monotonic() - float(self._beat[0]) if self._beat[0] else 0.0
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Count the producer as never having lived, until its next sign of life."""
         self._beat[0] = 0.0
 

@@ -43,7 +43,7 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument(
         "--cameras", action=argparse.BooleanOptionalAction,
-        help="publish pictures of all cameras, or of none; else as the scene states (not an AMBF flag)",
+        help="publish pictures of all cameras, or of none; by default as the scene sets it (not an AMBF flag)",
     )  # fmt: skip
     flags.add_argument("--root", action="append", default=[], help="further folder of scene files (not an AMBF flag)")
     for words, what in _WITHOUT_EFFECT.items():
@@ -110,9 +110,9 @@ def _notes(given: argparse.Namespace) -> tuple[str, ...]:
         if getattr(given, words[0].lstrip("-")) is not None
     ]
     if given.t is False:
-        notes.append("-t 0: the step is fixed all the same; simulated time falls behind on a machine that is too slow")
+        notes.append("-t 0: the step is fixed here anyway; simulated time falls behind on a machine that is too slow")
     if given.p > MAX_UPDATE_RATE:
-        notes.append(f"-p {given.p:g}: a tick has 1 ms; {MAX_UPDATE_RATE:g} updates per second are made")
+        notes.append(f"-p {given.p:g}: a tick lasts 1 ms; using {MAX_UPDATE_RATE:g} updates per second")
         return tuple(notes)
     return (*notes, *rate_notes(given.p))
 

@@ -25,10 +25,10 @@ def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
     """Compile what ``scenes`` need, or what most need; returns 1 when one of them cannot run."""
     scenes = scenes or [scene for scene in SCENES if scene.is_file()]
     if not scenes:
-        console.print("name a launch file: the scenes that are compiled by themselves come with the repository")
+        console.print("name a launch file: the default scenes come with the repository, not with the package")
         return 2
     begin = time.monotonic()
-    console.print(f"compiling what {len(scenes)} scenes need, in parallel: 1 to 2 minutes, once")
+    console.print(f"compiling the kernels of {len(scenes)} scenes in parallel; this takes 1 to 2 minutes, once")
     running = {scene: _start(scene, console) for scene in scenes}
     status = 0
     for scene, (process, reader) in running.items():

@@ -22,7 +22,7 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
         console.print(f"{source}: only URDF (.urdf) and MJCF (.xml) are converted", style="red", markup=False)
         return 1
     if not source.is_file():
-        console.print(f"{source}: there is no such file", style="red", markup=False)
+        console.print(f"{source}: file not found", style="red", markup=False)
         return 1
     try:
         converted = _mjcf(source) if _is_mjcf(source) else _urdf(source)
@@ -44,7 +44,7 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
 
 
 class MissingReaderError(Exception):
-    """A package that reads the format is not installed; the message states how to get it."""
+    """A package that reads the format is not installed; the message names the command that installs it."""
 
 
 def _is_mjcf(source: Path) -> bool:
@@ -70,7 +70,7 @@ def _mjcf(source: Path) -> Converted:
         import mujoco
     except ImportError as error:
         raise MissingReaderError(
-            f"{source}: MJCF is read by MuJoCo, which is not installed; get it by 'pip install mujoco==3.3.7'"
+            f"{source}: reading MJCF needs MuJoCo, which is not installed; run 'pip install mujoco==3.3.7'"
         ) from error
     return from_mjcf(mujoco.MjModel.from_xml_path(str(source)))
 

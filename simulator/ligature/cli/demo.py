@@ -16,7 +16,7 @@ EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "suture.py"
 def demo(throws: int, seed: int, out: Path, dataset: Path | None, console: Console) -> int:
     """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status."""
     if not EXAMPLE.is_file():
-        console.print(f"there is no '{EXAMPLE}': the demonstration comes with the repository, not with the package")
+        console.print(f"'{EXAMPLE}' is missing: the demonstration comes with the repository, not with the package")
         return 2
     if dataset is None:
         command = [sys.executable, str(EXAMPLE), "--throws", str(throws), "--seed", str(seed), "--out", str(out)]

@@ -39,7 +39,9 @@ def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> in
             console.print(f"{file}: is not in canonical form", markup=False)
             status = 1
         elif lost and not lossy:
-            console.print(f"{file}: left alone, since {lost} would be lost; --lossy takes that", markup=False)
+            console.print(
+                f"{file}: not written, because {lost} would be lost; write it anyway with --lossy", markup=False
+            )
             status = 1
         else:
             status = max(status, _save(file, text, console))

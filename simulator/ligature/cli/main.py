@@ -25,15 +25,17 @@ app = typer.Typer(
 
 Launch = Annotated[Path, typer.Argument(help="Launch file, or one model file.")]
 Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
-Roots = Annotated[list[Path] | None, typer.Option("--root", help="Folder below which files may be opened too.")]  # noqa: UP045
+Roots = Annotated[
+    list[Path] | None, typer.Option("--root", help="Additional folder that scene files may be read from.")
+]  # noqa: UP045
 
-Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies are to be there.")]  # noqa: UP045
+Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies the scene gets.")]  # noqa: UP045
 
 CockpitAddress = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
         "--cockpit-at", "--at", metavar="ADDRESS:PORT",
-        help="Where the web page is served; beyond this machine only with a token in LIGATURE_COCKPIT_TOKEN.",
+        help="Address of the web page; other machines need a token in LIGATURE_COCKPIT_TOKEN.",
     ),
 ]  # fmt: skip
 
@@ -63,22 +65,25 @@ def run(
     models: Models = None,
     root: Roots = None,
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", help="Simulated over wall time.", min=0.001)] = 1.0,
+    speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
     namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
     min_hz: Annotated[int | None, typer.Option("--min-hz", help="Publishing rate without commands.", min=1)] = None,  # noqa: UP045
     max_hz: Annotated[int | None, typer.Option("--max-hz", help="Publishing rate with commands.", min=1)] = None,  # noqa: UP045
     arm: Annotated[
         Optional[list[str]],  # noqa: UP045
-        typer.Option(help="An arm, NAME=KIND:BODY:TOOL, instead of those that are found; may be repeated."),
+        typer.Option(help="An arm, NAME=KIND:BODY:TOOL; replaces the arms found in the scene; repeatable."),
     ] = None,
-    src_crtk: Annotated[bool, typer.Option("--src-crtk", help="Arms under /CRTK too, as SRC's node.")] = False,
+    src_crtk: Annotated[
+        bool, typer.Option("--src-crtk", help="Publish arms under /CRTK too, as the challenge's node does.")
+    ] = False,
     names: Annotated[
         str, typer.Option(help="Name policy: ambf, or src for the suturing challenge's scripts.")
     ] = "ambf",
     cameras: Annotated[
         Optional[bool],  # noqa: UP045
         typer.Option(
-            "--cameras/--no-cameras", help="Publish pictures of all cameras, or of none; else as the scene states."
+            "--cameras/--no-cameras",
+            help="Publish pictures of all cameras, or of none; by default as the scene sets it.",
         ),
     ] = None,
     window: Annotated[bool, typer.Option("--window", help="Show the scene in a window.")] = False,
@@ -87,9 +92,9 @@ def run(
     ] = "",
     record: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(help="File to write all commands to, from which 'ligature replay' simulates the run again."),
+        typer.Option(help="File to record all commands to; 'ligature replay' simulates the run again from it."),
     ] = None,
-    cockpit: Annotated[bool, typer.Option("--cockpit", help="Serve the scene as a web page on this machine.")] = False,
+    cockpit: Annotated[bool, typer.Option("--cockpit", help="Serve the web page (cockpit) on this machine.")] = False,
     cockpit_at: CockpitAddress = None,
     devices: Devices = None,
 ) -> None:
@@ -130,7 +135,7 @@ def cockpit(
     root: Roots = None,
     at: CockpitAddress = None,
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", help="Simulated over wall time.", min=0.001)] = 1.0,
+    speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
     devices: Devices = None,
 ) -> None:
     """Run a scene with a live web page and without ROS; see `run --cockpit` for both."""
@@ -144,9 +149,9 @@ def cockpit(
 @app.command()
 def check(
     files: Annotated[list[Path], typer.Argument(help="Launch, world, model or input-device files.")],
-    strict: Annotated[bool, typer.Option(help="Refuse what AMBF refuses.")] = False,
+    strict: Annotated[bool, typer.Option(help="Reject files that AMBF rejects.")] = False,
     root: Roots = None,
-    verbose: Annotated[bool, typer.Option("-v", help="Show keys without effect too.")] = False,
+    verbose: Annotated[bool, typer.Option("-v", help="Also list keys without effect.")] = False,
     models: Models = None,
 ) -> None:
     """Report every problem of a scene as file:line:column; exit status 1 on errors."""
@@ -169,9 +174,12 @@ def bench(
 
 @app.command("compile")
 def compile_kernels(
-    scenes: Annotated[Optional[list[Path]], typer.Argument(help="Launch files; else scenes of the repository.")] = None,  # noqa: UP045
+    scenes: Annotated[
+        Optional[list[Path]],  # noqa: UP045
+        typer.Argument(help="Launch files; by default the scenes of the repository."),
+    ] = None,
 ) -> None:
-    """Compile ahead what scenes need, which their first start would do else; several at a time."""
+    """Compile the kernels of scenes ahead of their first start, several at a time."""
     from ligature.cli.compile import compile_ahead
 
     raise typer.Exit(compile_ahead(scenes or [], Console(highlight=False, soft_wrap=True)))
@@ -180,22 +188,22 @@ def compile_kernels(
 @app.command()
 def render(
     launch: Launch,
-    camera: Annotated[str, typer.Option(help="Camera, by name or a part of it.")],
+    camera: Annotated[str, typer.Option(help="Camera name, or a unique part of it.")],
     out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("out"),
     models: Models = None,
-    seconds: Annotated[float, typer.Option(help="Simulated seconds before the picture.", min=0)] = 0.0,
+    seconds: Annotated[float, typer.Option(help="Simulated seconds before the image.", min=0)] = 0.0,
     width: Annotated[int, typer.Option(help="Width in pixels; 0 for the camera's own.", min=0)] = 0,
     height: Annotated[int, typer.Option(help="Height in pixels; 0 for the camera's own.", min=0)] = 0,
     root: Roots = None,
-    format: Annotated[str, typer.Option(help="Of depth, ids and normals: npy, png or exr.")] = "npy",
-    annotations: Annotated[str, typer.Option(help="Any of coco,mask.")] = "",
-    exposure: Annotated[float, typer.Option(help="Stops brighter than drawn.")] = 0.0,
-    noise: Annotated[float, typer.Option(help="Standard deviation of colour, of full scale.", min=0)] = 0.0,
-    depth_noise: Annotated[float, typer.Option(help="Standard deviation of depth in metres.", min=0)] = 0.0,
-    distortion: Annotated[str, typer.Option(help="Lens: k1,k2,p1,p2,k3 as in OpenCV.")] = "0,0,0,0,0",
+    format: Annotated[str, typer.Option(help="Format of depth, ids and normals: npy, png or exr.")] = "npy",
+    annotations: Annotated[str, typer.Option(help="Annotations to write: coco, mask or both.")] = "",
+    exposure: Annotated[float, typer.Option(help="Exposure compensation in stops.")] = 0.0,
+    noise: Annotated[float, typer.Option(help="Standard deviation of colour noise; 1 is full scale.", min=0)] = 0.0,
+    depth_noise: Annotated[float, typer.Option(help="Standard deviation of depth noise in metres.", min=0)] = 0.0,
+    distortion: Annotated[str, typer.Option(help="Lens distortion k1,k2,p1,p2,k3 as in OpenCV.")] = "0,0,0,0,0",
     seed: Annotated[int, typer.Option(help="Seed of the noise.", min=0)] = 0,
 ) -> None:
-    """Draw one moment as a camera sees it, headless: colour, depth, ids, normals, calibration, annotations."""
+    """Render one camera image headless: colour, depth, ids, normals, calibration, annotations."""
     from ligature.cli.render import ANNOTATIONS
     from ligature.cli.render import render as run_render
     from ligature.render import ImageSensor
@@ -233,11 +241,11 @@ def decompose(
     mesh: Launch,
     out: Annotated[Optional[Path], typer.Option("-o", help="OBJ file to write.")] = None,  # noqa: UP045
     threshold: Annotated[
-        float, typer.Option(help="Concavity allowed; smaller follows closer.", min=0.01, max=1)
+        float, typer.Option(help="Allowed concavity; smaller values fit more closely.", min=0.01, max=1)
     ] = 0.05,
-    max_hulls: Annotated[int, typer.Option(help="Most hulls; -1 for any number.")] = -1,
+    max_hulls: Annotated[int, typer.Option(help="Maximum number of hulls; -1 for no limit.")] = -1,
 ) -> None:
-    """Cut a mesh into convex parts, one material each: a collision mesh for ADF."""
+    """Decompose a mesh into convex parts, one material each: a collision mesh for ADF."""
     from ligature.cli.decompose import decompose as run_decompose
 
     raise typer.Exit(run_decompose(mesh, out, threshold, max_hulls, Console(highlight=False, soft_wrap=True)))
@@ -247,7 +255,7 @@ def decompose(
 def fmt(
     files: Annotated[list[Path], typer.Argument(help="Scene files of any kind.")],
     check: Annotated[bool, typer.Option(help="Only report files that are not in canonical form.")] = False,
-    lossy: Annotated[bool, typer.Option(help="Write files too whose comments or spare blocks are lost.")] = False,
+    lossy: Annotated[bool, typer.Option(help="Also write files that lose comments or unused blocks.")] = False,
 ) -> None:
     """Write scene files in canonical form: keys in the schema's order, numbers and vectors in one style."""
     from ligature.cli.documents import fmt as run_fmt
@@ -257,7 +265,7 @@ def fmt(
 
 @app.command()
 def diff(before: Path, after: Path) -> None:
-    """Report what two scene files state differently, object by object; exit status 1 when they differ."""
+    """List the differences of two scene files, object by object; exit status 1 when they differ."""
     from ligature.cli.documents import diff as run_diff
 
     raise typer.Exit(run_diff(before, after, Console(highlight=False, soft_wrap=True)))
@@ -296,18 +304,20 @@ def poses(
     rate: Annotated[float, typer.Option(help="Poses per simulated second.", min=1, max=1000)] = 60.0,
     root: Roots = None,
 ) -> None:
-    """Simulate and write where all bodies are over time, for editors that play it back."""
+    """Simulate a scene and write the poses of all bodies over time, for editors that play them back."""
     raise typer.Exit(run_poses(file, indices(models), root or [], seconds, rate, out, Console(highlight=False)))
 
 
 @app.command()
 def demo(
-    throws: Annotated[int, typer.Option(help="Throws, from the first pair of holes on.", min=1, max=4)] = 2,
-    seed: Annotated[int, typer.Option(help="Where the needle lies; 0 is the scene's own place.", min=0)] = 0,
+    throws: Annotated[
+        int, typer.Option(help="Number of throws, beginning at the first pair of holes.", min=1, max=4)
+    ] = 2,
+    seed: Annotated[int, typer.Option(help="Seed of the needle's pose; 0 keeps the pose of the scene.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
-    dataset: Annotated[Optional[Path], typer.Option(help="HDF5 file to write instead, to learn from.")] = None,  # noqa: UP045
+    dataset: Annotated[Optional[Path], typer.Option(help="HDF5 dataset to write instead of pictures.")] = None,  # noqa: UP045
 ) -> None:
-    """Have two arms suture by themselves; prints the score, writes pictures."""
+    """Let two arms suture autonomously; prints the score, writes pictures."""
     from ligature.cli.demo import demo as run_demo
 
     raise typer.Exit(run_demo(throws, seed, out, dataset, Console(highlight=False, soft_wrap=True)))
@@ -316,11 +326,11 @@ def demo(
 @app.command()
 def record(
     out: Annotated[Path, typer.Argument(help="The bag to write.")],
-    exclude: Annotated[str, typer.Option(help="Regular expression of topics to leave out.")] = "",
-    seconds: Annotated[float, typer.Option(help="How long; 0 until Ctrl-C.", min=0)] = 0.0,
-    keep_free: Annotated[float, typer.Option(help="Gigabytes of the disk that stay free.", min=0)] = 1.0,
+    exclude: Annotated[str, typer.Option(help="Regular expression of topics to exclude.")] = "",
+    seconds: Annotated[float, typer.Option(help="Duration; 0 records until Ctrl-C.", min=0)] = 0.0,
+    keep_free: Annotated[float, typer.Option(help="Gigabytes of disk space to keep free.", min=0)] = 1.0,
 ) -> None:
-    """Record everything on ROS into a bag, which gets its name when it is whole."""
+    """Record all ROS topics into a bag; the file gets its name when it is complete."""
     from ligature.cli.record import record as run_record
 
     raise typer.Exit(run_record(out, exclude, seconds, keep_free, Console(highlight=False, soft_wrap=True)))
@@ -329,10 +339,13 @@ def record(
 @app.command()
 def replay(
     file: Annotated[Path, typer.Argument(help="A record of 'ligature run --record', or a bag.")],
-    scene: Annotated[Optional[Path], typer.Option(help="Launch file, instead of the recorded one.")] = None,  # noqa: UP045
-    joints: Annotated[str, typer.Option(help="Of a bag: measured or setpoint joints instead of commands.")] = "",
-    speed: Annotated[float, typer.Option("-s", help="Of a bag: its time over wall time.", min=0.001)] = 1.0,
-    dataset: Annotated[Optional[Path], typer.Option(help="Of a record: HDF5 file with pictures and motion.")] = None,  # noqa: UP045
+    scene: Annotated[Optional[Path], typer.Option(help="Launch file; replaces the recorded one.")] = None,  # noqa: UP045
+    joints: Annotated[str, typer.Option(help="For a bag: play measured or setpoint joints instead of commands.")] = "",
+    speed: Annotated[float, typer.Option("-s", help="For a bag: playback speed.", min=0.001)] = 1.0,
+    dataset: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="For a record: HDF5 file to write pictures and motion to."),
+    ] = None,
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
     from ligature.cli.replay import replay as run_replay
@@ -345,24 +358,36 @@ def replay(
 @app.command()
 def score(
     task: Annotated[str, typer.Argument(help="pose_estimation, insertion or suture.", callback=task_name)],
-    file: Annotated[Optional[Path], typer.Argument(help="A bag or a run's record; else the run that goes on.")] = None,  # noqa: UP045
-    scene: Annotated[Optional[Path], typer.Option(help="Launch file; of a record, instead of its own.")] = None,  # noqa: UP045
+    file: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Argument(help="A bag or a run's record; by default the running simulator."),
+    ] = None,
+    scene: Annotated[Optional[Path], typer.Option(help="Launch file; replaces the one of a record.")] = None,  # noqa: UP045
     timeout: Annotated[float, typer.Option(help="Seconds to wait for a report.", min=1)] = 3600.0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    patience: Annotated[Optional[float], typer.Option(hidden=True, min=1)] = None,  # noqa: UP045
 ) -> None:
-    """Report how well a task was done; exit status 0 done, 1 not done, 2 not judged."""
+    """Score a task; exit status 0 done, 1 not done, 2 not judged."""
     from ligature.cli.score import score as run_score
 
-    raise typer.Exit(run_score(task, file, scene, timeout, json, Console(highlight=False, soft_wrap=True)))
+    if patience is not None:
+        Console(stderr=True, highlight=False).print("'--patience' is deprecated; write '--timeout'", style="yellow")
+    raise typer.Exit(
+        run_score(
+            task, file, scene, timeout if patience is None else patience, json, Console(highlight=False, soft_wrap=True)
+        )
+    )
 
 
 @app.command()
 def teleop(
     config: Annotated[Path, typer.Argument(help="Teleoperation file, or a launch file with input devices.")],
-    record: Annotated[Optional[Path], typer.Option(help="File to write what devices state to.")] = None,  # noqa: UP045
-    replay: Annotated[Optional[Path], typer.Option(help="Recorded file that speaks for the devices.")] = None,  # noqa: UP045
+    record: Annotated[Optional[Path], typer.Option(help="File to record all device input to.")] = None,  # noqa: UP045
+    replay: Annotated[Optional[Path], typer.Option(help="Recorded file to play back instead of the devices.")] = None,  # noqa: UP045
     calibrate: Annotated[Optional[str], typer.Option(help="Device to calibrate.")] = None,  # noqa: UP045
-    check: Annotated[bool, typer.Option("--check", help="Only read the file, and print who drives whom.")] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Only read the file and print which device drives which arm.")
+    ] = False,
     devices: Annotated[Optional[str], typer.Option("-i", help="Indices of a launch file's input devices.")] = None,  # noqa: UP045
 ) -> None:
     """Drive arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""

@@ -41,13 +41,13 @@ def obstacle(uri: str) -> str:
     except ValueError:
         port = 0
     if where.scheme != "http" or not where.hostname or not port:
-        return f"ROS_MASTER_URI '{uri}' is no address such as {DEFAULT_MASTER}"
+        return f"ROS_MASTER_URI '{uri}' is not an address; write one such as {DEFAULT_MASTER}"
     if not _is_here(where.hostname):
         return f"the ROS master at {uri} does not answer, and '{where.hostname}' is not this machine"
     if _taken(port):
-        return f"port {port} is taken by another program that is no ROS master; set ROS_MASTER_URI to a free port"
+        return f"another program, not a ROS master, uses port {port}; set ROS_MASTER_URI to a free port"
     if shutil.which("rosmaster") is None:
-        return "there is no program 'rosmaster' (Debian package python3-rosmaster) to start a ROS master with"
+        return "the program 'rosmaster' is missing; install the Debian package python3-rosmaster"
     return ""
 
 

@@ -17,8 +17,8 @@ class RunOptions:
     ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
     ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy,
     ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
-    reports whether arms also have the names of the suturing challenge's CRTK node, ``cameras`` states
-    whether pictures are published (None: of the cameras for which the scene reports it), ``window`` whether
+    whether arms also have the names of the suturing challenge's CRTK node, ``cameras``
+    whether pictures are published (None: of those cameras for which the scene asks for it), ``window`` whether
     one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
     the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines for the user at
     the start, ``devices`` are indices of the input devices whose proxies are there.
@@ -81,7 +81,7 @@ def arm_entry(text: str) -> dict[str, str]:
     kind, _, place = rest.partition(":")
     body, _, tool = place.partition(":")
     if not equals or kind not in ("psm", "ecm", "camera", "mtm") or bool(body) is (kind == "mtm"):
-        raise ValueError(f"'{text}' is no arm; write PSM1=psm:BODY:TOOL, ECM=ecm:BODY, ECM=camera:BODY or MTML=mtm")
+        raise ValueError(f"'{text}' is not an arm; write PSM1=psm:BODY:TOOL, ECM=ecm:BODY, ECM=camera:BODY or MTML=mtm")
     found = {"name": name, "kind": "ecm" if kind == "camera" else kind}
     if body:
         found["tip" if kind == "camera" else "base"] = body
@@ -104,4 +104,7 @@ def rate_notes(rate: float) -> tuple[str, ...]:
     ticks = max(1, round(1000.0 / rate))
     if abs(1000.0 / rate - ticks) < 1e-6:
         return ()
-    return (f"-p {rate:g}: an update has whole ticks of 1 ms: {ticks} ms, {1000.0 / ticks:.4g} a second",)
+    return (
+        f"-p {rate:g}: an update is a whole number of 1 ms ticks; "
+        f"using {ticks} ms, {1000.0 / ticks:.4g} updates per second",
+    )

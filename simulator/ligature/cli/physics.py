@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import gc
 import math
-import sys
 import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 
-import ligature
 from ligature.adf import Severity
-from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Recording, Throttle
-from ligature.bus.process import end_with_parent, tell
-from ligature.bus.stop import stop_on_signal
+from ligature.bus import Block, Mailbox, Pace, Pacer, Recording, Throttle
+from ligature.bus.process import report
 from ligature.cli.options import RunOptions
+from ligature.cli.process import Run, run_process
 from ligature.cli.recorder import Recorder
 from ligature.model.commands import Command
 from ligature.model.messages import Message, handle
@@ -42,35 +40,26 @@ WINDOW = 1000
 
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
-    end_with_parent()
-    stop = stop_on_signal()
-    options = RunOptions.from_text(sys.argv[1])
-    try:
-        scene = options.load()
-    except ligature.SceneError as error:
-        for diagnostic in error.diagnostics:
-            tell("error", str(diagnostic))
-        sys.exit(2)
+    run_process(_simulate, owner=True)
+
+
+def _simulate(run: Run) -> None:
+    options, scene, block = run.options, run.scene, run.block
     for diagnostic in scene.diagnostics:
         if diagnostic.severity >= Severity.INFO:
-            tell(_EVENTS[diagnostic.severity], str(diagnostic))
-    simulation = Simulation(scene, TICK, 1.0 / options.rate)
+            report(_EVENTS[diagnostic.severity], str(diagnostic))
     try:
-        block = Block.create(options.bus, simulation.state.dtype)
-    except BusError as error:
-        tell("error", str(error))
-        sys.exit(1)
-    try:
+        simulation = Simulation(scene, TICK, 1.0 / options.rate)
         simulation.step(simulation.ticks_per_update)
         loop = Loop(simulation, block, options)
         loop.publish()
         if options.shown_cameras(scene):
-            tell("cameras")
+            report("cameras")
         gc.collect()
         gc.freeze()
         gc.disable()
-        tell("ready", f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.rods)} rods")
-        while not stop.is_set():
+        report("ready", f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.rods)} rods")
+        while not run.stop.is_set():
             loop.turn()
         loop.end()
     finally:
@@ -104,7 +93,7 @@ class Loop:
         self._recorder.end(self._updates + 1)
 
     def turn(self) -> None:
-        """Sleep, take commands, and run an update when it is due; the commands may state that it is not."""
+        """Sleep, take commands, and run an update when it is due; a command may pause it."""
         self._block.beat()
         nap = self._pacer.wait(time.monotonic())
         if nap > 0.0:
@@ -168,7 +157,7 @@ class Loop:
         self._mark, self._mark_updates = now, self._updates
         self._recorder.flush()
         if self._mailbox.rejected > self._warned:
-            tell(
+            report(
                 "warning",
                 f"{self._mailbox.rejected - self._warned} commands rejected: {self._mailbox.last_rejection}",
             )
@@ -178,7 +167,7 @@ class Loop:
                 figures["alarms"] += 1
                 figures["alarm"] = str(problem).encode("utf-8")[:ALARM_BYTES]
         for problem in self._simulation.problems[:5]:
-            tell("warning", str(problem))
+            report("warning", str(problem))
         self._simulation.problems.clear()
 
 

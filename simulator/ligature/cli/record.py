@@ -46,11 +46,11 @@ def record(out: Path, exclude: str, seconds: float, keep_free: float, console: C
     reason = _reason(lines)
     if reason or status != 0 or not part.is_file():
         free = shutil.disk_usage(out.parent).free / 1e9
-        said = (
-            f"the recording failed: {reason or f'the recorder ended with {status}'}; {free:.3g} GB of the disk are free"
+        reason = reason or f"the recorder ended with status {status}"
+        console.print(
+            f"the recording failed: {reason}; {free:.3g} GB of disk space are free", style="red", markup=False
         )
-        console.print(said, style="red", markup=False)
-        _tell_rest(part, console)
+        _report_rest(part, console)
         return 1
     part.replace(out)
     console.print(f"{out}: {out.stat().st_size / 1e6:.1f} MB", markup=False)
@@ -64,9 +64,9 @@ def _obstacle(out: Path) -> str:
     if out.suffix != ".bag":
         return f"'{out}' must end in .bag"
     if out.exists():
-        return f"'{out}' exists already; recordings replace nothing"
+        return f"'{out}' exists already; choose another name"
     if not os.access(out.parent, os.W_OK):
-        return f"nothing can be written to the folder '{out.parent}'"
+        return f"the folder '{out.parent}' is not writable"
     uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if not master_answers(uri):
         return f"no ROS master answers at {uri}; start the simulator with 'ligature run' first"
@@ -114,9 +114,9 @@ def _reason(lines: list[str]) -> str:
     return loud[-1].removeprefix("what():").strip() if loud else ""
 
 
-def _tell_rest(part: Path, console: Console) -> None:
-    """Remove a bag that holds nothing; state where one is that was cut off."""
+def _report_rest(part: Path, console: Console) -> None:
+    """Remove an empty bag; name the file of one that was cut off."""
     part.unlink(missing_ok=True)
     active = part.with_name(f"{part.name}.active")
     if active.exists():
-        console.print(f"what was recorded before is in '{active}'; 'rosbag reindex' may repair it", markup=False)
+        console.print(f"the part recorded before is in '{active}'; 'rosbag reindex' may repair it", markup=False)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ligature.bus import Block, Recording
 from ligature.bus.events import RUN
-from ligature.bus.process import tell
+from ligature.bus.process import report
 from ligature.bus.record import Excerpt, Header, Journal, Moment, RecordWriter
 from ligature.bus.recording import file_name
 from ligature.cli.options import RunOptions
@@ -41,7 +41,7 @@ class Recorder:
         self._since = 0.0
         self._copying: list[threading.Thread] = []
         self._copied: deque[tuple[str, bool]] = deque()
-        self._why_not = "the run was begun without a page and without --record"
+        self._why_not = "the run was started without --cockpit and without --record"
         header = Header(options.to_text(), simulation.state_hash())
         if options.record:
             self._begin_record(Path(options.record), header)
@@ -55,7 +55,7 @@ class Recorder:
         try:
             self._journal = self._writer = RecordWriter(path, header)
         except OSError as error:
-            tell("error", f"the run cannot be recorded: {_why(error)}: '{path}'")
+            report("error", f"cannot record the run: {_why(error)}: '{path}'")
             sys.exit(1)
 
     # --- while the run goes on ------------------------------------------------------------------
@@ -71,7 +71,7 @@ class Recorder:
     def flush(self) -> None:
         """Hand what was written to the disk, and report what was copied, at most once a second."""
         while self._copied:
-            self._say(*self._copied.popleft())
+            self._report(*self._copied.popleft())
         if self._journal is not None:
             try:
                 self._journal.flush()
@@ -82,7 +82,7 @@ class Recorder:
         """Begin a recording, or end the one that goes on."""
         name = file_name(recording.name)
         if name and self._excerpt is not None:
-            self._say(f"'{self._excerpt.path}' is recorded already", True)
+            self._report(f"'{self._excerpt.path}' is being recorded already", True)
         elif name:
             self._begin(update, FOLDER / name)
         elif self._excerpt is not None:
@@ -107,17 +107,17 @@ class Recorder:
 
     def _begin(self, update: int, path: Path) -> None:
         if self._journal is None:
-            self._say(f"nothing can be recorded in this run: {self._why_not}", True)
+            self._report(f"cannot record this run: {self._why_not}", True)
             return
         try:
             path.parent.mkdir(exist_ok=True)
             self._excerpt = Excerpt(path, self._journal, self._moment(self._journal, update))
         except OSError as error:
-            self._say(f"nothing is recorded: {_why(error)}: '{path}'", True)
+            self._report(f"cannot record: {_why(error)}: '{path}'", True)
             return
         self._since = self._simulation.time
         self._block.figures["recording"] = 1
-        self._say(f"recording to '{path}' from {self._since:.1f} s on")
+        self._report(f"recording to '{path}' from {self._since:.1f} s")
 
     def _end(self, update: int) -> None:
         assert self._excerpt is not None and self._journal is not None
@@ -147,25 +147,25 @@ class Recorder:
         return journal.moment(update, self._simulation.state_hash())
 
     def _give_up(self, error: OSError) -> None:
-        """Go on without records, and report it: a run matters more than its records."""
+        """Warn and continue without records: a run matters more than its records."""
         assert self._journal is not None
         if self._writer is not None:
             part = self._writer.abandon()
-            tell("error", f"the run is not recorded any more: {_why(error)}; '{part}' ends before the run does")
+            report("error", f"recording of the run stopped: {_why(error)}; '{part}' holds the part before")
         self._journal.close()
         self._journal = self._writer = None
         self._why_not = _why(error)
         if self._excerpt is not None:
             self._excerpt.drop()
-            self._say(f"the recording failed: {self._why_not}: '{self._excerpt.path}'", True)
+            self._report(f"the recording failed: {self._why_not}: '{self._excerpt.path}'", True)
         self._excerpt = None
         self._block.figures["recording"] = 0
 
-    def _say(self, text: str, bad: bool = False) -> None:
-        """Report the page, and the terminal when something is wrong."""
+    def _report(self, text: str, bad: bool = False) -> None:
+        """Report to the page, and to the terminal when something is wrong."""
         self._block.events.write(RUN, EVENT, text)
         if bad:
-            tell("warning", text)
+            report("warning", text)
 
 
 def _why(error: OSError) -> str:

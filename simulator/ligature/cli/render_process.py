@@ -5,21 +5,18 @@ It never holds up physics: it has a lower priority, takes the newest state, and 
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import replace
 
 import numpy as np
 
-import ligature
-from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, tell
-from ligature.bus.stop import stop_on_signal
-from ligature.cli.joining import SCENE_TIMEOUT
+from ligature.bus import Block
+from ligature.bus.process import report
 from ligature.cli.options import RunOptions
+from ligature.cli.process import Run, run_process
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Camera, Scene
-from ligature.model.state import new_state, state_dtype
+from ligature.model.state import new_state
 from ligature.render import CameraView, ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
 from ligature.render.calibration import calibrations
 from ligature.render.sensor import IDEAL
@@ -28,36 +25,25 @@ from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
 from ligature.ros.master import MasterWatch, NameTaken
 from ligature.ros.parameters import Follower
 
-PHYSICS_SILENCE = 5.0
-"""Seconds without a sign of life of the physics process after which this one ends."""
-
 NAP = 0.05
 """Longest sleep in seconds between two looks at the stop signal and the physics process."""
 
 
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
-    end_with_parent()
-    stop = stop_on_signal()
-    options = RunOptions.from_text(sys.argv[1])
+    run_process(_draw)
+
+
+def _draw(run: Run) -> None:
     try:
-        scene = options.load()
-        renderer = Renderer(scene)
-        block = Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set)
-        studio = Studio(scene, renderer, block, options)
-    except ligature.SceneError:
-        stop.wait(SCENE_TIMEOUT)
-        sys.exit(2)
+        renderer = Renderer(run.scene)
+        studio = Studio(run.scene, renderer, run.block, run.options)
     except (RenderUnavailable, NameTaken) as error:
-        tell("warning", f"no pictures: {error}")
-        sys.exit(0)
-    except BusError as error:
-        tell("warning", str(error))
-        sys.exit(0 if stop.is_set() else 1)
+        run.decline("pictures", error)
     for problem in renderer.problems:
-        tell("finding", str(problem.diagnostics[0]))
-    tell("ready", f"pictures of {', '.join(camera.identity.name for camera in studio.cameras)}")
-    while not stop.is_set() and block.age < PHYSICS_SILENCE:
+        report("finding", str(problem.diagnostics[0]))
+    report("ready", f"pictures of {', '.join(camera.identity.name for camera in studio.cameras)}")
+    while run.active:
         studio.turn(time.monotonic())
 
 
@@ -98,7 +84,7 @@ class Studio:
         self._node = CameraNode(scene, self.cameras, bool(options.cameras))
         self._follower = Follower(scene)
         MasterWatch(self._follower.poll).start()
-        self._refused: set[str] = set()
+        self._rejected: set[str] = set()
         self._exposures = [_Exposure(topics) for topics in self._node.topics]
 
     def turn(self, now: float) -> None:
@@ -156,18 +142,17 @@ class Studio:
             exposure.topics.publish_cloud(points, frame.rgb, stamp)
 
     def _sensor(self, camera: Camera, view: CameraView) -> ImageSensor:
-        """What the parameters state of a camera's sensor; one without faults, reported once, when they cannot be
-        used."""
+        """The sensor of a camera by its parameters; one without faults, with one warning, when they are invalid."""
         values = self._follower.sensors[camera.index]
         wrong = f"{camera.identity.topic}: {values}"
-        if wrong in self._refused:
+        if wrong in self._rejected:
             return IDEAL
         try:
             sensor = ImageSensor(**values)
             sensor.view(view)
         except ValueError as error:
-            tell("warning", f"{camera.identity.topic}/sensor: {error}; its pictures have no faults")
-            self._refused.add(wrong)
+            report("warning", f"{camera.identity.topic}/sensor: {error}; rendering without sensor faults")
+            self._rejected.add(wrong)
             return IDEAL
         return sensor
 
@@ -186,7 +171,7 @@ class Studio:
         return camera if (camera.stereo is None) == (started.stereo is None) else started
 
     def _set_lights(self) -> None:
-        """Give the lights what their parameters state now."""
+        """Set the lights to their parameters' values of now."""
         settings = self._renderer.lights.settings
         for index in range(len(settings)):
             values = self._follower.lights[index]

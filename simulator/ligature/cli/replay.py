@@ -41,7 +41,7 @@ def resimulate(
     if simulation.state_hash() != record.header.begin:
         simulation.close()
         raise Differs(
-            f"'{options.scene}' begins otherwise than when the run was recorded: the scene or the version changed"
+            f"'{options.scene}' starts in another state than the recorded run: the scene or the version changed"
         )
 
     watched = False
@@ -56,7 +56,7 @@ def resimulate(
         watched = True
         if record.begun not in ("", simulation.state_hash()):
             simulation.close()
-            raise Differs("the run goes otherwise before the recording begins: the version changed")
+            raise Differs("the run diverges before the recording begins: the version changed")
         watch(simulation)
 
     record.replay(update, simulation.apply, started)
@@ -71,7 +71,7 @@ def replay(
         if is_record(file):
             return _again(Record.read(file), scene, dataset, console)
         if dataset is not None:
-            raise ValueError(f"{file}: no record of a run, which a dataset is made from")
+            raise ValueError(f"{file}: not a record of a run; a dataset needs one")
         return _play(file, joints, speed, console)
     except ligature.SceneError as error:
         for diagnostic in error.diagnostics:
@@ -91,10 +91,10 @@ def _again(record: Record, scene: Path | None, dataset: Path | None, console: Co
     console.print(f"{len(record.commands)} commands, {simulation.time:.3f} s simulated in {took:.1f} s", markup=False)
     if record.begun:
         begin = record.start * simulation.ticks_per_update * TICK
-        console.print(f"recorded were the last {simulation.time - begin:.3f} s", markup=False)
+        console.print(f"the recording covers the last {simulation.time - begin:.3f} s", markup=False)
     simulation.close()
     if found != record.end:
-        console.print(f"the run ended otherwise: {found}, not {record.end}", style="red", markup=False)
+        console.print(f"the run ended in another state: {found}, not {record.end}", style="red", markup=False)
         return 1
     console.print(f"the same bits: {found}", markup=False)
     return 0

@@ -1,23 +1,27 @@
-"""Starts the ROS process: loads the run's scene and hands it to `ligature.ros`."""
+"""The ROS process: hands the run's scene and shared memory to `ligature.ros`."""
 
 from __future__ import annotations
 
-from ligature.bus.process import tell
-from ligature.cli.joining import give_up, join_run
+from ligature.bus.process import report
+from ligature.cli.process import Run, run_process
 
 
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
-    options, scene, stop = join_run()
+    run_process(_serve)
+
+
+def _serve(run: Run) -> None:
     from ligature.ros.master import NameTaken
     from ligature.ros.node import Node
 
+    options = run.options
     try:
-        node = Node(scene, options.bus, options.min_hz, options.max_hz, options.names, options.src_crtk)
+        node = Node(run.scene, run.block, options.min_hz, options.max_hz, options.names, options.src_crtk)
     except NameTaken as error:
-        give_up(stop, error)
-    tell("ready", node.told)
-    node.run(stop, lambda: tell("first-state"))
+        run.fail(error)
+    report("ready", node.summary)
+    node.run(run.stop, lambda: report("first-state"))
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ def _recorded(task: str, file: Path, scene: Path | None) -> Figures:
             attempts[0].observe(simulation.state[0])
 
     if task == "pose_estimation":
-        raise ValueError(f"{file}: a run's record holds no reports, and so no estimate; score a bag")
+        raise ValueError(f"{file}: a record of a run holds no reported pose; score a bag")
     resimulate(record, scene, watch).close()
     return attempts[0].judge().report(), attempts[0].monitor.measures().report()
 

@@ -25,7 +25,7 @@ from ligature.cli.options import RunOptions
 
 MASTER_TIMEOUT = 15.0
 LAST_TIMEOUT = 1.8
-"""Seconds after a signal at which the supervisor itself ends, should whoever reads its output no longer do so."""
+"""Seconds after a signal at which the supervisor ends even when nobody reads its output any more."""
 
 RESTART_PAUSE = 0.3
 QUICK_DEATH, MAX_QUICK_DEATHS = 5.0, 5
@@ -37,11 +37,10 @@ _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",
 }
 _DRAWING = ("window", "render", "cockpit")
-"""Processes that a run can do without; status 0 means that they have nothing to draw, or nowhere."""
+"""Processes that a run can do without; status 0 means that they cannot draw here or have nothing to draw."""
 
 _DRAWING_NICE = 10
-"""How far the processes that draw have a lower scheduling priority: software would leave no processor time to physics
-otherwise."""
+"""Nice level of the processes that draw: software rendering at normal priority starves physics."""
 
 _STYLES = {"error": "red", "problem": "red", "warning": "yellow", "finding": "dim"}
 
@@ -143,7 +142,7 @@ class Supervisor:
         return self._over or self._signalled.is_set()
 
     def _start(self) -> None:
-        self._say(f"loading [bold]{escape(self._options.scene)}[/bold]")
+        self._print(f"loading [bold]{escape(self._options.scene)}[/bold]")
         for note in self._options.notes:
             self._console.print(note, style="dim", markup=False)
         self._progress.start()
@@ -161,8 +160,7 @@ class Supervisor:
                 )
 
     def _start_drawing(self, name: str, module: str, nice: int = _DRAWING_NICE) -> None:
-        """Start a process that draws, with a lower priority unless set otherwise; without a ROS master the run is
-        over."""
+        """Start a process that draws, by default at a lower scheduling priority; without a master the run is over."""
         if "ros" in self._children or not self._options.ros:
             command = [sys.executable, "-m", module, self._options.to_text()]
             self._children[name] = Child(name, command, self._events, self._env, nice)
@@ -171,13 +169,13 @@ class Supervisor:
         """Whether a ROS master answers, after one was started where there was none."""
         uri = self._env["ROS_MASTER_URI"] = self._env.get("ROS_MASTER_URI") or master.DEFAULT_MASTER
         if master.master_answers(uri):
-            self._say(f"using the ROS master at {uri}")
+            self._print(f"using the ROS master at {uri}")
             return True
         problem = master.obstacle(uri)
         if problem:
             self._fail(problem)
             return False
-        self._say(f"no ROS master answers at {uri}: starting one")
+        self._print(f"no ROS master answers at {uri}: starting one")
         child = self._children["master"] = Child("master", master.command(uri), self._events, self._env)
         deadline = time.monotonic() + MASTER_TIMEOUT
         while time.monotonic() < deadline and not self._stopping and child.process.poll() is None:
@@ -185,17 +183,16 @@ class Supervisor:
                 return True
             time.sleep(0.05)
         if not self._stopping:
-            self._fail(f"the ROS master that was started for {uri} does not answer; start 'roscore' and try again")
+            self._fail(f"the ROS master started for {uri} does not answer; start 'roscore' and try again")
         return False
 
     def _handle(self, process: str, event: str, text: str) -> None:
         if event == "ready":
-            self._say(f"{process} ready: {text}")
+            self._print(f"{process} ready: {text}")
             if process == "physics" and self._options.window:
                 self._start_drawing("window", "ligature.cli.window_process")
             if process == "physics" and self._options.cockpit:
-                # an arm is driven from the page, which has its pictures drawn by a process that has a lower scheduling
-                # priority
+                # the page drives arms; a process of lower priority draws its pictures
                 self._start_drawing("cockpit", "ligature.cli.cockpit_process", 0)
             if self._options.ros:
                 self._progress.update("connecting to ROS")
@@ -206,7 +203,7 @@ class Supervisor:
         elif event == "first-state":
             self._progress.stop()
             if not self._published:
-                self._say(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
+                self._print(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
             self._published = True
         elif event in _STYLES:
             self._console.print(text, style=_STYLES[event], markup=False)
@@ -231,14 +228,14 @@ class Supervisor:
         lived = time.monotonic() - child.started
         child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_DEATH else 0
         if child.quick_deaths > MAX_QUICK_DEATHS and process in _DRAWING:
-            self._say(
-                f"[yellow]the {process} process dies again and again (status {status}): no more pictures[/yellow]"
+            self._print(
+                f"[yellow]the {process} process keeps failing (status {status}); continuing without it[/yellow]"
             )
             return
         if child.quick_deaths > MAX_QUICK_DEATHS:
-            self._fail(f"the {process} process dies again and again (status {status})")
+            self._fail(f"the {process} process keeps failing (status {status}); the run is over")
             return
-        self._say(f"[yellow]the {process} process ended with status {status}; starting it again[/yellow]")
+        self._print(f"[yellow]the {process} process ended with status {status}; restarting it[/yellow]")
         time.sleep(RESTART_PAUSE if child.quick_deaths else 0.0)
         child.start()
 
@@ -258,7 +255,7 @@ class Supervisor:
         for child in order:
             child.end(deadline - time.monotonic())
         remove(self._options.bus)
-        self._say("ended")
+        self._print("ended")
 
-    def _say(self, text: str) -> None:
+    def _print(self, text: str) -> None:
         self._console.print(text)

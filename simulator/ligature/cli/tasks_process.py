@@ -1,30 +1,33 @@
-"""The process that judges a task of a run, and hands it to `ligature.ros`."""
+"""The process that judges a task of a run, and publishes scores on ROS through `ligature.ros`."""
 
 from __future__ import annotations
 
 import sys
 
-from ligature.bus.process import tell
-from ligature.cli.joining import give_up, join_run
+from ligature.bus.process import report
+from ligature.cli.process import Run, run_process
 
 
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
-    options, scene, stop = join_run()
+    run_process(_judge)
+
+
+def _judge(run: Run) -> None:
     from ligature.ros.master import NameTaken
     from ligature.ros.tasks import TaskNode
     from ligature.tasks import MissingBodies
 
     try:
-        node = TaskNode(scene, options.bus, options.task, say)
+        node = TaskNode(run.scene, run.block, run.options.task, log)
     except (MissingBodies, NameTaken) as error:
-        give_up(stop, error)
-    tell("ready", f"judging '{options.task}'")
-    node.run(stop)
+        run.fail(error)
+    report("ready", f"judging '{run.options.task}'")
+    node.run(run.stop)
 
 
-def say(line: str) -> None:
-    """A line for whoever reads the run's output."""
+def log(line: str) -> None:
+    """Print a line to the run's output."""
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 

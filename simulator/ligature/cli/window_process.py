@@ -2,48 +2,40 @@
 
 from __future__ import annotations
 
-import sys
 import time
 
-import ligature
-from ligature.bus import Block, BusError, Outbox
-from ligature.bus.process import end_with_parent, tell
-from ligature.bus.stop import stop_on_signal
-from ligature.cli.options import RunOptions
-from ligature.model.state import new_state, state_dtype
+from ligature.bus import Outbox
+from ligature.bus.process import report
+from ligature.cli.process import Run, run_process
+from ligature.model.state import new_state
 from ligature.render import RenderUnavailable
 from ligature.render.viewer import Figures, Viewer
 from ligature.render.window import Window
 
-PHYSICS_SILENCE = 5.0
-"""Seconds without a sign of life of the physics process after which this one ends."""
-
 MIN_FRAME_PERIOD = 1.0 / 60.0
-"""Seconds that a picture is shown at least."""
+"""Shortest time in seconds that a picture is shown."""
 
 SMOOTHING = 0.1
-"""Part of the newest frame time in the frame rate on the screen."""
+"""Weight of the newest frame time in the displayed frame rate."""
 
 
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
-    end_with_parent()
-    stop = stop_on_signal()
-    options = RunOptions.from_text(sys.argv[1])
+    run_process(_show)
+
+
+def _show(run: Run) -> None:
+    scene, block = run.scene, run.block
     try:
-        scene = options.load()
-        block = Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set)
         window = Window(f"Ligature: {scene.name}")
-    except (RenderUnavailable, ligature.SceneError, BusError) as error:
-        if isinstance(error, RenderUnavailable):
-            tell("warning", str(error))
-        sys.exit(0)
+    except RenderUnavailable as error:
+        run.decline("window", error)
     outbox, ring, state = Outbox(block.rings["window"]), block.rings["window"], new_state(scene)
     viewer = Viewer(scene, outbox.push, window.context)
     window.listen(viewer)
-    tell("ready", "H in the window shows its keys")
+    report("ready", "H in the window shows its keys")
     period = MIN_FRAME_PERIOD
-    while not (stop.is_set() or window.closed) and block.age < PHYSICS_SILENCE:
+    while run.active and not window.closed:
         begin = time.monotonic()
         ring.beat()
         block.read(state)

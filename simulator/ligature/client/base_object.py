@@ -194,7 +194,9 @@ class BaseObject:
         """
         if all(map(math.isfinite, values)):
             return True
-        rospy.logwarn(f"{self._name}: {', '.join(map(str, values))} cannot be commanded; the last command holds")
+        rospy.logwarn(
+            f"{self._name}: {', '.join(map(str, values))} are not valid commands; keeping the previous command"
+        )
         return False
 
     def _pose_commanded(self) -> None:

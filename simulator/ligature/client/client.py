@@ -43,7 +43,7 @@ class Client:
 
     ``get_obj_handle`` makes an object *active*: one daemon thread publishes the commands of all active objects at the
     rate given to `connect`, so that targets hold until they are changed. Objects that appear after `connect` are
-    found by `refresh`. Names that match no object or several give None, with a message that states what there is.
+    found by `refresh`. Names that match no object or several give None, with a message that lists what there is.
     """
 
     def __init__(self, client_name: str = "ambf_client", max_discovery_attempts: int = 5) -> None:
@@ -207,4 +207,4 @@ def _send(handle: BaseObject) -> None:
     except (rospy.ROSException, rospy.ROSSerializationException) as error:
         if rospy.core.is_shutdown_requested():
             return
-        rospy.logerr_throttle(COMPLAINT_PAUSE, f"{handle.get_name()}: the command cannot be sent: {error}")
+        rospy.logerr_throttle(COMPLAINT_PAUSE, f"{handle.get_name()}: cannot send the command: {error}")

@@ -10,7 +10,7 @@ from ligature.client.joints import JointedObject, grown
 
 
 class Object(JointedObject):
-    """A body with one mask that states which joints are driven to positions, the others by efforts."""
+    """A body with one mask that selects which joints are driven to positions, the others by efforts."""
 
     State = ObjectState
     Command = ObjectCmd

@@ -87,7 +87,7 @@ def _heard(publisher: Any, name: str) -> bool:
     deadline = time.monotonic() + LISTENER_TIMEOUT
     while publisher.get_num_connections() == 0:
         if time.monotonic() > deadline or rospy.is_shutdown():
-            rospy.logwarn(f"nobody listens to {publisher.name}: is the simulator running?")
+            rospy.logwarn(f"no subscriber of {publisher.name}: is the simulator running?")
             return False
         time.sleep(_POLL)
     return True

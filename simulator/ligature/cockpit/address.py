@@ -16,7 +16,7 @@ LEAST_TOKEN = 12
 
 
 class AddressError(ValueError):
-    """An address that cannot be served; the message states what would be right."""
+    """An address that cannot be served; the message gives what would be right."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def read_address(text: str) -> Address:
     host, colon, port = text.rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
     if not colon or not host or not port.isdecimal() or int(port) > 65535:
-        raise AddressError(f"'{text}' is no ADDRESS:PORT such as {DEFAULT}")
+        raise AddressError(f"'{text}' is not ADDRESS:PORT; write for example {DEFAULT}")
     return Address(host, int(port))
 
 
@@ -58,7 +58,7 @@ def check_token(address: Address, token: str) -> None:
         raise AddressError(f"the cockpit's token has {len(token)} characters; it must have at least {LEAST_TOKEN}")
     if not token and not address.loopback:
         raise AddressError(
-            f"the cockpit at {address.host} could be reached by other machines: "
+            f"the cockpit at {address.host} is reachable from other machines: "
             f"set a token of at least {LEAST_TOKEN} characters in {TOKEN_VARIABLE}, or serve 127.0.0.1"
         )
 
@@ -71,6 +71,4 @@ def check_free(address: Address) -> None:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(place)
     except OSError as error:
-        raise AddressError(
-            f"the cockpit cannot be served at {address.host}:{address.port}: {error.strerror}"
-        ) from error
+        raise AddressError(f"cannot serve the cockpit at {address.host}:{address.port}: {error.strerror}") from error

@@ -49,7 +49,7 @@ class Audience:
         if self.desk.operator is not None:
             return "operated"
         kept = self.desk.kept(now)
-        return f"operator away, desk kept {kept:.0f} s" if kept else "nobody operates"
+        return f"operator away, control reserved {kept:.0f} s" if kept else "nobody operates"
 
     def hear(self, word: str, client: int, value: Any, now: float) -> bool:
         """Take what happened; False when it is for somebody else to decide."""
@@ -93,7 +93,7 @@ class Audience:
         new = self.desk.claim(client, now, key)
         if new is None:
             kept = self.desk.kept(now)
-            why = f"The desk is kept for its operator for {kept:.0f} s." if kept else "Somebody operates already."
+            why = f"Control is reserved for its operator for {kept:.0f} s." if kept else "Another browser has control."
             self.clients[client].add_notification("Watching only", why, auto_close_seconds=5.0, color="yellow")
             return
         if before is not None and before != client:

@@ -162,7 +162,7 @@ class Cockpit:
             self._teleop_controls = TeleopControls(client, self._ros, act)
 
     def _end_operating(self, why: str, there: bool) -> None:
-        """Nobody operates any more; ``there`` states whether the browser still shows the controls."""
+        """Nobody operates any more; ``there``: whether the browser still shows the controls."""
         self._stop_all(why)
         if there:
             for controls in (*self._controls, self._run_controls, self._camera_controls, self._teleop_controls):
@@ -220,19 +220,19 @@ class Cockpit:
 
     def _follow(self, now: float, dt: float) -> None:
         """Send the next goals of what is pursued, as long as the operator's browser answers."""
-        led = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
+        driven = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
         dragged = any(controls.dragging for controls in self._controls)
-        self._deadman.watch(self._audience.desk.operator if led or dragged else None)
+        self._deadman.watch(self._audience.desk.operator if driven or dragged else None)
         if self._deadman.silence > TIMEOUT:
             silent = 1e3 * self._deadman.silence
             self._stop_all(f"the operator's browser has not answered for {silent:.0f} ms")
             return
-        for arm in led:
+        for arm in driven:
             for command in self._pursuits[arm].advance(min(dt, 0.05)):
                 self._outbox.push(command)
 
     def _stop_all(self, why: str) -> None:
-        """Hold every arm that the operator drives, and state why."""
+        """Hold every arm that the operator drives, and show why."""
         for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
             dragged = arm < len(self._controls) and self._controls[arm].dragging
             if pursuits.stop() or dragged:
@@ -254,7 +254,7 @@ class Cockpit:
             else:
                 self._clockwork.end_record()
         except ValueError as error:
-            self._recorded = f"nothing is recorded: {error}"
+            self._recorded = f"cannot record: {error}"
 
     # --- what is shown -------------------------------------------------------------------------
 

@@ -39,29 +39,29 @@ class Gate:
         self._token = token
         self._local = address.loopback and not token
         self._pass = hmac.new(token.encode(), COOKIE.encode(), hashlib.sha256).hexdigest()
-        self.refused = 0
+        self.rejected = 0
 
     def answer(self, request: Request) -> Response | None:
         """The response that ends a request here; None lets it in."""
         found = self._answer(request)
         if found is not None and found.status_code >= http.HTTPStatus.BAD_REQUEST:
-            self.refused += 1
+            self.rejected += 1
         return found
 
     def _answer(self, request: Request) -> Response | None:
         host = request.headers.get("Host", "")
         if self._local and not _names_this_machine(host):
-            return _refusal(http.HTTPStatus.FORBIDDEN, f"'{host}' is not the name of this machine.")
+            return _refusal(http.HTTPStatus.FORBIDDEN, f"'{host}' is not a name of this machine.")
         origin = request.headers.get("Origin")
         if origin is not None and urlsplit(origin).netloc != host:
-            return _refusal(http.HTTPStatus.FORBIDDEN, "Pages of other sites are kept out.")
+            return _refusal(http.HTTPStatus.FORBIDDEN, "Requests from other sites are rejected.")
         if not self._token or self._has_pass(request.headers):
             return None
         shown = parse_qs(urlsplit(request.path).query).get(PARAMETER, [""])[0]
         if not shown:
             return _refusal(http.HTTPStatus.UNAUTHORIZED, "This page needs the token of the cockpit.")
         if not hmac.compare_digest(shown.encode(), self._token.encode()):
-            return _refusal(http.HTTPStatus.FORBIDDEN, "This is not the token of the cockpit.")
+            return _refusal(http.HTTPStatus.FORBIDDEN, "The token is wrong.")
         headers = Headers({"Location": "/", "Set-Cookie": f"{COOKIE}={self._pass}; HttpOnly; SameSite=Strict; Path=/"})
         return Response(http.HTTPStatus.SEE_OTHER, "See Other", headers, b"")
 

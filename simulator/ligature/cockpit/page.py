@@ -28,7 +28,7 @@ def serve(address: Address, gate: Gate) -> ViserServer:
         server = ViserServer(address.host, address.port, "Ligature", verbose=False)
     if address.port and server.get_port() != address.port:
         server.stop()
-        raise AddressError(f"the cockpit cannot be served at {address.host}:{address.port}: it was taken meanwhile")
+        raise AddressError(f"cannot serve the cockpit at {address.host}:{address.port}: another program took the port")
     for message in (ShareUrlRequest, ShareUrlDisconnect):  # any visitor could make the page public with these
         server._websock_server.unregister_handler(message)
     gui = server.gui
@@ -48,7 +48,7 @@ def badge(word: str, colour: str) -> str:
 
 
 class Header:
-    """The line that states what is shown, how fast it runs, and who operates."""
+    """The status line: what is shown, how fast it runs, and who operates."""
 
     def __init__(self, server: ViserServer, scene: str) -> None:
         self._scene = scene

@@ -34,8 +34,6 @@ REST = 3.0
 NICE = 10
 """How much lower the scheduling priority of drawing is than that of physics and the rest of the cockpit."""
 
-PHYSICS_SILENCE = 5.0
-
 Eye = tuple[int, str]
 """A camera's index, and which of its eyes: left, right, or an empty text for the camera itself."""
 
@@ -79,7 +77,7 @@ class Pictures:
             self._try(lambda: self._pipe.send(sight))
 
     def newest(self) -> NDArray[np.uint8] | None:
-        """The newest picture (height, width, 3) that was not taken yet; `problem` states why there are none."""
+        """The newest picture (height, width, 3) that was not taken yet; `problem` is the reason why there are none."""
         picture = None
         while not self.problem and self._try(self._pipe.poll):
             got = self._try(self._pipe.recv)
@@ -93,7 +91,7 @@ class Pictures:
         try:
             return call()
         except (EOFError, OSError):
-            self.problem = self.problem or "the process that draws has ended"
+            self.problem = self.problem or "the rendering process has ended"
             return None
 
     def close(self) -> None:
@@ -114,7 +112,7 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
         while pipe.poll(None if sight is None else 0):
             sight = pipe.recv()
             if easel is not None:
-                easel.forget()
+                easel.reset()
         if sight is None:
             continue
         try:
@@ -148,9 +146,9 @@ class _Easel:
     @property
     def ended(self) -> bool:
         """Whether the simulation is over."""
-        return self._block.age > PHYSICS_SILENCE
+        return not self._block.active
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Draw the same moment again when asked."""
         self._drawn = -1
 

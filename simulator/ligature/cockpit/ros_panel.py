@@ -94,7 +94,7 @@ class RosPanel:
                 f"{escape(pair.leader)} → {escape(pair.follower)} "
                 f'<span style="color:#909296">{escape(pair.status or pair.current_state)}</span>'
             )
-        words = "<br>".join(rows) or "nobody teleoperates; start <code>ligature teleop</code>"
+        words = "<br>".join(rows) or "no teleoperation; start <code>ligature teleop</code>"
         return f'<div id="pairs" style="font-size:12px;padding:2px 8px">{words}</div>'
 
     def _topic_words(self) -> str:

@@ -46,7 +46,7 @@ class Clockwork:
         self._send(Reset())
 
     def pace(self, speed: float) -> None:
-        """Simulated over wall time."""
+        """Simulated time over wall time."""
         self._send(Pace(speed))
 
     def record(self, name: str) -> None:
@@ -88,14 +88,14 @@ class SimulationControls:
             self._paused: Any = gui.add_checkbox("Paused", paused)
             steps = gui.add_button_group("Step", STEPS, hint="Updates to run while paused")
             self._speed = gui.add_dropdown(
-                "Speed", SPEEDS, initial_value=speed if speed in SPEEDS else "1", hint="Simulated over wall time"
+                "Speed", SPEEDS, initial_value=speed if speed in SPEEDS else "1", hint="Simulated time over wall time"
             )
             reset = gui.add_button("Reset the scene", color="red")
             name = gui.add_text(
-                "Record as", record_as, hint="Name of a file in the folder of recordings; empty: the date"
+                "Record as", record_as, hint="File name in the folder of recordings; empty uses the date"
             )
             self._recorded: Any = gui.add_checkbox(
-                "Record", recording, hint="To be simulated again bit for bit by 'ligature replay'"
+                "Record", recording, hint="'ligature replay' simulates the recording again, bit for bit"
             )
         self._paused.on_update(self._of("pause"))
         steps.on_click(self._of("step"))

@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 
 import ligature
-from ligature.in_process import Simulation
+from ligature.camera_simulation import Simulation
 from ligature.model.scene import ArmDescription, ArmKind
 
 FORMAT = "ligature dataset 1"
@@ -29,7 +29,7 @@ EARLY = 1e-6
 
 
 class DatasetError(RuntimeError):
-    """A dataset that cannot be written; the message states why."""
+    """A dataset that cannot be written; the message gives the reason."""
 
 
 class _Disk(io.FileIO):
@@ -91,7 +91,7 @@ class DatasetWriter:
         phases: Sequence[str] = (),
     ) -> None:
         if path.exists():
-            raise DatasetError(f"'{path}' exists already; datasets replace nothing")
+            raise DatasetError(f"'{path}' exists already; choose another name")
         self._path, self._part = path, path.with_name(f"{path.name}.part")
         self._simulation, self._size, self._period = simulation, size, 1.0 / rate
         self._cameras = {name: simulation.cameras[name] for name in cameras}
@@ -216,7 +216,7 @@ class DatasetWriter:
                 raise self._disk.error
         except (OSError, RuntimeError) as error:
             self.abandon()
-            raise DatasetError(f"the dataset '{self._path}' cannot be written: {error}") from error
+            raise DatasetError(f"cannot write the dataset '{self._path}': {error}") from error
 
     def __enter__(self) -> DatasetWriter:
         return self

@@ -13,11 +13,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from ligature.camera_simulation import Simulation
 from ligature.environments.goals import GOALS, Goal, tip_position
-from ligature.in_process import Simulation
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.load import load
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks.scenery import Scenery
 
@@ -104,7 +104,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         arm = arm or self._goal.arm
         found = self._simulation.arms[arm]
         if not isinstance(found, PsmArm):
-            raise ValueError(f"'{arm}' is no PSM")
+            raise ValueError(f"'{arm}' is not a PSM")
         self._arm = found
         self._scenery = Scenery.of(self._simulation.scene, self._goal.holes)
         self._action, self._observation, self._dense = action, observation, reward == "dense"
@@ -154,14 +154,14 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for 20 ms."""
         wanted = np.clip(np.nan_to_num(np.asarray(action, dtype=float)), -1.0, 1.0)
-        refused = self._act(wanted)
+        rejected = self._act(wanted)
         self._simulation.step(self._ticks)
         self._count += 1
         distance = self._goal.distance(self._simulation, self._arm)
         done = distance <= 0.0
         reward = SUCCESS_REWARD * done + (100.0 * (self._before - distance) if self._dense else 0.0)
         self._before = distance
-        info = {**self._info(distance), "refused": refused}
+        info = {**self._info(distance), "refused": rejected}
         return self._observe(), float(reward), done, self._count >= self._most, info
 
     def _act(self, action: Array) -> str:
@@ -174,8 +174,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
                 arm.servo_cp(_stepped(arm, action))
             if arm.jaw is not None:
                 arm.jaw.servo_jp(arm.jaw.setpoint_js().position + STEP_JAW * action[6])
-        except Refused as refused:
-            return str(refused)
+        except Rejected as rejection:
+            return str(rejection)
         return ""
 
     def _observe(self) -> Any:

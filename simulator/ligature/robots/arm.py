@@ -3,7 +3,7 @@
 Names are those of CRTK (interface reference §5). ``local`` poses are in the arm's base frame; `measured_cp` and
 `servo_cp` have the base frame applied that `set_base_frame` set. Poses are accepted as x y z qx qy qz qw (7,) or as
 matrices (4, 4) and returned as (7,). Twists and wrenches (6,) are linear then angular. Radians, metres, seconds of
-simulated time. A command that is not carried out raises `Refused` and changes nothing.
+simulated time. A command that is not carried out raises `Rejected` and changes nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ligature.robots.axes import Axes
 from ligature.robots.device import Device
 from ligature.robots.impedance import CartesianImpedance
 from ligature.robots.inverse import InverseResult, Reason
-from ligature.robots.operating_state import Refused, State
+from ligature.robots.operating_state import Rejected, State
 from ligature.robots.poses import pose_matrix_of, turned
 
 Array = NDArray[np.float64]
@@ -106,9 +106,9 @@ class Arm(Device):
 
     def _require_joints(self, what: str) -> None:
         if self._state is not State.ENABLED:
-            raise Refused(f"{what}: {self.name} is {self._state.name}, not ENABLED; arm not ready")
+            raise Rejected(f"{what}: {self.name} is {self._state.name}, not ENABLED; arm not ready")
         if not self._homed:
-            raise Refused(f"{what}: {self.name} is not homed; arm not ready")
+            raise Rejected(f"{what}: {self.name} is not homed; arm not ready")
 
     def _require_cartesian(self, what: str) -> None:
         self._require_joints(what)
@@ -279,7 +279,7 @@ class Arm(Device):
         T = inverse(self._T_reference_base) @ pose_matrix_of(pose, what)
         result = self.kinematics.inverse(T, self.joints.setpoint[0])
         if int(result.code) not in (Reason.REACHED, Reason.OUTSIDE_LIMITS):
-            raise Refused(
+            raise Rejected(
                 f"{what}: no inverse kinematics of {self.name} at {T[:3, 3].round(4).tolist()}: {result.reason}"
             )
         return self.joints.clipped(result.q)
@@ -324,7 +324,7 @@ class Arm(Device):
             self.body_servo_cf(np.zeros(6) if wrench is None else wrench)
 
     def _push_with(self, what: str, push: Any) -> None:
-        """Have the joints push as ``what`` states, anew each tick."""
+        """Have the joints push as ``what`` computes, anew each tick."""
         self._require_cartesian(what)
         self._stop_for(self.joints)
         self._pushing = what, push
@@ -348,11 +348,11 @@ class Arm(Device):
     def _six(values: ArrayLike, what: str) -> Array:
         numbers = np.array(values, dtype=float).reshape(-1)
         if len(numbers) != 6 or not np.isfinite(numbers).all():
-            raise Refused(f"{what} takes 6 finite numbers, not {numbers.tolist()}")
+            raise Rejected(f"{what} takes 6 finite numbers, not {numbers.tolist()}")
         return numbers
 
     def set_base_frame(self, pose: ArrayLike, reference: str) -> None:
-        """State where the base stands in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
+        """Set the pose of the base in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
         self._T_reference_base = pose_matrix_of(pose, "set_base_frame")
         self.reference = reference
         self.emit("base_frame", reference)
@@ -375,7 +375,7 @@ class Arm(Device):
         values = np.array(jp, dtype=float).reshape(-1)
         n = self.joints.n
         if len(values) > n:
-            raise Refused(f"too many joints: {self.name} has {n}, not {len(values)}")
+            raise Rejected(f"too many joints: {self.name} has {n}, not {len(values)}")
         T = self.kinematics.forward(np.concatenate([values, np.zeros(n - len(values))]))
         return matrix_pose7(T if local else self._T_reference_base @ T)
 
@@ -383,10 +383,10 @@ class Arm(Device):
         """Joint values of a local pose, closest to ``seed`` (n,)."""
         values = np.array(seed, dtype=float).reshape(-1)
         if len(values) != self.joints.n:
-            raise Refused(f"incorrect number of joints: {self.name} has {self.joints.n}, not {len(values)}")
+            raise Rejected(f"incorrect number of joints: {self.name} has {self.joints.n}, not {len(values)}")
         result = self.kinematics.inverse(pose_matrix_of(cp, "inverse_kinematics"), values)
         if not result.ok:
-            raise Refused(f"inverse kinematics failed: {result.reason}")
+            raise Rejected(f"inverse kinematics failed: {result.reason}")
         return result.q
 
     # --- trajectories -----------------------------------------------------------------------
@@ -406,7 +406,7 @@ class Arm(Device):
     def _set_ratio(self, v: float | None, a: float | None) -> None:
         for ratio in (v, a):
             if ratio is not None and not 0.0 < ratio <= 1.0:
-                raise Refused(f"a ratio must be above 0 and at most 1, not {ratio:g}")
+                raise Rejected(f"a ratio must be above 0 and at most 1, not {ratio:g}")
         for axes in self._groups():
             axes.ratio_v, axes.ratio_a = v or axes.ratio_v, a or axes.ratio_a
         if v is not None and a is not None:

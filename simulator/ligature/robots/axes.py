@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 from ligature.robots.plant import Plant
 from ligature.robots.trajectory import JointTrajectory
 
@@ -37,8 +37,8 @@ class Axes:
         Of the n joints, as clients see them.
     limits
         Lower and upper ends (2, n).
-    fastest, hardest
-        Velocities and accelerations (n,) of moves at ratio 1.
+    max_velocity, max_acceleration
+        Limits (n,) of moves at ratio 1, in rad/s or m/s and rad/s² or m/s².
     plant
         What is driven.
     """
@@ -92,12 +92,12 @@ class Axes:
         return np.clip(position, self.limits[0], self.limits[1])
 
     def checked(self, values: ArrayLike, what: str) -> Array:
-        """``values`` as n numbers; raises `Refused` when they are not."""
+        """``values`` as n numbers; raises `Rejected` when they are not."""
         numbers = np.array(values, dtype=float).reshape(-1)
         if len(numbers) != self.n:
-            raise Refused(f"{what} takes {self.n} numbers ({', '.join(self.names)}), not {len(numbers)}")
+            raise Rejected(f"{what} takes {self.n} numbers ({', '.join(self.names)}), not {len(numbers)}")
         if not np.isfinite(numbers).all():
-            raise Refused(f"{what} takes finite numbers, not {numbers.tolist()}")
+            raise Rejected(f"{what} takes finite numbers, not {numbers.tolist()}")
         return numbers
 
     # --- modes ------------------------------------------------------------------------------

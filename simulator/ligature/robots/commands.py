@@ -17,15 +17,15 @@ from ligature.model.frames import quaternion_matrix
 from ligature.model.messages import FLAG, INDEX, Numbers, Real, Text, Vector, wire
 from ligature.model.scene import ArmKind
 from ligature.robots.impedance import CartesianImpedance
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 
 if TYPE_CHECKING:
     from ligature.robots.arm import Arm
 
 _WHAT_IS_MISSING = {
-    ArmKind.PSM: "is no PSM: it has neither jaw nor tool",
-    ArmKind.ECM: "is no ECM: it has no endoscope",
-    ArmKind.MTM: "is no MTM",
+    ArmKind.PSM: "is not a PSM: it has neither jaw nor tool",
+    ArmKind.ECM: "is not an ECM: it has no endoscope",
+    ArmKind.MTM: "is not an MTM",
 }
 
 _GAINS = Numbers(12)
@@ -75,9 +75,9 @@ class ArmCommand(Command):
         return self.verb.rpartition("/")[2].startswith("move_")
 
     def carry_out(self, arm: Arm) -> None:
-        """Have ``arm`` do it; raises `Refused` with the reason when it does not."""
+        """Have ``arm`` do it; raises `Rejected` with the reason when it does not."""
         if self.kind is not None and arm.kind != self.kind.name:
-            raise Refused(f"{arm.name} {_WHAT_IS_MISSING[self.kind]}")
+            raise Rejected(f"{arm.name} {_WHAT_IS_MISSING[self.kind]}")
         self._call(arm)
 
     def _call(self, arm: Any) -> None:

@@ -1,6 +1,6 @@
 """A CRTK device: operating states, homing, busy flags, events and the groups of joints it drives.
 
-Seconds of simulated time. A command that is not carried out raises `Refused` and changes nothing.
+Seconds of simulated time. A command that is not carried out raises `Rejected` and changes nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ligature.robots.axes import Axes, Mode
-from ligature.robots.operating_state import Action, OperatingState, Refused, State, action
+from ligature.robots.operating_state import Action, OperatingState, Rejected, State, action
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ MOST_EVENTS = 500
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a device; ``name`` is the topic that reports it, ``value`` what it states."""
+    """Something that happened to a device; ``name`` is the topic that reports it, ``value`` its content."""
 
     device: str
     name: str
@@ -140,7 +140,7 @@ class Device:
     def adopt(self) -> None:
         """Be enabled and homed at once, where the arm stands: for clients that know no states."""
         if self._state is State.FAULT:
-            raise Refused(f"{self.name} is in FAULT; send 'disable', then 'enable'")
+            raise Rejected(f"{self.name} is in FAULT; send 'disable', then 'enable'")
         self._state, self._homed, self._pending = State.ENABLED, True, None
         self._busy = self._homing = False
         self._hold_all()

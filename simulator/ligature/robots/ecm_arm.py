@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from ligature.robots.arm import Arm, damped_inverse
 from ligature.robots.axes import Axes
 from ligature.robots.ecm import ENDOSCOPES, INSERTION, Ecm
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class EcmArm(Arm):
     def set_endoscope_type(self, endoscope: str) -> None:
         """Change the endoscope, which turns the picture of UP and DOWN scopes; NONE keeps the straight one."""
         if endoscope not in ENDOSCOPES:
-            raise Refused(f"there is no endoscope '{endoscope}'; known are {', '.join(ENDOSCOPES)}")
+            raise Rejected(f"there is no endoscope '{endoscope}'; known are {', '.join(ENDOSCOPES)}")
         self.kinematics = Ecm(endoscope, self.kinematics.model)
         self.emit("endoscope_type", endoscope)
 

@@ -68,7 +68,7 @@ def psm_kinematics(scene: Scene, description: ArmDescription) -> tuple[Psm, str]
         tool = instrument(description.tool or DEFAULT_TOOL)
     except ValueError as error:
         tool = instrument(DEFAULT_TOOL)
-        problem = f"{error}; it is taken for {tool.type}"
+        problem = f"{error}; using {tool.type}"
     return _known(tool, lengths) or Psm(tool, lengths=lengths), problem
 
 

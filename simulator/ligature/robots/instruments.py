@@ -160,7 +160,7 @@ def instrument(tool_type: str | int) -> Instrument:
     text = str(tool_type).strip()
     match = _TYPE.match(text)
     if match is None:
-        raise ValueError(f"'{text}' is no tool type; write NAME:NUMBER, for example LARGE_NEEDLE_DRIVER:400006")
+        raise ValueError(f"'{text}' is not a tool type; write NAME:NUMBER, for example LARGE_NEEDLE_DRIVER:400006")
     name, number = match["name"], match["number"]
     if number is None and not name.isdigit():
         return _by_name(name)

@@ -66,7 +66,7 @@ class Mtm(Chain):
 
     def __init__(self, side: str) -> None:
         if side not in LIMITS:
-            raise ValueError(f"there is no {side} MTM; state left or right")
+            raise ValueError(f"'{side}' is not a side of the console; use 'left' or 'right'")
         self.side = side
         links = (
             Link(alpha=HALF_PI, theta=-HALF_PI),

@@ -14,7 +14,7 @@ from ligature.model.frames import quaternion_matrix
 from ligature.robots.arm import Arm, JointState
 from ligature.robots.axes import Axes
 from ligature.robots.mtm import Mtm
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 from ligature.robots.plant import IdealPlant
 from ligature.robots.poses import rotation_vector
 
@@ -73,7 +73,7 @@ class MtmArm(Arm):
         """Keep an orientation (4,) of `measured_cp` while the arm yields to efforts."""
         values = np.array(quaternion, dtype=float).reshape(-1)
         if len(values) != 4 or not np.isfinite(values).all() or not 0.9 <= np.linalg.norm(values) <= 1.1:
-            raise Refused(f"lock_orientation takes a quaternion of length 1, not {values.tolist()}")
+            raise Rejected(f"lock_orientation takes a quaternion of length 1, not {values.tolist()}")
         R = quaternion_matrix(values / np.linalg.norm(values))
         self._locked = self._T_reference_base[:3, :3].T @ R
         self.emit("orientation_locked", True)

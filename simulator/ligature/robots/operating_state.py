@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Any
+
+from ligature.deprecation import warn_deprecated
 
 
 class State(enum.IntEnum):
@@ -20,7 +23,7 @@ class State(enum.IntEnum):
 
 @dataclass(frozen=True)
 class OperatingState:
-    """What ``crtk_msgs/OperatingState`` states: ``is_busy`` during moves and homing, never because of ``servo_``."""
+    """The content of ``crtk_msgs/OperatingState``: ``is_busy`` during moves and homing, never because of ``servo_``."""
 
     state: State = State.DISABLED
     is_homed: bool = False
@@ -28,7 +31,7 @@ class OperatingState:
 
 
 class Action(enum.Enum):
-    """What an allowed command leads to."""
+    """The effect of an allowed command."""
 
     NOTHING = enum.auto()
     POWER_UP = enum.auto()
@@ -39,8 +42,8 @@ class Action(enum.Enum):
     UNHOME = enum.auto()
 
 
-class Refused(ValueError):
-    """A command that the arm does not carry out; the text states why and what would be right."""
+class Rejected(ValueError):
+    """A command that an arm does not carry out; the message gives the reason and what would be right."""
 
 
 _D, _E, _P, _F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
@@ -52,15 +55,23 @@ TRANSITIONS: dict[str, dict[State, Action]] = {
     "home": {_D: Action.HOME, _E: Action.HOME},
     "unhome": dict.fromkeys(State, Action.UNHOME),
 }
-"""Action of each command in each state; what is missing is refused."""
+"""Action of each command in each state; what is missing is rejected."""
 
 
 def action(command: str, state: State) -> Action:
-    """What ``command`` leads to in ``state``; raises `Refused` for an unknown command or one that is not allowed."""
+    """The effect of ``command`` in ``state``; raises `Rejected` for an unknown command or one that is not allowed."""
     if command not in TRANSITIONS:
-        raise Refused(f"'{command}' is no state command; there are {', '.join(TRANSITIONS)}")
+        raise Rejected(f"'{command}' is not a state command; use one of {', '.join(TRANSITIONS)}")
     found = TRANSITIONS[command].get(state)
     if found is None:
         allowed = ", ".join(s.name for s in TRANSITIONS[command])
-        raise Refused(f"'{command}' is not allowed in state {state.name}, only in {allowed}")
+        raise Rejected(f"'{command}' is not allowed in state {state.name}, only in {allowed}")
     return found
+
+
+def __getattr__(name: str) -> Any:
+    """Former names of this module."""
+    if name == "Refused":
+        warn_deprecated("Refused", "Rejected")
+        return Rejected
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,23 +7,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 
 Array = NDArray[np.float64]
 
 
 def pose_matrix_of(pose: ArrayLike, what: str) -> Array:
-    """A pose, (7,) or (4, 4), as (4, 4); raises `Refused` for anything else."""
+    """A pose, (7,) or (4, 4), as (4, 4); raises `Rejected` for anything else."""
     values = np.array(pose, dtype=float)
     if not np.isfinite(values).all():
-        raise Refused(f"{what} takes finite numbers")
+        raise Rejected(f"{what} takes finite numbers")
     if values.shape == (4, 4):
         return values
     if values.shape != (7,):
-        raise Refused(f"{what} takes a pose x y z qx qy qz qw or a (4, 4) matrix, not the shape {values.shape}")
+        raise Rejected(f"{what} takes a pose x y z qx qy qz qw or a (4, 4) matrix, not the shape {values.shape}")
     length = float(np.linalg.norm(values[3:]))
     if not 0.9 <= length <= 1.1:
-        raise Refused(f"{what}: the quaternion has the length {length:.3g}; it must be 1")
+        raise Rejected(f"{what}: the quaternion has the length {length:.3g}; it must be 1")
     values[3:] /= length
     return pose7_matrix(values)
 

@@ -38,7 +38,7 @@ Limits = tuple[float, float]
 
 @dataclass(frozen=True)
 class PsmLengths:
-    """The three lengths in metres that tell one PSM and instrument from another.
+    """The three lengths in metres that distinguish one PSM and instrument from another.
 
     ``rcc`` from the insertion carriage at insertion zero to the RCM, ``shaft`` from the carriage to the palm,
     ``wrist`` from the palm to the wrist yaw axis.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ligature.robots.arm import Arm, JointState
 from ligature.robots.axes import Axes
 from ligature.robots.instruments import instrument
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 from ligature.robots.psm import INSERTION, Psm
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ class PsmArm(Arm):
         try:
             found = instrument(tool)
         except ValueError as error:
-            raise Refused(f"set_tool_type: {error}") from error
+            raise Rejected(f"set_tool_type: {error}") from error
         self.kinematics = Psm(found, self.kinematics.model, self.kinematics.lengths)
         self._fit_limits()
         self.emit("tool_type", self.tool_type)
@@ -137,7 +137,7 @@ class PsmArm(Arm):
     def _require_cartesian(self, what: str) -> None:
         super()._require_cartesian(what)
         if self.depth < ENTRY_DEPTH:
-            raise Refused(
+            raise Rejected(
                 f"{what}: the tool of {self.name} is {1000 * self.depth:.0f} mm below the remote centre; "
                 f"insert it to {1000 * LEAST_DEPTH:.0f} mm first"
             )
@@ -152,7 +152,7 @@ class PsmArm(Arm):
     def _jaw(self, what: str) -> Axes:
         self._require_joints(what)
         if self._jaw_axes is None:
-            raise Refused(f"{what}: {self.name} has no jaw")
+            raise Rejected(f"{what}: {self.name} has no jaw")
         return self._jaw_axes
 
     def servo_jaw(self, angle: ArrayLike) -> None:

@@ -35,7 +35,7 @@ class ArmRecord:
         status = (arm.operating_state, axes.ratio_v, axes.ratio_a, arm.reference, tool, present)
         if status != self._status:
             self._status = status
-            self._tell(record)
+            self._fill_status(record)
         grip = arm.gripper if isinstance(arm, MtmArm) else arm.jaw.axes if isinstance(arm, PsmArm) and arm.jaw else None
         if grip is not None:
             opening, wanted = grip.readings()
@@ -46,7 +46,7 @@ class ArmRecord:
             self._described = described
             self._describe(record, measured, setpoint, wrench)
 
-    def _tell(self, record: Any) -> None:
+    def _fill_status(self, record: Any) -> None:
         """Fill in what changes seldom."""
         state, *ratio, reference, record["tool"], record["tool_present"] = self._status
         record["operating"], record["homed"], record["busy"] = state.state, state.is_homed, state.is_busy

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
-from ligature.robots.operating_state import Refused
+from ligature.robots.operating_state import Rejected
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class JointTrajectory:
 
     Raises
     ------
-    Refused
+    Rejected
         When ruckig finds no trajectory: it calculates none of more than `LONGEST` seconds.
     """
 
@@ -50,7 +50,7 @@ class JointTrajectory:
         except (RuckigError, ValueError):  # arithmetic that fails; a result that its Python enumeration lacks
             result = Result.Error
         if result not in (Result.Working, Result.Finished):
-            raise Refused(
+            raise Rejected(
                 f"ruckig finds no trajectory within {LONGEST:g} s from {np.round(position, 4).tolist()} to"
                 f" {np.round(goal, 4).tolist()}; raise 'trajectory_j/set_ratio'"
             )

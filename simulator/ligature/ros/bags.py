@@ -24,7 +24,7 @@ REPORTS = "/surgical_robotics_challenge/completion_report"
 
 
 class BagError(ValueError):
-    """A bag that cannot be used; the message states why."""
+    """A bag that cannot be used; the message gives the reason."""
 
 
 @contextmanager
@@ -35,10 +35,10 @@ def opened(path: Path) -> Iterator[rosbag.Bag]:
             yield bag
     except rosbag.ROSBagUnindexedException:
         raise BagError(
-            f"{path}: the bag is cut off: its recorder did not come to the end; 'rosbag reindex' may repair it"
+            f"{path}: the bag is truncated: its recorder did not finish; 'rosbag reindex' may repair it"
         ) from None
     except rosbag.ROSBagException as error:
-        raise BagError(f"{path}: no bag, or a damaged one: {error}") from None
+        raise BagError(f"{path}: not a bag, or a damaged one: {error}") from None
     except OSError as error:
         raise BagError(f"{path}: {error.strerror or error}") from None
 
@@ -82,9 +82,9 @@ def judge(path: Path, scene: Scene, task: str) -> tuple[Score, Attempt]:
             elif len(seen) == len(bodies):
                 score = _judged(attempt, message) or score
     if score is None and task == "pose_estimation":
-        raise BagError(f"{path}: nobody reports a pose in it, on {REPORTS}/TEAM/task1")
+        raise BagError(f"{path}: no pose is reported on {REPORTS}/TEAM/task1")
     if len(seen) < len(bodies):
-        raise BagError(f"{path}: states nothing about {', '.join(sorted(set(bodies) - seen))}")
+        raise BagError(f"{path}: has no topics of {', '.join(sorted(set(bodies) - seen))}")
     return score or attempt.judge(), attempt
 
 

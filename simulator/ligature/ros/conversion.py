@@ -167,7 +167,7 @@ class ActuatorTemplate(_Attached):
         self.message.type.data = "CONSTRAINT"
 
     def content(self, message: ActuatorState, state: Record) -> None:
-        """Whether something is held; the reference never reports it, clients gain by it."""
+        """Whether something is held; AMBF never fills it in; clients need it."""
         message.actuated = bool(state["actuator_active"][self.index])
 
 
@@ -283,7 +283,9 @@ def body_command(message: RigidBodyCmd, body: Body) -> BodyCommand:
     """The command of a ``RigidBodyCmd``; raises ValueError naming what is wrong."""
     kinds = {int(kind) for kind in CommandType}
     if message.cartesian_cmd_type not in kinds:
-        raise ValueError(f"cartesian_cmd_type is {message.cartesian_cmd_type}; 0 force, 1 position, 2 velocity")
+        raise ValueError(
+            f"cartesian_cmd_type is {message.cartesian_cmd_type}; it must be 0 (force), 1 (position) or 2 (velocity)"
+        )
     kind = CommandType(message.cartesian_cmd_type)
     if kind is CommandType.POSITION:
         target = pose7(message.pose)
@@ -295,7 +297,7 @@ def body_command(message: RigidBodyCmd, body: Body) -> BodyCommand:
     types = list(message.joint_cmds_types[:count])
     types += [int(CommandType.FORCE)] * (count - len(types))
     if not set(types) <= kinds:
-        raise ValueError("joint_cmds_types holds another number than 0 force, 1 position, 2 velocity")
+        raise ValueError("joint_cmds_types must hold 0 (force), 1 (position) or 2 (velocity)")
     return BodyCommand(
         body.index, kind, target, tuple(CommandType(t) for t in types), tuple(message.joint_cmds[:count])
     )

@@ -49,7 +49,7 @@ class Diagnostics:
             "commands received": str(figures["received"]),
             "commands coalesced": str(figures["coalesced"]),
             "commands rejected": str(int(figures["rejected"]) + int(figures["malformed"])),
-            "commands dropped": str(sum(ring.refused for ring in self._block.rings.values())),
+            "commands dropped": str(sum(ring.dropped for ring in self._block.rings.values())),
             "messages published": str(figures["published"]),
             "publications dropped": str(figures["publish_late"]),
             "messages missed by slow clients": str(self.missed),

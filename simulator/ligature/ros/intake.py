@@ -38,7 +38,7 @@ class Oversized:
         with self._lock:
             self.count += 1
         rospy.logwarn_throttle(
-            WARNING_PAUSE, f"{name}: a message of {size} bytes is refused; at most {MOST_BYTES} bytes are taken"
+            WARNING_PAUSE, f"{name}: rejected a message of {size} bytes; the maximum is {MOST_BYTES} bytes"
         )
 
 
@@ -88,7 +88,7 @@ def read_bounded_request(connection: Any, b: io.BytesIO, msg_queue: list[Any], s
     size = announced(b)
     if size is not None and size > MOST_BYTES:
         oversized.note(connection.resolved_name, size)
-        raise TransportTerminated(f"a request of {size} bytes is refused; at most {MOST_BYTES} are taken")
+        raise TransportTerminated(f"rejected a request of {size} bytes; the maximum is {MOST_BYTES}")
     TCPROSTransportProtocol.read_messages(connection, b, msg_queue, sock)
 
 

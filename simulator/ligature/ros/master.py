@@ -42,7 +42,7 @@ def commanded_topics() -> set[str]:
 
 
 class NameTaken(RuntimeError):
-    """Another simulator of the same world runs on this master; the message states what to do."""
+    """Another simulator of the same world runs on this master; the message lists what to do."""
 
 
 def require_free(name: str) -> None:
@@ -92,7 +92,7 @@ class MasterWatch(threading.Thread):
                 self.look()
             except NO_ANSWER:
                 if self._answers:
-                    rospy.logwarn("the ROS master does not answer; clients that are connected stay so")
+                    rospy.logwarn("the ROS master does not answer; existing connections continue")
                 self._answers = False
 
     def look(self) -> None:
@@ -100,13 +100,13 @@ class MasterWatch(threading.Thread):
         code, _, _ = rospy.get_master().lookupNode(rospy.get_name())
         if code != 1 or not self._answers:
             register_again()
-            rospy.logwarn("the ROS master answers again; everything is registered with it")
+            rospy.logwarn("the ROS master answers again; all topics and services are registered again")
             self._answers = True
         self._also()
 
 
 def register_again() -> None:
-    """Report the master about every publication, subscription and service of this node; connections stay."""
+    """Register every publication, subscription and service of this node with the master; connections stay."""
     topics, listeners = get_topic_manager(), get_registration_listeners()
     for name, type_ in topics.get_publications():
         listeners.notify_added(name, type_, Registration.PUB)

@@ -35,19 +35,16 @@ DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
 HOUSEKEEPING = 0.02
 """Seconds between looks at watchdogs and the physics process."""
 
-PHYSICS_SILENCE = 5.0
-"""Seconds without a sign of life of the physics process after which this one ends."""
-
 
 class Node:
     """The simulator on ROS; raises `ligature.ros.master.NameTaken` when another one is there already."""
 
     def __init__(
-        self, scene: Scene, bus: str, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool
+        self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool
     ) -> None:
         self._scene = scene
         self._state = new_state(scene)
-        self._block = Block.attach(bus, self._state.dtype)
+        self._block = block
         self._ring = self._block.rings["ros"]
         self._woken = threading.Event()
         name = node_name(scene.world.topic)
@@ -64,7 +61,7 @@ class Node:
         self._reception.subscribe_world()
         self._arms = ArmsNode(scene, self._block, self._outbox, challenge)
         arms = ", ".join(arm.name for arm in scene.arms) or "none"
-        self.told = f"{2 * len(outlets)} topics of objects; arms: {arms}"
+        self.summary = f"{2 * len(outlets)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block)
         self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
         self._master = MasterWatch(Parameters(scene, self._adopt).poll)
@@ -72,7 +69,7 @@ class Node:
     def run(self, stop: Stop, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
         self._master.start()
-        told, housekeeping = False, 0.0
+        published, housekeeping = False, 0.0
         if self._block.read(self._state):
             self._arms.start(self._state[0])
         while not stop.is_set() and not rospy.is_shutdown():
@@ -87,8 +84,8 @@ class Node:
                 self._woken.wait(nap)
             elif self._block.read(self._state):
                 self._publish(now)
-                if not told:
-                    told = True
+                if not published:
+                    published = True
                     on_first()
 
     def _advertise(self, min_hz: int | None, max_hz: int | None, policy: str) -> list[Outlet]:
@@ -103,7 +100,9 @@ class Node:
             if topic is None:
                 hidden.append(identity.topic)
             elif not rosgraph.names.is_legal_name(topic):
-                rospy.logwarn(f"'{topic}' is no name for ROS and is not advertised; use letters, digits, '_' and '/'")
+                rospy.logwarn(
+                    f"'{topic}' is not a valid ROS name and is not advertised; use letters, digits, '_' and '/'"
+                )
             else:
                 low, high = min_hz or max(identity.publish_low, 1), max_hz or max(identity.publish_high, 1)
                 outlets.append(self._outlet(template, topic, low, high))
@@ -121,7 +120,7 @@ class Node:
         self._woken.set()
 
     def _adopt(self, command: ParentCommand) -> None:
-        """A camera or light gets another parent; its messages report it."""
+        """A camera or light gets another parent; its messages name the new one."""
         self._outbox.push(command)
         template = self._placed.get((command.kind, command.index))
         if template is not None:
@@ -142,9 +141,9 @@ class Node:
         self._ring.beat()
         self._reception.watch(now)
         figures = self._block.figures
-        figures["malformed"] = self._reception.refused + self._arms.refused + oversized.count
+        figures["malformed"] = self._reception.rejected + self._arms.rejected + oversized.count
         self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
         self._diagnostics.faults = self._arms.faults
         self._world.loop_hz = float(figures["loop_hz"][0])
         self._diagnostics.publish(now)
-        return self._block.age < PHYSICS_SILENCE
+        return self._block.active

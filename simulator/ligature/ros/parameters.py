@@ -176,7 +176,7 @@ class Parameters:
         identifiers = [body.identity.identifier for body in self._scene.bodies]
         found = find_by_text(identifiers, text) if isinstance(text, str) else None
         if found is None:
-            rospy.logwarn(f"{name} is {text!r}: no body is called that, or several are; the parent stays")
+            rospy.logwarn(f"{name} is {text!r}: no body or several bodies match; keeping the parent")
             return
         self._send(ParentCommand(kind, index, found))
 
@@ -215,7 +215,7 @@ class Follower:
         try:
             into[item.index] = make(values)
         except ValueError as error:
-            text = f"{item.identity.topic}: {error}; it stays as it was"
+            text = f"{item.identity.topic}: {error}; keeping the previous values"
             if text not in self._told:
                 rospy.logwarn(text)
             self._told.add(text)
@@ -247,7 +247,7 @@ def _look_up(tree: Any, name: str) -> Any:
 def _number(values: Values, name: str, least: float) -> float:
     value = values[name]
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < least:
-        expected = "a finite number" if math.isinf(least) else f"a number not below {least:g}"
+        expected = "a finite number" if math.isinf(least) else f"a number of at least {least:g}"
         raise ValueError(f"{name} is {value!r}; expected {expected}")
     return float(value)
 

@@ -27,10 +27,10 @@ QUEUE = 100
 
 
 class PlaybackError(RuntimeError):
-    """The simulator does not take what a bag holds; the message states why."""
+    """The simulator does not take what a bag holds; the message gives the reason."""
 
 
-def play(path: Path, joints: str, speed: float, say: Callable[[str], None]) -> int:
+def play(path: Path, joints: str, speed: float, log: Callable[[str], None]) -> int:
     """Play ``path``; returns how many messages were sent.
 
     With ``joints`` empty, these are the messages on topics that the simulator subscribes; with ``measured`` or
@@ -47,7 +47,7 @@ def play(path: Path, joints: str, speed: float, say: Callable[[str], None]) -> i
             raise BagError(
                 f"{path}: holds no {what} that the running simulator takes; '--joints measured' plays joint states"
             )
-        say(f"playing {', '.join(routes)}")
+        log(f"playing {', '.join(routes)}")
         types = {topic: message for topic, message, _ in _firsts(bag, routes)}
         publishers = {
             topic: rospy.Publisher(
@@ -90,7 +90,7 @@ def _connect(publishers: dict[str, rospy.Publisher]) -> None:
     for publisher in publishers.values():
         while publisher.get_num_connections() == 0:
             if time.monotonic() > deadline:
-                raise PlaybackError(f"nobody takes {publisher.name} any more")
+                raise PlaybackError(f"nothing subscribes to {publisher.name} any more")
             time.sleep(0.01)
 
 
@@ -116,7 +116,7 @@ def _wait_for(arm: str, what: str, ready: Callable[[Any], bool]) -> None:
     subscriber = rospy.Subscriber(f"{arm}/operating_state", OperatingState, newest.append, queue_size=QUEUE)
     while not (newest and ready(newest[-1])):
         if time.monotonic() > deadline:
-            raise PlaybackError(f"{arm} does not come {what}")
+            raise PlaybackError(f"{arm} fails {what}")
         time.sleep(0.01)
     subscriber.unregister()
 

@@ -54,7 +54,7 @@ class Reception:
     def __init__(self, scene: Scene, outbox: Outbox, on_command: Callable[[Key, bool], None]) -> None:
         self._scene, self._outbox, self._on_command = scene, outbox, on_command
         self._watchdog: Watchdog[Key] = Watchdog()
-        self.refused = 0
+        self.rejected = 0
 
     def commanded(self, key: Key) -> bool:
         """Whether an object is being commanded."""
@@ -93,7 +93,7 @@ class Reception:
         rospy.Subscriber(topic, message, receive, queue_size=QUEUE, tcp_nodelay=True)
 
     def _command_of(self, template: Any) -> Callable[[Any], None]:
-        """What to do with a command for one object; a refused one (ValueError) does not feed the watchdog."""
+        """What to do with a command for one object; a rejected one (ValueError) does not feed the watchdog."""
         key, topic = (template.kind, template.index), template.identity.topic
 
         def take(message: Any) -> None:
@@ -134,5 +134,5 @@ class Reception:
             self._refuse(topic, error)
 
     def _refuse(self, topic: str, error: ValueError) -> None:
-        self.refused += 1
-        rospy.logwarn_throttle(WARNING_PAUSE, f"{topic}: command refused: {error}")
+        self.rejected += 1
+        rospy.logwarn_throttle(WARNING_PAUSE, f"{topic}: command rejected: {error}")

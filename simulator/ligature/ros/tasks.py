@@ -33,25 +33,22 @@ Array = NDArray[np.float64]
 SAMPLING = 0.005
 """Wall seconds between two looks at the state; 100 Hz of simulated time is what the challenge's evaluation takes."""
 
-TELLING, LOOKING = 0.1, 0.2
+PUBLISH_PERIOD, LOOK_PERIOD = 0.1, 0.2
 """Seconds between two publications of measures, and between two looks for new teams."""
-
-PHYSICS_SILENCE = 5.0
-"""Seconds without a sign of life of the physics process after which this one ends."""
 
 QUEUE = 10
 
 
 class TaskNode:
-    """Judges one attempt after the other at ``task``; ``say`` receives lines for a person.
+    """Judges one attempt after the other at ``task``; ``log`` receives lines for a person.
 
     Raises `ligature.tasks.MissingBodies`, and `ligature.ros.master.NameTaken`.
     """
 
-    def __init__(self, scene: Scene, bus: str, task: str, say: Callable[[str], None]) -> None:
-        self._attempt, self._say = Attempt(scene, task), say
+    def __init__(self, scene: Scene, block: Block, task: str, log: Callable[[str], None]) -> None:
+        self._attempt, self._log = Attempt(scene, task), log
         self._state = new_state(scene)
-        self._block = Block.attach(bus, self._state.dtype)
+        self._block = block
         self._lock = threading.Lock()
         name = f"{node_name(scene.world.topic)}_tasks"
         require_free(f"/{name}")
@@ -62,25 +59,25 @@ class TaskNode:
         self._passages = rospy.Publisher(f"{root}/passages", PointStamped, queue_size=QUEUE)
         rospy.Subscriber(f"{root}/restart", Empty, self._restart, queue_size=QUEUE)
         self._teams: set[str] = set()
-        self._told = 0
+        self._published = 0
 
     def run(self, stop: Stop) -> None:
         """Watch until ``stop`` is set or the physics process is gone."""
         MasterWatch().start()
-        telling, looking, tick = 0.0, 0.0, -1
-        while not stop.is_set() and not rospy.is_shutdown() and self._block.age < PHYSICS_SILENCE:
+        publish_at, look_at, tick = 0.0, 0.0, -1
+        while not stop.is_set() and not rospy.is_shutdown() and self._block.active:
             now = time.monotonic()
             if self._block.read(self._state) and int(self._state["tick"][0]) != tick:
                 tick = int(self._state["tick"][0])
                 with self._lock:
                     self._attempt.observe(self._state[0])
-                    self._tell_passages()
-            if now >= looking:
-                looking = now + LOOKING
+                    self._publish_passages()
+            if now >= look_at:
+                look_at = now + LOOK_PERIOD
                 self._look_for_teams()
-            if now >= telling:
-                telling = now + TELLING
-                self._tell_measures()
+            if now >= publish_at:
+                publish_at = now + PUBLISH_PERIOD
+                self._publish_measures()
             time.sleep(SAMPLING)
 
     def _restart(self, message: Any) -> None:
@@ -129,29 +126,29 @@ class TaskNode:
             rospy.logwarn(f"{team}: {error}")
             return
         report = score.report()
-        said = "done" if score.success else f"not done: {report['why']}"
+        verdict = "done" if score.success else f"not done: {report['why']}"
         level = DiagnosticStatus.OK if score.success else DiagnosticStatus.WARN
-        self._score.publish(_status(self._attempt.task, level, said, team, report))
+        self._score.publish(_status(self._attempt.task, level, verdict, team, report))
         self._measures.publish(_status(self._attempt.task, level, "", "", measures.report()))
         for line in (f"{team}:", *score.lines(), *measures.lines()):
-            self._say(line)
+            self._log(line)
 
-    def _tell_measures(self) -> None:
+    def _publish_measures(self) -> None:
         with self._lock:
             report = self._attempt.monitor.measures().report()
         self._measures.publish(_status(self._attempt.task, DiagnosticStatus.OK, "", "", report))
 
-    def _tell_passages(self) -> None:
+    def _publish_passages(self) -> None:
         """Publish where the tip went through holes since the last time, each in the frame of its hole."""
         found = self._attempt.monitor.passages
-        self._told = min(self._told, len(found))
-        for passage in found[self._told :]:
+        self._published = min(self._published, len(found))
+        for passage in found[self._published :]:
             point = PointStamped()
             point.header.stamp = rospy.Time.now()
             point.header.frame_id = f"{'Exit' if passage.exit else 'Entry'}{passage.pair}"
             point.point.x, point.point.y = passage.lateral
             self._passages.publish(point)
-        self._told = len(found)
+        self._published = len(found)
 
 
 def _status(name: str, level: int, message: str, who: str, report: Mapping[str, object]) -> DiagnosticStatus:

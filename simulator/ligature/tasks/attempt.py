@@ -98,12 +98,12 @@ class Attempt:
         Raises ValueError before the first state, and without a pose where one is needed.
         """
         if self._poses is None:
-            raise ValueError("the task cannot be judged before its first state")
+            raise ValueError("cannot judge the task before its first state")
         scenery, poses = self._scenery, self._poses
         if self.task == "insertion":
             return judge_insertion(scenery, poses, self.monitor.passages, self.time)
         if self.task == "suture":
             return judge_suture(scenery, poses, self.monitor.passages, self.time, self._pairs)
         if T_camera_needle is None:
-            raise ValueError("a pose estimation is judged by the pose that is reported")
+            raise ValueError("pose_estimation needs the reported pose")
         return judge_estimate(scenery, poses, pose7_matrix(poses[self._camera]), T_camera_needle, self.time)

@@ -53,7 +53,7 @@ class Measures:
             f"time {self.time:.1f} s",
             f"tissue force at most {self.tissue_force:.2f} N, {self.tissue_force_mean:.2f} N on average while inserted",
             f"thread tension at most {self.thread_tension:.2f} N",
-            f"ways of the tips: {ways or 'none'}",
+            f"paths of the tips: {ways or 'none'}",
             f"drops of the needle: {self.drops}",
         ]
 

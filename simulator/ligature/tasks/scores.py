@@ -112,9 +112,9 @@ def judge_insertion(scenery: Scenery, body_pose: Array, passages: Sequence[Passa
     pair, is_exit, axial = _closest(scenery, body_pose)
     failed = InsertionScore(False, time, pair, axial, None, None)
     if not is_exit:
-        return _because(failed, "the hole closest to the tip is no exit")
+        return _because(failed, "the hole closest to the tip is not an exit")
     if len(passages) < 2:
-        return _because(failed, f"the tip went through {len(passages)} holes, two are needed")
+        return _because(failed, f"the tip went through {len(passages)} holes; two are needed")
     newest, before = passages[-1], passages[-2]
     if not (newest.exit and newest.pair == pair):
         return _because(failed, f"the last hole was not exit {pair}")
@@ -186,6 +186,6 @@ def judge_suture(
     newest = list(passages[-len(wanted) :])
     got = [(passage.pair, passage.exit) for passage in newest]
     if got != wanted:
-        said = ", ".join(f"{'exit' if e else 'entry'} {p}" for p, e in got) or "none"
-        return SutureScore(False, time, axial, (), f"the tip's last holes were {said}")
+        holes = ", ".join(f"{'exit' if e else 'entry'} {p}" for p, e in got) or "none"
+        return SutureScore(False, time, axial, (), f"the tip's last holes were {holes}")
     return SutureScore(True, time, axial, tuple(passage.miss for passage in newest))

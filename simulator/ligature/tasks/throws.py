@@ -69,7 +69,7 @@ class NeedleArc:
 
 @dataclass(frozen=True)
 class Grip:
-    """How a tool holds a needle: ``depth`` metres from its tip; ``tilt``, ``pivot`` and ``flipped`` state which way."""
+    """How a tool holds a needle: ``depth`` metres from its tip; ``tilt``, ``pivot`` and ``flipped`` describe how."""
 
     depth: float
     tilt: float

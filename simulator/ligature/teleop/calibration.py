@@ -32,7 +32,7 @@ BROKEN = np.full((4, 4), np.nan)
 
 
 class Unclear(ValueError):
-    """Motions that do not show the axes; the message states what to do."""
+    """Motions that do not show the axes; the message describes the right motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def axes_of_words(x: str, y: str, z: str) -> Array:
         raise Unclear(f"an axis points {', '.join(AXES)}, not '{unknown[0]}'")
     R = np.array([AXES[x], AXES[y], AXES[z]]).T
     if abs(np.linalg.det(R) - 1.0) > 1e-9:
-        raise Unclear(f"axes {x}, {y}, {z} are no right-handed frame")
+        raise Unclear(f"axes {x}, {y}, {z} do not form a right-handed frame")
     return R
 
 

@@ -206,7 +206,7 @@ class _Reader:
                 if followers and followers[:1] == others[:1] and not waiting & {name, other}:
                     raise self.fail(
                         node.mark, f"{name} and {other} would both begin with {followers[0]}",
-                        f"begin one of the lists with another arm, or with '{NOBODY}' to have it wait",
+                        f"begin one of the lists with another arm, or with '{NOBODY}' to make it wait",
                     )  # fmt: skip
             pairs[name] = followers
         return pairs, frozenset(waiting)
@@ -226,7 +226,7 @@ class _Reader:
         kind = self.text(node, "kind") if node is not None else ""
         if kind not in KINDS:
             mark = node.mark if node is not None else block.mark
-            raise self.fail(mark, f"device {name} is of no known kind '{kind}'", f"known are {', '.join(KINDS)}")
+            raise self.fail(mark, f"device {name} has the unknown kind '{kind}'", f"known are {', '.join(KINDS)}")
         adapter = module(kind)
         own = ("kind", "topic", "axes", "handle", "grip", "buttons", "force", "settings")
         self.known(block, (*own, *adapter.OPTIONS), f"device {name}")

@@ -84,7 +84,7 @@ class Arm:
             return f"{self.name} is {state.state}"
         if not state.is_homed:
             return f"{self.name} is not homed"
-        return f"{self.name} moves by itself" if state.is_busy else ""
+        return f"{self.name} is busy with a move" if state.is_busy else ""
 
     def tip(self, camera: str) -> Tip | None:
         """Set-points in the camera's frame; None while frames or set-points are unknown."""

@@ -55,7 +55,7 @@ def of_launch_file(path: Path, indices: tuple[int, ...] | None = None) -> Teleop
     devices = load_scene(path).input_devices
     for index in indices or ():
         if not 0 <= index < len(devices):
-            raise _problem(path, f"there is no input device {index}", f"there are {len(devices)}, counted from 0")
+            raise _problem(path, f"input device {index} does not exist", f"there are {len(devices)}, counted from 0")
     chosen = tuple(range(len(devices))) if indices is None else indices
     scene = load_scene(path, devices=chosen)
     return of_devices(scene, [scene.input_devices[index] for index in chosen], path)
@@ -66,7 +66,7 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
 
     A device drives the arm that has its root link, one without a root link the first arm that is free; it may be
     switched to all others. Where no arm is left it drives its proxy, if the scene has it. Devices that cannot drive are
-    passed over; the notes state why, and what of the others has no effect.
+    passed over; the notes give the reason, and what of the others has no effect.
     """
     arms = [arm.name for arm in scene.arms if arm.kind is ArmKind.PSM]
     specs, wanted, notes = _specs(scene, devices)
@@ -83,7 +83,7 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
             continue
         if first is None or first in taken:
             why = f"{first} is driven already" if first else "no arm is left" if arms else "the scene has no arm"
-            notes.append(f"{device.key}: it drives nothing, because {why}")
+            notes.append(f"{device.key}: not used, because {why}")
             continue
         pairs[spec.name] = (first, *(arm for arm in arms if arm != first))
         notes += [f"{device.key}: {note}" for note in _without_effect(device)]
@@ -98,7 +98,7 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
 
 
 def _proxy(scene: Scene, device: InputDevice) -> ProxySpec:
-    """The proxy of a device; its grip drives the joints with limits, unless the device states that it does not."""
+    """The proxy of a device; its grip drives the joints with limits, unless the device disables that."""
     root = scene.bodies[device.proxy]
     joints = [scene.joints[index] for index in root.joints]
     limits = np.array([[joint.low or 0.0, joint.high or 0.0] for joint in joints]).reshape(-1, 2).T
@@ -119,7 +119,7 @@ def _specs(
         kind = next((kind for part, kind in HARDWARE if part in device.hardware_name.lower()), None)
         if kind is None:
             known = ", ".join(part for part, _ in HARDWARE)
-            notes.append(f"{device.key}: no hardware '{device.hardware_name}' is known; known names hold {known}")
+            notes.append(f"{device.key}: hardware '{device.hardware_name}' is unknown; known names contain {known}")
             continue
         one = kind if kind in TOPICS else device.hardware_name if kind == "mtm" else device.key
         if claimed[one] >= (len(PADDLES) if kind == "hydra" else 1):
@@ -127,9 +127,7 @@ def _specs(
             continue
         arm = _arm_of(scene, device)
         if device.root_link and arm is None and "simulated multibody" not in device.settings:
-            notes.append(
-                f"{device.key}: its root link '{device.root_link}' is of no arm, and nothing else can be driven"
-            )
+            notes.append(f"{device.key}: its root link '{device.root_link}' belongs to no arm; only arms can be driven")
             continue
         spec = _spec(device, kind, claimed[one])
         claimed[one] += 1
@@ -151,7 +149,7 @@ def _without_effect(device: InputDevice) -> list[str]:
     if unused:
         notes.append(f"{', '.join(unused)}: no effect on an arm")
     if str(settings.get("enable joint control", True)).lower() in ("false", "0"):
-        notes.append("enable joint control: a grip drives the jaw all the same")
+        notes.append("enable joint control: ignored, the grip always drives the jaw")
     return notes
 
 

@@ -15,7 +15,7 @@ import rospy
 
 
 class MissingPackage(RuntimeError):
-    """The package of a message type is not installed; the message states which."""
+    """The package of a message type is not installed; the message names it."""
 
 
 def message_class(type_: str, what: str) -> Any:
@@ -49,14 +49,14 @@ class Listener:
         except AttributeError as error:
             sender = header["callerid"]
             rospy.logerr_throttle_identical(
-                10.0, f"{self._topic}: {sender} sends {header['type']}, which is not understood here: {error}"
+                10.0, f"{self._topic}: {sender} sends {header['type']}, which cannot be read here: {error}"
             )
 
     def _class_of(self, md5: str, type_: str, definition: str) -> Any:
         if md5 not in self._classes:
             self._classes[md5] = _generated(type_, definition)
             if self._classes[md5] is None:
-                rospy.logerr(f"{self._topic}: its publisher reports no usable definition of {type_}")
+                rospy.logerr(f"{self._topic}: its publisher sends no usable definition of {type_}")
         return self._classes[md5]
 
     def close(self) -> None:

@@ -67,7 +67,7 @@ class Teleop:
     config
         Devices, pairs, camera.
     recorder
-        Writes down what devices and pedals state.
+        Records the input of devices and pedals.
     replay
         Speaks for the devices, which are not opened then, as soon as the arms are ready.
     """
@@ -197,8 +197,8 @@ class Teleop:
 
     def _arms_ready(self, tips: dict[str, Tip | None]) -> bool:
         """Whether all arms that are to be driven are ready; a replay sends no sooner."""
-        led = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
-        return all(tips[arm.name] is not None and not arm.obstacle() for arm in led)
+        driven = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
+        return all(tips[arm.name] is not None and not arm.obstacle() for arm in driven)
 
     def _take_in(self, now: float, tips: dict[str, Tip | None]) -> None:
         """Empty the queue; of a leader that drives, no reading is passed over but those that came too late to
@@ -278,7 +278,13 @@ class Teleop:
 
     def _publish_camera(self, follows: bool) -> None:
         hands = " and ".join(self.seat.drives_camera)
-        why = "following" if follows else f"{hands} must both speak" if hands else "a hand leapt; press the pedal again"
+        why = (
+            "following"
+            if follows
+            else f"both of {hands} must send poses"
+            if hands
+            else "a hand leapt; press the pedal again"
+        )
         self._camera_topics.publish("following", follows)
         self._camera_topics.publish("status", why)
 
@@ -306,7 +312,7 @@ class Teleop:
     def _handle(self, name: str, value: Any) -> None:
         handler = getattr(self, f"_on_{name.replace(' ', '_')}", None)
         if handler is None:
-            rospy.logwarn(f"teleoperation knows nothing of '{name}'")
+            rospy.logwarn(f"'{name}' is not a topic of teleoperation")
             return
         try:
             handler(value)
@@ -408,7 +414,7 @@ class Teleop:
         for leader in self.seat.leaders.values():
             if leader.selected == arm and leader.pairing.status is Status.FOLLOWING:
                 leader.pairing.contest()
-                rospy.logwarn(f"{arm}: {sender} sends it servo commands too")
+                rospy.logwarn(f"{arm}: {sender} sends servo commands too; stop one of the two")
 
     # --- selection --------------------------------------------------------------------------
 

@@ -27,7 +27,7 @@ MOST_SCALE = 1.0
 
 
 class Pair:
-    """A leader that may drive a follower; ``wanted`` states that it should, as far as the pair is selected."""
+    """A leader that may drive a follower; ``wanted``: whether it should, as far as the pair is selected."""
 
     def __init__(
         self, leader: Leader, arm: Arm | Proxy, seat: Seat, handset: Handset, device: Device | None, topics: PairTopics
@@ -59,7 +59,7 @@ class Pair:
             self._enter(ALIGNING, "aligning")
 
     def advance(self, now: float, tip: Tip | None, idle: str) -> None:
-        """Take the next step; ``idle`` states why nobody may drive now, and is empty when all may."""
+        """Take the next step; ``idle`` is the reason why nobody may drive now, empty when all may."""
         why = "" if self.wanted and self.selected else "not selected" if self.wanted else "disabled"
         if why or idle:
             self._enter(DISABLED, why or idle)
@@ -93,7 +93,7 @@ class Pair:
                 self.arm.make_ready()
             return obstacle
         if tip is None:
-            return f"nothing reports where {self.arm.name} is from the camera"
+            return f"no pose of {self.arm.name} relative to the camera is published"
         hand = self.leader.hand
         if self.leader.pairing.status is Status.IDLE and (hand is None or self._old(hand, now)):
             return f"{self.leader.name} is silent"
@@ -116,7 +116,7 @@ class Pair:
             self._turn_asked = now
             goal = self._handset.calibration.orientation_on_device(R)
             self._turns = self._device is not None and self._device.turn_to(goal)
-        return f"{self.leader.name} turns to {self.arm.name}" if self._turns else ""
+        return f"{self.leader.name} aligns with {self.arm.name}" if self._turns else ""
 
     def _keep_orientation(self) -> None:
         """While the clutch is pressed the leader keeps its orientation, so that it stays aligned."""

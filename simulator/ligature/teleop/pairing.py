@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 class Settings:
     """How a leader moves its follower.
 
-    ``scale`` is follower metres for a leader metre. ``align`` states whether the leader is brought to the follower's
+    ``scale`` is follower metres for a leader metre. ``align``: whether the leader is brought to the follower's
     orientation before it drives; otherwise the difference at the start is kept. ``max_velocity`` (m/s) and
     ``max_angular_velocity`` (rad/s) bound the follower's goal, ``workspace`` two opposite corners of where it may be
     in the camera's frame. ``jaw`` are the angles of a closed and of an open grip. A leader that is silent for
@@ -73,7 +73,7 @@ class Status(enum.Enum):
     CLUTCHED = "clutched"
     SILENT = "the leader is silent"
     LEAPT = "the leader leapt"
-    BROKEN = "the leader sends numbers that are no pose"
+    BROKEN = "the leader sends invalid poses"
     CONTESTED = "another leader claims the follower"
 
 

@@ -51,7 +51,7 @@ class Proxy:
     def obstacle(self) -> str:
         """Why it cannot be driven; empty when it can."""
         if time.monotonic() - self._heard > FRESH:
-            return f"nothing is heard of the proxy on {self._spec.topic}; run the simulator with the same -i"
+            return f"no state of the proxy arrives on {self._spec.topic}; run the simulator with the same -i"
         return ""
 
     def setpoint(self) -> tuple[str, Array] | None:

@@ -18,7 +18,7 @@ from ligature.teleop.devices.device import Reading
 
 
 class Recorder:
-    """Writes what devices and pedals state to a text file; the first entry is second zero."""
+    """Writes the input of devices and pedals to a text file; the first entry is second zero."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -40,7 +40,7 @@ class Recorder:
 
 
 class Replay:
-    """What a recorded file states, at its pace; raises ValueError with the line that is none."""
+    """Plays a recorded file at its pace; raises ValueError with the line that is invalid."""
 
     def __init__(self, path: Path) -> None:
         self._rows = list(_rows(path))
@@ -63,7 +63,7 @@ class Replay:
         return self._next >= len(self._rows)
 
     def due(self, now: float) -> Iterator[tuple[str, Any]]:
-        """What is stated up to ``now``: ``("reading", (device, Reading))`` or the name and value of an event."""
+        """What is due up to ``now``: ``("reading", (device, Reading))`` or the name and value of an event."""
         if self._start is None:
             self._start = now
         while self._next < len(self._rows) and self._rows[self._next]["t"] <= now - self._start:
@@ -90,5 +90,5 @@ def _rows(path: Path) -> Iterator[dict[str, Any]]:
             except (ValueError, KeyError, TypeError):
                 valid = False
             if not valid:
-                raise ValueError(f"{path}:{number}: no reading of a device and no event")
+                raise ValueError(f"{path}:{number}: neither a reading of a device nor an event")
             yield row

@@ -19,7 +19,7 @@ PEDALS = ("clutch", "camera")
 
 @dataclass
 class PairTold:
-    """What a pair states of itself."""
+    """What a pair reports of itself."""
 
     leader: str
     follower: str

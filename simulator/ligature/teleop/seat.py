@@ -26,7 +26,7 @@ class Conflict(ValueError):
 class Leader:
     """A device: the followers it may drive, the one that it drives, and its newest sample.
 
-    ``clutched`` states whether its own clutch is pressed, ``allowed`` whether it may drive (its arms are ready),
+    ``clutched``: whether its own clutch is pressed, ``allowed`` whether it may drive (its arms are ready),
     ``used`` is the sample that it drove with last.
     """
 
@@ -121,7 +121,7 @@ class Seat:
                 raise Conflict(f"{leader} may drive {', '.join(chosen.followers)}, not {follower}")
             other = next((each for each in self._leaders.values() if each.selected == follower), None)
             if other is not None and other is not chosen:
-                raise Conflict(f"{follower} obeys {other.name}; unselect it there first")
+                raise Conflict(f"{follower} follows {other.name}; unselect it there first")
         chosen.pairing.release()
         chosen.selected = follower
 

@@ -233,7 +233,7 @@ def _listen(topic: str, type_: type, take: Callable[[Any], None]) -> None:
         try:
             take(message)
         except (ValueError, IndexError) as error:
-            rospy.logwarn_throttle(2.0, f"{topic}: command refused: {error}")
+            rospy.logwarn_throttle(2.0, f"{topic}: command rejected: {error}")
 
     rospy.Subscriber(topic, type_, listen, queue_size=10, tcp_nodelay=True)
 

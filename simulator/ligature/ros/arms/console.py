@@ -62,7 +62,7 @@ class Console:
             self._listen(f"{root}/home", Empty, lambda _: self._all("home"))
             self._listen(f"{root}/set_volume", Float64, lambda m: self._volume.publish(m.data))
             self._listen(f"{root}/beep", Float64MultiArray, lambda m: rospy.loginfo(f"beep {list(m.data)}"))
-            self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"states: {m.data}"))
+            self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"string_to_speech: {m.data}"))
 
     def _listen(self, topic: str, type_: type, take: Callable[[Any], None]) -> None:
         rospy.Subscriber(topic, type_, take, queue_size=QUEUE)

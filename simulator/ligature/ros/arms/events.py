@@ -74,7 +74,7 @@ class EventTopics:
         self._logged: dict[str, float] = {}
         self.error = ""
 
-    def tell(self, name: str, value: Any) -> None:
+    def publish(self, name: str, value: Any) -> None:
         """Publish an event."""
         if name == "operating_state":
             self._state = value

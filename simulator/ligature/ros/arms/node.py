@@ -55,7 +55,7 @@ class ArmsNode:
         self._frame_prefix = scene.world.frame_prefix
         self._base_body = [arm.base for arm in scene.arms]
         self._outlets: list[ArmOutlet] = []
-        self.refused = 0
+        self.rejected = 0
         self._count = 0
         self._beat = 0.0
         self._due = -math.inf
@@ -89,10 +89,10 @@ class ArmsNode:
         self._block.events.skip()
         for outlet, record in zip(self._outlets, state["arm"], strict=True):
             outlet.follow(record)
-            outlet.events.tell("operating_state", [record["operating"], record["homed"], record["busy"]])
-            outlet.events.tell("trajectory_j/ratio", float(record["ratio"][0]))
+            outlet.events.publish("operating_state", [record["operating"], record["homed"], record["busy"]])
+            outlet.events.publish("trajectory_j/ratio", float(record["ratio"][0]))
             if outlet.description.kind is ArmKind.PSM and int(record["tool"]) in INSTRUMENTS:
-                outlet.events.tell("tool_type", INSTRUMENTS[int(record["tool"])].type)
+                outlet.events.publish("tool_type", INSTRUMENTS[int(record["tool"])].type)
 
     def next_due(self) -> float:
         """When `publish` has something to do, on the monotonic clock."""
@@ -119,7 +119,7 @@ class ArmsNode:
         for outlet in self._outlets:
             sent += outlet.publish(state["arm"][outlet.index], stamp, 0 if outlet.index in settled else self._count)
         for event in events:
-            self._outlets[event.arm].events.tell(event.name, event.value)
+            self._outlets[event.arm].events.publish(event.name, event.value)
         if now > self._beat:
             self._beat = now + HEARTBEAT
             for outlet in self._outlets:
@@ -131,8 +131,8 @@ class ArmsNode:
         return sent
 
     def _stamp(self, state: Any) -> Any:
-        now, told = rospy.Time.now(), rospy.Time.from_sec(float(state["stamp"]))
-        return now if (now - told).to_sec() > STALE else told
+        now, stamp = rospy.Time.now(), rospy.Time.from_sec(float(state["stamp"]))
+        return now if (now - stamp).to_sec() > STALE else stamp
 
     def _publish_tf(self, state: Any, stamp: Any) -> None:
         if self._tf is None or not self._tf.heard:
@@ -159,10 +159,10 @@ class ArmsNode:
             try:
                 self.push(take(message))
             except (ValueError, CodecError) as error:
-                self.refused += 1
-                outlet.events.tell("warning", f"{topic}: command refused: {error}")
+                self.rejected += 1
+                outlet.events.publish("warning", f"{topic}: command rejected: {error}")
                 if topic.startswith("move"):
-                    outlet.events.tell("goal_reached", False)
+                    outlet.events.publish("goal_reached", False)
 
         return listen
 

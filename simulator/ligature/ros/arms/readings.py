@@ -70,7 +70,7 @@ def _joints(topic: str, field: str, names: tuple[str, ...], n: int) -> Reading:
 
 
 def _one(topic: str, name: str, field: str, rows: int) -> Reading:
-    """A single joint, with as many of position, velocity and effort as ``rows`` states."""
+    """A single joint, with the first ``rows`` of position, velocity and effort."""
 
     def fill(message: Any, record: Record) -> None:
         values = record[field].tolist()

@@ -45,7 +45,7 @@ class Adapter(Device):
         self._buttons = {"grey": bool(message.grey_button), "white": bool(message.white_button)}
 
     def feel(self, force: Array) -> None:
-        """Press the hand, in the driver's axes; without the driver's messages a line states what is missing."""
+        """Press the hand, in the driver's axes; without the driver's messages a warning names what is missing."""
         if self._message is None:
             self._message = self._force_message()
         if self._message:

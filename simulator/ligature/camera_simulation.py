@@ -1,4 +1,7 @@
-"""The simulation as Python users have it: with cameras, which stand on the simulation and so cannot be a part of it."""
+"""`ligature.Simulation`: the simulation with cameras.
+
+Cameras read the simulation's state, and `ligature.simulation` knows nothing of them.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Simulation(simulation.Simulation):
-    """A running scene (`ligature.simulation.Simulation`) that can be looked at.
+    """A running scene (`ligature.simulation.Simulation`) with cameras.
 
     OpenGL is loaded when ``cameras`` is used for the first time, and a context is made at the first picture.
     """
@@ -21,14 +24,14 @@ class Simulation(simulation.Simulation):
 
     @cached_property
     def cameras(self) -> simulation.Handles[CameraHandle]:
-        """Cameras of the scene by name; raises ImportError where OpenGL's Python package is missing."""
+        """Cameras of the scene by name; raises ImportError when OpenGL's Python package is missing."""
         from ligature.render.cameras import Studio, camera_handles
 
         self._studio = Studio(self)
         return camera_handles(self._studio)
 
     def close(self) -> None:
-        """Give the physics engine and OpenGL back; neither steps nor pictures are to be had after this."""
+        """Release the physics engine and OpenGL; the simulation can neither step nor draw after this."""
         if self._studio is not None:
             self._studio.close()
         super().close()

@@ -1,0 +1,120 @@
+"""The arms of a running scene by name: commands, ticks, states and events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from ligature.adf import Diagnostic
+from ligature.arms.ecm import build_ecm
+from ligature.arms.mtm import build_mtm
+from ligature.arms.psm import build_psm
+from ligature.model.scene import ArmKind, Scene
+from ligature.model.state import StateRecord
+from ligature.model.subsystem import Subsystem
+from ligature.physics import World
+from ligature.robots.arm import Arm
+from ligature.robots.commands import ArmCommand
+from ligature.robots.operating_state import Rejected
+from ligature.robots.record import ArmRecord
+
+_BUILDERS = {ArmKind.PSM: build_psm, ArmKind.ECM: build_ecm, ArmKind.MTM: build_mtm}
+
+WATCH_PERIOD = 5
+"""Ticks between two looks at following errors."""
+
+
+class ArmSet(Subsystem, Mapping[str, Arm]):
+    """The arms of a running scene by name."""
+
+    def __init__(self, scene: Scene, world: World, dt: float = 1e-3) -> None:
+        self._world, self._dt = world, dt
+        self.problems: list[Diagnostic] = []
+        self._arms: list[Arm] = []
+        for description in scene.arms:
+            self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
+        self._by_name = {arm.name: arm for arm in self._arms}
+        self._records = [ArmRecord(arm) for arm in self._arms]
+
+    def __getitem__(self, name: str) -> Arm:
+        if name not in self._by_name:
+            known = ", ".join(self._by_name) or "none"
+            raise KeyError(f"no arm is called '{name}'; there are {known}")
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self._arms)
+
+    def apply(self, command: ArmCommand) -> None:
+        """Carry out a command; what the arm rejects becomes its warning, whatever else it raises its FAULT."""
+        arm = self._arms[command.arm]
+        try:
+            command.carry_out(arm)
+        except Rejected as error:
+            arm.emit("warning", str(error))
+            if command.moves:
+                arm.emit("goal_reached", False)
+        except Exception as error:  # no command ends a run
+            arm.fault(f"{command.verb} failed: {_words(error)}")
+
+    def _guarded(self, what: str, arm: Arm, act: Callable[..., None], *arguments: Any) -> None:
+        """Have an arm do something; whatever it raises becomes its FAULT, and the other arms go on."""
+        try:
+            act(*arguments)
+        except Exception as error:
+            arm.fault(f"{what} failed: {_words(error)}")
+
+    def release(self, index: int) -> None:
+        """Whoever commanded an arm is gone: it stays where it is."""
+        arm = self._arms[index]
+        if arm.is_enabled and arm.is_homed:
+            self._guarded("hold", arm, arm.hold)
+
+    def step(self, tick: int) -> None:
+        """Advance all arms by a tick."""
+        for arm in self._arms:
+            self._guarded("motion", arm, arm.tick, self._dt)
+        if (tick + 1) % WATCH_PERIOD == 0:
+            for arm in self._arms:
+                self._guarded("following-error check", arm, arm.watch, WATCH_PERIOD * self._dt)
+
+    def write_state(self, state: StateRecord) -> None:
+        """Write the state of all arms."""
+        for arm, arm_record, record in zip(self._arms, self._records, state["arm"][0], strict=True):
+            self._guarded("write_state", arm, arm_record.write, record)
+
+    def take_problems(self) -> list[Diagnostic]:
+        """What was found since the last call."""
+        found, self.problems = self.problems, []
+        return found
+
+    def events(self) -> list[tuple[int, str, Any]]:
+        """What happened since the last call: number of the arm, name and value."""
+        found = []
+        for index, arm in enumerate(self._arms):
+            found += [(index, event.name, event.value) for event in arm.events]
+            arm.events.clear()
+        return found
+
+    def reset(self) -> None:
+        """The scene was put back to its start: moves end, and arms hold where they are now."""
+        for arm in self._arms:
+            self._guarded("reset", arm, arm.settle)
+
+    def snapshot(self) -> list[dict[str, Any]]:
+        """Everything that lasts from tick to tick."""
+        return [arm.snapshot() for arm in self._arms]
+
+    def restore(self, snapshot: Sequence[dict[str, Any]]) -> None:
+        """Continue from `snapshot`."""
+        for arm, state in zip(self._arms, snapshot, strict=True):
+            arm.restore(state)
+        self._records = [ArmRecord(arm) for arm in self._arms]
+
+
+def _words(error: Exception) -> str:
+    """The message of an exception, with its type unless the arm itself raised it."""
+    return str(error) if isinstance(error, Rejected) else f"{type(error).__name__}: {error}"

@@ -1,0 +1,31 @@
+"""What contacts, grasps and threads exert on an instrument, for ``measured_cf``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.model.frames import pose7_matrix
+from ligature.model.scene import ArmDescription
+from ligature.physics import World
+from ligature.robots.arm import Arm
+
+Array = NDArray[np.float64]
+
+
+class TipWrench:
+    """What the world exerts on the instrument, in base axes about the tip."""
+
+    def __init__(self, world: World, description: ArmDescription, bodies: Sequence[int], arm: Arm) -> None:
+        self._world, self._base, self._bodies, self._arm = world, description.base, tuple(bodies), arm
+
+    def __call__(self) -> Array:
+        if not self._world.touched(self._bodies):
+            return np.zeros(6)
+        T_world_base = pose7_matrix(self._world.pose7(self._base))
+        tip = T_world_base @ self._arm.kinematics.forward(self._arm.joints.measured()[0])
+        wrench = self._world.contact_wrench(self._bodies, tip[:3, 3])
+        R = T_world_base[:3, :3].T
+        return np.concatenate([R @ wrench[:3], R @ wrench[3:]])

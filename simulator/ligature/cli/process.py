@@ -1,0 +1,84 @@
+"""How every process of a run begins, and how it leaves a run that it cannot be part of.
+
+Each has one argument, the run's options as text, and reports to the supervisor by lines (`ligature.bus.process`).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NoReturn
+
+import ligature
+from ligature.bus import Block, BusError
+from ligature.bus.process import end_with_parent, report
+from ligature.bus.stop import Stop, stop_on_signal
+from ligature.cli.options import RunOptions
+from ligature.model.scene import Scene
+from ligature.model.state import state_dtype
+
+END_TIMEOUT = 10.0
+"""Seconds that a process which cannot go on waits for the end of the run, before it is started again."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """The run that a process is part of: its options, its scene, its stop signal and its shared memory."""
+
+    options: RunOptions
+    scene: Scene
+    stop: Stop
+    block: Block
+
+    @property
+    def active(self) -> bool:
+        """Whether no signal has asked for the end, and the physics process lives."""
+        return not self.stop.is_set() and self.block.active
+
+    def fail(self, error: Exception) -> NoReturn:
+        """End the run for a reason that its user has to put right."""
+        report("fatal", str(error))
+        self.stop.wait(END_TIMEOUT)
+        sys.exit(2)
+
+    def decline(self, what: str, error: Exception) -> NoReturn:
+        """End this process; the run continues without ``what``."""
+        report("warning", f"no {what}: {error}")
+        sys.exit(0)
+
+
+def run_process(work: Callable[[Run], None], owner: bool = False) -> None:
+    """Be a process of a run: end with the parent, stop on signals, load the scene, map the shared memory, do ``work``.
+
+    The ``owner``, which simulates, creates the shared memory and reports what is wrong with the scene; all others wait
+    until it has written the first state. A process that cannot join ends with a status other than 0.
+    """
+    end_with_parent()
+    stop = stop_on_signal()
+    options = RunOptions.from_text(sys.argv[1])
+    try:
+        scene = options.load()
+    except ligature.SceneError as error:
+        _leave(stop, owner, [str(diagnostic) for diagnostic in error.diagnostics], 2)
+    try:
+        dtype = state_dtype(scene)
+        if owner:
+            block = Block.create(options.bus, dtype)
+        else:
+            block = Block.attach(options.bus, dtype, cancelled=stop.is_set)
+    except BusError as error:
+        _leave(stop, owner, [str(error)], 1)
+    work(Run(options, scene, stop, block))
+
+
+def _leave(stop: Stop, owner: bool, problems: list[str], status: int) -> NoReturn:
+    """Report why this process cannot join and end it.
+
+    When the owner has the same problem it reports it and the run ends; others repeat it only when the run continues.
+    """
+    if not owner and stop.wait(END_TIMEOUT):
+        sys.exit(0)
+    for problem in problems:
+        report("error" if owner else "warning", problem)
+    sys.exit(status)
