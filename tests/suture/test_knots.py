@@ -43,7 +43,7 @@ class TwoArms:
         for element, hand in ((0, LEFT), (n - 1, RIGHT)):
             T = pose7_matrix(np.r_[self.rod.positions[element], self.rod.orientations[element]])
             T[:3, 3] -= self.bench.pose[hand][:3]
-            self.rod.grip(element, hand, np.eye(4), T)
+            self.rod.attach(element, hand, np.eye(4), T)
 
     @property
     def tension(self):

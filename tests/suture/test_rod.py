@@ -162,7 +162,7 @@ def test_grip_holds_an_element_to_a_moving_body_until_released(kit):
     T = np.eye(4)
     T[:3, 3] = rod.positions[10] - np.array([0.025, 0.0, 0.02])
     T_element = np.eye(4)
-    rod.grip(10, 0, T_element, T)
+    rod.attach(10, 0, T_element, T)
     bench.twist[0][2] = 0.05
     bench.step(400)
     assert rod.positions[10, 2] == pytest.approx(0.02, abs=0.2e-3)

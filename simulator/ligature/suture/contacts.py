@@ -11,7 +11,7 @@ import math
 
 from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
-from ligature.suture.coupling import SLIPS
+from ligature.suture.layout import SLIPS
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 
 SLACK = 0.5
@@ -37,14 +37,14 @@ def detect(first, n, nodes, shapes, old, new, work, tension, counts, self_skip, 
     ``tension`` (elements,) is that of the last tick. ``counts`` returns the contacts found, and those for
     which there was no room. Bonds that already stand at the head of ``new`` stay.
     """
-    bonds = new.count[0]
+    constraints = new.count[0]
     capacity = new.node.shape[0]
     _world_segments(first, n, nodes, work, dt)
     missed = _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt)
     settled = new.count[0]
     missed += _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip)
     _sort(new, settled)
-    _remember(old, new, bonds)
+    _remember(old, new, constraints)
     counts[0], counts[1] = new.count[0], missed
 
 
@@ -218,7 +218,7 @@ def _record(first, nodes, new, work, e, k, key, s, d, inside, nx, ny, nz, fricti
     new.gap[c] = gap
     new.target[c] = min(0.0, gap + RECOVERY * dt)
     new.friction[c] = friction * nodes.friction[i]
-    new.bond[c] = False
+    new.bilateral[c] = False
     new.press[c] = 0.0
     new.closed[c] = False
     new.mode[c], new.switches[c] = SLIPS, 0
@@ -368,12 +368,12 @@ def _sort(touches, begin):
 
 
 @inlined
-def _remember(old, new, bonds):
+def _remember(old, new, constraints):
     """Carry slip, pressure and state over from the contacts of the last tick; both lists are sorted."""
     o = 0
-    while o < old.count[0] and old.bond[o]:
+    while o < old.count[0] and old.bilateral[o]:
         o += 1
-    for c in range(bonds, new.count[0]):
+    for c in range(constraints, new.count[0]):
         while o < old.count[0] and (
             old.key[o] < new.key[c] or (old.key[o] == new.key[c] and old.node[o, 0] < new.node[c, 0])
         ):
