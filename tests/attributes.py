@@ -97,7 +97,7 @@ CACHES: dict[str, str] = {
             "TreeControl._client",
             "Lift._client",
             "Closures._client",
-            "_Held.constraint",
+            "Weld.constraint",
         ),
         "Bullet's own numbers",
     ),  # fmt: skip

@@ -37,7 +37,7 @@ def test_tie_to_an_unknown_body_is_refused(kit):
     description = kit.from_material(kit.line(5, 0.1), 1e-3, 1e9, 1100.0)
     none = np.zeros(3)
     attachment = Attachment(0, 9, np.eye(4), np.eye(4), none, none, none, *FREE)
-    with pytest.raises(ValueError, match="tied to body 9, which is no partner"):
+    with pytest.raises(ValueError, match="attached to body 9, which is missing in its partners"):
         kit.Bench([]).add(replace(description, attachments=(attachment,)))
 
 

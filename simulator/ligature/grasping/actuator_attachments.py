@@ -29,7 +29,7 @@ class ActuatorAttachments:
         if child in self._rod_bodies:
             self._rods.attach(parent, child, T_parent_frame, T_child_frame)
             return ("element", parent, child)
-        handle = self._world.add_fixed(parent, child, T_parent_frame, T_child_frame)
+        handle = self._world.add_weld(parent, child, T_parent_frame, T_child_frame)
         self._set_held(child, True)
         return ("weld", handle, child)
 
@@ -55,7 +55,7 @@ class ActuatorAttachments:
         elif handle[0] == "element":
             self._rods.detach(handle[1], handle[2])
         else:
-            self._world.remove_fixed(handle[1])
+            self._world.remove_weld(handle[1])
             self._set_held(handle[2], False)
 
     def _set_held(self, body: int, held: bool) -> None:

@@ -310,7 +310,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
         """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
         if self.driven(body):
             return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
-        holders = [self.scene.bodies[held.parent] for held in self._held.values() if held.child == body]
+        holders = [self.scene.bodies[held.parent] for held in self._welds.values() if held.child == body]
         held_mass, held_inertia = self.mass_of(body)
         own = self.scene.bodies[body]
         mass = held_mass - own.mass + sum(holder.mass for holder in holders)
@@ -363,18 +363,18 @@ class World(Subsystem, BulletQueries, GraspSupport):
         The world is built anew, for Bullet's own caches would go on. Commands hold, as if they were sent again; so do
         the constraints of actuators.
         """
-        controls, commands, held = self._controls, self._body_controls, self.held_constraints()
+        controls, commands, held = self._controls, self._body_controls, self.welds()
         handle = self._next_handle
         self.close()
         self._create()
         for control, before in zip(self._controls, controls, strict=True):
             control.follow(before)
-        self._hold_counts = dict(Counter(grasp.child for grasp in held.values()))
+        self._hold_counts = dict(Counter(weld.child for weld in held.values()))
         for body, command in commands.items():
             self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
             self._body_controls[body].set(command.type, command.target.copy())
         self._restore_masses()
-        self.hold_again(held)
+        self.restore_welds(held)
         self._next_handle = handle
 
     def _restart(self, index: int, tree: Tree) -> None:
@@ -396,7 +396,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
             "controls": [control.snapshot() for control in self._controls],
             "told": dict(self._motions.told),
             "parting": self._parting.snapshot(),
-            "held": self.held_constraints(),
+            "held": self.welds(),
             "bodies": {body: control.snapshot() for body, control in self._body_controls.items()},
             **kept(self, _KEPT),
         }
@@ -419,7 +419,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
         put_back(self, {name: snapshot[name] for name in _KEPT})
         self._restore_masses()
         self._restore_disabled_pairs()
-        self.hold_again(snapshot["held"])
+        self.restore_welds(snapshot["held"])
         self._parting.restore(snapshot["parting"])
         self._next_handle = snapshot["_next_handle"]
         self._motions.forget_all()

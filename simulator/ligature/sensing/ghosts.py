@@ -29,12 +29,12 @@ CONVEX = (Box, Sphere, Cylinder, Capsule, Cone, Hull)
 BAND = 1e-4
 """Distance in metres within which the surfaces of a ghost and a body are measured.
 
-A pair is not measured again before the two can have moved by as much as there is between their surfaces: so what is
-sensed is the same however often somebody looks.
+A pair is measured again only after the two may have moved by the distance between their surfaces, so that the result
+does not depend on the rate of reading.
 """
 
 DOUBT = 0.5
-"""Share of a measured distance that counts on; the engine's distances are not exact."""
+"""Share of a measured distance to rely on; the engine's distances are not exact."""
 
 
 @compiled
@@ -104,7 +104,7 @@ def _pairs_to_ask(
     inside: NDArray[np.bool_],
     ask: NDArray[np.bool_],
 ) -> bool:
-    """Flag in ``ask`` the pairs that are near each other and may have met or parted since they were asked about.
+    """Flag in ``ask`` the pairs that are near each other and may have met or parted since their last measurement.
 
     ``room`` (g, n) is how far the two may move until then; it is used up for pairs far from each other, which are not
     ``inside``.
@@ -128,7 +128,7 @@ def _pairs_to_ask(
 
 @compiled
 def _moved(before: Array, now: Array, reach: float) -> float:
-    """Bound of the way that any point within ``reach`` of the origin went between two poses (7,)."""
+    """Bound of the displacement of any point within ``reach`` of the origin between two poses (7,)."""
     way, turn = 0.0, 0.0
     for a in range(3):
         way += (now[a] - before[a]) ** 2
@@ -197,7 +197,7 @@ class Ghosts(Subsystem):
         self._planes = np.vstack([np.zeros((0, 4)), *(planes for _, _, planes, _ in arrays)])
 
     def sense(self, state: StateRecord) -> None:
-        """Look what is in the ghosts, and write it."""
+        """Find the bodies in the ghosts, and write them."""
         self.update(state["ghost_world"][0], state["body_pose"][0])
         state["ghost_sensed"][0] = self.sensed
 

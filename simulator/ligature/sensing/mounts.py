@@ -61,7 +61,7 @@ class Mounts(Subsystem):
         self.world = self._initial.copy()
 
     def of(self, kind: str) -> slice:
-        """Where the objects of ``kind`` (ghost, camera or light) stand in ``local`` and ``world``."""
+        """Rows of the objects of ``kind`` (ghost, camera or light) in ``local`` and ``world``."""
         return self._slices[kind]
 
     def update(self, body_pose: NDArray[np.float64]) -> None:

@@ -35,7 +35,7 @@ def detect(first, n, nodes, shapes, old, new, work, tension, counts, self_skip, 
     """Fill ``new`` with the contacts of elements ``first`` … ``first + n - 1``; ``old`` are the last tick's.
 
     ``tension`` (elements,) is that of the last tick. ``counts`` returns the contacts found, and those for
-    which there was no room. Bonds that already stand at the head of ``new`` stay.
+    which there was no room. Point constraints and grasps at the head of ``new`` stay.
     """
     constraints = new.count[0]
     capacity = new.node.shape[0]

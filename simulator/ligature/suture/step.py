@@ -32,7 +32,7 @@ LARGE_SWING = 5e-3
 """Swing of an element in radians, in one Newton step, after which another follows."""
 
 MAX_SWING = 0.5
-"""Largest swing of a Newton step; steps that want more are shortened."""
+"""Largest swing of a Newton step; larger ones are shortened."""
 
 
 @kernel
