@@ -27,7 +27,7 @@ def _supple(kit, points, diameter, youngs, **keys):
 
 
 class TwoArms:
-    """Two hands that grip the ends of a thread lying in an open bend."""
+    """Two hands that hold the ends of a thread lying in an open bend."""
 
     def __init__(self, kit, n=110):
         turn, radius = np.linspace(0.0, 3.6, 200), 0.018
