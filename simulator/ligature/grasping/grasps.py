@@ -29,7 +29,7 @@ from ligature.suture.rod import Pads
 
 Array = NDArray[np.float64]
 
-LOOK = 5
+SEARCH_PERIOD = 5
 """Ticks between two searches for bodies between open fingers."""
 
 CREEP = 0.2e-3
@@ -114,7 +114,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             if jaw.name == name:
                 return self._held(index)
         known = ", ".join(jaw.name for jaw in self._scene.jaws) or "none"
-        raise KeyError(f"no jaw is called '{name}'; there are {known}")
+        raise KeyError(f"jaw '{name}' is missing; the scene has {known}")
 
     def __iter__(self) -> Iterator[str]:
         return (jaw.name for jaw in self._scene.jaws)
@@ -155,11 +155,11 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
                 self._keep(index, held)
             elif thread is not None:
                 self._keep_thread(index, thread)
-            elif self._near[index] or ((tick + index) % LOOK == 0 and self._fingers[index].driven()):
-                self._look(index)
+            elif self._near[index] or ((tick + index) % SEARCH_PERIOD == 0 and self._fingers[index].driven()):
+                self._search(index)
         self._exchange_impulses()
 
-    def _look(self, index: int) -> None:
+    def _search(self, index: int) -> None:
         """Close gently on the nearest body between the fingers; grasp it when both pads touch it."""
         fingers, disabled = self._fingers[index], self._disabled[index]
         around, box = self._world.surroundings(fingers.jaw.fingers)
@@ -208,7 +208,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             thread = thread_grasps.begin(number, self._rods, self._world, fingers, friction)
             if thread is not None:
                 self._thread_grasps[index] = thread
-                self._world.stopped_fingers.update(jaw.fingers)
+                self._world.set_stopped(jaw.fingers, True)
                 self._keep_thread(index, thread)
                 return True
         return False
@@ -225,7 +225,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def _release_thread(self, index: int, thread: thread_grasps.ThreadGrasp) -> None:
         """Release a thread."""
         self._thread_grasps[index] = self._pads[index] = None
-        self._world.stopped_fingers -= set(self._scene.jaws[index].fingers)
+        self._world.set_stopped(self._scene.jaws[index].fingers, False)
         self._rods.exclude(thread.rod, self._scene.jaws[index].fingers, None)
         self._fingers[index].release()
         self._update_rod(thread.rod)

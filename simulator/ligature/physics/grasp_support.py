@@ -101,6 +101,10 @@ class GraspSupport:
         collide = not disabled and other not in self.scene.bodies[body].no_collision_with
         pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(collide), physicsClientId=self.client)
 
+    def set_stopped(self, fingers: Collection[int], stopped: bool) -> None:
+        """Record that ``fingers`` are stopped on a thread, or no longer."""
+        self.stopped_fingers = self.stopped_fingers | set(fingers) if stopped else self.stopped_fingers - set(fingers)
+
     # --- joints -----------------------------------------------------------------------------
 
     def stop_joint(self, joint: int, position: float, effort: float) -> None:

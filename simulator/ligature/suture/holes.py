@@ -52,7 +52,7 @@ MAX_APPROACH = 0.5
 MAX_WAIT = 32
 """Most ticks between two searches for passages."""
 
-_KEPT = ("_wait", "_turn", "_near", "_gaps")
+_KEPT = ("_countdown", "_turn", "_near", "_gaps")
 """Attributes of `Holes` that last from tick to tick: when to search for new passages, and where."""
 
 
@@ -109,7 +109,7 @@ class Holes:
         self._gaps = np.zeros((n + len(self._rods), len(scene.holes)))
         self._near = np.ones(len(scene.holes), dtype=bool)
         self._mobile = self._sites.recoil.any(axis=(1, 2))
-        self._wait = 0
+        self._countdown = 0
         self._turn = -1
         self._idle = not scene.holes or not (self._needles or self._rods)
 
@@ -119,8 +119,8 @@ class Holes:
         """Find and follow passages, before the rods advance."""
         if self._idle:
             return
-        if self._wait > 0:
-            self._wait -= 1
+        if self._countdown > 0:
+            self._countdown -= 1
             if not self._passages.filled[0]:
                 return
         else:
@@ -164,7 +164,7 @@ class Holes:
             )
         nearest = self._gaps.min(axis=0)
         self._near[:] = nearest < NEAR
-        self._wait = int(min(max(float(nearest.min()), 0.0) / (MAX_APPROACH * self._dt), MAX_WAIT))
+        self._countdown = int(min(max(float(nearest.min()), 0.0) / (MAX_APPROACH * self._dt), MAX_WAIT))
 
     def _read_holes(self, holes: list[int]) -> None:
         sites = self._sites
@@ -264,12 +264,12 @@ class Holes:
         if body in self._needles:
             path = self._needles.index(body)
             self._keep([c for c in range(n) if p.path[c] != path and p.owner[c] != self._paths.owner[path]])
-        self._wait = 0
+        self._countdown = 0
 
     def reset(self) -> None:
         """Empty all holes, and search for new passages in the next tick."""
         self._clear()
-        self._wait, self._turn = 0, -1
+        self._countdown, self._turn = 0, -1
         self._near[:] = True
         self._gaps[:] = 0.0
         self._read_holes(list(range(len(self._scene.holes))))
