@@ -103,7 +103,14 @@ CACHES: dict[str, str] = {
     ),  # fmt: skip
     # what sensors make of the state
     **dict.fromkeys(
-        ("Ghosts._seen_ghost", "Ghosts._seen_body", "Ghosts._room", "Ghosts._inside", "Ghosts._ask", "Ghosts.sensed"),
+        (
+            "Ghosts._measured_ghost",
+            "Ghosts._measured_body",
+            "Ghosts._room",
+            "Ghosts._inside",
+            "Ghosts._due",
+            "Ghosts.sensed",
+        ),
         "saves asking again; `sense` fills it from the state",
     ),
     "Mounts.world": "`sense` fills it from the state",

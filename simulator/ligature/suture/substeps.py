@@ -1,7 +1,7 @@
 """A whole tick of a rod in one call: usually one step, several where contacts do not settle.
 
 A thread that snaps into a new shape, as when a knot closes, changes its contacts faster than one step
-can follow; a tick in which they do not settle is taken back and done again in shorter steps. World
+can follow; a tick in which they do not settle is undone and repeated in shorter steps. World
 axes, SI units.
 """
 
