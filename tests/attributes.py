@@ -23,7 +23,7 @@ CACHES: dict[str, str] = {
     "Rod._passage_table": "addresses of arrays",
     "Rod._scratch": "scratch",
     "Rod._corners": "written by every call of `box`",
-    "Rod._bonds": "follows from grips, ties and pads",
+    "Rod._constraint_rows": "follows from constraints, attachments and pads",
     "Rod._motion": "the colliders' array",
     **dict.fromkeys(
         ("Rod._near", "Rod._met", "Rod._apart", "Rod._movable", "Rod._pushed", "Shapes.node"),
@@ -37,9 +37,9 @@ CACHES: dict[str, str] = {
         "written for every contact before it is read",
     ),  # fmt: skip
     "Colliders._R": "scratch",
-    "Holes._p": "addresses of arrays",
-    "Holes._s": "addresses of arrays",
-    "Holes._l": "addresses of arrays",
+    "Holes._passage_table": "addresses of arrays",
+    "Holes._site_table": "addresses of arrays",
+    "Holes._path_table": "addresses of arrays",
     "Holes._rod_tables": "addresses of arrays",
     **dict.fromkeys(
         (
@@ -49,7 +49,7 @@ CACHES: dict[str, str] = {
             "Holes._pull",
             "Holes._mass",
             "Holes._inertia",
-            "Lines.pose",
+            "Paths.pose",
             "Sites.shared",
             "Passages.J",
             "Passages.T",
@@ -59,7 +59,7 @@ CACHES: dict[str, str] = {
         ),
         "written before it is read in every tick",
     ),  # fmt: skip
-    "Exchange._hands": "scratch of a tick",
+    "ImpulseExchange._solvers": "scratch of a tick",
     # what is read from Bullet when somebody asks
     **dict.fromkeys(
         (
@@ -97,13 +97,20 @@ CACHES: dict[str, str] = {
             "TreeControl._client",
             "Lift._client",
             "Closures._client",
-            "_Held.constraint",
+            "Weld.constraint",
         ),
         "Bullet's own numbers",
     ),  # fmt: skip
     # what sensors make of the state
     **dict.fromkeys(
-        ("Ghosts._seen_ghost", "Ghosts._seen_body", "Ghosts._room", "Ghosts._inside", "Ghosts._ask", "Ghosts.sensed"),
+        (
+            "Ghosts._measured_ghost",
+            "Ghosts._measured_body",
+            "Ghosts._room",
+            "Ghosts._inside",
+            "Ghosts._due",
+            "Ghosts.sensed",
+        ),
         "saves asking again; `sense` fills it from the state",
     ),
     "Mounts.world": "`sense` fills it from the state",

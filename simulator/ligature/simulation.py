@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic
 from ligature.arms import ArmSet
-from ligature.grasping import Clamps, Grasps, Holder
+from ligature.grasping import ActuatorAttachments, ActuatorGrasps, Grasps
 from ligature.model.commands import (
     ActuatorCommand,
     BodyCommand,
@@ -217,9 +217,9 @@ class Simulation:
         self._rays = Rays(scene, self._world)
         self._touches = Touches(self._world)
         self.arms = ArmSet(scene, self._world, dt)
-        clamps, rods = Clamps(scene, self._world), self._suture.rods
-        self._actuators = Actuators(scene, Holder(scene, self._world, rods, clamps), self._rays)
-        self.grasps = Grasps(scene, self._world, rods, clamps, lambda: self._actuators.held)
+        actuator_grasps, rods = ActuatorGrasps(scene, self._world), self._suture.rods
+        self._actuators = Actuators(scene, ActuatorAttachments(scene, self._world, rods, actuator_grasps), self._rays)
+        self.grasps = Grasps(scene, self._world, rods, actuator_grasps, lambda: self._actuators.held)
         self._tick: dict[str, tuple[Subsystem, ...]] = {
             "control": (self.arms, self._actuators, self._rays, Controllers(self._world)),
             "suture": (self._suture, self.grasps),
@@ -347,7 +347,7 @@ class Simulation:
         """
         BodyCommand(body, CommandType.POSITION, tuple(pose)).check()
         before = pose7_matrix(self._world.pose7(body))
-        self.grasps.let_go_of(body)
+        self.grasps.release_body(body)
         self._world.set_pose(body, pose)
         self._suture.rods.carry(body, pose7_matrix(pose) @ inverse(before))
         self._suture.holes.forget(body)

@@ -1,4 +1,4 @@
-"""Jaws on a thread: held, sliding by Coulomb's law, let go."""
+"""Jaws on a thread: grasped, sliding by Coulomb's law, released."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_a_thread_is_held_where_it_was_grasped(thread: Stretched) -> None:
     thread.pull(0.3e-3)
     held = thread.sim.grasps["PSM1"]
     assert 0.5 < held.share < 1.0
-    # the pads' springs give, and the thread stretches between the pads' two ends, of which the nearer yields first
+    # the pads' springs deflect, and the thread stretches between the pads' two ends, of which the nearer yields first
     assert held.slip[0] < 0.15e-3
     limit = 2 * FRICTION * held.normal_force
     assert thread.rod.tension[5] == pytest.approx(held.share * limit, rel=1e-3)

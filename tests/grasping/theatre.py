@@ -59,8 +59,8 @@ class Theatre:
     def _jaw(self, name: str):
         return next(jaw for jaw in self.sim.scene.jaws if jaw.name == name)
 
-    def grip_pose(self, name: str, back: float = 0.0) -> np.ndarray:
-        """Pose (7,) of an arm's tip in its base frame, ``back`` metres before where it grips the needle."""
+    def grasp_pose(self, name: str, back: float = 0.0) -> np.ndarray:
+        """Pose (7,) of an arm's tip in its base frame, ``back`` metres before where it grasps the needle."""
         capsule, angle = PLACES[name]
         T = pose7_matrix(self.needle_at) @ self.needle.body.colliders[capsule].T_body_shape
         along, normal = T[:3, 2], pose7_matrix(self.needle_at)[:3, 2]
@@ -73,7 +73,7 @@ class Theatre:
 
     def reach(self, name: str, back: float = 0.0) -> None:
         """Move an arm to the needle, or ``back`` metres before it."""
-        self.sim.arms[name].move_cp(self.grip_pose(name, back))
+        self.sim.arms[name].move_cp(self.grasp_pose(name, back))
         self.wait()
 
     def open(self, name: str) -> None:

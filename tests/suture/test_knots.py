@@ -27,7 +27,7 @@ def _supple(kit, points, diameter, youngs, **keys):
 
 
 class TwoArms:
-    """Two hands that grip the ends of a thread lying in an open bend."""
+    """Two hands that hold the ends of a thread lying in an open bend."""
 
     def __init__(self, kit, n=110):
         turn, radius = np.linspace(0.0, 3.6, 200), 0.018
@@ -43,7 +43,7 @@ class TwoArms:
         for element, hand in ((0, LEFT), (n - 1, RIGHT)):
             T = pose7_matrix(np.r_[self.rod.positions[element], self.rod.orientations[element]])
             T[:3, 3] -= self.bench.pose[hand][:3]
-            self.rod.grip(element, hand, np.eye(4), T)
+            self.rod.attach(element, hand, np.eye(4), T)
 
     @property
     def tension(self):

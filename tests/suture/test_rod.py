@@ -37,7 +37,7 @@ def test_tie_to_an_unknown_body_is_refused(kit):
     description = kit.from_material(kit.line(5, 0.1), 1e-3, 1e9, 1100.0)
     none = np.zeros(3)
     attachment = Attachment(0, 9, np.eye(4), np.eye(4), none, none, none, *FREE)
-    with pytest.raises(ValueError, match="tied to body 9, which is no partner"):
+    with pytest.raises(ValueError, match="attached to body 9, which is missing in its partners"):
         kit.Bench([]).add(replace(description, attachments=(attachment,)))
 
 
@@ -162,7 +162,7 @@ def test_grip_holds_an_element_to_a_moving_body_until_released(kit):
     T = np.eye(4)
     T[:3, 3] = rod.positions[10] - np.array([0.025, 0.0, 0.02])
     T_element = np.eye(4)
-    rod.grip(10, 0, T_element, T)
+    rod.attach(10, 0, T_element, T)
     bench.twist[0][2] = 0.05
     bench.step(400)
     assert rod.positions[10, 2] == pytest.approx(0.02, abs=0.2e-3)

@@ -1,7 +1,7 @@
-"""Holds bodies: rigidly for actuators, by friction between the fingers of jaws."""
+"""Attaches bodies rigidly for actuators, and grasps them by friction between the fingers of jaws."""
 
-from ligature.grasping.clamps import Clamps
+from ligature.grasping.actuator_attachments import ActuatorAttachments
+from ligature.grasping.actuator_grasps import ActuatorGrasps
 from ligature.grasping.grasps import Grasps, Held
-from ligature.grasping.holder import Holder
 
-__all__ = ["Clamps", "Grasps", "Held", "Holder"]
+__all__ = ["ActuatorAttachments", "ActuatorGrasps", "Grasps", "Held"]

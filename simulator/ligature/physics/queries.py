@@ -23,15 +23,17 @@ from ligature.physics.wrenches import about, contact_forces, contact_wrench, fix
 
 Array = NDArray[np.float64]
 
-GRASP_FORCE = 500.0
-"""Largest force in newtons by which a grasp holds; jams yield instead of exploding."""
+WELD_FORCE = 500.0
+"""Maximum force of a weld in newtons, so that jammed bodies slip instead of exploding."""
 
 _FAR = [0.0, 0.0, -1000.0]
 """Where the probes of ghosts wait between questions."""
 
 
 @dataclass
-class _Held:
+class Weld:
+    """A rigid constraint of Bullet between frames of two bodies, given in their body frames B."""
+
     parent: int
     child: int
     T_parent_frame: Array
@@ -53,7 +55,7 @@ class BulletQueries:
         probes = getattr(self, "_probe_shapes", [])
         self._probe_shapes: list[tuple[Sequence[Collider], float]] = []
         self._probes: list[int] = []
-        self._held: dict[int, _Held] = {}
+        self._welds: dict[int, Weld] = {}
         self._next_handle = 0
         self._impulses: dict[int, Array] = {}
         for colliders, margin in probes:
@@ -119,8 +121,8 @@ class BulletQueries:
                 break
         return found
 
-    def add_fixed(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
-        """Hold two frames together, given in the body frames of parent and child; returns a handle."""
+    def add_weld(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
+        """Weld two frames, given in the body frames of parent and child; returns a handle."""
         bodies = self.scene.bodies
         in_parent = inverse(bodies[parent].T_body_inertial) @ T_parent_frame
         in_child = inverse(bodies[child].T_body_inertial) @ T_child_frame
@@ -131,21 +133,21 @@ class BulletQueries:
             matrix_quaternion(in_parent[:3, :3]).tolist(), matrix_quaternion(in_child[:3, :3]).tolist(),
             physicsClientId=self.client,
         )  # fmt: skip
-        pybullet.changeConstraint(constraint, maxForce=GRASP_FORCE, physicsClientId=self.client)
+        pybullet.changeConstraint(constraint, maxForce=WELD_FORCE, physicsClientId=self.client)
         self._next_handle += 1
-        self._held[self._next_handle] = _Held(parent, child, T_parent_frame, T_child_frame, int(constraint))
+        self._welds[self._next_handle] = Weld(parent, child, T_parent_frame, T_child_frame, int(constraint))
         return self._next_handle
 
-    def remove_fixed(self, handle: Any) -> None:
-        """Let go what `add_fixed` holds."""
-        held = self._held.pop(handle)
-        pybullet.removeConstraint(held.constraint, physicsClientId=self.client)
+    def remove_weld(self, handle: Any) -> None:
+        """Remove a weld that `add_weld` made."""
+        weld = self._welds.pop(handle)
+        pybullet.removeConstraint(weld.constraint, physicsClientId=self.client)
 
     def touched(self, bodies: Sequence[int]) -> bool:
         """Whether `contact_wrench` may find anything: a quick look."""
         if any(body in self._impulses for body in bodies):
             return True
-        if any(held.parent in bodies or held.child in bodies for held in self._held.values()):
+        if any(weld.parent in bodies or weld.child in bodies for weld in self._welds.values()):
             return True
         own = {(place.uid, place.link) for place in map(self.place_of.get, bodies) if place is not None}
         return any(
@@ -164,7 +166,7 @@ class BulletQueries:
     def contact_wrench(self, bodies: Sequence[int], point: Array) -> Array:
         """Force and moment (6,) about ``point`` (3,) that the rest of the world exerted on ``bodies`` in the last tick.
 
-        Counted are contacts, holds of actuators, and all that was given to `apply_impulse`: rods, grasps, tissue.
+        Counted are contacts, welds, and all that was given to `apply_impulse`: rods, grasps, tissue.
         Gravity, inertia and what the bodies do to each other are not.
         """
         places = [self.place_of[body] for body in bodies if body in self.place_of]
@@ -174,27 +176,27 @@ class BulletQueries:
             links = {link for owner, link in own if owner == uid}
             wrench += contact_wrench(self.client, uid, links, own, point)
         inside = set(bodies)
-        for held in self._held.values():
-            if (held.parent in inside) != (held.child in inside):
-                sign = 1.0 if held.parent in inside else -1.0
-                wrench += sign * self._hold_wrench(held, point)
+        for weld in self._welds.values():
+            if (weld.parent in inside) != (weld.child in inside):
+                sign = 1.0 if weld.parent in inside else -1.0
+                wrench += sign * self._weld_wrench(weld, point)
         for body in inside & self._impulses.keys():
             wrench += about(self._impulses[body] / self.dt, self.place_of[body].centre(), point)
         return wrench
 
-    def _hold_wrench(self, held: _Held, point: Array) -> Array:
-        """Wrench (6,) of a hold on its parent."""
+    def _weld_wrench(self, weld: Weld, point: Array) -> Array:
+        """Wrench (6,) of a weld on its parent."""
         pose, twist = np.empty(7), np.empty(6)
-        self.place_of[held.parent].read_inertial(pose, twist)
-        in_parent = inverse(self.scene.bodies[held.parent].T_body_inertial) @ held.T_parent_frame
-        return fixed_wrench(self.client, held.constraint, pose, in_parent, point)
+        self.place_of[weld.parent].read_inertial(pose, twist)
+        in_parent = inverse(self.scene.bodies[weld.parent].T_body_inertial) @ weld.T_parent_frame
+        return fixed_wrench(self.client, weld.constraint, pose, in_parent, point)
 
-    def held_constraints(self) -> dict[int, _Held]:
-        """The grasps that hold, to be made again after a rebuild."""
-        return dict(self._held)
+    def welds(self) -> dict[int, Weld]:
+        """The present welds by handle, to be restored after a rebuild."""
+        return dict(self._welds)
 
-    def hold_again(self, held: dict[int, _Held]) -> None:
-        """Make the grasps of `held_constraints` again under their old handles."""
-        for handle, grasp in held.items():
+    def restore_welds(self, welds: dict[int, Weld]) -> None:
+        """Make ``welds`` again under their old handles."""
+        for handle, weld in welds.items():
             self._next_handle = handle - 1
-            self.add_fixed(grasp.parent, grasp.child, grasp.T_parent_frame, grasp.T_child_frame)
+            self.add_weld(weld.parent, weld.child, weld.T_parent_frame, weld.T_child_frame)

@@ -27,8 +27,8 @@ from ligature.physics.bodies import BodyControl, Placement
 from ligature.physics.closures import Closures
 from ligature.physics.control import TreeControl
 from ligature.physics.drive import Drive
+from ligature.physics.grasp_support import GraspSupport
 from ligature.physics.gravity import common_gravity, gravity_lifts
-from ligature.physics.grips import BulletGrips
 from ligature.physics.mobility import mobility
 from ligature.physics.motions import Motions
 from ligature.physics.parting import Parting
@@ -58,7 +58,15 @@ MOST_CHARACTERS = 300
 MAX_SPEED = 1e4
 """Speed in m/s or rad/s beyond which a body has diverged."""
 
-_KEPT = ("_held_up", "_gripped", "_passing", "stopped_fingers", "_impulses", "_next_handle", "_told_owned")
+_KEPT = (
+    "_hold_counts",
+    "_grasp_counts",
+    "_disabled_pairs",
+    "stopped_fingers",
+    "_impulses",
+    "_next_handle",
+    "_told_owned",
+)
 """Attributes that last from tick to tick as they are."""
 
 
@@ -91,7 +99,7 @@ class Controllers(Subsystem):
         """Nothing: it is part of the world."""
 
 
-class World(Subsystem, BulletQueries, BulletGrips):
+class World(Subsystem, BulletQueries, GraspSupport):
     """All rigid bodies of ``scene`` outside rods; one Bullet client of its own."""
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
@@ -137,7 +145,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
         self._parting = Parting(self.client, self.dt)
         self._setup_queries()
-        self._setup_grips()
+        self._setup_grasp_support()
         self._motions.forget_all()
 
     def report(self, diagnostic: Diagnostic) -> None:
@@ -302,7 +310,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
         """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
         if self.driven(body):
             return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
-        holders = [self.scene.bodies[held.parent] for held in self._held.values() if held.child == body]
+        holders = [self.scene.bodies[held.parent] for held in self._welds.values() if held.child == body]
         held_mass, held_inertia = self.mass_of(body)
         own = self.scene.bodies[body]
         mass = held_mass - own.mass + sum(holder.mass for holder in holders)
@@ -355,18 +363,18 @@ class World(Subsystem, BulletQueries, BulletGrips):
         The world is built anew, for Bullet's own caches would go on. Commands hold, as if they were sent again; so do
         the constraints of actuators.
         """
-        controls, commands, held = self._controls, self._body_controls, self.held_constraints()
+        controls, commands, held = self._controls, self._body_controls, self.welds()
         handle = self._next_handle
         self.close()
         self._create()
         for control, before in zip(self._controls, controls, strict=True):
             control.follow(before)
-        self._held_up = dict(Counter(grasp.child for grasp in held.values()))
+        self._hold_counts = dict(Counter(weld.child for weld in held.values()))
         for body, command in commands.items():
             self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
             self._body_controls[body].set(command.type, command.target.copy())
-        self._weigh_again()
-        self.hold_again(held)
+        self._restore_masses()
+        self.restore_welds(held)
         self._next_handle = handle
 
     def _restart(self, index: int, tree: Tree) -> None:
@@ -388,7 +396,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
             "controls": [control.snapshot() for control in self._controls],
             "told": dict(self._motions.told),
             "parting": self._parting.snapshot(),
-            "held": self.held_constraints(),
+            "held": self.welds(),
             "bodies": {body: control.snapshot() for body, control in self._body_controls.items()},
             **kept(self, _KEPT),
         }
@@ -409,9 +417,9 @@ class World(Subsystem, BulletQueries, BulletGrips):
             command = self._body_controls[body] = BodyControl(self.place_of[body], self.dt)
             command.restore(state)
         put_back(self, {name: snapshot[name] for name in _KEPT})
-        self._weigh_again()
-        self._part_again()
-        self.hold_again(snapshot["held"])
+        self._restore_masses()
+        self._restore_disabled_pairs()
+        self.restore_welds(snapshot["held"])
         self._parting.restore(snapshot["parting"])
         self._next_handle = snapshot["_next_handle"]
         self._motions.forget_all()

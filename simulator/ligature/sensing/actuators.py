@@ -1,4 +1,4 @@
-"""Constraint actuators: hold a body, rigidly or until it slips, by name, by sensor or with an offset, and let it go.
+"""Constraint actuators: attach or grasp a body by name, by sensor or with an offset, and release it.
 
 Semantics of the reference (interface reference §3.4, ADF specification §17.5): the body is held
 wherever it is, without tolerance; a request while something is held changes nothing.
@@ -20,15 +20,15 @@ from ligature.model.lookup import find_by_text
 from ligature.model.scene import Scene, SensorType
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem
-from ligature.sensing.queries import Holds
+from ligature.sensing.queries import Attachable
 from ligature.sensing.rays import Rays
 
 Array = NDArray[np.float64]
 
 
 @dataclass
-class _Hold:
-    """What an actuator holds: the body and the constraint that does it."""
+class _Attached:
+    """The body that an actuator holds, and the handle of its attachment or grasp."""
 
     body: int
     handle: Any
@@ -37,20 +37,23 @@ class _Hold:
 class Actuators(Subsystem):
     """The actuators of a scene and what each of them holds."""
 
-    def __init__(self, scene: Scene, holds: Holds, rays: Rays) -> None:
+    def __init__(self, scene: Scene, bodies: Attachable, rays: Rays) -> None:
         self._scene = scene
-        self._holder = holds
+        self._bodies = bodies
         self._rays = rays
-        self._holds: list[_Hold | None] = [None] * len(scene.actuators)
+        self._attached: list[_Attached | None] = [None] * len(scene.actuators)
         self._identifiers = [body.identity.identifier for body in scene.bodies]
 
     @property
     def held(self) -> list[int]:
         """Body held by each actuator, -1 for none."""
-        return [-1 if hold is None or not self._holder.holds(hold.handle) else hold.body for hold in self._holds]
+        return [-1 if attached is None or not self._lasts(attached) else attached.body for attached in self._attached]
+
+    def _lasts(self, attached: _Attached) -> bool:
+        return self._bodies.holds(attached.handle)
 
     def apply(self, command: ActuatorCommand, body_pose: Array) -> Diagnostic | None:
-        """Carry out ``command`` with bodies at ``body_pose`` (bodies, 7); what it could not do is returned."""
+        """Carry out ``command`` with bodies at ``body_pose`` (bodies, 7); returns what went wrong."""
         if not command.actuate:
             self.release(command.actuator)
             return None
@@ -61,40 +64,40 @@ class Actuators(Subsystem):
         except LookupError as error:
             return Diagnostic(Severity.WARNING, str(error))
         try:
-            self._grasp(command, body, body_pose)
+            self._hold(command, body, body_pose)
         except ValueError as error:
             return Diagnostic(Severity.WARNING, f"{self._name(command.actuator)}: {error}")
         return None
 
     def release(self, actuator: int) -> None:
-        """Let go whatever ``actuator`` holds."""
-        hold = self._holds[actuator]
-        if hold is not None:
-            self._holder.remove_fixed(hold.handle)
-            self._holds[actuator] = None
+        """Release the body that ``actuator`` holds."""
+        attached = self._attached[actuator]
+        if attached is not None:
+            self._bodies.release(attached.handle)
+            self._attached[actuator] = None
 
     def write_state(self, state: StateRecord) -> None:
-        """Write what every actuator holds."""
+        """Write the body that every actuator holds."""
         held = np.array(self.held, dtype=np.int32)
         state["actuator_body"][0], state["actuator_active"][0] = held, held >= 0
 
     def reset(self) -> None:
-        """Go on holding what constraints hold; threads and what pads hold were let go."""
-        self._holds = [hold if hold is not None and self._holder.holds(hold.handle) else None for hold in self._holds]
+        """Keep welded bodies; threads and grasped bodies were released."""
+        self._attached = [attached if attached and self._lasts(attached) else None for attached in self._attached]
 
-    def snapshot(self) -> list[_Hold | None]:
-        """What every actuator holds; the constraints themselves are part of the physics."""
-        return self._holds
+    def snapshot(self) -> list[_Attached | None]:
+        """The body of every actuator; its attachment or grasp is part of the physics."""
+        return self._attached
 
-    def restore(self, snapshot: list[_Hold | None]) -> None:
+    def restore(self, snapshot: list[_Attached | None]) -> None:
         """Continue from `snapshot`."""
-        self._holds = snapshot
+        self._attached = snapshot
 
     def _name(self, actuator: int) -> str:
         return self._scene.actuators[actuator].identity.identifier
 
     def _body_of(self, command: ActuatorCommand) -> int:
-        """The body that a command means; raises LookupError naming what was not found."""
+        """The body that a command names; raises LookupError with the name that was not found."""
         name = self._name(command.actuator)
         if command.sensor is not None:
             return self._sensed(command.sensor, name)
@@ -118,7 +121,7 @@ class Actuators(Subsystem):
             raise LookupError(f"actuator {actuator}: sensor '{text}' senses nothing")
         return int(triggered[-1])
 
-    def _grasp(self, command: ActuatorCommand, body: int, body_pose: Array) -> None:
+    def _hold(self, command: ActuatorCommand, body: int, body_pose: Array) -> None:
         actuator = self._scene.actuators[command.actuator]
         T_parent_frame = actuator.T_body_actuator
         if command.offset is None:
@@ -127,7 +130,7 @@ class Actuators(Subsystem):
         else:
             T_child_frame = self._scene.bodies[body].T_body_inertial @ pose7_matrix(np.array(command.offset))
         if actuator.slip is None:
-            handle = self._holder.add_fixed(actuator.parent, body, T_parent_frame, T_child_frame)
+            handle = self._bodies.attach(actuator.parent, body, T_parent_frame, T_child_frame)
         else:
-            handle = self._holder.add_yielding(actuator.slip, actuator.parent, body, T_parent_frame, T_child_frame)
-        self._holds[command.actuator] = _Hold(body, handle)
+            handle = self._bodies.grasp(actuator.slip, actuator.parent, body, T_parent_frame, T_child_frame)
+        self._attached[command.actuator] = _Attached(body, handle)

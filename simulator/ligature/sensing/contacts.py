@@ -13,7 +13,7 @@ from ligature.sensing.queries import Queries
 
 
 class Contacts(Subsystem):
-    """The contact sensors of a scene and the contact points they found last."""
+    """The contact sensors of a scene and their last contact points."""
 
     def __init__(self, scene: Scene, queries: Queries) -> None:
         self._queries = queries
@@ -21,19 +21,19 @@ class Contacts(Subsystem):
         self.events: list[tuple[int, Contact]] = []
 
     def sense(self, state: StateRecord) -> None:
-        """Look at the contacts of every sensor's body, and write them."""
+        """Find the contacts of every sensor's body, and write them."""
         if self._sensors:
             self._look()
             self._write(state)
 
     def reset(self) -> None:
-        """Nothing: what is sensed follows from the bodies."""
+        """Nothing: contacts follow from the bodies."""
 
     def snapshot(self) -> None:
-        """Nothing: what is sensed follows from the bodies."""
+        """Nothing: contacts follow from the bodies."""
 
     def restore(self, snapshot: None) -> None:
-        """Nothing: what is sensed follows from the bodies."""
+        """Nothing: contacts follow from the bodies."""
 
     def _look(self) -> None:
         self.events = [

@@ -29,12 +29,12 @@ CONVEX = (Box, Sphere, Cylinder, Capsule, Cone, Hull)
 BAND = 1e-4
 """Distance in metres within which the surfaces of a ghost and a body are measured.
 
-A pair is not measured again before the two can have moved by as much as there is between their surfaces: so what is
-sensed is the same however often somebody looks.
+A pair is measured again only after the two may have moved by the distance between their surfaces, so that the result
+does not depend on the rate of reading.
 """
 
-DOUBT = 0.5
-"""Share of a measured distance that counts on; the engine's distances are not exact."""
+CONFIDENCE = 0.5
+"""Share of a measured distance to rely on; the engine's distances are not exact."""
 
 
 @compiled
@@ -92,43 +92,43 @@ def _invert(pose: Array, out: Array) -> None:
 
 
 @compiled
-def _pairs_to_ask(
+def _pairs_to_measure(
     ghost_world: Array,
     body_pose: Array,
     solid: NDArray[np.int64],
     ghost_reach: Array,
     reach: Array,
-    seen_ghost: Array,
-    seen_body: Array,
+    measured_ghost: Array,
+    measured_body: Array,
     room: Array,
     inside: NDArray[np.bool_],
-    ask: NDArray[np.bool_],
+    due: NDArray[np.bool_],
 ) -> bool:
-    """Flag in ``ask`` the pairs that are near each other and may have met or parted since they were asked about.
+    """Flag in ``due`` the pairs that are near each other and may have met or parted since their last measurement.
 
     ``room`` (g, n) is how far the two may move until then; it is used up for pairs far from each other, which are not
     ``inside``.
     """
     found = False
-    for g in range(ask.shape[0]):
-        for i in range(ask.shape[1]):
+    for g in range(due.shape[0]):
+        for i in range(due.shape[1]):
             square, pose = 0.0, body_pose[solid[i]]
             for a in range(3):
                 square += (ghost_world[g, a] - pose[a]) ** 2
             if square > (ghost_reach[g] + reach[i]) ** 2:
-                inside[g, i] = ask[g, i] = False
+                inside[g, i] = due[g, i] = False
                 room[g, i] = -1.0
                 continue
-            moved = _moved(seen_ghost[g, i], ghost_world[g], ghost_reach[g])
-            moved += _moved(seen_body[g, i], pose, reach[i])
-            ask[g, i] = not moved <= room[g, i]
-            found = found or ask[g, i]
+            moved = _moved(measured_ghost[g, i], ghost_world[g], ghost_reach[g])
+            moved += _moved(measured_body[g, i], pose, reach[i])
+            due[g, i] = not moved <= room[g, i]
+            found = found or due[g, i]
     return found
 
 
 @compiled
 def _moved(before: Array, now: Array, reach: float) -> float:
-    """Bound of the way that any point within ``reach`` of the origin went between two poses (7,)."""
+    """Bound of the displacement of any point within ``reach`` of the origin between two poses (7,)."""
     way, turn = 0.0, 0.0
     for a in range(3):
         way += (now[a] - before[a]) ** 2
@@ -177,9 +177,9 @@ class Ghosts(Subsystem):
         self._ghost_reach = np.array([_reach(g.colliders) for g in scene.ghosts])
         self.sensed = np.zeros((len(scene.ghosts), len(scene.bodies)), dtype=bool)
         shape = (len(self._probes), len(self._solid))
-        self._seen_ghost, self._seen_body = np.zeros((*shape, 7)), np.zeros((*shape, 7))
+        self._measured_ghost, self._measured_body = np.zeros((*shape, 7)), np.zeros((*shape, 7))
         self._room = np.full(shape, -1.0)
-        self._inside, self._ask = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        self._inside, self._due = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
 
     def _lay_out_volumes(self, scene: Scene) -> None:
         """The convex pieces of all ghosts, as arrays for the test against rod elements."""
@@ -197,29 +197,29 @@ class Ghosts(Subsystem):
         self._planes = np.vstack([np.zeros((0, 4)), *(planes for _, _, planes, _ in arrays)])
 
     def sense(self, state: StateRecord) -> None:
-        """Look what is in the ghosts, and write it."""
+        """Find the bodies in the ghosts, and write them."""
         self.update(state["ghost_world"][0], state["body_pose"][0])
         state["ghost_sensed"][0] = self.sensed
 
     def reset(self) -> None:
-        """Nothing: what is sensed follows from where everything is."""
+        """Nothing: overlaps follow from the poses."""
 
     def snapshot(self) -> None:
-        """Nothing: what is sensed follows from where everything is."""
+        """Nothing: overlaps follow from the poses."""
 
     def restore(self, snapshot: None) -> None:
-        """Nothing: what is sensed follows from where everything is."""
+        """Nothing: overlaps follow from the poses."""
 
     def update(self, ghost_world: Array, body_pose: Array) -> None:
-        """Sense again; ``ghost_world`` (ghosts, 7) and ``body_pose`` (bodies, 7) in world axes."""
+        """Update ``sensed``; ``ghost_world`` (ghosts, 7) and ``body_pose`` (bodies, 7) in world axes."""
         if not self._probes:
             return
-        asking = _pairs_to_ask(
-            ghost_world, body_pose, self._solid, self._ghost_reach, self._reach, self._seen_ghost, self._seen_body,
-            self._room, self._inside, self._ask,
+        measuring = _pairs_to_measure(
+            ghost_world, body_pose, self._solid, self._ghost_reach, self._reach, self._measured_ghost,
+            self._measured_body, self._room, self._inside, self._due,
         )  # fmt: skip
-        if asking:
-            self._ask_about_bodies(ghost_world, body_pose[self._solid])
+        if measuring:
+            self._measure_pairs(ghost_world, body_pose[self._solid])
         self.sensed[:, self._solid] = self._inside
         if len(self._elements):
             _elements_inside(
@@ -227,15 +227,15 @@ class Ghosts(Subsystem):
                 ghost_world, body_pose, self._elements, self._half_lengths, self._radii, self.sensed,
             )  # fmt: skip
 
-    def _ask_about_bodies(self, ghost_world: Array, bodies: Array) -> None:
-        for ghost in np.flatnonzero(self._ask.any(axis=1)):
-            asked = np.flatnonzero(self._ask[ghost])
-            candidates = self._solid[asked].tolist()
+    def _measure_pairs(self, ghost_world: Array, bodies: Array) -> None:
+        for ghost in np.flatnonzero(self._due.any(axis=1)):
+            rows = np.flatnonzero(self._due[ghost])
+            candidates = self._solid[rows].tolist()
             gaps = np.array(self._queries.probe_gaps(self._probes[ghost], ghost_world[ghost], candidates, BAND))
-            self._inside[ghost, asked] = gaps <= 0.0
-            self._room[ghost, asked] = DOUBT * np.minimum(np.abs(gaps), BAND)
-            self._seen_ghost[ghost, asked] = ghost_world[ghost]
-            self._seen_body[ghost, asked] = bodies[asked]
+            self._inside[ghost, rows] = gaps <= 0.0
+            self._room[ghost, rows] = CONFIDENCE * np.minimum(np.abs(gaps), BAND)
+            self._measured_ghost[ghost, rows] = ghost_world[ghost]
+            self._measured_body[ghost, rows] = bodies[rows]
 
 
 def _reach(colliders: tuple[Collider, ...]) -> float:

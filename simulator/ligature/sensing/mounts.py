@@ -1,4 +1,4 @@
-"""World poses of ghosts, cameras and lights: objects without mass that ride on bodies or on each other.
+"""World poses of ghosts, cameras and lights: objects without mass, mounted on bodies or on each other.
 
 Poses are x y z qx qy qz qw; ``local`` is in the parent's frame (body frame B, or the frame of the
 parent camera, light or ghost), ``world`` in world axes. Lengths in metres.
@@ -42,7 +42,7 @@ def _update(
 
 
 class Mounts(Subsystem):
-    """The attached objects of a scene, ghosts first, then cameras, then lights.
+    """The mounted objects of a scene, ghosts first, then cameras, then lights.
 
     ``local`` and ``world`` are (n, 7) arrays over all of them; `of` gives the slice of one kind.
     """
@@ -61,7 +61,7 @@ class Mounts(Subsystem):
         self.world = self._initial.copy()
 
     def of(self, kind: str) -> slice:
-        """Where the objects of ``kind`` (ghost, camera or light) stand in ``local`` and ``world``."""
+        """Rows of the objects of ``kind`` (ghost, camera or light) in ``local`` and ``world``."""
         return self._slices[kind]
 
     def update(self, body_pose: NDArray[np.float64]) -> None:
@@ -74,18 +74,18 @@ class Mounts(Subsystem):
             self.local[self._slices[kind].start + index] = pose
 
     def adopt(self, kind: str, index: int, body: int | None) -> None:
-        """Hang one object on ``body``, or on the world; its pose in the parent's frame stays what it was."""
+        """Mount one object on ``body``, or on the world; its pose in the parent's frame stays."""
         self._parents[self._slices[kind].start + index] = -1 if body is None else body
         self._order = self._parents_first()
 
     def reset(self) -> None:
-        """Put every object back to where the scene states, on the parent that it states."""
+        """Put every object back to the pose and parent that the scene states."""
         self.local[:] = self._initial
         self._parents[:] = self._initial_parents
         self._order = self._parents_first()
 
     def sense(self, state: StateRecord) -> None:
-        """Move every object with its parent, and write where it is."""
+        """Move every object with its parent, and write the poses."""
         self.update(state["body_pose"][0])
         state["ghost_world"][0] = self.world[self.of("ghost")]
         for kind in ("camera", "light"):
@@ -102,7 +102,7 @@ class Mounts(Subsystem):
         self._order = self._parents_first()
 
     def _parent_index(self, attachment: Attachment) -> int:
-        """Index of the parent among bodies followed by attached objects; -1 for the world."""
+        """Index of the parent among bodies followed by mounted objects; -1 for the world."""
         if attachment.parent is None:
             return -1
         kind, index = attachment.parent
@@ -113,7 +113,7 @@ class Mounts(Subsystem):
         return self._n_bodies + int(self._slices[kind].start) + index
 
     def _parents_first(self) -> NDArray[np.int64]:
-        """Evaluation order in which a parent comes before what rides on it."""
+        """Evaluation order in which a parent comes before its children."""
         depth = np.zeros(len(self._parents), dtype=np.int64)
         for i in range(len(self._parents)):
             parent = self._parents[i]

@@ -1,4 +1,4 @@
-"""What sensors and actuators ask of whoever knows the contacts; `ligature.physics.World` answers.
+"""What sensors and actuators need of the physics; `ligature.physics.World` implements it.
 
 Poses are x y z qx qy qz qw in world axes, lengths in metres.
 """
@@ -26,7 +26,7 @@ class Queries(Protocol):
     def probe_gaps(self, probe: int, pose: Array, bodies: Sequence[int], within: float) -> list[float]:
         """Distance of each of ``bodies`` from the probe at ``pose`` (7,), negative where they overlap.
 
-        ``within`` stands for all that is farther.
+        ``within`` stands for all larger distances.
         """
 
     def ray_test(self, starts: Array, ends: Array) -> RayHits:
@@ -50,20 +50,21 @@ class Touchable(Protocol):
     """Bodies whose contacts are watched."""
 
     def touches(self, most: int) -> tuple[Array, Array]:
-        """Where bodies touched in the last step, (n, 3), and the forces on one of the two, (n, 3); ``most`` of them."""
+        """Contact points of the last step, (n, 3), and the forces on one of the two bodies, (n, 3); at most
+        ``most``."""
 
 
-class Holds(Protocol):
-    """Holding bodies together."""
+class Attachable(Protocol):
+    """Bodies that actuators attach to others and grasp."""
 
-    def add_fixed(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
-        """Hold two frames together, given in the body frames of parent and child; returns a handle."""
+    def attach(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
+        """Attach two frames rigidly, given in the body frames of parent and child; returns a handle."""
 
-    def add_yielding(self, slip: Slip, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
-        """The same by friction between pads, beyond which the child slips; returns a handle."""
+    def grasp(self, slip: Slip, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
+        """Hold ``child`` by friction between pads, beyond which it slips; returns a handle."""
 
     def holds(self, handle: Any) -> bool:
-        """Whether it has not slipped out."""
+        """Whether the body of a handle is still held."""
 
-    def remove_fixed(self, handle: Any) -> None:
-        """Let go what `add_fixed` holds."""
+    def release(self, handle: Any) -> None:
+        """Release the body of a handle from `attach` or `grasp`."""

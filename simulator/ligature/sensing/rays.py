@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 
 
 class Rays(Subsystem):
-    """The rays of all sensors of a scene, one after the other, as the state record wants them.
+    """The rays of all sensors of a scene, one after the other, in the order of the state record.
 
-    Resistance sensors push in every tick; what rays measure is looked up when the state is written.
+    Resistance sensors push in every tick; rays are measured when the state is written.
     """
 
     def __init__(self, scene: Scene, queries: Pushable) -> None:
@@ -39,12 +39,12 @@ class Rays(Subsystem):
         self._stick = [_Stick(sensor, sensor.parent not in scene.rod_bodies) for sensor in pushing]
 
     def step(self, tick: int) -> None:
-        """Let every resistance sensor push during the coming step of the bodies."""
+        """Apply the forces of every resistance sensor in the coming step of the bodies."""
         for stick in self._stick:
             stick.step(self._queries)
 
     def sense(self, state: StateRecord) -> None:
-        """Cast every ray with the bodies where the state has them, and write what they hit."""
+        """Cast every ray among the bodies of the state, and write the hits."""
         if not self.sensors:
             return
         self.update(state["body_pose"][0])
@@ -53,12 +53,12 @@ class Rays(Subsystem):
         state["ray_body"][0], state["ray_point"][0], state["ray_normal"][0] = hits.body, hits.point, hits.normal
 
     def reset(self) -> None:
-        """Nothing sticks any more."""
+        """Release every stuck ray."""
         for stick in self._stick:
             stick.reset()
 
     def snapshot(self) -> dict[str, Any]:
-        """What was hit last, and where the rays of resistance sensors stick."""
+        """The last hits, and the points where rays of resistance sensors stick."""
         return {"hits": self.hits._asdict(), "stick": [kept(stick, STICK_KEPT) for stick in self._stick]}
 
     def restore(self, snapshot: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Contact points and forces for whoever looks at them, as often as eyes can see; world axes, metres and newtons."""
+"""Contact points and forces for displays, at their rate; world axes, metres and newtons."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ligature.model.subsystem import Subsystem, kept, put_back
 from ligature.sensing.queries import Touchable
 
 LOOK_TICKS = 16
-"""Ticks between two looks at contacts that are watched."""
+"""Ticks between two readings of watched contacts."""
 
 
 class Touches(Subsystem):
-    """Where bodies touch, while that is watched."""
+    """Contact points between bodies while a display watches them."""
 
     def __init__(self, bodies: Touchable) -> None:
         self._bodies = bodies
@@ -25,7 +25,7 @@ class Touches(Subsystem):
         self._forces: NDArray[np.float64] = np.zeros((0, 3))
 
     def watch(self, enabled: bool) -> None:
-        """Look from now on, or no longer."""
+        """Start or stop reading contacts."""
         self._watching = enabled
         self._empty()
 
@@ -33,12 +33,12 @@ class Touches(Subsystem):
         self._points, self._forces = np.zeros((0, 3)), np.zeros((0, 3))
 
     def step(self, tick: int) -> None:
-        """Look at the contacts of the step that has just been done, every `LOOK_TICKS`."""
+        """Read the contacts of the last step, every `LOOK_TICKS`."""
         if self._watching and (tick + 1) % LOOK_TICKS == 0:
             self._points, self._forces = self._bodies.touches(MAX_TOUCHES)
 
     def write_state(self, state: StateRecord) -> None:
-        """Write what the last look found."""
+        """Write the contacts of the last reading."""
         count = len(self._points)
         if count or state["touch_count"][0]:
             state["touch_count"] = count
@@ -46,7 +46,7 @@ class Touches(Subsystem):
                 state[name][0, :count], state[name][0, count:] = found, 0.0
 
     def reset(self) -> None:
-        """Nothing was seen yet; watching goes on."""
+        """Forget the last reading; watching goes on."""
         self._empty()
 
     def snapshot(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a rod needs of the rigid bodies: motion, and a way to push; `ligature.physics.World` gives it.
+"""What a rod needs of the rigid bodies: their motion and impulses on them; `ligature.physics.World` implements it.
 
 World axes, SI units; poses are x y z qx qy qz qw.
 """
@@ -20,27 +20,27 @@ class Bodies(Protocol):
         """Pose (7,) of a body's inertial frame and its twist (6,), linear part at the centre of mass."""
 
     def driven(self, body: int) -> bool:
-        """Whether a body moves as a command states, whatever pushes it."""
+        """Whether a body is kinematically controlled: a command moves it against all forces."""
 
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) at its centre of mass and ``moment`` (3,)."""
 
 
 class HeldBodies(Bodies, Protocol):
-    """The rigid bodies that tissue holds, and those it is part of."""
+    """The rigid bodies in tissue, and those that the tissue belongs to."""
 
     def mobility(self, body: int) -> Array:
         """Change (6, 6) of a body's twist for a unit of impulse and moment at its centre of mass, at the start."""
 
     def attached_load(self, body: int) -> tuple[float, Array, Array]:
-        """Mass and inertia (3,) of what holds a body, and what pulls at it in the coming tick besides gravity.
+        """Mass and inertia (3,) attached to a body, and the load (6,) on it in the coming tick besides gravity.
 
-        The pull (6,) is at its centre of mass.
+        The load acts at its centre of mass.
         """
 
 
 class Masses(Protocol):
-    """How bodies resist forces: more while they are held, see `ligature.physics.grips`."""
+    """Masses of bodies, larger while they are held, see `ligature.physics.grasp_support`."""
 
     def mass_of(self, body: int) -> tuple[float, Array]:
         """Mass and principal moments (3,) of a body."""

@@ -21,7 +21,7 @@ from ligature.suture.placing import survey
 Array = NDArray[np.float64]
 
 LOOKS = 1
-"""Bodies far from every rod that are looked at in a tick, in turn."""
+"""Bodies far from every rod whose poses are read in a tick, in turn."""
 
 NEAR = 0.02
 """Distance in metres within which a moving body's pose is read every tick.
@@ -136,7 +136,7 @@ class Colliders:
         self._due[k] = self._placed[k] = True
 
     def restart(self) -> None:
-        """Forget when poses were read, so that the next update reads all."""
+        """Read all poses in the next update."""
         self._turn = -1
 
     def reset(self) -> None:

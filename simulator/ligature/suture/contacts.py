@@ -1,8 +1,8 @@
 """Finds the contact points of a rod at the start of a tick: capsules against convex parts, and against themselves.
 
-A contact is found before anything touches, while what may move in a tick still fits between, and with
-the plane that must not be crossed in it: so nothing tunnels. Memory of friction goes from one tick's
-contact to the next one's of the same pair. World axes, SI units.
+The search finds a contact before its surfaces touch, while the largest motion of a tick still fits between them, with
+the plane that the element must not cross: so nothing tunnels. Friction continues from the last tick's contact of the
+same pair. World axes, SI units.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import math
 
 from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
-from ligature.suture.coupling import SLIPS
+from ligature.suture.layout import SLIPS
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 
 SLACK = 0.5
-"""Distance, in radii, at which a contact is found although nothing moves."""
+"""Distance, in radii, at which a contact is found even at rest."""
 
-THROWN = 4.0
-"""Most radii by which tension widens the search for contacts with bodies."""
+MAX_TENSION_REACH = 4.0
+"""Maximum distance, in radii, by which tension widens the search for contacts with bodies."""
 
 RECOVERY = 0.1
 """Speed in m/s at which a rod that starts inside a body is pushed out."""
@@ -35,16 +35,16 @@ def detect(first, n, nodes, shapes, old, new, work, tension, counts, self_skip, 
     """Fill ``new`` with the contacts of elements ``first`` … ``first + n - 1``; ``old`` are the last tick's.
 
     ``tension`` (elements,) is that of the last tick. ``counts`` returns the contacts found, and those for
-    which there was no room. Bonds that already stand at the head of ``new`` stay.
+    which the table has no room. Point constraints and grasps at the head of ``new`` stay.
     """
-    bonds = new.count[0]
+    constraints = new.count[0]
     capacity = new.node.shape[0]
     _world_segments(first, n, nodes, work, dt)
     missed = _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt)
     settled = new.count[0]
     missed += _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip)
     _sort(new, settled)
-    _remember(old, new, bonds)
+    _continue_friction(old, new, constraints)
     counts[0], counts[1] = new.count[0], missed
 
 
@@ -98,7 +98,7 @@ def _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt):
         for e in range(n):
             box = work.box[e]
             # A light taut element is thrown farther in a tick than its motion shows.
-            thrown = min(abs(tension[e]) * dt * dt / nodes.mass[first + e], THROWN * nodes.radius[first + e])
+            thrown = min(abs(tension[e]) * dt * dt / nodes.mass[first + e], MAX_TENSION_REACH * nodes.radius[first + e])
             margin = sweep + thrown
             outside = False
             for a in range(3):
@@ -147,7 +147,7 @@ def _depth_at(kind, size, planes, pose, R, segment, s, p, normal):
 
 @inlined
 def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
-    """Where along a segment (0..1) it comes nearest to a convex part, and the distance there.
+    """Parameter (0..1) of the point of a segment nearest to a convex part, and the distance there.
 
     The distance is convex along the segment, so its slope brackets the lowest point. Where both ends
     lie over one face, the point moves from the middle to the lower end as the element tilts.
@@ -194,7 +194,7 @@ def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
 
 @inlined
 def _record(first, nodes, new, work, e, k, key, s, d, inside, nx, ny, nz, friction, dt):
-    """Add the contact of element ``e`` at ``s`` with node ``k``, whose skin is ``d`` off along -normal.
+    """Add the contact of element ``e`` at ``s`` with node ``k``, whose surface is at ``d`` along -normal.
 
     ``inside`` is the depth of the point that node ``k`` keeps, below its skin.
     """
@@ -218,7 +218,7 @@ def _record(first, nodes, new, work, e, k, key, s, d, inside, nx, ny, nz, fricti
     new.gap[c] = gap
     new.target[c] = min(0.0, gap + RECOVERY * dt)
     new.friction[c] = friction * nodes.friction[i]
-    new.bond[c] = False
+    new.bilateral[c] = False
     new.press[c] = 0.0
     new.closed[c] = False
     new.mode[c], new.switches[c] = SLIPS, 0
@@ -327,7 +327,7 @@ def _touch_pair(first, nodes, new, work, capacity, i, j, offset):
     if new.count[0] == capacity:
         return 1
     per = 1.0 / length
-    # Already inside each other: no wish to recover faster than other contacts do.
+    # Already inside each other: recover no faster than other contacts.
     _record(first, nodes, new, work, i, first + j, offset + j, s, d, near, dx * per, dy * per, dz * per,
             nodes.friction[first + j], 1e-3)  # fmt: skip
     return 0
@@ -359,7 +359,7 @@ def _swap(touches, a, b):
 
 @inlined
 def _sort(touches, begin):
-    """Bring fresh contacts from ``begin`` on into the order of key and element, by insertion."""
+    """Sort new contacts from ``begin`` on by key and element (insertion sort)."""
     for c in range(begin + 1, touches.count[0]):
         k = c
         while k > begin and _before(touches, k, k - 1):
@@ -368,12 +368,12 @@ def _sort(touches, begin):
 
 
 @inlined
-def _remember(old, new, bonds):
-    """Carry slip, pressure and state over from the contacts of the last tick; both lists are sorted."""
+def _continue_friction(old, new, constraints):
+    """Continue slip, normal force and mode of the last tick's contacts; both lists are sorted."""
     o = 0
-    while o < old.count[0] and old.bond[o]:
+    while o < old.count[0] and old.bilateral[o]:
         o += 1
-    for c in range(bonds, new.count[0]):
+    for c in range(constraints, new.count[0]):
         while o < old.count[0] and (
             old.key[o] < new.key[c] or (old.key[o] == new.key[c] and old.node[o, 0] < new.node[c, 0])
         ):
@@ -383,7 +383,7 @@ def _remember(old, new, bonds):
         n, slip = new.normal[c], old.slip[o]
         along = n[0] * slip[0] + n[1] * slip[1] + n[2] * slip[2]
         flat = slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2
-        # A normal that trembles must not wear the slip down: turn it, keep its length.
+        # A jittering normal must not shorten the slip: rotate it, keep its length.
         scale = math.sqrt(flat / (flat - along * along)) if flat > 2.0 * along * along else 1.0
         for a in range(3):
             new.slip[c, a] = scale * (slip[a] - along * n[a])

@@ -1,8 +1,8 @@
-"""Solves a rod together with the nodes that contacts tie it to: conjugate gradients around the chain's solver.
+"""Solves a rod together with the nodes that contacts couple to it: conjugate gradients around the chain's solver.
 
-A closed contact stands in the matrices of its two nodes as if each were held by a spring fixed in
-space; what one node's motion does to the other is left, and iterated to rounding with the chain's direct
-solver as preconditioner. Only tied nodes and those between them take part, however long the rod. World
+The matrices of the two nodes of a closed contact treat each as held by a spring fixed in space. The effect of one
+node's motion on the other remains, and is iterated to rounding with the chain's direct solver as preconditioner.
+Only coupled nodes and those between them take part, however long the rod. World
 axes, SI units.
 """
 
@@ -21,9 +21,9 @@ CG_TOLERANCE = 1e-6
 
 @kernel
 def gather(n, total, nodes, touches, work):
-    """Find what closed contacts tie together: returns the first and last node of the chain, and a count of rows.
+    """Find the nodes that closed contacts couple: returns the first and last node of the chain, and a count of rows.
 
-    ``work.rows`` receives these nodes and those between them, then the bodies with a load. Without ties
+    ``work.rows`` receives these nodes and those between them, then the bodies with a load. Without contacts
     between movable nodes the first is past the last, which is -1.
     """
     low, high = n, -1
@@ -55,7 +55,7 @@ def gather(n, total, nodes, touches, work):
 
 @inlined
 def _apply_coupling(rows, nodes, touches, work, p, out):
-    """out = E p: what each movable node of a contact feels of the other's motion."""
+    """out = E p: the load on each movable node of a contact from the other's motion."""
     for m in range(rows):
         i = work.rows[m]
         for a in range(6):
@@ -107,7 +107,7 @@ def _dot(rows, work, a, b):
 
 @kernel
 def couple(n, low, high, rows, nodes, touches, work):
-    """Complete ``work.d`` and ``work.load`` by what contacts between movable nodes carry across.
+    """Complete ``work.d`` and ``work.load`` by the coupling of contacts between movable nodes.
 
     ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``.
     """
@@ -129,7 +129,7 @@ def couple(n, low, high, rows, nodes, touches, work):
 
 @inlined
 def _iterate(n, low, high, rows, nodes, touches, work):
-    """Conjugate gradients for ``work.d`` of the tied nodes."""
+    """Conjugate gradients for ``work.d`` of the coupled nodes."""
     p, r, z, s = work.cg[0], work.cg[1], work.cg[2], work.cg[3]
     _apply_coupling(rows, nodes, touches, work, work.d, r)
     for m in range(rows):

@@ -3,8 +3,8 @@
 A contact is a stiff spring along its normal and a bristle across it: elastic while it sticks, of
 constant force against the motion while it slips, all evaluated at the end of the tick. Which contacts
 touch and which stick is found by repetition (an active-set Newton method), starting from the last
-tick. What each contact does to its two nodes apart goes into their matrices; what ties the nodes
-together is solved in `ligature.suture.coupled_solve`. World axes, SI units; `Touches.push` and the matrices K
+tick. The stiffness that a contact adds to each of its two nodes goes into their matrices; the coupling between
+the nodes is solved in `ligature.suture.coupled_solve`. World axes, SI units; `Touches.push` and the matrices K
 are times dt².
 """
 
@@ -13,10 +13,8 @@ from __future__ import annotations
 import math
 
 from ligature.kernels import inlined, kernel
+from ligature.suture.layout import SLIPS, STICKS, YIELDS
 from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
-
-SLIPS, STICKS, YIELDS = 0, 1, 2
-"""How a contact's friction enters a solve: a constant force, a spring, a spring as stiff as the limit allows."""
 
 MAX_SWITCHES = 3
 """Switches between stick and slip after which a contact yields for the rest of the tick."""
@@ -132,8 +130,9 @@ def _friction(touches, c, wx, wy, wz, scale, dt):
 
 @inlined
 def rigid(touches, c):
-    """Whether bond ``c`` has no limit; one with friction is a grasp, of which `Touches.press` is given."""
-    return touches.bond[c] and touches.friction[c] == 0.0
+    """Whether ``c`` is a point constraint; a bilateral contact with friction is a grasp, whose `Touches.press` is
+    given."""
+    return touches.bilateral[c] and touches.friction[c] == 0.0
 
 
 @kernel
@@ -147,7 +146,7 @@ def add_contacts(nodes, touches, work, stiffness, dt):
         room = gap - touches.target[c]
         touches.room[c] = room
         across, along, s, normal = 0.0, 0.0, 0.0, 0.0
-        if touches.bond[c]:
+        if touches.bilateral[c]:
             room = gap
         if rigid(touches, c):
             across, along, s, normal = scale, scale, scale, scale
@@ -205,7 +204,7 @@ def settle_contacts(nodes, touches, work, stiffness, dt):
         begun = touches.begun[c]
         w[0], w[1], w[2] = begun[0] + ux - un * n[0], begun[1] + uy - un * n[1], begun[2] + uz - un * n[2]
         press = force[0] * n[0] + force[1] * n[1] + force[2] * n[2]
-        if touches.bond[c]:
+        if touches.bilateral[c]:
             press = touches.press[c]
         if touches.closed[c] and press >= 0.0:
             changed = _settle_friction(touches, c, w, press, stiffness) or changed
@@ -214,7 +213,7 @@ def settle_contacts(nodes, touches, work, stiffness, dt):
             touches.press[c] = 0.0
             changed = True
         elif touches.room[c] + un < 0.0:
-            # How hard it presses shows in the next solve; until then it slides freely.
+            # The next solve finds its normal force; until then it slides freely.
             touches.closed[c] = True
             touches.press[c] = 0.0
             touches.mode[c] = SLIPS
@@ -229,9 +228,9 @@ def _settle_friction(touches, c, w, press, stiffness):
     before = touches.friction[c] * touches.press[c]
     touches.press[c] = press
     size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    grip = size * stiffness
+    force = size * stiffness
     if touches.mode[c] == STICKS:
-        if grip <= limit * STICTION:
+        if force <= limit * STICTION:
             return False
         touches.switches[c] += 1
         touches.mode[c] = SLIPS if touches.switches[c] < MAX_SWITCHES else YIELDS

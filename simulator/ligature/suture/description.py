@@ -1,7 +1,7 @@
-"""What a rod is made of: elements, the joints between them, and the ties of its ends; SI units.
+"""What a rod is made of: elements, the joints between them, and the attachments of its ends; SI units.
 
-An element is a rigid capsule with an inertial frame I; joint j lies between elements j and j + 1. A tie
-holds one element to a body outside the rod. Frames of joints are given in the I of either side.
+An element is a rigid capsule with an inertial frame I; joint j lies between elements j and j + 1. An
+attachment holds one element to a body outside the rod. Frames of joints are given in the I of either side.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FREE = np.array([[1.0] * 3, [-1.0] * 3])
 class Attachment:
     """Holds element ``element`` to body ``body`` of the scene.
 
-    ``T_element_a`` and ``T_body_b`` (4, 4) are the tied frames in the inertial frames of element and
+    ``T_element_a`` and ``T_body_b`` (4, 4) are the attached frames in the inertial frames of element and
     body; ``stiffness``, ``damping``, ``rest``, ``low``, ``high`` (3,) are those of the rotation, as in
     `RodDescription`.
     """
@@ -64,12 +64,12 @@ class RodDescription:
         (n, 3) acceleration in world axes; (n, 2) fraction of linear and angular speed lost in a second.
     pivots, frames
         (n - 1, 2, 3) and (n - 1, 2, 3, 3): the joint in I of its two elements.
-    give
+    compliance
         (n - 1,) compliance of the joint's translation in m/N.
     joint_stiffness, joint_damping, rest, low, high
         (n - 1, 3) about the axes of the joint frame: N m/rad, N m s/rad, rad. ``low > high`` is free.
-    ties
-        What holds the rod to bodies.
+    attachments
+        Attachments of the rod to bodies.
     bodies
         (n,) body indices of the elements in the scene, empty for a rod outside a scene.
     """

@@ -1,10 +1,9 @@
-"""Tissue holes: what passes through one is held there, sideways by the tissue and along by friction.
+"""Tissue holes: the tissue holds what passes through them, sideways by springs and along by friction.
 
-Where a needle or a thread first crosses the opening of a hole it marks a puncture, a point and axes fixed
-in the hole's body. From then on the tissue pushes it back to the puncture like a spring, and rubs along
-it: viscous friction F = -K v as in the paper of the challenge, and Coulomb friction that keeps a released
-needle where it was left. Too hard a pull sideways tears the tissue: the puncture moves on. A
-puncture anywhere else in tissue makes another such passage. World axes, SI units.
+A needle or a thread that first crosses the opening of a hole marks a puncture, a point and axes fixed in the hole's
+body. From then on the tissue pushes it back to the puncture like a spring, with friction along the path: viscous
+F = -K v as in the paper of the challenge, and Coulomb friction that keeps a released needle in place. A sideways
+force above the strength tears the tissue: the puncture moves on. World axes, SI units.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from ligature.model.state import MAX_INSERTIONS, StateRecord
 from ligature.model.subsystem import kept, put_back
 from ligature.suture import passages as arrays
 from ligature.suture.bodies import HeldBodies
-from ligature.suture.holding import hold_alone, react
+from ligature.suture.passage_forces import react, solve_needle
 from ligature.suture.rod import Rod
 from ligature.suture.rods import Rods
 from ligature.suture.tables import table_of
@@ -34,27 +33,27 @@ LEAST_FRICTION, LEAST_STRENGTH, LEAST_STIFFNESS = 0.3, 3.0, 4000.0
 """Friction (N), sideways strength (N) and stiffness (N/m) of tissue whose file states nothing.
 
 Masses in scenes of AMBF are often a thousand times those of real needles and threads; such a needle would
-fall out of real tissue. So its tissue bears its weight: the following multiples of it. A thread of a kilogram that
-falls until it hangs from its needle shakes it with twice its weight along and five times aside.
+fall out of real tissue. Its tissue therefore scales with its weight by the factors below. A thread of a kilogram that
+falls until it hangs from its needle loads it with twice its weight along and five times sideways.
 """
 
 FRICTION_PER_WEIGHT, STRENGTH_PER_WEIGHT, SAG = 2.5, 15.0, 2e-5
-"""Friction and strength over the weight of needle and thread; metres by which that weight pulls them aside."""
+"""Friction and strength over the weight of needle and thread; sideways deflection in metres under that weight."""
 
 SETTLING = 0.002
-"""Time in seconds in which a needle swings back to its puncture."""
+"""Time constant in seconds in which a needle returns to its puncture."""
 
 NEAR = 0.01
-"""Distance in metres within which a hole's pose is read at every look."""
+"""Distance in metres within which a hole's pose is read at every search."""
 
-SURPRISE = 0.5
-"""Speed in m/s that a needle or thread may suddenly reach: how soon to look again."""
+MAX_APPROACH = 0.5
+"""Maximum speed in m/s of needles and threads between two searches."""
 
-MOST_BLIND = 32
-"""Most ticks between two looks."""
+MAX_WAIT = 32
+"""Most ticks between two searches for passages."""
 
-_KEPT = ("_blind", "_turn", "_near", "_gaps")
-"""Attributes of `Holes` that last from tick to tick: when to look for new passages, and where."""
+_KEPT = ("_countdown", "_turn", "_near", "_gaps")
+"""Attributes of `Holes` that last from tick to tick: when to search for new passages, and where."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +61,8 @@ class Insertion:
     """A needle or thread in a hole.
 
     ``hole`` is the hole's index in the scene and ``body`` the needle or the element that passes;
-    ``depth`` (m) the length of needle or thread beyond the hole, ``point`` (3,) where it passes and
-    ``force`` (3,), ``moment`` (3,) what the tissue does to it there, in world axes.
+    ``depth`` (m) the length of needle or thread beyond the hole, ``point`` (3,) the crossing and
+    ``force`` (3,), ``moment`` (3,) the wrench of the tissue there, in world axes.
     """
 
     hole: int
@@ -75,14 +74,14 @@ class Insertion:
 
 
 class Holes:
-    """The holes of a scene and what is in them.
+    """The holes of a scene and the passages through them.
 
     Parameters
     ----------
     scene
         Its recognised holes, needles and rods.
     rods
-        The running rods; they feel the holes in their own solve, with the needles tied to them.
+        The running rods; their own solve includes the passages of them and of the needles attached to them.
     bodies
         The rigid bodies.
     dt
@@ -94,9 +93,11 @@ class Holes:
         self._needles = [needle.body for needle in scene.needles]
         self._passages = arrays.passages()
         self._sites = _sites(scene, bodies)
-        self._lines = _lines(scene, self._rods)
+        self._paths = _paths(scene, self._rods)
         self._before = [_lengths(rod) for rod in self._rods]
-        self._p, self._s, self._l = (table_of(g) for g in (self._passages, self._sites, self._lines))
+        self._passage_table, self._site_table, self._path_table = (
+            table_of(g) for g in (self._passages, self._sites, self._paths)
+        )
         self._rod_tables = [table_of(rod.nodes) for rod in self._rods]
         for owner, rod in enumerate(self._rods):
             rod.take_passages(self._passages, owner)
@@ -108,7 +109,7 @@ class Holes:
         self._gaps = np.zeros((n + len(self._rods), len(scene.holes)))
         self._near = np.ones(len(scene.holes), dtype=bool)
         self._mobile = self._sites.recoil.any(axis=(1, 2))
-        self._blind = 0
+        self._countdown = 0
         self._turn = -1
         self._idle = not scene.holes or not (self._needles or self._rods)
 
@@ -118,45 +119,52 @@ class Holes:
         """Find and follow passages, before the rods advance."""
         if self._idle:
             return
-        if self._blind > 0:
-            self._blind -= 1
+        if self._countdown > 0:
+            self._countdown -= 1
             if not self._passages.filled[0]:
                 return
         else:
-            self._look()
+            self._search()
         if self._passages.filled[0]:
             self._follow()
 
     def end(self) -> None:
-        """Hold needles that no rod solves for, and push the holes back; after the rods have advanced."""
+        """Solve needles without a rod and apply the reactions to the holes, after the rods have advanced."""
         p = self._passages
         for c in range(p.filled[0]):
-            line = int(p.line[c])
-            if p.owner[c] < 0 and line not in p.line[:c]:
-                self._hold_alone(line)
+            path = int(p.path[c])
+            if p.owner[c] < 0 and path not in p.path[:c]:
+                self._solve_needle(path)
         for c in range(p.filled[0]):
             hole = self._scene.holes[p.hole[c]]
-            react(self._p, self._sites.pose, c, self._reaction)
+            react(self._passage_table, self._sites.pose, c, self._reaction)
             if self._mobile[p.hole[c]]:
                 self._bodies.apply_impulse(hole.body, self._reaction[:3], self._reaction[3:])
 
-    def _look(self) -> None:
-        """Find lines that have entered holes, and how long nothing else can."""
-        for line, body in enumerate(self._needles):
-            self._lines.pose[line] = self._bodies.motion(body)[0]
+    def _search(self) -> None:
+        """Find paths that have entered holes, and the number of ticks in which no other can."""
+        for path, body in enumerate(self._needles):
+            self._paths.pose[path] = self._bodies.motion(body)[0]
         self._turn = (self._turn + 1) % len(self._scene.holes)
         self._near[self._turn] = True
         self._read_holes(np.flatnonzero(self._near).tolist())
-        for line in range(len(self._needles)):
-            look_for_needle(self._p, self._l, self._s, line, self._gaps[line])
+        for path in range(len(self._needles)):
+            look_for_needle(self._passage_table, self._path_table, self._site_table, path, self._gaps[path])
         for owner, rod in enumerate(self._rods):
-            line = len(self._needles) + owner
+            path = len(self._needles) + owner
             look_for_rod(
-                self._p, self._s, self._rod_tables[owner], rod.first, self._before[owner], line, owner, self._gaps[line]
+                self._passage_table,
+                self._site_table,
+                self._rod_tables[owner],
+                rod.first,
+                self._before[owner],
+                path,
+                owner,
+                self._gaps[path],
             )
         nearest = self._gaps.min(axis=0)
         self._near[:] = nearest < NEAR
-        self._blind = int(min(max(float(nearest.min()), 0.0) / (SURPRISE * self._dt), MOST_BLIND))
+        self._countdown = int(min(max(float(nearest.min()), 0.0) / (MAX_APPROACH * self._dt), MAX_WAIT))
 
     def _read_holes(self, holes: list[int]) -> None:
         sites = self._sites
@@ -164,64 +172,74 @@ class Holes:
             sites.pose[hole], sites.twist[hole] = self._bodies.motion(self._scene.holes[hole].body)
 
     def _follow(self) -> None:
-        """Bring all passages up to date and drop those that have ended."""
+        """Update all passages and drop those that have ended."""
         p, n = self._passages, int(self._passages.filled[0])
         self._read_holes(sorted(set(p.hole[:n].tolist())))
         self._sites.shared[:] = np.bincount(p.hole[:n], minlength=len(self._sites.shared))
-        for line in sorted(set(p.line[:n].tolist())):
-            if line < len(self._needles):
-                self._read_needle(line)
+        for path in sorted(set(p.path[:n].tolist())):
+            if path < len(self._needles):
+                self._read_needle(path)
         lasting = [c for c in range(n) if self._follows(c)]
         if len(lasting) < n:
             self._keep(lasting)
 
     def _follows(self, c: int) -> bool:
-        owner = int(self._passages.line[c]) - len(self._needles)
+        owner = int(self._passages.path[c]) - len(self._needles)
         if owner < 0:
-            return bool(follow_needle(self._p, self._l, self._s, c))
+            return bool(follow_needle(self._passage_table, self._path_table, self._site_table, c))
         rod = self._rods[owner]
-        return bool(follow_rod(self._p, self._l, self._s, self._rod_tables[owner], rod.first, self._before[owner], c))
+        return bool(
+            follow_rod(
+                self._passage_table,
+                self._path_table,
+                self._site_table,
+                self._rod_tables[owner],
+                rod.first,
+                self._before[owner],
+                c,
+            )
+        )
 
     def _keep(self, rows: list[int]) -> None:
-        """Close the ranks around the passages that last."""
+        """Move the passages ``rows`` to the front, and drop the others."""
         for name, array in zip(self._passages._fields, self._passages, strict=True):
-            if name not in arrays.ALONE:
+            if name not in arrays.NOT_ROWS:
                 array[: len(rows)] = array[rows]
         self._passages.filled[0] = len(rows)
 
-    def _read_needle(self, line: int) -> None:
-        """Motion of a needle, and what will pull at it in this tick, for whoever solves for it."""
-        body, bodies = self._scene.bodies[self._needles[line]], self._bodies
-        self._lines.pose[line], self._twist[line] = bodies.motion(body.index)
-        mass, inertia, self._pull[line] = bodies.attached_load(body.index)
-        self._mass[line], self._inertia[line] = body.mass + mass, body.inertia + inertia
-        self._pull[line, :3] += body.mass * body.gravity
-        owner = int(self._lines.owner[line])
+    def _read_needle(self, path: int) -> None:
+        """Read the motion of a needle and the forces on it in this tick, for the solve that moves it."""
+        body, bodies = self._scene.bodies[self._needles[path]], self._bodies
+        self._paths.pose[path], self._twist[path] = bodies.motion(body.index)
+        mass, inertia, self._pull[path] = bodies.attached_load(body.index)
+        self._mass[path], self._inertia[path] = body.mass + mass, body.inertia + inertia
+        self._pull[path, :3] += body.mass * body.gravity
+        owner = int(self._paths.owner[path])
         if owner >= 0:
-            fall = self._pull[line, :3] / self._mass[line]
-            self._rods[owner].pull_partner(body.index, fall, self._mass[line], self._inertia[line])
+            fall = self._pull[path, :3] / self._mass[path]
+            self._rods[owner].pull_partner(body.index, fall, self._mass[path], self._inertia[path])
 
-    def _hold_alone(self, line: int) -> None:
-        hold_alone(
-            self._p, line, self._lines.pose[line], self._twist[line], self._mass[line], self._inertia[line],
-            self._pull[line], *self._scratch, self._dt,
+    def _solve_needle(self, path: int) -> None:
+        solve_needle(
+            self._passage_table, path, self._paths.pose[path], self._twist[path], self._mass[path], self._inertia[path],
+            self._pull[path], *self._scratch, self._dt,
         )  # fmt: skip
         p, n = self._passages, int(self._passages.filled[0])
-        impulse = p.impulse[:n][p.line[:n] == line].sum(axis=0)
-        self._bodies.apply_impulse(self._needles[line], impulse[:3], impulse[3:])
+        impulse = p.impulse[:n][p.path[:n] == path].sum(axis=0)
+        self._bodies.apply_impulse(self._needles[path], impulse[:3], impulse[3:])
 
     # --- state ------------------------------------------------------------------------------
 
     @property
     def insertions(self) -> tuple[Insertion, ...]:
-        """What is in the holes now."""
+        """The needles and elements in holes now."""
         p = self._passages
         return tuple(self._insertion(c) for c in range(int(p.filled[0])))
 
     def _insertion(self, c: int) -> Insertion:
         p = self._passages
-        owner = int(p.line[c]) - len(self._needles)
-        body = self._needles[p.line[c]] if owner < 0 else self._rods[owner].description.bodies[p.element[c]]
+        owner = int(p.path[c]) - len(self._needles)
+        body = self._needles[p.path[c]] if owner < 0 else self._rods[owner].description.bodies[p.element[c]]
         force = p.force[c, :3] - np.array([p.bend[c] * p.force[c, 4], 0.0, 0.0])
         return Insertion(
             hole=int(p.hole[c]), body=body, depth=float(p.depth[c]), point=p.x[c] + p.lever[c],
@@ -241,17 +259,17 @@ class Holes:
                 state[f"insertion_{name}"][0, row] = getattr(insertion, name)
 
     def forget(self, body: int) -> None:
-        """Take a needle out of its holes without a trace: it was put elsewhere."""
+        """Drop the passages of a needle that was put elsewhere."""
         p, n = self._passages, int(self._passages.filled[0])
         if body in self._needles:
-            line = self._needles.index(body)
-            self._keep([c for c in range(n) if p.line[c] != line and p.owner[c] != self._lines.owner[line]])
-        self._blind = 0
+            path = self._needles.index(body)
+            self._keep([c for c in range(n) if p.path[c] != path and p.owner[c] != self._paths.owner[path]])
+        self._countdown = 0
 
     def reset(self) -> None:
-        """Empty all holes, and look for new passages in the next tick."""
+        """Empty all holes, and search for new passages in the next tick."""
         self._clear()
-        self._blind, self._turn = 0, -1
+        self._countdown, self._turn = 0, -1
         self._near[:] = True
         self._gaps[:] = 0.0
         self._read_holes(list(range(len(self._scene.holes))))
@@ -273,7 +291,7 @@ class Holes:
         put_back(self, {name: snapshot[name] for name in _KEPT})
 
     def _clear(self) -> None:
-        """No passages, and none of earlier ones left in the rows behind."""
+        """Clear the passages, and the rows of earlier ones."""
         self._passages.filled[0] = 0
         for name in arrays.ROWS:
             getattr(self._passages, name)[:] = 0
@@ -291,27 +309,27 @@ def _sites(scene: Scene, bodies: HeldBodies) -> arrays.Sites:
     return sites
 
 
-def _lines(scene: Scene, rods: list[Rod]) -> arrays.Lines:
-    """Needles and rods as arrays, with the law that each hole has for each of them."""
-    lines = arrays.lines(len(scene.needles) + len(rods), len(scene.holes))
+def _paths(scene: Scene, rods: list[Rod]) -> arrays.Paths:
+    """Needles and rods as arrays, with the tissue law of each hole for each of them."""
+    paths = arrays.paths(len(scene.needles) + len(rods), len(scene.holes))
     attached = {attachment.body: owner for owner, rod in enumerate(rods) for attachment in rod.description.attachments}
-    for line, needle in enumerate(scene.needles):
+    for path, needle in enumerate(scene.needles):
         arc = needle.arc
-        lines.centre[line], lines.x[line], lines.y[line] = arc.centre, arc.x, arc.y
-        lines.radius[line], lines.begin[line], lines.end[line] = arc.radius, arc.begin, arc.end
+        paths.centre[path], paths.x[path], paths.y[path] = arc.centre, arc.x, arc.y
+        paths.radius[path], paths.begin[path], paths.end[path] = arc.radius, arc.begin, arc.end
         owner = attached.get(needle.body, -1)
-        lines.owner[line] = owner
-        lines.node[line] = rods[owner].node_of[needle.body] if owner >= 0 else 0
+        paths.owner[path] = owner
+        paths.node[path] = rods[owner].node_of[needle.body] if owner >= 0 else 0
         weight = _weight(scene, [needle.body]) + (_rod_weight(rods[owner]) if owner >= 0 else 0.0)
         for hole in scene.holes:
-            _set_law(lines, line, hole, weight, arc.radius)
+            _set_law(paths, path, hole, weight, arc.radius)
     for owner, rod in enumerate(rods):
-        line = len(scene.needles) + owner
+        path = len(scene.needles) + owner
         attached_needles = [needle.body for needle in scene.needles if attached.get(needle.body) == owner]
         weight = _rod_weight(rod) + _weight(scene, attached_needles)
         for hole in scene.holes:
-            _set_law(lines, line, hole, weight, 0.0)
-    return lines
+            _set_law(paths, path, hole, weight, 0.0)
+    return paths
 
 
 def _weight(scene: Scene, bodies: list[int]) -> float:
@@ -333,11 +351,11 @@ def settled_tissue(tissue: Tissue, weight: float) -> Tissue:
     )
 
 
-def _set_law(lines: arrays.Lines, line: int, hole: Hole, weight: float, arm: float) -> None:
-    """Springs, dampers and limits of a line in a hole; what they do at an arm they do against turning.
+def _set_law(paths: arrays.Paths, path: int, hole: Hole, weight: float, arm: float) -> None:
+    """Springs, dampers and limits of a path in a hole; those of rotation act at an arm.
 
-    That arm is half the opening, at whose rim tissue touches a needle; more, up to ``arm`` metres, for needles so heavy
-    that the tissue bears their weight. A thread has no arm: it turns freely.
+    The arm is half the opening, at whose rim tissue touches a needle; longer, up to ``arm`` metres, for heavy needles
+    whose tissue scales with their weight. A thread has no arm: it turns freely.
     """
     tissue = settled_tissue(hole.tissue, weight)
     if arm > 0.0:
@@ -348,8 +366,8 @@ def _set_law(lines: arrays.Lines, line: int, hole: Hole, weight: float, arm: flo
     damping = SETTLING * stiffness
     damping[0] = tissue.drag
     friction, strength = tissue.friction or 0.0, tissue.strength or 0.0
-    lines.stiffness[line, hole.index], lines.damping[line, hole.index] = stiffness, damping
-    lines.limit[line, hole.index] = [friction, strength, strength, arm * friction, arm * strength, arm * strength]
+    paths.stiffness[path, hole.index], paths.damping[path, hole.index] = stiffness, damping
+    paths.limit[path, hole.index] = [friction, strength, strength, arm * friction, arm * strength, arm * strength]
 
 
 def _lengths(rod: Rod) -> Array:

@@ -1,7 +1,7 @@
 """The arrays of a rod, grouped for compiled code; poses are of inertial frames I in world axes, SI units.
 
-A rod is a chain of n nodes: its elements in order and, at either end, the body it is tied to. Behind
-the chain stand the other bodies that it may touch, to N nodes in all. Joint j is between nodes j and
+A rod is a chain of n nodes: its elements in order and, at either end, the body attached there. The other
+bodies that it may touch follow the chain, N nodes in all. Joint j is between nodes j and
 j + 1. Multipliers and their rows are scaled by dt²: a force f appears as f dt² (kg m).
 """
 
@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SLIPS, STICKS, YIELDS = 0, 1, 2
+"""Modes of friction in a solve: a constant force, a spring, a spring as stiff as the Coulomb limit allows."""
+
 
 class Nodes(NamedTuple):
     """What moves: N nodes."""
 
     mass: Array  # (N,)
     inertia: Array  # (N, 3) principal moments
-    fixed: NDArray[np.bool_]  # (N,) moves as commanded, whatever pulls at it
+    fixed: NDArray[np.bool_]  # (N,) kinematically controlled: no force moves it
     gravity: Array  # (N, 3)
     keep: Array  # (N, 2) fraction of linear and angular speed that damping leaves after a tick
     x: Array  # (N, 3) centre of mass
@@ -37,7 +40,7 @@ class Joints(NamedTuple):
 
     pivot: Array  # (n - 1, 2, 3) in I of nodes j, j + 1
     frame: Array  # (n - 1, 2, 4) orientation of the joint frame in I of nodes j, j + 1
-    compliance: Array  # (n - 1,) compliance of the translation, m/N
+    compliance: Array  # (n - 1,) of the translation, m/N
     stiffness: Array  # (n - 1, 3) N m/rad about the axes of the joint frame
     damping: Array  # (n - 1, 3) N m s/rad
     rest: Array  # (n - 1, 3) rad
@@ -53,7 +56,7 @@ class Touches(NamedTuple):
 
     count: NDArray[np.int64]  # type: ignore[assignment]  # (1,)
     node: NDArray[np.int64]  # (C, 2)
-    key: NDArray[np.int64]  # (C,) which part was touched; the same contact keeps its key
+    key: NDArray[np.int64]  # (C,) names the touched part; the same contact keeps its key
     local: Array  # (C, 2, 3) point in I of both nodes: on the axis of a capsule, on the skin of a body
     arm: Array  # (C, 2) from there to the skin, along the normal
     start: Array  # (C, 2, 3) that point at the start of the tick, world
@@ -64,13 +67,13 @@ class Touches(NamedTuple):
     slip: Array  # (C, 3) tangential displacement that friction resists
     press: Array  # (C,) normal force, N
     closed: NDArray[np.bool_]  # (C,)
-    mode: NDArray[np.int64]  # (C,) of friction: slips, sticks, yields
+    mode: NDArray[np.int64]  # (C,) of friction: `SLIPS`, `STICKS` or `YIELDS`
     switches: NDArray[np.int64]  # (C,) of the mode in this tick
     room: Array  # (C,) gap beyond the target at which the last solve began
     begun: Array  # (C, 3) slip there
     ended: Array  # (C, 3) slip at its end
     push: Array  # (C, 3) force on the element where it began, times dt²
-    bond: NDArray[np.bool_]  # (C,) holds the points together whatever the gap: in every direction, or across pads
+    bilateral: NDArray[np.bool_]  # (C,) a point constraint or a grasp: acts whatever the gap
     force: Array  # (C, 3) on the element, N
 
 
@@ -90,7 +93,7 @@ class Shapes(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Scratch of a tick; nothing in it survives one."""
+    """Scratch of a tick; nothing in it outlives the tick."""
 
     x: Array  # (N, 3) start of the tick
     q: Array  # (N, 4)
@@ -109,7 +112,7 @@ class Work(NamedTuple):
     load: Array  # (n - 1, 6)
     cg: Array  # (4, N, 6)
     coupled_load: Array  # (n - 1, 6)
-    rows: NDArray[np.int64]  # (N,) of what contacts tie together
+    rows: NDArray[np.int64]  # (N,) nodes that contacts couple
     pushed: NDArray[np.bool_]  # (N,) bodies that contacts push
     K: Array  # (C, 3, 3) contact stiffness times dt²
     arms: Array  # (C, 2, 3) levers of each contact on its nodes
@@ -141,7 +144,7 @@ def nodes(total: int) -> Nodes:
 
 
 def joints(n: int) -> Joints:
-    """Room for ``n`` joints."""
+    """Arrays for ``n`` joints."""
     z = np.zeros
     return Joints(
         pivot=z((n, 2, 3)), frame=z((n, 2, 4)), compliance=z(n), stiffness=z((n, 3)), damping=z((n, 3)), rest=z((n, 3)),
@@ -176,7 +179,7 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
 
 
 def touches(contacts: int) -> Touches:
-    """Room for ``contacts`` contact points, none yet."""
+    """Arrays for ``contacts`` contact points, none yet."""
     z = np.zeros
     return Touches(
         count=np.zeros(1, np.int64), node=np.zeros((contacts, 2), np.int64), key=np.zeros(contacts, np.int64),
@@ -185,6 +188,6 @@ def touches(contacts: int) -> Touches:
         target=z(contacts), friction=z(contacts), slip=z((contacts, 3)), press=z(contacts),
         closed=np.zeros(contacts, np.bool_), mode=np.zeros(contacts, np.int64),
         switches=np.zeros(contacts, np.int64), room=z(contacts), begun=z((contacts, 3)),
-        ended=z((contacts, 3)), push=z((contacts, 3)), bond=np.zeros(contacts, np.bool_),
+        ended=z((contacts, 3)), push=z((contacts, 3)), bilateral=np.zeros(contacts, np.bool_),
         force=z((contacts, 3)),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Brings bodies and their convex parts to where they are at the start of a tick; world axes, SI units."""
+"""Places bodies and their convex parts at the start of a tick; world axes, SI units."""
 
 from __future__ import annotations
 
@@ -98,12 +98,12 @@ def write_elements(first, x, q, v, w, inertial_to_body, tension, bodies, poses, 
 
 
 @kernel
-def sound(first, n, x, q, v, w, fastest):
-    """Whether the ``n`` nodes from ``first`` on are finite and slower than ``fastest``."""
+def sound(first, n, x, q, v, w, max_speed):
+    """Whether the ``n`` nodes from ``first`` on are finite and slower than ``max_speed``."""
     for i in range(first, first + n):
         total = q[i, 3]
         for a in range(3):
-            if not abs(v[i, a]) < fastest:
+            if not abs(v[i, a]) < max_speed:
                 return False
             total += x[i, a] + q[i, a] + w[i, a]
         if not math.isfinite(total):

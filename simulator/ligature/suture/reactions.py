@@ -1,4 +1,4 @@
-"""What a step gives back: impulses on bodies and the tension of elements; world axes, SI units."""
+"""Results of a step: impulses on bodies and the tension of elements; world axes, SI units."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def _joint_load(n, work, joints, i, out):
 
 @inlined
 def add_reactions(n, joints, touches, work, impulse, dt):
-    """Add to ``impulse`` what joints and contacts did to every node, in N s, with the moment about its centre."""
+    """Add the impulses of joints and contacts on every node to ``impulse``, in N s, with the moment about its
+    centre."""
     for i in range(n):
         _joint_load(n, work, joints, i, work.sum6)
         for a in range(6):

@@ -1,4 +1,4 @@
-"""One rod: its state, its tick, what it gives back to the bodies that it is tied to or touches.
+"""One rod: its state, its tick, and its impulses on the bodies that it is attached to or touches.
 
 World axes, SI units. Outside, poses are x y z qx qy qz qw of body frames B, twists linear then angular
 with the linear part at the centre of mass.
@@ -18,21 +18,21 @@ from ligature.model.poses import compose_rows
 from ligature.model.subsystem import kept, put_back
 from ligature.suture import layout
 from ligature.suture.bodies import Bodies
-from ligature.suture.bonds import PINCH
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import Attachment, RodDescription, frame_quaternions
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
+from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.substeps import run_tick
 from ligature.suture.tables import table_of
 
 Array = NDArray[np.float64]
 
 INDENTATION = 0.05
-"""How deep, in radii, a contact is pressed in by 1 N."""
+"""Penetration depth of a contact under 1 N, in radii."""
 
 LOCKED = 1e6
-"""Stiffness in N m/rad of a joint axis that does not turn."""
+"""Stiffness in N m/rad of a locked joint axis."""
 
 MAX_SPEED = 1e4
 """Speed in m/s beyond which a rod counts as diverged."""
@@ -40,10 +40,10 @@ MAX_SPEED = 1e4
 
 @dataclass(frozen=True, eq=False)
 class Partner:
-    """A body outside the rod that it may be tied to or touch.
+    """A body outside the rod that it may be attached to or touch.
 
-    ``body`` is its index in the scene. ``fixed`` bodies move as they do, whatever the rod does; they
-    receive the reaction all the same. ``gravity`` (3,) is what the physics will add to its motion.
+    ``body`` is its index in the scene. The rod does not move ``fixed`` bodies, but they receive its reaction.
+    ``gravity`` (3,) is the acceleration that the physics adds to its motion.
     """
 
     body: int
@@ -56,10 +56,10 @@ class Partner:
 
 @dataclass(frozen=True, eq=False)
 class Pads:
-    """A pair of pads that hold whatever element of a rod passes between them.
+    """The pads of a jaw that grasp whatever element of a rod passes between them.
 
-    ``points`` (p, 3) are where they touch and ``normal`` (3,) points across them, in the inertial frame of the
-    partner ``body``; ``limit`` is the largest friction force in newtons, shared by the points.
+    ``points`` (p, 3) are the contact points and ``normal`` (3,) points across them, in the inertial frame of the
+    partner ``body``; ``limit`` is the maximum friction force in newtons, shared by the points.
     """
 
     body: int
@@ -69,8 +69,8 @@ class Pads:
 
 
 @dataclass(frozen=True, eq=False)
-class Grip:
-    """Holds ``element`` to a partner ``body`` while it lasts: the same point in the two inertial frames."""
+class PointConstraint:
+    """Holds ``points`` (m, 2, 3), in the inertial frames of ``element`` and of the partner ``body``, together."""
 
     element: int
     body: int
@@ -85,7 +85,7 @@ class Rod:
     description
         What the rod is made of.
     partners
-        The bodies that it may meet; ties name them by index.
+        The bodies that it may meet; attachments name them by index.
     shapes
         Their convex parts, from `Colliders`; None for a rod that touches nothing but itself.
     dt
@@ -94,7 +94,7 @@ class Rod:
     Attributes
     ----------
     joints
-        The joints of the chain with their springs, angles and loads, those of the end ties included.
+        The joints of the chain with their springs, angles and loads, those of the attachments at its ends included.
     tension
         (n,) pull along each element in newtons at the last tick.
     settled_soundly
@@ -111,14 +111,14 @@ class Rod:
         self.description = description
         self.partners = tuple(partners)
         self.dt = dt
-        self.grips: list[Grip] = []
+        self.constraints: list[PointConstraint] = []
         self._pads: tuple[Pads, ...] = ()
         n = len(description.mass)
         known = {partner.body: partner for partner in partners}
         for attachment in description.attachments:
             if attachment.body not in known:
                 raise ValueError(
-                    f"rod '{description.name}' is tied to body {attachment.body}, which is no partner of it"
+                    f"rod '{description.name}' is attached to body {attachment.body}, which is missing in its partners"
                 )
         head, tail, others = _ends(description)
         self._first = 1 if head else 0
@@ -141,7 +141,7 @@ class Rod:
         self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
-        self._permanent = [self._grip_of(attachment) for attachment in others]
+        self._permanent = [self._constraint_of(attachment) for attachment in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
         self._fixed = {p.body: p.fixed for p in partners}
         self._near: list[int] | None = None
@@ -180,11 +180,11 @@ class Rod:
                 )
         return nodes
 
-    def _grip_of(self, attachment: Attachment) -> Grip:
-        """A tie in the middle of the rod, as three points that stay together."""
+    def _constraint_of(self, attachment: Attachment) -> PointConstraint:
+        """An attachment in the middle of the rod, as three points that stay together."""
         arm = 0.5 * float(np.linalg.norm(np.diff(self.description.ends[attachment.element], axis=0)))
         corners = arm * np.array([[1.0, 0.0, 0.0], [-0.5, 0.866, 0.0], [-0.5, -0.866, 0.0]])
-        return Grip(
+        return PointConstraint(
             attachment.element,
             attachment.body,
             np.stack([corners @ T[:3, :3].T + T[:3, 3] for T in (attachment.T_element_a, attachment.T_body_b)], axis=1),
@@ -193,7 +193,7 @@ class Rod:
     # --- state ------------------------------------------------------------------------------
 
     def reset(self) -> None:
-        """Put every element back to its initial pose, at rest, and let go of all grips."""
+        """Put every element back to its initial pose, at rest, and release added attachments and grasps."""
         nodes, own = self._nodes, self._own
         poses = np.array([matrix_pose7(T) for T in self.description.T_world_inertial])
         nodes.x[:], nodes.q[:] = 0.0, [0.0, 0.0, 0.0, 1.0]
@@ -202,14 +202,14 @@ class Rod:
         for partner in self.partners:
             nodes.fixed[self.node_of[partner.body]] = partner.fixed
         self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
-        self.grips, self._pads, self._near = [], (), None
-        self._bonds = self._gather_bonds()
+        self.constraints, self._pads, self._near = [], (), None
+        self._constraint_rows = self._gather_constraints()
         self.tension[:], self.impulse[:] = 0.0, 0.0
         self.newton_steps, self.settled_soundly = 0, True
         self._clear_touches()
 
     def _clear_touches(self) -> None:
-        """No contacts, and none of earlier ones left in the rows behind."""
+        """Clear the contacts, and the rows of earlier ones."""
         for touches in self._touches:
             for array in touches:
                 array[:] = 0
@@ -240,7 +240,7 @@ class Rod:
         put_back(self, {name: snapshot[name] for name in _KEPT})
         self.skip[:] = snapshot["skip"]
         self._near = None
-        self._bonds = self._gather_bonds()
+        self._constraint_rows = self._gather_constraints()
 
     def finite(self) -> bool:
         """Whether the state is usable."""
@@ -279,10 +279,10 @@ class Rod:
 
     def hangs_on(self, body: int) -> bool:
         """Whether ``body`` and nothing else holds the rod."""
-        return {*self._attached, *(grip.body for grip in self.grips)} == {body}
+        return {*self._attached, *(constraint.body for constraint in self.constraints)} == {body}
 
     def carry(self, T: Array) -> None:
-        """Move the whole rod by ``T`` (4, 4) in world axes, and leave it at rest, its contacts forgotten."""
+        """Move the whole rod by ``T`` (4, 4) in world axes, at rest and without contacts."""
         nodes, own = self._nodes, self._own
         nodes.x[own] = nodes.x[own] @ T[:3, :3].T + T[:3, 3]
         for i in range(own.start, own.stop):
@@ -292,7 +292,7 @@ class Rod:
             touches.count[0] = 0
 
     def hold_element(self, element: int, held: bool = True) -> None:
-        """Make an element move with its present velocity, whatever pulls at it, or free it again."""
+        """Let an element keep its present velocity against all forces, or free it again."""
         self._nodes.fixed[self._first + element] = held
 
     @property
@@ -306,27 +306,27 @@ class Rod:
         return self._first
 
     def take_passages(self, held: Passages, owner: int) -> None:
-        """Feel the tissue holes of ``held`` whose ``owner`` is this number, from now on."""
+        """Include the passages of ``held`` with this ``owner`` in the solve from now on."""
         self._passages, self._passage_table, self._owner = held, table_of(held), owner
 
     def pull_partner(self, body: int, acceleration: Array, mass: float, inertia: Array) -> None:
-        """Let a movable partner fall with ``acceleration`` (3,), and resist with ``mass`` and ``inertia`` (3,).
+        """Set ``acceleration`` (3,), ``mass`` and ``inertia`` (3,) of a movable partner for the coming tick.
 
-        It does so in the coming tick: what pulls at it or holds it is another from tick to tick.
+        Loads and holders of a partner change from tick to tick.
         """
         i, nodes = self.node_of[body], self._nodes
         self._pulled.setdefault(i, (nodes.gravity[i].copy(), float(nodes.mass[i]), nodes.inertia[i].copy()))
         nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = acceleration, mass, inertia
 
     def _end_pulls(self) -> None:
-        """Let partners resist forces as before `pull_partner`."""
+        """Undo `pull_partner`."""
         nodes = self._nodes
         for i, (gravity, mass, inertia) in self._pulled.items():
             nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = gravity, mass, inertia
         self._pulled.clear()
 
     def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
-        """Let an element fall with ``acceleration`` (3,) from now on."""
+        """Set the gravity ``acceleration`` (3,) of an element from now on."""
         self._nodes.gravity[self._first + element] = acceleration
 
     @property
@@ -339,7 +339,7 @@ class Rod:
 
     @property
     def skip(self) -> NDArray[np.bool_]:
-        """Which elements pass through which parts of bodies, (parts, n)."""
+        """Pairs of parts of bodies and elements that do not collide, (parts, n)."""
         return self._shapes.skip
 
     @property
@@ -355,18 +355,18 @@ class Rod:
         return self._corners
 
     def place(self, body: int, pose: Array, twist: Array) -> None:
-        """Report where a partner's inertial frame is, (7,), and how it moves, (6,), at the start of the tick."""
+        """Set pose (7,) and twist (6,) of a partner's inertial frame at the start of the tick."""
         i, nodes = self.node_of[body], self._nodes
         nodes.x[i], nodes.q[i], nodes.v[i], nodes.w[i] = pose[:3], pose[3:], twist[:3], twist[3:]
 
     def set_mass(self, partner: Partner, mass: float, inertia: Array, held: bool) -> None:
-        """Let a partner resist forces with ``mass`` and principal moments ``inertia`` (3,) from now on."""
+        """Set ``mass`` and principal moments ``inertia`` (3,) of a partner; a ``held`` one does not fall."""
         i, nodes = self.node_of[partner.body], self._nodes
         nodes.mass[i], nodes.inertia[i] = mass, inertia
         nodes.gravity[i] = 0.0 if held else partner.gravity
 
     def meet(self, colliders: Colliders, near: list[int], bodies: Bodies) -> None:
-        """Take the motion of the partners that matter in this tick: those near, tied or gripping."""
+        """Read the motion of the partners of this tick: those near, attached or grasping."""
         if near is not self._near:
             self._gather_partners(colliders, near)
         self._motion = colliders.motion
@@ -376,66 +376,70 @@ class Rod:
             self._nodes.fixed[node] = bodies.driven(body)
 
     def _gather_partners(self, colliders: Colliders, near: list[int]) -> None:
-        """Sort the partners that matter: their shapes, where their motion comes from, which of them can be moved."""
+        """Collect the partners of this tick: their shapes, the source of their motion, and which of them can move."""
         self._near = near
         self._shapes.node[:] = -1
         for body in near:
             self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
         rows = [(colliders.row_of[body], self.node_of[body]) for body in near]
         self._met = np.array(rows, dtype=np.int64).reshape(-1, 2)
-        holding = sorted({*self._attached, *(g.body for g in self.grips), *(p.body for p in self._pads)})
+        holding = sorted({*self._attached, *(g.body for g in self.constraints), *(p.body for p in self._pads)})
         self._apart = [body for body in holding if body not in near]
         partners = [(body, self.node_of[body]) for body in (*near, *self._apart)]
         self._movable = [(body, node) for body, node in partners if not self._fixed[body]]
         self._pushed = [(body, node) for body, node in partners if self._mobile[body]]
 
-    def grip(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
-        """Hold frame a of an element and frame b of a partner, (4, 4) in their frames B, together."""
+    def attach(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
+        """Attach frame a of an element to frame b of a partner, (4, 4) in their frames B."""
         if body not in self.node_of:
-            raise ValueError(f"rod '{self.description.name}' never meets body {body}: it has no collision shape")
+            raise ValueError(
+                f"rod '{self.description.name}' cannot be attached to body {body}: the body has no collision shape"
+            )
         description = self.description
         T_a = inverse(description.T_body_inertial[element]) @ T_element_a
         partner = next(p for p in self.partners if p.body == body)
         T_b = inverse(partner.T_body_inertial) @ T_body_b
         none = np.zeros(3)
-        self.grips.append(self._grip_of(Attachment(element, body, T_a, T_b, none, none, none, none, none)))
+        self.constraints.append(self._constraint_of(Attachment(element, body, T_a, T_b, none, none, none, none, none)))
         self._near = None
-        self._bonds = self._gather_bonds()
+        self._constraint_rows = self._gather_constraints()
 
-    def release(self, element: int, body: int) -> None:
-        """Let go of a grip."""
-        self.grips = [g for g in self.grips if (g.element, g.body) != (element, body)]
+    def detach(self, element: int, body: int) -> None:
+        """Remove an attachment that `attach` made."""
+        self.constraints = [g for g in self.constraints if (g.element, g.body) != (element, body)]
         self._near = None
-        self._bonds = self._gather_bonds()
+        self._constraint_rows = self._gather_constraints()
 
-    def pinch(self, pads: Sequence[Pads]) -> None:
-        """Hold what passes between ``pads`` from now on, and nothing else by pads."""
+    def set_pads(self, pads: Sequence[Pads]) -> None:
+        """Grasp the elements between ``pads`` from now on, and no others."""
         if [p.body for p in pads] != [p.body for p in self._pads]:
             self._near = None
         self._pads = tuple(pads)
-        self._bonds = self._gather_bonds()
+        self._constraint_rows = self._gather_constraints()
 
-    def _gather_bonds(self) -> tuple[NDArray[np.int64], Array]:
-        """Nodes and kinds (g, 3) and points (g, 3, 2, 3) of all bonds; grasps last."""
-        held = (*self._permanent, *self.grips)
+    def _gather_constraints(self) -> tuple[NDArray[np.int64], Array]:
+        """Nodes and kinds (g, 3) and points (g, 3, 2, 3) of all point constraints and grasps; grasps last."""
+        held = (*self._permanent, *self.constraints)
         nodes = [(self._first + g.element, self.node_of[g.body], 0) for g in held]
         nodes += [(self._first, self.node_of[p.body], 1) for p in self._pads for _ in p.points]
-        points = np.array([*(g.points for g in held), *(p for pads in self._pads for p in _pinch_rows(pads))])
+        points = np.array([*(g.points for g in held), *(p for pads in self._pads for p in _grasp_rows(pads))])
         return np.array(nodes, dtype=np.int64).reshape(-1, 3), points.reshape(-1, 3, 2, 3)
 
-    def _find_pinched(self) -> None:
-        """Give every grasp the element nearest to its point."""
-        grips, points = self._bonds
-        rows = np.flatnonzero(grips[:, 2])
+    def _find_grasped(self) -> None:
+        """Assign to every grasp the element nearest to its point."""
+        constraints, points = self._constraint_rows
+        rows = np.flatnonzero(constraints[:, 2])
         for row in rows:
-            k = grips[row, 1]
+            k = constraints[row, 1]
             at = self._nodes.x[k] + quaternion_matrix(self._nodes.q[k]) @ points[row, 0, 1]
-            grips[row, 0] = self._first + int(np.argmin(np.linalg.norm(self.positions - at, axis=1)))
+            constraints[row, 0] = self._first + int(np.argmin(np.linalg.norm(self.positions - at, axis=1)))
 
-    def pinched(self, body: int) -> tuple[int, Array]:
-        """Element in the pads of a body, and force (3,) of the pads on the rod in the last tick; -1 without any."""
+    def grasped(self, body: int) -> tuple[int, Array]:
+        """Element between the pads of a body, -1 for none, and force (3,) of the pads on the rod in the last tick."""
         touches = self._touches[0]
-        rows = np.flatnonzero(touches.bond[: touches.count[0]] & (touches.key[: touches.count[0]] <= PINCH))
+        rows = np.flatnonzero(
+            touches.bilateral[: touches.count[0]] & (touches.key[: touches.count[0]] <= FIRST_GRASP_KEY)
+        )
         rows = rows[touches.node[rows, 1] == self.node_of[body]]
         if not len(rows):
             return -1, np.zeros(3)
@@ -447,16 +451,16 @@ class Rod:
         return [(body, impulse) for body, impulse in pushed if impulse.any()]
 
     def step(self) -> None:
-        """Advance by one tick; `impulse` then holds what each partner receives."""
+        """Advance by one tick; `impulse` then holds the impulse on each partner."""
         a, b, c = self._touches
         last, next_, spare = (self._touch_tables[id(touches)] for touches in self._touches)
         nodes, joints, shapes, work = self._tables
         if self._pads:
-            self._find_pinched()
-        grips, points = self._bonds
+            self._find_grasped()
+        constraints, points = self._constraint_rows
         run_tick(
             self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
-            work, self._passage_table, self._owner, grips, points, self._motion, self._met, self._counts,
+            work, self._passage_table, self._owner, constraints, points, self._motion, self._met, self._counts,
             self._self_skip, self._stiffness, self.impulse, self.tension, MAX_SPEED, self.dt,
         )  # fmt: skip
         self.newton_steps, self.settled_soundly = int(self._counts[2]), bool(self._counts[4])
@@ -470,15 +474,15 @@ class Rod:
 
 NODES_KEPT = ("x", "q", "v", "w", "mass", "inertia", "gravity", "fixed")
 JOINTS_KEPT = ("angle", "load")
-TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bond", "normal", "force", "start")
+TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "normal", "force", "start")
 """Arrays of nodes, joints and contact points that last from tick to tick."""
 
-_KEPT = ("tension", "impulse", "grips", "_pads", "newton_steps", "settled_soundly")
+_KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly")
 """Attributes of a `Rod` that do."""
 
 
-def _pinch_rows(pads: Pads) -> list[Array]:
-    """What `ligature.suture.bonds` wants of each point of a pair of pads, (3, 2, 3)."""
+def _grasp_rows(pads: Pads) -> list[Array]:
+    """Rows (3, 2, 3) of `ligature.suture.point_constraints`, one for each point of a pair of pads."""
     rows = []
     for point in pads.points:
         row = np.zeros((3, 2, 3))
@@ -488,7 +492,7 @@ def _pinch_rows(pads: Pads) -> list[Array]:
 
 
 def _ends(description: RodDescription) -> tuple[Attachment | None, Attachment | None, list[Attachment]]:
-    """The ties that become the chain's first and last node, and the others."""
+    """The attachments whose bodies become the chain's first and last node, and the others."""
     head = next((t for t in description.attachments if t.element == 0), None)
     last = len(description.mass) - 1
     tail = next(
@@ -498,7 +502,7 @@ def _ends(description: RodDescription) -> tuple[Attachment | None, Attachment | 
 
 
 def _joints(description: RodDescription, head: Attachment | None, tail: Attachment | None) -> layout.Joints:
-    """Joint arrays of the whole chain, those of the ties at its ends included."""
+    """Joint arrays of the whole chain, those of the attachments at its ends included."""
     pivots, frames = list(description.pivots), list(description.frames)
     compliance = list(description.compliance)
     rows = {

@@ -25,7 +25,7 @@ NEXT_TO_PADS = 3
 """Elements next to the one between pads that do not touch the fingers."""
 
 NEXT_TO_ATTACHMENT = 3
-"""Elements next to a tie that do not touch the tied body, in which they begin."""
+"""Elements next to an attachment that do not touch its body, in which they begin."""
 
 
 class Rods:
@@ -62,7 +62,7 @@ class Rods:
         return rod
 
     def step(self, bodies: Bodies) -> None:
-        """Advance every rod by one tick and push the bodies that it is tied to or touches."""
+        """Advance every rod by one tick and apply its impulses to the bodies that it is attached to or touches."""
         if not self.rods:
             return
         box = self.rods[0].box()
@@ -78,25 +78,25 @@ class Rods:
             if not rod.settled_soundly:
                 self._heal(rod)
 
-    def grip(self, body: int, element_body: int, T_body_a: Array, T_element_b: Array) -> None:
-        """Hold frame a (4, 4) of a body and frame b of an element together; both are given in body frames B.
+    def attach(self, body: int, element_body: int, T_body_a: Array, T_element_b: Array) -> None:
+        """Attach frame b of an element to frame a (4, 4) of a body; both are given in body frames B.
 
-        Raises ValueError when ``element_body`` is no element of a rod or ``body`` cannot hold one.
+        Raises ValueError when ``element_body`` is no element of a rod or ``body`` has no collision shape.
         """
         if element_body not in self._of_body:
-            raise ValueError(f"body {element_body} is no element of a rod")
+            raise ValueError(f"body {element_body} is not an element of a rod")
         rod, element = self._of_body[element_body]
-        rod.grip(element, body, T_element_b, T_body_a)
+        rod.attach(element, body, T_element_b, T_body_a)
 
-    def release(self, body: int, element_body: int) -> None:
-        """Let go of what `grip` holds."""
+    def detach(self, body: int, element_body: int) -> None:
+        """Remove an attachment that `attach` made."""
         rod, element = self._of_body[element_body]
-        rod.release(element, body)
+        rod.detach(element, body)
 
     def carry(self, body: int, T: Array) -> None:
-        """Take note that ``body`` was put elsewhere, moved by ``T`` (4, 4) in world axes.
+        """Follow a ``body`` that was put elsewhere, moved by ``T`` (4, 4) in world axes.
 
-        Threads that hang on it alone go along, at rest.
+        Threads that are attached to it alone move with it, at rest.
         """
         self._colliders.restart()
         for rod in self.rods:
@@ -104,11 +104,11 @@ class Rods:
                 rod.carry(T)
 
     def element_of(self, body: int) -> int:
-        """Number of the element that a body is in its rod."""
+        """Number of a body's element in its rod."""
         return self._of_body[body][1]
 
     def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
-        """Let the elements around ``element`` of a rod pass through ``bodies``; None ends that."""
+        """Disable collision of ``bodies`` with the elements around ``element`` of a rod; None enables it again."""
         rod = self.rods[number]
         beside = np.abs(np.arange(len(rod.positions)) - element) < NEXT_TO_PADS if element is not None else False
         for body in bodies:
@@ -116,7 +116,7 @@ class Rods:
             rod.skip[parts] = self._skip[number][parts] | beside
 
     def update_masses(self, masses: Masses) -> None:
-        """Take over how the bodies that may meet a rod resist forces now, and whether they are held or fall."""
+        """Read mass and inertia of the bodies that may meet a rod, and whether they are held or fall."""
         for rod in self.rods:
             for partner in rod.partners:
                 held = masses.is_held(partner.body)
@@ -129,10 +129,10 @@ class Rods:
         for rod in self.rods:
             rod.write(state["body_pose"][0], state["body_twist"][0], state["rod_tension"][0])
 
-    def holds(self, body: int, element_body: int) -> bool:
-        """Whether `grip` holds an element."""
+    def is_attached(self, body: int, element_body: int) -> bool:
+        """Whether `attach` holds an element to a body."""
         rod, element = self._of_body[element_body]
-        return any((grip.element, grip.body) == (element, body) for grip in rod.grips)
+        return any((constraint.element, constraint.body) == (element, body) for constraint in rod.constraints)
 
     def reset(self) -> None:
         """Put every rod back to its initial shape, at rest."""
@@ -142,7 +142,7 @@ class Rods:
         self._colliders.reset()
 
     def take_problems(self) -> list[Diagnostic]:
-        """What was found since the last call."""
+        """Problems since the last call."""
         found, self.problems = self.problems, []
         return found
 
@@ -164,7 +164,7 @@ class Rods:
 
 
 def _partner(scene: Scene, index: int, free: bool) -> Partner:
-    """A body as rods meet it; a link of an arm recoils with its own mass alone."""
+    """A body as a partner of rods; a link of an arm recoils with its own mass alone."""
     body = scene.bodies[index]
     ball = 0.4 * body.mass * 1e-6
     return Partner(

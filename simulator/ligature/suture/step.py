@@ -14,7 +14,7 @@ from ligature.kernels import inlined, kernel
 from ligature.suture.chain import factor, solve
 from ligature.suture.coupled_solve import couple, gather
 from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
-from ligature.suture.holding import add_holds, settle_holds
+from ligature.suture.passage_forces import add_passage_forces, settle_passages
 from ligature.suture.rotations import (
     cross,
     left_jacobian_inverse_times,
@@ -32,7 +32,7 @@ LARGE_SWING = 5e-3
 """Swing of an element in radians, in one Newton step, after which another follows."""
 
 MAX_SWING = 0.5
-"""Largest swing of a Newton step; steps that want more are shortened."""
+"""Largest swing of a Newton step; larger ones are shortened."""
 
 
 @kernel
@@ -115,7 +115,7 @@ def linearise(n, total, nodes, joints, work, dt):
 
 @kernel
 def assemble(n, total, nodes, joints, work):
-    """Node matrices H (inertia, stiffness of the tension) and loads g (what the free motion wants)."""
+    """Node matrices H (inertia, stiffness of the tension) and loads g (of the free motion)."""
     for i in range(total):
         H, R = work.H[i], work.R[i]
         m = nodes.mass[i]
@@ -230,7 +230,7 @@ def advance(n, total, nodes, joints, touches, work, passages, owner, stiffness, 
         linearise(n, total, nodes, joints, work, dt)
         assemble(n, total, nodes, joints, work)
         add_contacts(nodes, touches, work, stiffness, dt)
-        add_holds(passages, owner, nodes, work, elapsed, dt)
+        add_passage_forces(passages, owner, nodes, work, elapsed, dt)
         low, high, rows = gather(n, total, nodes, touches, work)
         top = high if high >= 0 else n - 1
         factor(n, top, nodes.fixed, work.H, work.lever[:, 0], work.lever[:, 1], work.B, work.compliance,
@@ -241,7 +241,7 @@ def advance(n, total, nodes, joints, touches, work, passages, owner, stiffness, 
             couple(n, low, high, rows, nodes, touches, work)
         changed = settle_contacts(nodes, touches, work, stiffness, dt)
         largest = correct(n, total, nodes, work)
-        changed = settle_holds(passages, owner, nodes, elapsed) or changed
+        changed = settle_passages(passages, owner, nodes, elapsed) or changed
         for j in range(n - 1):
             for a in range(6):
                 joints.load[j, a] = work.load[j, a]

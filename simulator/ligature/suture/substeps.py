@@ -1,7 +1,7 @@
-"""A whole tick of a rod in one call: in one step as a rule, in several where contacts do not settle.
+"""A whole tick of a rod in one call: usually one step, several where contacts do not settle.
 
 A thread that snaps into a new shape, as when a knot closes, changes its contacts faster than one step
-can follow; a tick in which they do not settle is taken back and done again in shorter steps. World
+can follow; a tick in which they do not settle is undone and repeated in shorter steps. World
 axes, SI units.
 """
 
@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
-from ligature.suture.bonds import place_bonds
 from ligature.suture.contacts import detect
-from ligature.suture.holding import add_hold_impulses, begin_again, begin_holds
+from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
 from ligature.suture.placing import sound
+from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
@@ -29,7 +29,7 @@ REFINEMENT, MAX_PARTS = 4, 16
 """How many steps take the place of one that did not settle, and the most in a tick."""
 
 MAX_STEPS = 16
-"""Newton steps of a tick after which no more time is spent on settling: steps count as they are."""
+"""Newton steps of a tick after which steps count although contacts have not settled."""
 
 
 @inlined
@@ -41,7 +41,7 @@ def _copy2(a, b):
 
 @inlined
 def _place(nodes, motion, met):
-    """Bring the nodes ``met[:, 1]`` to where ``motion`` (b, 13) has their bodies, in rows ``met[:, 0]``."""
+    """Set the nodes ``met[:, 1]`` to the motion of their bodies, rows ``met[:, 0]`` of ``motion`` (b, 13)."""
     for m in range(met.shape[0]):
         row, i = motion[met[m, 0]], met[m, 1]
         for a in range(3):
@@ -72,7 +72,7 @@ def _take_back(nodes, joints, work):
 
 @inlined
 def _move_shapes(nodes, shapes, h):
-    """Move the parts of bodies on by ``h`` seconds, as their nodes move."""
+    """Advance the parts of bodies by ``h`` seconds with their nodes."""
     for c in range(shapes.node.shape[0]):
         k = shapes.node[c]
         if k < 0:
@@ -85,7 +85,7 @@ def _move_shapes(nodes, shapes, h):
 
 @inlined
 def _scale_loads(joints, factor):
-    """Loads are kept times the square of the step: bring them to another step."""
+    """Scale the loads, which are times the square of the step, to another step."""
     for j in range(joints.load.shape[0]):
         for a in range(6):
             joints.load[j, a] *= factor
@@ -93,11 +93,11 @@ def _scale_loads(joints, factor):
 
 @inlined
 def _one_step(
-    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, tension, counts, self_skip,
-    stiffness, h, begins, elapsed,
+    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, constraints, points, tension, counts,
+    self_skip, stiffness, h, begins, elapsed,
 ):  # fmt: skip
     new.count[0] = 0
-    place_bonds(nodes, work, old, new, grips, points)
+    add_point_constraints(nodes, work, old, new, constraints, points)
     detect(first, work.segment.shape[0], nodes, shapes, old, new, work, tension, counts, self_skip, h)
     return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, begins, elapsed)
 
@@ -105,7 +105,8 @@ def _one_step(
 @kernel
 def run_tick(
     first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, spare, work_table,
-    passage_table, owner, grips, points, motion, met, counts, self_skip, stiffness, impulse, tension, max_speed, dt,
+    passage_table, owner, constraints, points, motion, met, counts, self_skip, stiffness, impulse, tension, max_speed,
+    dt,
 ):  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``spare``.
 
@@ -119,7 +120,7 @@ def run_tick(
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
     _copy2(shapes.pose, shape_poses)
-    begin_holds(passages, owner)
+    begin_passages(passages, owner)
     for i in range(total):
         for k in range(6):
             impulse[i, k] = 0.0
@@ -132,17 +133,17 @@ def run_tick(
         _scale_loads(joints, (size / scale) ** 2)
         scale = size
         more, settled = _one_step(
-            first, n, total, nodes, joints, shapes, old, new, work, passages, owner, grips, points, tension,
+            first, n, total, nodes, joints, shapes, old, new, work, passages, owner, constraints, points, tension,
             counts, self_skip, stiffness, h, done == 0, dt * (done + size) / MAX_PARTS,
         )  # fmt: skip
         steps += more
         if not settled and size > 1 and steps < MAX_STEPS:
             _take_back(nodes, joints, work)
-            begin_again(passages, owner)
+            restart_passages(passages, owner)
             size, scale = size // REFINEMENT, kept
             continue
         add_reactions(n, joints, new, work, impulse, h)
-        add_hold_impulses(passages, owner, impulse, h)
+        add_passage_impulses(passages, owner, impulse, h)
         done += size
         if done == MAX_PARTS:
             break

@@ -1,4 +1,4 @@
-"""Threads and the holes they pass through as one subsystem: in a tick their steps interleave. World axes, SI units."""
+"""Threads and the holes that they pass through as one subsystem, since their steps interleave. World axes, SI units."""
 
 from __future__ import annotations
 
@@ -48,5 +48,5 @@ class Suture(Subsystem):
         self.holes.restore(snapshot["holes"])
 
     def take_problems(self) -> list[Diagnostic]:
-        """What diverged since the last call."""
+        """Rods that diverged since the last call."""
         return self.rods.take_problems()

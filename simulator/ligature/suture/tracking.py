@@ -1,4 +1,4 @@
-"""Where needles and rods pass through holes: finds new passages and follows those there are.
+"""Tracks needles and rods through holes: finds new passages and follows the present ones.
 
 World axes, SI units; arrays as in `ligature.suture.passages`.
 """
@@ -10,22 +10,23 @@ import math
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture import passages as arrays
+from ligature.suture.layout import SLIPS, STICKS
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.suture.tables import opener
 
 open_nodes = opener(layout.nodes(1))
 open_passages = opener(arrays.passages(1))
 open_sites = opener(arrays.sites(1))
-open_lines = opener(arrays.lines(1, 1))
+open_paths = opener(arrays.paths(1, 1))
 
 LEAST_SLOPE = 0.3
-"""Cosine between a line and the way through a hole below which it lies across rather than passes."""
+"""Cosine between a path and the axis of a hole below which the path lies across the hole."""
 
 APART = 0.002
-"""Distance along a line, in metres, within which two crossings of one hole are the same passage."""
+"""Distance along a path, in metres, within which two crossings of one hole are the same passage."""
 
 LOST = 0.003
-"""Distance in metres from a line to its puncture at which the passage has ended."""
+"""Distance in metres from a path to its puncture at which the passage ends."""
 
 
 @inlined
@@ -54,30 +55,30 @@ def _turn_into_hole(sites, h, R, x, y, z):
 
 
 @inlined
-def _known(p, line, hole, depth):
-    """Whether a crossing of ``hole`` at ``depth`` belongs to a passage there is."""
+def _known(p, path, hole, depth):
+    """Whether a crossing of ``hole`` at ``depth`` belongs to a present passage."""
     known = False
     for c in range(p.filled[0]):
-        same = p.line[c] == line and p.hole[c] == hole
+        same = p.path[c] == path and p.hole[c] == hole
         known = known or (same and abs(p.depth[c] - depth) < APART)
     return known
 
 
 @inlined
-def _enter(p, sites, line, hole, owner, node, element, depth, x, y, z):
-    """A new passage at the world point; returns its row, -1 when there is no room."""
+def _enter(p, sites, path, hole, owner, node, element, depth, x, y, z):
+    """A new passage at the world point; returns its row, -1 when the table is full."""
     c = p.filled[0]
     if c == p.hole.shape[0]:
         return -1
     p.filled[0] = c + 1
-    p.hole[c], p.line[c], p.owner[c], p.node[c], p.element[c] = hole, line, owner, node, element
+    p.hole[c], p.path[c], p.owner[c], p.node[c], p.element[c] = hole, path, owner, node, element
     p.anchor[c], p.depth[c] = depth, depth
     pose = sites.pose[hole]
     _body_rotation(pose, p.B)
     px, py, pz = rotate_back(p.B, x - pose[0], y - pose[1], z - pose[2])
     p.point[c, 0], p.point[c, 1], p.point[c, 2] = px, py, pz
     for r in range(6):
-        p.mode[c, r] = 0
+        p.mode[c, r] = STICKS
         p.force[c, r] = 0.0
     return c
 
@@ -101,9 +102,9 @@ def _mark_axes(p, c):
 
 
 @inlined
-def _arc_axes(p, c, lines, line, angle):
+def _arc_axes(p, c, paths, path, angle):
     """Axes of passage ``c`` where the needle, whose rotation is in ``p.A``, has the given angle."""
-    X, Y = lines.x[line], lines.y[line]
+    X, Y = paths.x[path], paths.y[path]
     ca, sa = math.cos(angle), math.sin(angle)
     tx, ty, tz = rotate(p.A, ca * Y[0] - sa * X[0], ca * Y[1] - sa * X[1], ca * Y[2] - sa * X[2])
     nx, ny, nz = cross(X[0], X[1], X[2], Y[0], Y[1], Y[2])
@@ -112,20 +113,20 @@ def _arc_axes(p, c, lines, line, angle):
 
 
 @inlined
-def _arc_point(p, lines, line, angle):
+def _arc_point(p, paths, path, angle):
     """World point of a needle, whose rotation is in ``p.A``, at an angle of its arc."""
-    X, Y, m, pose, r = lines.x[line], lines.y[line], lines.centre[line], lines.pose[line], lines.radius[line]
+    X, Y, m, pose, r = paths.x[path], paths.y[path], paths.centre[path], paths.pose[path], paths.radius[path]
     ca, sa = r * math.cos(angle), r * math.sin(angle)
     x, y, z = rotate(p.A, m[0] + ca * X[0] + sa * Y[0], m[1] + ca * X[1] + sa * Y[1], m[2] + ca * X[2] + sa * Y[2])
     return pose[0] + x, pose[1] + y, pose[2] + z
 
 
 @inlined
-def _enter_needle(p, lines, sites, line, hole):
+def _enter_needle(p, paths, sites, path, hole):
     """Find where the arc of a needle crosses the opening of a hole that it did not pass before."""
-    _body_rotation(lines.pose[line], p.A)
+    _body_rotation(paths.pose[path], p.A)
     _body_rotation(sites.pose[hole], p.B)
-    X, Y, m, pose, r = lines.x[line], lines.y[line], lines.centre[line], lines.pose[line], lines.radius[line]
+    X, Y, m, pose, r = paths.x[path], paths.y[path], paths.centre[path], paths.pose[path], paths.radius[path]
     cx, cy, cz = rotate(p.A, m[0], m[1], m[2])
     cx, cy, cz = _into_hole(sites, hole, p.B, pose[0] + cx, pose[1] + cy, pose[2] + cz)
     ax, ay, az = rotate(p.A, X[0], X[1], X[2])
@@ -136,11 +137,11 @@ def _enter_needle(p, lines, sites, line, hole):
     if amplitude <= abs(cz):
         return
     base, spread = math.atan2(bz, az), math.acos(-cz / amplitude)
-    middle = 0.5 * (lines.begin[line] + lines.end[line])
+    middle = 0.5 * (paths.begin[path] + paths.end[path])
     best, steepest = 0.0, LEAST_SLOPE
     for side in range(2):
         angle = _wrap(base + (spread if side == 0 else -spread), middle)
-        if angle < lines.begin[line] or angle > lines.end[line]:
+        if angle < paths.begin[path] or angle > paths.end[path]:
             continue
         ca, sa = math.cos(angle), math.sin(angle)
         slope = abs(ca * bz - sa * az)
@@ -148,38 +149,38 @@ def _enter_needle(p, lines, sites, line, hole):
         inside = inside and abs(cy + r * (ca * ay + sa * by)) <= sites.half[hole, 1]
         if inside and slope >= steepest:
             best, steepest = angle, slope
-    depth = r * (lines.end[line] - best)
-    if steepest == LEAST_SLOPE or _known(p, line, hole, depth):
+    depth = r * (paths.end[path] - best)
+    if steepest == LEAST_SLOPE or _known(p, path, hole, depth):
         return
-    x, y, z = _arc_point(p, lines, line, best)
-    c = _enter(p, sites, line, hole, lines.owner[line], lines.node[line], 0, depth, x, y, z)
+    x, y, z = _arc_point(p, paths, path, best)
+    c = _enter(p, sites, path, hole, paths.owner[path], paths.node[path], 0, depth, x, y, z)
     if c >= 0:
-        _arc_axes(p, c, lines, line, best)
+        _arc_axes(p, c, paths, path, best)
         _mark_axes(p, c)
 
 
 @kernel
-def follow_needle(passage_table, line_table, site_table, c):
+def follow_needle(passage_table, path_table, site_table, c):
     """Bring passage ``c`` of a needle up to date; False when the needle has left the hole."""
-    p, lines, sites = open_passages(passage_table), open_lines(line_table), open_sites(site_table)
-    line, pose = p.line[c], sites.pose[p.hole[c]]
-    _body_rotation(lines.pose[line], p.A)
+    p, paths, sites = open_passages(passage_table), open_paths(path_table), open_sites(site_table)
+    path, pose = p.path[c], sites.pose[p.hole[c]]
+    _body_rotation(paths.pose[path], p.A)
     _body_rotation(pose, p.B)
     hx, hy, hz = rotate(p.B, p.point[c, 0], p.point[c, 1], p.point[c, 2])
     hx, hy, hz = pose[0] + hx, pose[1] + hy, pose[2] + hz
-    body, m, X, Y = lines.pose[line], lines.centre[line], lines.x[line], lines.y[line]
+    body, m, X, Y = paths.pose[path], paths.centre[path], paths.x[path], paths.y[path]
     ux, uy, uz = rotate_back(p.A, hx - body[0], hy - body[1], hz - body[2])
     ux, uy, uz = ux - m[0], uy - m[1], uz - m[2]
     around = math.atan2(ux * Y[0] + uy * Y[1] + uz * Y[2], ux * X[0] + uy * X[1] + uz * X[2])
-    angle = _wrap(around, 0.5 * (lines.begin[line] + lines.end[line]))
-    if not (lines.begin[line] <= angle <= lines.end[line]):
+    angle = _wrap(around, 0.5 * (paths.begin[path] + paths.end[path]))
+    if not (paths.begin[path] <= angle <= paths.end[path]):
         return False
-    p.depth[c] = lines.radius[line] * (lines.end[line] - angle)
-    _arc_axes(p, c, lines, line, angle)
-    x, y, z = _arc_point(p, lines, line, angle)
-    p.owner[c], p.node[c] = lines.owner[line], lines.node[line]
-    return _relate(p, lines, sites, c, x, y, z, hx, hy, hz, body[0], body[1], body[2], body[3:7],
-                   1.0 / lines.radius[line])  # fmt: skip
+    p.depth[c] = paths.radius[path] * (paths.end[path] - angle)
+    _arc_axes(p, c, paths, path, angle)
+    x, y, z = _arc_point(p, paths, path, angle)
+    p.owner[c], p.node[c] = paths.owner[path], paths.node[path]
+    return _relate(p, paths, sites, c, x, y, z, hx, hy, hz, body[0], body[1], body[2], body[3:7],
+                   1.0 / paths.radius[path])  # fmt: skip
 
 
 @inlined
@@ -210,7 +211,7 @@ def _rod_axes(p, c, tx, ty, tz):
 
 
 @inlined
-def _enter_rod(p, sites, nodes, first, before, line, owner, hole):
+def _enter_rod(p, sites, nodes, first, before, path, owner, hole):
     """Find elements of a rod that cross the opening of a hole where it did not pass before."""
     _body_rotation(sites.pose[hole], p.B)
     n = before.shape[0] - 1
@@ -226,10 +227,10 @@ def _enter_rod(p, sites, nodes, first, before, line, owner, hole):
         if abs(px) > sites.half[hole, 0] or abs(py) > sites.half[hole, 1]:
             continue
         depth = before[n] - before[e] - s * length
-        if abs(gz - fz) < LEAST_SLOPE * length or _known(p, line, hole, depth):
+        if abs(gz - fz) < LEAST_SLOPE * length or _known(p, path, hole, depth):
             continue
         x, y, z = ax + s * (bx - ax), ay + s * (by - ay), az + s * (bz - az)
-        c = _enter(p, sites, line, hole, owner, first + e, e, depth, x, y, z)
+        c = _enter(p, sites, path, hole, owner, first + e, e, depth, x, y, z)
         if c >= 0:
             # Any axes about the tangent will do for a round thread.
             per = 1.0 / math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
@@ -241,9 +242,9 @@ def _enter_rod(p, sites, nodes, first, before, line, owner, hole):
 
 
 @kernel
-def follow_rod(passage_table, line_table, site_table, node_table, first, before, c):
+def follow_rod(passage_table, path_table, site_table, node_table, first, before, c):
     """Bring passage ``c`` of a rod up to date; False when the rod has left the hole."""
-    p, lines, sites = open_passages(passage_table), open_lines(line_table), open_sites(site_table)
+    p, paths, sites = open_passages(passage_table), open_paths(path_table), open_sites(site_table)
     nodes = open_nodes(node_table)
     pose = sites.pose[p.hole[c]]
     _body_rotation(pose, p.B)
@@ -273,23 +274,23 @@ def follow_rod(passage_table, line_table, site_table, node_table, first, before,
     _rod_axes(p, c, per * ux, per * uy, per * uz)
     i = first + e
     return _relate(
-        p, lines, sites, c, ax + s * ux, ay + s * uy, az + s * uz, hx, hy, hz,
+        p, paths, sites, c, ax + s * ux, ay + s * uy, az + s * uz, hx, hy, hz,
         nodes.x[i, 0], nodes.x[i, 1], nodes.x[i, 2], nodes.q[i], 0.0,
     )  # fmt: skip
 
 
 @inlined
-def _relate(p, lines, sites, c, x, y, z, hx, hy, hz, nx, ny, nz, q, bend):
-    """Stretch, levers and constants of passage ``c``, whose line is at x, y, z and whose puncture at h.
+def _relate(p, paths, sites, c, x, y, z, hx, hy, hz, nx, ny, nz, q, bend):
+    """Stretch, levers and constants of passage ``c``, whose path is at x, y, z and whose puncture at h.
 
-    A stretch beyond what the tissue bears moves the puncture. ``p.B`` holds the rotation of the hole's
+    A stretch beyond the tissue's strength moves the puncture. ``p.B`` holds the rotation of the hole's
     body; ``q`` (4,) is the node's; ``bend`` is the curvature, 0 for threads, which may turn. False when
-    line and puncture have parted.
+    path and puncture have parted.
     """
     dx, dy, dz = x - hx, y - hy, z - hz
     if not (dx * dx + dy * dy + dz * dz < LOST * LOST):
         return False
-    hole, line, A, E = p.hole[c], p.line[c], p.axes[c], p.stretch[c]
+    hole, path, A, E = p.hole[c], p.path[c], p.axes[c], p.stretch[c]
     ox, oy, _oz = _into_hole(sites, hole, p.B, hx, hy, hz)
     if abs(ox) > sites.half[hole, 0] + LOST or abs(oy) > sites.half[hole, 1] + LOST:
         return False
@@ -298,9 +299,9 @@ def _relate(p, lines, sites, c, x, y, z, hx, hy, hz, nx, ny, nz, q, bend):
     for k in range(4):
         p.q[c, k] = q[k]
     for r in range(6):
-        p.stiffness[c, r] = lines.stiffness[line, hole, r]
-        p.damping[c, r] = lines.damping[line, hole, r]
-        p.limit[c, r] = lines.limit[line, hole, r]
+        p.stiffness[c, r] = paths.stiffness[path, hole, r]
+        p.damping[c, r] = paths.damping[path, hole, r]
+        p.limit[c, r] = paths.limit[path, hole, r]
         p.impulse[c, r] = 0.0
         E[r] = 0.0
     E[0] = p.depth[c] - p.anchor[c]
@@ -309,7 +310,7 @@ def _relate(p, lines, sites, c, x, y, z, hx, hy, hz, nx, ny, nz, q, bend):
     p.bend[c] = bend
     if bend > 0.0:
         _turned(p, c)
-    _yield(p, c)
+    _tear(p, c)
     _recoil(p, sites, c, hole, x, y, z)
     return True
 
@@ -331,16 +332,16 @@ def _turned(p, c):
 
 
 @inlined
-def _yield(p, c):
-    """Move the puncture where the stretch is more than the tissue bears."""
+def _tear(p, c):
+    """Move the puncture where the stretch exceeds the tissue's strength."""
     A, E = p.axes[c], p.stretch[c]
     rx, ry, rz = 0.0, 0.0, 0.0
     for r in range(6):
-        p.mode[c, r] = 0
+        p.mode[c, r] = STICKS
         k = p.stiffness[c, r]
         if k == 0.0 or abs(k * E[r]) <= p.limit[c, r]:
             continue
-        p.mode[c, r] = 1
+        p.mode[c, r] = SLIPS
         kept = p.limit[c, r] / k if E[r] > 0.0 else -p.limit[c, r] / k
         over = E[r] - kept
         E[r] = kept
@@ -386,8 +387,8 @@ def _turn_frame(f, rx, ry, rz):
 def _recoil(p, sites, c, hole, x, y, z):
     """Mobility and velocity of the hole at passage ``c``, in its axes.
 
-    A hole that holds several lines is shared out among them: each takes it for that much lighter, so
-    that together they do not push it further than it can go (mass splitting; Tonge et al. 2012).
+    Several paths in one hole share its mass: each sees a lighter hole, so that together they do not push
+    it too far (mass splitting; Tonge et al. 2012).
     """
     A, pose, v = p.axes[c], sites.pose[hole], sites.twist[hole]
     lx, ly, lz = x - pose[0], y - pose[1], z - pose[2]
@@ -429,24 +430,24 @@ def _hole_centre(p, sites, h):
 
 
 @kernel
-def look_for_needle(passage_table, line_table, site_table, line, gaps):
-    """Find the holes that a needle has entered; ``gaps`` (H,) gets its distances to all, from below."""
-    p, lines, sites = open_passages(passage_table), open_lines(line_table), open_sites(site_table)
-    pose, m = lines.pose[line], lines.centre[line]
+def look_for_needle(passage_table, path_table, site_table, path, gaps):
+    """Find the holes that a needle has entered; ``gaps`` (H,) receives lower bounds of its distances to all."""
+    p, paths, sites = open_passages(passage_table), open_paths(path_table), open_sites(site_table)
+    pose, m = paths.pose[path], paths.centre[path]
     _body_rotation(pose, p.A)
     cx, cy, cz = rotate(p.A, m[0], m[1], m[2])
     cx, cy, cz = pose[0] + cx, pose[1] + cy, pose[2] + cz
     for h in range(gaps.shape[0]):
         x, y, z, reach = _hole_centre(p, sites, h)
         away = math.sqrt((x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2)
-        gaps[h] = abs(away - lines.radius[line]) - reach
+        gaps[h] = abs(away - paths.radius[path]) - reach
         if gaps[h] <= 0.0:
-            _enter_needle(p, lines, sites, line, h)
+            _enter_needle(p, paths, sites, path, h)
 
 
 @kernel
-def look_for_rod(passage_table, site_table, node_table, first, before, line, owner, gaps):
-    """Find the holes that a rod has entered; ``gaps`` (H,) gets its distances to all, from below.
+def look_for_rod(passage_table, site_table, node_table, first, before, path, owner, gaps):
+    """Find the holes that a rod has entered; ``gaps`` (H,) receives lower bounds of its distances to all.
 
     ``before`` (n + 1,) is the length of the rod up to each element, the first of which is node ``first``.
     """
@@ -460,4 +461,4 @@ def look_for_rod(passage_table, site_table, node_table, first, before, line, own
             nearest = min(nearest, away - 0.5 * (before[e + 1] - before[e]))
         gaps[h] = nearest - reach
         if gaps[h] <= 0.0:
-            _enter_rod(p, sites, nodes, first, before, line, owner, h)
+            _enter_rod(p, sites, nodes, first, before, path, owner, h)

@@ -1,8 +1,7 @@
-"""Threads between the fingers of a jaw: held across the pads, sliding along them against friction.
+"""Grasps of threads between the fingers of a jaw: rigid across the pads, frictional along them.
 
-The rod's own contacts with the fingers hold until both pads touch; then the pads of `ligature.suture.rod` take
-over, inside the rod's implicit solve, with the friction that the force between the fingers allows. World axes, SI
-units.
+Until both pads touch, the rod's own contacts with the fingers act. Then `ligature.suture.rod.Pads` replace them inside
+the rod's implicit solve; the force between the fingers sets their Coulomb limit. World axes, SI units.
 """
 
 from __future__ import annotations
@@ -22,12 +21,13 @@ Array = NDArray[np.float64]
 
 
 @dataclass
-class Pinch:
-    """One jaw that holds a thread.
+class ThreadGrasp:
+    """A thread between the pads of one jaw.
 
-    ``rod`` is its number, ``body`` the element between the pads, ``along`` (m) where that was from the rod's
-    beginning when the grasp began. ``positions`` are where the fingers stop, ``lever`` how far the thread is from
-    their axis. ``points`` (2, 3) and ``normal`` (3,) of the pads are in the first finger's inertial frame.
+    ``rod`` is its number, ``body`` the element between the pads, ``along`` (m) the arc length from the rod's start to
+    the pads when the grasp began. ``positions`` (rad) are the joint positions at which the fingers stop, ``lever`` (m)
+    is the distance of the thread from their axis. ``points`` (2, 3) and ``normal`` (3,) of the pads are in the first
+    finger's inertial frame.
     """
 
     rod: int
@@ -44,8 +44,8 @@ class Pinch:
     slip: float = 0.0
 
 
-def begin(number: int, rods: Rods, world: World, fingers: Fingers, friction: float) -> Pinch | None:
-    """A grasp of a rod, when both pads touch it and the fingers are asked to close."""
+def begin(number: int, rods: Rods, world: World, fingers: Fingers, friction: float) -> ThreadGrasp | None:
+    """A grasp of a rod when both pads touch it and the commands close the fingers; None otherwise."""
     rod, jaw = rods.rods[number], fingers.jaw
     axis, pivot = fingers.axis()
     touched = [_touched(rod, fingers, finger, axis, pivot) for finger in (0, 1)]
@@ -60,27 +60,27 @@ def begin(number: int, rods: Rods, world: World, fingers: Fingers, friction: flo
     along *= 0.5 * jaw.half_width / max(float(np.linalg.norm(along)), 1e-12)
     T = pose7_matrix(world.motion(jaw.fingers[0])[0])
     points = (np.array([on_rod - along, on_rod + along]) - T[:3, 3]) @ T[:3, :3]
-    return Pinch(
+    return ThreadGrasp(
         number, rod.description.bodies[element], _along(rod, element, on_rod), fingers.positions(),
         float(np.linalg.norm(lever)), points, T[:3, :3].T @ normal, friction, jaw.half_width,
     )  # fmt: skip
 
 
-def keep(pinch: Pinch, rods: Rods, world: World, fingers: Fingers) -> Pads | None:
-    """What the pads do in the coming tick; None when the fingers open, or the thread has slipped out."""
-    rod, finger = rods.rods[pinch.rod], fingers.jaw.fingers[0]
-    force = min(fingers.efforts()) / max(pinch.lever, LEAST_LEVER)
+def keep(thread: ThreadGrasp, rods: Rods, world: World, fingers: Fingers) -> Pads | None:
+    """The pads for the coming tick; None when the fingers open or the thread has slipped out."""
+    rod, finger = rods.rods[thread.rod], fingers.jaw.fingers[0]
+    force = min(fingers.efforts()) / max(thread.lever, LEAST_LEVER)
     T = pose7_matrix(world.motion(finger)[0])
-    centre = T[:3, :3] @ pinch.points.mean(axis=0) + T[:3, 3]
+    centre = T[:3, :3] @ thread.points.mean(axis=0) + T[:3, 3]
     element, on_rod, _ = _nearest(rod, centre)
-    if force <= 0.0 or np.linalg.norm(on_rod - centre) > pinch.reach:
+    if force <= 0.0 or np.linalg.norm(on_rod - centre) > thread.reach:
         return None
-    pinch.normal_force, pinch.body = force, rod.description.bodies[element]
-    pinch.slip = _along(rod, element, on_rod) - pinch.along
-    pinch.force = rod.pinched(finger)[1]
-    fingers.stop(pinch.positions, (force * pinch.lever, force * pinch.lever))
-    rods.exclude(pinch.rod, fingers.jaw.fingers, element)
-    return Pads(finger, pinch.points, pinch.normal, 2.0 * pinch.friction * force)
+    thread.normal_force, thread.body = force, rod.description.bodies[element]
+    thread.slip = _along(rod, element, on_rod) - thread.along
+    thread.force = rod.grasped(finger)[1]
+    fingers.stop(thread.positions, (force * thread.lever, force * thread.lever))
+    rods.exclude(thread.rod, fingers.jaw.fingers, element)
+    return Pads(finger, thread.points, thread.normal, 2.0 * thread.friction * force)
 
 
 def within(rods: Rods, box: Array) -> bool:
@@ -119,7 +119,7 @@ def _nearest(rod: Rod, point: Array) -> tuple[int, Array, Array]:
 
 
 def _along(rod: Rod, element: int, point: Array) -> float:
-    """How far from the beginning of a rod, along it, a point on an element is."""
+    """Arc length in metres from the start of a rod to a point (3,) on an element."""
     ends = rod.description.ends
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     R = pose7_matrix(np.concatenate([rod.positions[element], rod.orientations[element]]))[:3, :3]

@@ -1,8 +1,8 @@
-"""What tissue does to the needles and rods in its holes, inside the implicit solve of a tick.
+"""Forces of tissue on the needles and rods that pass through it, inside the implicit solve of a tick.
 
 Each passage is a spring in six directions between a node and its hole, with drag along, evaluated at the
-end of the tick. Along the line (and about it) the spring is friction: it bears so much and no more.
-Which rows slip is found by repetition, as with contacts. The hole gives way by its own mobility,
+end of the tick. Along the path and about it the spring is friction with a limit.
+Which rows slip is found by repetition, as with contacts. The hole recoils by its own mobility,
 so that a light hole and a heavy needle stay stable: with S the springs and A the hole's mobility the
 node feels (S⁻¹ + dt² A)⁻¹. World axes, SI units.
 """
@@ -13,24 +13,22 @@ import math
 
 from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6
+from ligature.suture.layout import SLIPS, STICKS, YIELDS
 from ligature.suture.rotations import cross, matrix_of, multiply, quaternion_of, rotation_vector
 from ligature.suture.tracking import open_passages
-
-STICKS, SLIPS, YIELDS = 0, 1, 2
-"""How a limited row enters a solve: a spring, a constant load, a spring as stiff as the limit allows."""
 
 MAX_SWITCHES = 6
 """Changes of mode in a tick after which a row yields for the rest of it."""
 
 FLOOR = 1e-9
-"""Stiffness of rows that have none, N/m or N m/rad."""
+"""Least stiffness of a row, N/m or N m/rad."""
 
 MAX_STEPS = 8
-"""Most Newton steps of a needle alone."""
+"""Most Newton steps of a needle without a rod."""
 
 
 @inlined
-def begin_hold(p, c):
+def _begin_passage(p, c):
     """Springs of passage ``c`` as the last tick left them."""
     p.switches[c] = 0
     for r in range(6):
@@ -50,7 +48,7 @@ def _set_row(p, c, r, stretch):
 
 @inlined
 def respond(p, c, elapsed):
-    """What the node feels of passage ``c``: stiffness ``p.K`` and the load ``p.load`` where the tick began."""
+    """Passage ``c`` as it acts on its node: stiffness ``p.K`` and load ``p.load`` at the start of the tick."""
     T, K = p.T, p.K[c]
     for i in range(6):
         for j in range(6):
@@ -69,58 +67,58 @@ def respond(p, c, elapsed):
 
 
 @inlined
-def begin_holds(p, owner):
+def begin_passages(p, owner):
     """Springs of the passages of a rod as the last tick left them."""
     for c in range(p.filled[0]):
         if p.owner[c] == owner:
-            begin_hold(p, c)
+            _begin_passage(p, c)
             for a in range(6):
                 p.impulse[c, a] = 0.0
 
 
 @inlined
-def begin_again(p, owner):
+def restart_passages(p, owner):
     """Springs of the passages of a rod as they were, after a step that did not settle."""
     for c in range(p.filled[0]):
         if p.owner[c] == owner:
-            begin_hold(p, c)
+            _begin_passage(p, c)
 
 
 @inlined
-def add_holds(p, owner, nodes, work, elapsed, h):
-    """Add what the passages of a rod do to the matrices and loads of its nodes."""
+def add_passage_forces(p, owner, nodes, work, elapsed, h):
+    """Add the passages of a rod to the matrices and loads of its nodes."""
     for c in range(p.filled[0]):
         i = p.node[c]
         if p.owner[c] == owner and nodes.fixed[i]:
             respond(p, c, elapsed)
         elif p.owner[c] == owner:
-            add_hold(p, c, nodes.x[i], nodes.q[i], work.H[i], work.g[i], elapsed, h)
+            _add_passage(p, c, nodes.x[i], nodes.q[i], work.H[i], work.g[i], elapsed, h)
 
 
 @inlined
-def settle_holds(p, owner, nodes, elapsed):
+def settle_passages(p, owner, nodes, elapsed):
     """Forces of the passages of a rod as solved; True when a solve with other modes has to follow."""
     changed = False
     for c in range(p.filled[0]):
         i = p.node[c]
         if p.owner[c] == owner:
-            changed = settle_hold(p, c, nodes.x[i], nodes.q[i], elapsed) or changed
+            changed = _settle_passage(p, c, nodes.x[i], nodes.q[i], elapsed) or changed
     return changed
 
 
 @inlined
-def add_hold_impulses(p, owner, impulse, h):
-    """Add what the passages of a rod did in ``h`` seconds to the impulses (N, 6) of its nodes."""
+def add_passage_impulses(p, owner, impulse, h):
+    """Add the impulses of a rod's passages in ``h`` seconds to those (N, 6) of its nodes."""
     for c in range(p.filled[0]):
         if p.owner[c] == owner:
-            add_hold_impulse(p, c, h)
+            _add_passage_impulse(p, c, h)
             for a in range(6):
                 impulse[p.node[c], a] += h * p.d[a]
 
 
 @inlined
 def move(p, c, x, q):
-    """How far passage ``c`` moved with its node, now at ``x`` (3,) and ``q`` (4,), to ``p.d`` in its axes."""
+    """Write the motion of passage ``c`` with its node, now at ``x`` (3,) and ``q`` (4,), to ``p.d`` in its axes."""
     b, lever, A, d = p.q[c], p.lever[c], p.axes[c], p.d
     tx, ty, tz, tw = multiply(q[0], q[1], q[2], q[3], -b[0], -b[1], -b[2], b[3])
     rx, ry, rz = rotation_vector(tx, ty, tz, tw)
@@ -134,7 +132,7 @@ def move(p, c, x, q):
 
 @inlined
 def _press(p, c):
-    """Force of passage ``c`` on its line for the motion in ``p.d``."""
+    """Force of passage ``c`` on its path for the motion in ``p.d``."""
     for i in range(6):
         s = p.load[c, i]
         for j in range(6):
@@ -157,7 +155,7 @@ def _fill_jacobian(p, c):
 
 
 @inlined
-def add_hold(p, c, x, q, H, g, elapsed, h):
+def _add_passage(p, c, x, q, H, g, elapsed, h):
     """Add passage ``c`` to the matrix ``H`` (6, 6) and the load ``g`` (6,) of its node, both times h²."""
     respond(p, c, elapsed)
     move(p, c, x, q)
@@ -183,8 +181,8 @@ def add_hold(p, c, x, q, H, g, elapsed, h):
 
 
 @inlined
-def settle_hold(p, c, x, q, elapsed):
-    """Force of passage ``c`` with its node where the solve put it; True when rows stick or slip unlike assumed."""
+def _settle_passage(p, c, x, q, elapsed):
+    """Force of passage ``c`` with its node as solved; True when a row sticks or slips other than the solve assumed."""
     move(p, c, x, q)
     _press(p, c)
     changed = False
@@ -211,8 +209,8 @@ def settle_hold(p, c, x, q, elapsed):
 
 
 @inlined
-def add_hold_impulse(p, c, h):
-    """Add what passage ``c`` did to its line in ``h`` seconds to ``p.impulse``; ``p.d`` has the force and moment.
+def _add_passage_impulse(p, c, h):
+    """Add the impulse of passage ``c`` on its path in ``h`` seconds to ``p.impulse``; ``p.d`` gets force and moment.
 
     Both are about the node's centre, in world axes.
     """
@@ -226,16 +224,16 @@ def add_hold_impulse(p, c, h):
 
 
 @kernel
-def hold_alone(passage_table, line, pose, twist, mass, inertia, pull, H, Y, g, dt):
-    """Impulses in this tick of all passages of a needle that no rod solves for.
+def solve_needle(passage_table, path, pose, twist, mass, inertia, pull, H, Y, g, dt):
+    """Impulses in this tick of all passages of a needle that is not attached to a rod.
 
-    ``pose`` (7,) and ``twist`` (6,) are those of the needle, ``pull`` (6,) the force and moment that
-    will act on it besides; ``H``, ``Y`` (6, 6) and ``g`` (6,) are scratch.
+    ``pose`` (7,) and ``twist`` (6,) are those of the needle, ``pull`` (6,) the other force and moment
+    on it; ``H``, ``Y`` (6, 6) and ``g`` (6,) are scratch.
     """
     p = open_passages(passage_table)
     for c in range(p.filled[0]):
-        if p.line[c] == line:
-            begin_hold(p, c)
+        if p.path[c] == path:
+            _begin_passage(p, c)
     R, x, q = p.B, pose[0:3], pose[3:7]
     matrix_of(q[0], q[1], q[2], q[3], R)
     for a in range(3):
@@ -260,8 +258,8 @@ def hold_alone(passage_table, line, pose, twist, mass, inertia, pull, H, Y, g, d
             g[a] = free[a] - mass * (mx if a == 0 else (my if a == 1 else mz))
             g[3 + a] = free[3 + a] - moment
         for c in range(p.filled[0]):
-            if p.line[c] == line:
-                add_hold(p, c, x, q, H, g, dt, dt)
+            if p.path[c] == path:
+                _add_passage(p, c, x, q, H, g, dt, dt)
         invert_spd6(H, Y)
         for a in range(6):
             s = 0.0
@@ -275,13 +273,13 @@ def hold_alone(passage_table, line, pose, twist, mass, inertia, pull, H, Y, g, d
         _turn_row(q, d[3], d[4], d[5])
         changed = False
         for c in range(p.filled[0]):
-            if p.line[c] == line:
-                changed = settle_hold(p, c, x, q, dt) or changed
+            if p.path[c] == path:
+                changed = _settle_passage(p, c, x, q, dt) or changed
         if not changed:
             break
     for c in range(p.filled[0]):
-        if p.line[c] == line:
-            add_hold_impulse(p, c, dt)
+        if p.path[c] == path:
+            _add_passage_impulse(p, c, dt)
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""Rigid bodies as grasps and holes meet them, and how impulses at a point move them; world axes, SI units."""
+"""Motion of rigid bodies at a point, and their response to impulses there; world axes, SI units."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ Array = NDArray[np.float64]
 class Motion:
     """A body at the start of a tick.
 
-    ``pose`` (7,) is that of its inertial frame, ``twist`` (6,) as it would be after the tick were it
-    left alone; ``inverse_mass`` and ``inverse_inertia`` (3,) principal are zero for what impulses do
-    not move.
+    ``pose`` (7,) is that of its inertial frame, ``twist`` (6,) the one after the tick without
+    further impulses; ``inverse_mass`` and ``inverse_inertia`` (3,) are zero for a body that impulses do not move.
     """
 
     pose: Array

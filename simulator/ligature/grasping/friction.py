@@ -1,6 +1,6 @@
-"""Compiled: what the pads of several jaws do in one tick to the body that they hold together.
+"""Kernels of the friction law: impulses of one tick of several pairs of pads on the body that they hold together.
 
-World axes and SI units, but for what stands in the patch of a jaw: its z axis is normal to the pads. Rows of a
+World axes and SI units; quantities of a patch are in its own axes, z normal to the pads. Rows of a
 patch are force along x, y, z and moment about x, y, z. Friction bounds rows 0, 1 and 5 by an ellipsoid, the
 force between the fingers bounds row 2.
 """
@@ -21,18 +21,19 @@ from ligature.suture.tables import opener
 Array = NDArray[np.float64]
 
 SWEEPS = 20
-"""Repetitions in which jaws that share a body, and rows that slide, agree."""
+"""Gauss-Seidel sweeps over the grasps of one body and the rows that slip."""
 
 MAX_NEWTON = 50
 
 STIFFNESS, DAMPING = 2e4, 60.0
-"""Of pads against translation, N/m and N s/m: two tools that disagree by 0.1 mm pull 1 N."""
+"""Stiffness and damping of pads in translation, N/m and N s/m: two tools off by 0.1 mm pull with 1 N."""
 
 CATCH_UP = 0.02
-"""Seconds in which a body catches up with what its holder moved on while the tick was under way."""
+"""Time constant in seconds in which a body makes up for its holder's change of velocity within a tick."""
 
 TURN_STIFFNESS, TURN_DAMPING = 2.0, 5e-3
-"""Of pads against rotation, N m/rad and N m s/rad: 1 N at the tip of a needle turns it by half a degree."""
+"""Stiffness and damping of pads in rotation, N m/rad and N m s/rad: 1 N at the tip of a needle turns it by half a
+degree."""
 
 
 @inlined
@@ -42,35 +43,35 @@ def _spring(row, dt):
     return k / (c + dt * k), 1.0 / (dt * (c + dt * k))
 
 
-class Pads(NamedTuple):
-    """The jaws that hold one body, g of them."""
+class GraspArrays(NamedTuple):
+    """The g grasps of one body."""
 
     patch: Array  # (g, 7) pose of the patch in the inertial frame of the jaw's holder
     held: Array  # (g, 7) pose of the body's inertial frame in the patch, as held
-    limits: Array  # (g, 3) largest tangential force, moment about the normal, and normal force
+    limits: Array  # (g, 3) maximum tangential force, moment about the normal, and normal force
     load: Array  # (g, 6) on the body, in patch axes: N, N m
-    slid: Array  # (g, 2) way and angle that the body has slipped: m, rad
+    slid: Array  # (g, 2) slip of the body: m, rad
     pace: Array  # (g, 6) velocity of the holder at the patch in the last tick, in patch axes
-    lag: Array  # (g, 6) how far the body has yet to catch up with the holder, in patch axes
-    slides: NDArray[np.bool_]  # (g, 2) whether it slides along the pads, and pries them apart
+    lag: Array  # (g, 6) displacement that the body lags behind the holder, in patch axes
+    slides: NDArray[np.bool_]  # (g, 2) whether the body slips along the pads, and pulls them apart
 
 
 class Motions(NamedTuple):
-    """The body and the holders of its g jaws at the start of a tick, inertial frames, world axes."""
+    """The body and the holders of its g grasps at the start of a tick, inertial frames, world axes."""
 
     body_pose: Array  # (7,)
-    body_twist: Array  # (6,) as it would be after the tick were the body let go
-    inverse: Array  # (4,) of the body's mass, and of its principal moments
+    body_twist: Array  # (6,) after the tick without the grasps
+    inverse: Array  # (4,) inverse of the body's mass and principal moments
     holder_pose: Array  # (g, 7)
     holder_twist: Array  # (g, 6)
     ride: Array  # (g, 6) velocity of the holders at the body's centre in the last tick
-    pending: Array  # (6,) impulse and moment that the body was given already
-    attached_load: Array  # (6,) force and moment that move along what was added to the body's mass
-    impulse: Array  # (1 + g, 6) what jaws give to the body, and to their holders
+    pending: Array  # (6,) impulse and moment already applied to the body in this tick
+    attached_load: Array  # (6,) force and moment that accelerate the mass added to the body
+    impulse: Array  # (1 + g, 6) on the body, and on the holders
 
 
 class Scratch(NamedTuple):
-    """What one tick of g jaws works with; nothing in it survives one."""
+    """Scratch of one tick of g grasps; nothing in it outlives the tick."""
 
     at: Array  # (g, 3) patches in the world
     R: Array  # (g, 3, 3)
@@ -89,31 +90,33 @@ class Scratch(NamedTuple):
 
 
 def motions(g: int) -> Motions:
-    """Room for the motion of a body and ``g`` holders."""
+    """Arrays for the motion of a body and ``g`` holders."""
     z = np.zeros
     return Motions(z(7), z(6), z(4), z((g, 7)), z((g, 6)), z((g, 6)), z(6), z(6), z((1 + g, 6)))
 
 
-def pads(g: int) -> Pads:
-    """Room for ``g`` jaws."""
+def grasp_arrays(g: int) -> GraspArrays:
+    """Arrays for ``g`` grasps."""
     z = np.zeros
-    return Pads(z((g, 7)), z((g, 7)), z((g, 3)), z((g, 6)), z((g, 2)), z((g, 6)), z((g, 6)), np.zeros((g, 2), np.bool_))
+    return GraspArrays(
+        z((g, 7)), z((g, 7)), z((g, 3)), z((g, 6)), z((g, 2)), z((g, 6)), z((g, 6)), np.zeros((g, 2), np.bool_)
+    )
 
 
 def scratch(g: int) -> Scratch:
-    """Scratch for ``g`` jaws."""
+    """Scratch for ``g`` grasps."""
     z = np.zeros
     return Scratch(z((g, 3)), z((g, 3, 3)), z((g, 6)), z((g, 6)), z((g, 6, 6)), z(6), z((3, 3)), z((3, 3)), z((6, 6)),
                    z(6), z(6), z(3), z(3), z(3))  # fmt: skip
 
 
-open_motions, open_pads, open_scratch = opener(motions(1)), opener(pads(1)), opener(scratch(1))
+open_motions, open_grasps, open_scratch = opener(motions(1)), opener(grasp_arrays(1)), opener(scratch(1))
 
 
 @inlined
-def _place(g, body_pose, holder_pose, pads, room):
-    """Where patch ``g`` is in the world, and how far the body is off its held pose."""
-    h, p, b, held, R, S, at = holder_pose[g], pads.patch[g], body_pose, pads.held[g], room.R[g], room.S, room.at[g]
+def _place(g, body_pose, holder_pose, grasps, room):
+    """Pose of patch ``g`` in the world, and the error of the body's pose against its held pose."""
+    h, p, b, held, R, S, at = holder_pose[g], grasps.patch[g], body_pose, grasps.held[g], room.R[g], room.S, room.at[g]
     matrix_of(h[3], h[4], h[5], h[6], S)
     x, y, z = rotate(S, p[0], p[1], p[2])
     at[0], at[1], at[2] = h[0] + x, h[1] + y, h[2] + z
@@ -162,8 +165,8 @@ def _push(twist, inverse_mass, W, R, rx, ry, rz, impulse):
 
 
 @inlined
-def _soften(g, inverse_mass, rx, ry, rz, room, dt):
-    """Impulse of patch ``g`` for a unit of velocity, the softness of its pads included."""
+def _fill_impedance(g, inverse_mass, rx, ry, rz, room, dt):
+    """Impulse of patch ``g`` for a unit of velocity, the compliance of its pads included."""
     ask, step, K = room.ask, room.step, room.K
     for row in range(6):
         for k in range(6):
@@ -193,7 +196,7 @@ def _solve3(B, more, u, out):
 
 @inlined
 def _slide(row, Y, force, moment, room):
-    """Bring the impulse ``row`` (6,) to the ellipsoid of friction, so that the body slips against it.
+    """Project the impulse ``row`` (6,) onto the ellipsoid of friction, so that the body slips against it.
 
     Of all impulses within, the one of largest dissipation: the slip is normal to the ellipsoid (Goyal, Ruina
     and Papadopoulos, Planar sliding with dry friction, 1991). With rows scaled to a unit ball, u is the
@@ -226,25 +229,26 @@ def _slide(row, Y, force, moment, room):
 
 @inlined
 def _bound(row, Y, limits, room, dt):
-    """Bring an impulse (6,) back to what the pads can carry; returns whether it slides, and whether it pries them."""
+    """Clip an impulse (6,) to the limits of the pads; returns whether the body slips and whether it pulls them
+    apart."""
     force, moment, press = dt * limits[0], dt * limits[1], dt * limits[2]
     slides = (row[0] / force) ** 2 + (row[1] / force) ** 2 + (row[5] / moment) ** 2 > 1.0
     if slides:
         _slide(row, Y, force, moment, room)
-    pries = abs(row[2]) > press
+    pulls_apart = abs(row[2]) > press
     row[2] = min(max(row[2], -press), press)
-    return slides, pries
+    return slides, pulls_apart
 
 
 @inlined
-def _follow(g, error, velocity, load, held, slid, slides, pries, dt):
-    """Let the held pose of a patch that slips follow, so that its springs carry what the pads can."""
+def _follow(g, error, velocity, load, held, slid, slides, pulls_apart, dt):
+    """Move the held pose of a patch that slips, so that its springs carry the limits of the pads."""
     sx, sy, sz, turned = 0.0, 0.0, 0.0, 0.0
     if slides:
         sx = error[0] + dt * velocity[0] + load[0] / STIFFNESS
         sy = error[1] + dt * velocity[1] + load[1] / STIFFNESS
         turned = error[5] + dt * velocity[5] + load[5] / TURN_STIFFNESS
-    if pries:
+    if pulls_apart:
         sz = error[2] + dt * velocity[2] + load[2] / STIFFNESS
     h, c, s = held[g], math.cos(turned), math.sin(turned)
     h[0], h[1], h[2] = c * h[0] - s * h[1] + sx, s * h[0] + c * h[1] + sy, h[2] + sz
@@ -254,9 +258,9 @@ def _follow(g, error, velocity, load, held, slid, slides, pries, dt):
 
 
 @inlined
-def _sweep(g, body_pose, inverse_mass, pads, room, dt):
-    """Bring the impulse of one patch, kept in its load, to where its springs want it; whether it was bounded."""
-    at, load, ask, step = room.at[g], pads.load[g], room.ask, room.step
+def _sweep(g, body_pose, inverse_mass, grasps, room, dt):
+    """Update the impulse of one patch, kept in its load, by the law of its springs; returns whether it was clipped."""
+    at, load, ask, step = room.at[g], grasps.load[g], room.ask, room.step
     rx, ry, rz = at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2]
     _velocity(room.R[g], room.twist, rx, ry, rz, ask)
     for row in range(6):
@@ -269,20 +273,20 @@ def _sweep(g, body_pose, inverse_mass, pads, room, dt):
         for k in range(6):
             change += room.Y[g, row, k] * ask[k]
         load[row] -= change
-    slides, pries = _bound(load, room.Y[g], pads.limits[g], room, dt)
+    slides, pulls_apart = _bound(load, room.Y[g], grasps.limits[g], room, dt)
     for row in range(6):
         step[row] += load[row]
     _push(room.twist, inverse_mass, room.W, room.R[g], rx, ry, rz, step)
-    pads.slides[g, 0], pads.slides[g, 1] = slides, pries
-    return slides or pries
+    grasps.slides[g, 0], grasps.slides[g, 1] = slides, pulls_apart
+    return slides or pulls_apart
 
 
 @kernel
-def let_free(motion_table, room_table, own_mass, gravity, dt):
-    """Bring `Motions.body_twist`, given at the start of a tick, to its end, were all jaws to let the body go.
+def predict_free(motion_table, room_table, own_mass, gravity, dt):
+    """Advance `Motions.body_twist` from the start of a tick to its end, as if all grasps released the body.
 
-    What was added to its ``own_mass``, and to its inertia with it, moves along with the holders, by the mean change
-    of `Motions.ride`, which is brought up to date. ``gravity`` (3,) pulls at the own mass.
+    The mass and inertia added to its ``own_mass`` move with the holders, by the mean change of `Motions.ride`, which is
+    updated. ``gravity`` (3,) acts on the own mass alone.
     """
     moves, room = open_motions(motion_table), open_scratch(room_table)
     pose, twist, inverse = moves.body_pose, moves.body_twist, moves.inverse
@@ -315,41 +319,40 @@ def let_free(motion_table, room_table, own_mass, gravity, dt):
 
 
 @kernel
-def hold(motion_table, pads_table, room_table, dt):
-    """Fill `Motions.impulse` for one tick: row 0 acts on the body, row 1 + g on the holder of jaw g.
+def solve(motion_table, grasp_table, room_table, dt):
+    """Fill `Motions.impulse` for one tick: row 0 acts on the body, row 1 + g on the holder of grasp g.
 
-    All are about the centres of mass, in world axes. Holders move as they do; that they gain or lose speed within
-    the tick shows in the next one as a lag of the body, which is made up in time without force. The pads are
-    brought up to date.
+    All are about the centres of mass, in world axes. Holders keep their velocity within the tick; their acceleration
+    appears in the next tick as a lag of the body, which decays without force. The grasps are updated.
     """
-    moves, pads, room = open_motions(motion_table), open_pads(pads_table), open_scratch(room_table)
+    moves, grasps, room = open_motions(motion_table), open_grasps(grasp_table), open_scratch(room_table)
     body_pose, body_twist, impulse = moves.body_pose, moves.body_twist, moves.impulse
     holder_pose, holder_twist, inverse_mass = moves.holder_pose, moves.holder_twist, moves.inverse[0]
-    n = pads.patch.shape[0]
+    n = grasps.patch.shape[0]
     _inverse_inertia(body_pose, moves.inverse[1:], room.S, room.W)
     for k in range(6):
         room.twist[k] = body_twist[k]
     for g in range(n):
-        _place(g, body_pose, holder_pose, pads, room)
+        _place(g, body_pose, holder_pose, grasps, room)
         at, h = room.at[g], holder_pose[g]
         _velocity(room.R[g], holder_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
-        _soften(g, inverse_mass, at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
+        _fill_impedance(g, inverse_mass, at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
         for row in range(6):
-            change = room.drift[g, row] - pads.pace[g, row]
-            pads.pace[g, row] = room.drift[g, row]
-            pads.lag[g, row] = (1.0 - dt / CATCH_UP) * pads.lag[g, row] - dt * change
-            room.error[g, row] -= pads.lag[g, row]
-            pads.load[g, row] = 0.0
+            change = room.drift[g, row] - grasps.pace[g, row]
+            grasps.pace[g, row] = room.drift[g, row]
+            grasps.lag[g, row] = (1.0 - dt / CATCH_UP) * grasps.lag[g, row] - dt * change
+            room.error[g, row] -= grasps.lag[g, row]
+            grasps.load[g, row] = 0.0
     for _ in range(SWEEPS):
         bounded = False
         for g in range(n):
-            bounded = _sweep(g, body_pose, inverse_mass, pads, room, dt) or bounded
+            bounded = _sweep(g, body_pose, inverse_mass, grasps, room, dt) or bounded
         if n == 1 and not bounded:
             break
     for k in range(6):
         impulse[0, k] = 0.0
     for g in range(n):
-        at, h, load, total = room.at[g], holder_pose[g], pads.load[g], room.step
+        at, h, load, total = room.at[g], holder_pose[g], grasps.load[g], room.step
         fx, fy, fz = rotate(room.R[g], load[0], load[1], load[2])
         mx, my, mz = rotate(room.R[g], load[3], load[4], load[5])
         for side in range(2):
@@ -364,4 +367,6 @@ def hold(motion_table, pads_table, room_table, dt):
         _velocity(room.R[g], room.twist, rx, ry, rz, room.ask)
         for row in range(6):
             room.ask[row] -= room.drift[g, row]
-        _follow(g, room.error[g], room.ask, load, pads.held, pads.slid, pads.slides[g, 0], pads.slides[g, 1], dt)
+        _follow(
+            g, room.error[g], room.ask, load, grasps.held, grasps.slid, grasps.slides[g, 0], grasps.slides[g, 1], dt
+        )

@@ -1,4 +1,4 @@
-"""Constraint actuators with ``ligature slip``: they hold by friction, what they hold slips, and is lost in the end."""
+"""Constraint actuators with ``ligature slip``: they grasp by friction; the body slips, and in the end slips out."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def _pulled(sim: Simulation, force: float, ticks: int = 100) -> float:
     return float(np.linalg.norm(needle.pose[:3] - start))
 
 
-def test_an_actuator_holds_rigidly_unless_it_is_asked_to_slip(simulate: Make) -> None:
+def test_an_actuator_holds_rigidly_without_ligature_slip(simulate: Make) -> None:
     sim = simulate("")
     assert sim.scene.actuators[0].slip is None
     assert _pulled(sim, 10.0) < 0.3e-3
     assert sim.state["actuator_active"][0, 0]
 
 
-def test_what_a_yielding_actuator_holds_slips_beyond_the_friction_of_its_pads(simulate: Make) -> None:
+def test_a_body_in_an_actuator_grasp_slips_beyond_the_friction_of_its_pads(simulate: Make) -> None:
     sim = simulate(SLIP)
     limit = 2 * 0.5 * sim.bodies["Needle"].body.friction * 8.0
     # a sudden pull is felt twice

@@ -1,22 +1,24 @@
-"""Bonds: points of two nodes that stay together, for ties in the middle of a rod, for grips, and for grasps.
+"""Point constraints and thread grasps, as contacts that act whatever their gap.
 
-A grasp holds whatever element passes between two pads: across them rigidly, along them by friction up to a
-limit that is given. World axes, SI units.
+A point constraint holds points of two nodes together: three of them attach an element to a body. A thread grasp holds
+whatever element passes between two pads, rigidly across them and along them by friction up to a given limit. World
+axes, SI units.
 """
 
 from __future__ import annotations
 
 from ligature.kernels import inlined
-from ligature.suture.coupling import SLIPS
+from ligature.suture.layout import SLIPS
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
 
-PINCH = -2
+FIRST_GRASP_KEY = -2
 """Key of the first grasp; the next ones have lower keys."""
 
 
 @inlined
-def _bond(nodes, work, touches, i, k, points):
-    """Add bonds that hold ``points`` (m, 2, 3), given in the frames of nodes i and k, together this tick."""
+def _constrain(nodes, work, touches, i, k, points):
+    """Add point constraints that hold ``points`` (m, 2, 3), given in the frames of nodes i and k, together this
+    tick."""
     for node in (i, k):
         matrix_of(nodes.q[node, 0], nodes.q[node, 1], nodes.q[node, 2], nodes.q[node, 3], work.R[node])
     for m in range(points.shape[0]):
@@ -26,7 +28,7 @@ def _bond(nodes, work, touches, i, k, points):
         touches.count[0] = c + 1
         touches.key[c] = -1
         touches.node[c, 0], touches.node[c, 1] = i, k
-        touches.bond[c], touches.closed[c] = True, True
+        touches.bilateral[c], touches.closed[c] = True, True
         touches.target[c], touches.friction[c], touches.press[c] = 0.0, 0.0, 0.0
         for s in range(2):
             node = touches.node[c, s]
@@ -45,8 +47,8 @@ def _bond(nodes, work, touches, i, k, points):
 
 
 @inlined
-def _pinch(nodes, work, old, touches, g, i, k, points):
-    """Add grasp number ``g`` of the element at node i by node k.
+def _grasp(nodes, work, old, touches, g, i, k, points):
+    """Add thread grasp number ``g`` of the element at node i by the pads of node k.
 
     ``points[0, 1]`` is the middle of the pads and ``points[1, 1]`` their normal, in the frame of node k;
     ``points[2, 0, 0]`` is the largest force along the pads.
@@ -77,15 +79,15 @@ def _pinch(nodes, work, old, touches, g, i, k, points):
         gap += (start[0, m] - start[1, m]) * normal[m]
         slip[m] = 0.0
     touches.gap[c], touches.target[c] = gap, 0.0
-    touches.node[c, 0], touches.node[c, 1], touches.key[c] = i, k, PINCH - g
+    touches.node[c, 0], touches.node[c, 1], touches.key[c] = i, k, FIRST_GRASP_KEY - g
     touches.arm[c, 0], touches.arm[c, 1] = 0.0, 0.0
-    touches.bond[c], touches.closed[c] = True, True
+    touches.bilateral[c], touches.closed[c] = True, True
     touches.friction[c], touches.press[c] = 1.0, points[2, 0, 0]
     touches.mode[c], touches.switches[c] = SLIPS, 0
     for o in range(old.count[0]):
-        if not old.bond[o]:
+        if not old.bilateral[o]:
             break
-        if old.key[o] == PINCH - g:
+        if old.key[o] == FIRST_GRASP_KEY - g:
             along = old.slip[o, 0] * normal[0] + old.slip[o, 1] * normal[1] + old.slip[o, 2] * normal[2]
             for m in range(3):
                 slip[m] = old.slip[o, m] - along * normal[m]
@@ -93,13 +95,13 @@ def _pinch(nodes, work, old, touches, g, i, k, points):
 
 
 @inlined
-def place_bonds(nodes, work, old, touches, grips, points):
-    """Add the bonds of all ``grips`` (g, 3): two nodes and whether it is a grasp, with ``points`` (g, m, 2, 3).
+def add_point_constraints(nodes, work, old, touches, constraints, points):
+    """Add all ``constraints`` (g, 3), each two nodes and whether it is a grasp, with ``points`` (g, m, 2, 3).
 
     ``old`` are the contacts of the last tick.
     """
-    for g in range(grips.shape[0]):
-        if grips[g, 2]:
-            _pinch(nodes, work, old, touches, g, grips[g, 0], grips[g, 1], points[g])
+    for g in range(constraints.shape[0]):
+        if constraints[g, 2]:
+            _grasp(nodes, work, old, touches, g, constraints[g, 0], constraints[g, 1], points[g])
         else:
-            _bond(nodes, work, touches, grips[g, 0], grips[g, 1], points[g])
+            _constrain(nodes, work, touches, constraints[g, 0], constraints[g, 1], points[g])

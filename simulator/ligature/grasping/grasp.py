@@ -1,10 +1,10 @@
-"""A grasp that yields: jaws hold a body by friction, up to a limit surface; world axes, SI units.
+"""A frictional grasp with a limit surface: pads hold a body until it slips; world axes, SI units.
 
-The pads touch the body in a patch. What the patch carries without slipping, of tangential force and of
-moment about its normal, lies within an ellipsoid (Howe and Cutkosky, Practical force-motion models for
+The pads touch the body in a patch. The tangential force and the moment about the normal that the patch carries
+without slip lie within an ellipsoid (Howe and Cutkosky, Practical force-motion models for
 sliding manipulation, 1996); its size follows the force between the fingers. Within it the pads are stiff
-springs; beyond it the body slips, and what it was held by follows. Prying with more than the force between
-the fingers opens them. The other two moments have no limit.
+springs; beyond it the body slips, and the anchors of the springs follow. A normal force above the force between the
+fingers pulls the pads apart. The other two moments have no limit.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.grasping.friction import grasp_arrays, motions, predict_free, scratch, solve
+from ligature.grasping.motion import Motion
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
-from ligature.suture.motion import Motion
-from ligature.suture.pads import hold, let_free, motions, pads, scratch
 from ligature.suture.tables import table_of
 
 Array = NDArray[np.float64]
@@ -26,12 +26,12 @@ LINE_ARM = 0.5
 """Mean arm of friction on an evenly pressed line, in halves of its length: a wire across a pad."""
 
 LEAST_FORCE = 1e-9
-"""Normal force in newtons below which a grasp holds nothing."""
+"""Least normal force in newtons, which keeps the limits positive."""
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Where and how the pads touch: ``T_holder_patch`` (4, 4) in the holder's inertial frame, its z axis normal
+    """The contact patch of two pads: ``T_holder_patch`` (4, 4) in the holder's inertial frame, its z axis normal
     to the pads; ``half_width`` of the pads in metres; Coulomb ``friction`` of one pad.
     """
 
@@ -51,7 +51,7 @@ def share_of_limit(force: Array, moment: float, limits: tuple[float, float]) -> 
 
 
 class Grasp:
-    """One body held between the fingers of one jaw.
+    """One body held between two pads.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Grasp:
         self.pace, self.lag = np.zeros(6), np.zeros(6)
 
     def begin(self, holder: Motion) -> None:
-        """Take note of how the holder moves when the grasp begins."""
+        """Record the holder's velocity at the start of the grasp."""
         T = self.world_patch(holder.pose)
         velocity = holder.velocity_at(T[:3, 3])
         self.pace = np.concatenate([T[:3, :3].T @ velocity[:3], T[:3, :3].T @ velocity[3:]])
@@ -93,68 +93,68 @@ class Grasp:
         return np.asarray(pose7_matrix(holder_pose) @ self.patch.T_holder_patch)
 
     def move_patch(self, T_holder_patch: Array) -> None:
-        """Let the pads touch elsewhere, with nothing else changed."""
+        """Move the patch on the holder; body and loads stay."""
         T_holder_body = self.patch.T_holder_patch @ pose7_matrix(self.held)
         self.patch = replace(self.patch, T_holder_patch=T_holder_patch)
         self.patch_pose = matrix_pose7(T_holder_patch)
         self.held = matrix_pose7(inverse(T_holder_patch) @ T_holder_body)
 
     def share(self) -> float:
-        """How much of what friction can carry was used in the last tick, 0 to 1."""
+        """Used share of the limit surface in the last tick, 0 to 1."""
         return share_of_limit(self.load[:2], float(self.load[5]), self.patch.limits(self.normal_force))
 
 
-class Hands:
-    """The arrays in which ``count`` grasps of one body meet; reused from tick to tick.
+class GraspSolver:
+    """Solves ``count`` grasps of one body together; reused from tick to tick.
 
     Attributes
     ----------
     motions
-        The caller fills in how the body and the holders move.
+        Motion of the body and the holders; the caller fills it in.
     """
 
     def __init__(self, count: int) -> None:
-        self.motions, self._pads, self._scratch = motions(count), pads(count), scratch(count)
-        self._tables = table_of(self.motions), table_of(self._pads), table_of(self._scratch)
+        self.motions, self._grasps, self._scratch = motions(count), grasp_arrays(count), scratch(count)
+        self._tables = table_of(self.motions), table_of(self._grasps), table_of(self._scratch)
 
-    def let_free(self, own_mass: float, gravity: Array, dt: float) -> Array:
-        """See `ligature.suture.pads.let_free`; returns `Motions.attached_load`."""
-        let_free(self._tables[0], self._tables[2], own_mass, gravity, dt)
+    def predict_free(self, own_mass: float, gravity: Array, dt: float) -> Array:
+        """See `ligature.grasping.friction.predict_free`; returns `Motions.attached_load`."""
+        predict_free(self._tables[0], self._tables[2], own_mass, gravity, dt)
         return self.motions.attached_load
 
-    def hold(self, grasps: Sequence[Grasp], dt: float) -> Array:
+    def solve(self, grasps: Sequence[Grasp], dt: float) -> Array:
         """Impulses (1 + g, 6) of one tick on the body and on the holders, each about its centre of mass.
 
-        `Motions.body_twist` is as it would be after the tick were the body let go. Holders are taken to move as
-        they do; an arm of kilograms is not moved within a tick by what springs on a needle carry.
+        `Motions.body_twist` is the twist after the tick without the grasps. Holders keep their velocity within the
+        tick: the springs of a needle do not move an arm of kilograms.
         """
-        held = self._pads
+        held = self._grasps
         for g, grasp in enumerate(grasps):
             held.patch[g], held.held[g], held.slid[g] = grasp.patch_pose, grasp.held, grasp.slipped
             held.pace[g], held.lag[g] = grasp.pace, grasp.lag
             held.limits[g, :2] = grasp.patch.limits(grasp.normal_force)
             held.limits[g, 2] = max(grasp.normal_force, LEAST_FORCE)
-        hold(*self._tables, dt)
+        solve(*self._tables, dt)
         for g, grasp in enumerate(grasps):
             grasp.held[:], grasp.load[:], grasp.slipped[:] = held.held[g], held.load[g], held.slid[g]
             grasp.pace[:], grasp.lag[:], grasp.slides[:] = held.pace[g], held.lag[g], held.slides[g]
         return self.motions.impulse
 
 
-def hold_together(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Motion, dt: float) -> Array:
-    """`Hands.hold` for once, of a body and holders that move as given."""
-    hands = Hands(len(grasps))
-    at = hands.motions
+def solve_once(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Motion, dt: float) -> Array:
+    """One `GraspSolver.solve` for a body and holders with the given motion."""
+    solver = GraspSolver(len(grasps))
+    at = solver.motions
     at.body_pose[:], at.body_twist[:] = body.pose, body.twist
     at.inverse[0], at.inverse[1:] = body.inverse_mass, body.inverse_inertia
     for g, holder in enumerate(holders):
         at.holder_pose[g], at.holder_twist[g] = holder.pose, holder.twist
-    return hands.hold(grasps, dt)
+    return solver.solve(grasps, dt)
 
 
 def warm_up() -> None:
-    """Compile the kernels, or load them, so that the first grasp of a run need not wait."""
+    """Compile the kernels or load them from the cache, so that the first grasp of a run does not wait."""
     origin = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     still = Motion(origin, np.zeros(6), 1.0, np.ones(3))
-    hold_together([Grasp(Patch(np.eye(4), 1e-3, 0.5), np.eye(4))], [still], still, 1e-3)
-    Hands(1).let_free(1.0, np.zeros(3), 1e-3)
+    solve_once([Grasp(Patch(np.eye(4), 1e-3, 0.5), np.eye(4))], [still], still, 1e-3)
+    GraspSolver(1).predict_free(1.0, np.zeros(3), 1e-3)

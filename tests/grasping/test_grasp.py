@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ligature.grasping.friction import STIFFNESS
+from ligature.grasping.grasp import Grasp, Patch, share_of_limit, solve_once
+from ligature.grasping.motion import Motion
 from ligature.model.frames import pose7_matrix
-from ligature.suture.grasp import Grasp, Patch, hold_together, share_of_limit
-from ligature.suture.motion import Motion
-from ligature.suture.pads import STIFFNESS
 
 DT, MASS, INERTIA = 1e-3, 0.05, 1e-6
 FRICTION, HALF_WIDTH, NORMAL = 0.3, 0.00125, 10.0
@@ -54,7 +54,7 @@ def _pull(wrench, ticks=500, normal=NORMAL):
     grasp, needle = _grasp(normal=normal), Needle()
     for k in range(GROWTH + ticks):
         motion = needle.motion(np.array(wrench, dtype=float) * min(1.0, k / GROWTH))
-        on_needle, on_jaw = hold_together([grasp], [_jaw()], motion, DT)
+        on_needle, on_jaw = solve_once([grasp], [_jaw()], motion, DT)
         assert on_jaw[:3] == pytest.approx(-on_needle[:3], abs=1e-12)
         needle.advance(motion, on_needle)
     return needle, on_needle / DT, grasp
@@ -85,7 +85,7 @@ def test_needle_stays_where_it_slipped_to():
     for tick in range(300):
         force = FORCE + 2.0 if tick < 30 else 0.0
         motion = needle.motion(np.array([force, 0, 0, 0, 0, 0]))
-        on_needle, _ = hold_together([grasp], [_jaw()], motion, DT)
+        on_needle, _ = solve_once([grasp], [_jaw()], motion, DT)
         needle.advance(motion, on_needle)
     assert np.abs(needle.twist).max() < 1e-6
     assert needle.pose[0] == pytest.approx(grasp.slipped[0], rel=0.02)
@@ -134,7 +134,7 @@ def test_two_tools_that_drift_apart_share_a_needle_and_slip_alike():
         at = 0.002 * k * DT
         jaws = [_jaw((-0.01 - at, 0, 0), (-0.002, 0, 0)), _jaw((0.01 + at, 0, 0), (0.002, 0, 0))]
         motion = needle.motion(np.zeros(6))
-        impulses = hold_together(grasps, jaws, motion, DT)
+        impulses = solve_once(grasps, jaws, motion, DT)
         largest = max(largest, np.abs(impulses[1:, :3]).max() / DT)
         needle.advance(motion, impulses[0])
     assert largest <= FORCE * (1.0 + 1e-9)
@@ -149,7 +149,7 @@ def test_two_tools_that_hold_still_do_not_fight():
     grasps = [_grasp((0.01, 0, 0)), _grasp((-0.01, 0, 0))]
     for _ in range(300):
         motion = needle.motion(np.zeros(6))
-        impulses = hold_together(grasps, [_jaw((-0.01, 0, 0)), _jaw((0.0101, 0, 0))], motion, DT)
+        impulses = solve_once(grasps, [_jaw((-0.01, 0, 0)), _jaw((0.0101, 0, 0))], motion, DT)
         needle.advance(motion, impulses[0])
     assert grasps[0].load[0] == pytest.approx(-0.5e-4 * STIFFNESS, rel=1e-3)
     assert needle.pose[0] == pytest.approx(0.5e-4, rel=1e-3)

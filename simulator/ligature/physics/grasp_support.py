@@ -1,4 +1,4 @@
-"""What grasping asks of Bullet: what is near, how far apart, joints that stop, contacts off, added mass.
+"""What grasping needs of Bullet: nearby bodies, gaps, stopped joints, disabled collisions, added mass.
 
 Mixed into `World`. World axes, SI units.
 """
@@ -20,16 +20,17 @@ from ligature.physics.control import FREE, TreeControl
 Array = NDArray[np.float64]
 
 MIN_HELD_MASS = 0.05
-"""Mass in kg that a held body has at least towards forces; its weight stays its own, the rest moves as the holder.
+"""Minimum mass in kg of a held body in its response to forces; its weight stays its own, the rest moves with the
+holder.
 
-What holds it is an arm of kilograms. A needle of 0.1 g between stiff pads and a taut thread would be thrown
-from one to the other within a tick: a force F meets the next reaction only after F dt²/m, 11 mm for 1 N.
+The holder is an arm of kilograms. Stiff pads and a taut thread would throw a needle of 0.1 g from one to the other
+within a tick: a force F meets the next reaction only after F dt²/m, 11 mm for 1 N.
 """
 
 MIN_COMMANDED_MASS = 0.5
-"""The same of a body that a command drives by setting its velocity anew each tick: that of the challenge's needle.
+"""Minimum mass in kg of a body whose velocity a command sets in each tick: that of the challenge's needle.
 
-It pushes with the momentum that it has: one of 0.1 g with 3 mN at 30 mm/s, and does not part the rim of a hole.
+Such a body pushes with its own momentum: one of 0.1 g with 3 mN at 30 mm/s, which does not open the rim of a hole.
 """
 
 
@@ -44,10 +45,10 @@ class Gaps:
     normal: Array
 
 
-class BulletGrips:
+class GraspSupport:
     """The part of a `World` that grasping needs.
 
-    ``stopped_fingers`` are fingers whose joints are stopped while they hold a thread: it cannot move them.
+    ``stopped_fingers`` are the fingers whose joints are stopped while they hold a thread, which cannot move them.
     """
 
     scene: Scene
@@ -64,13 +65,13 @@ class BulletGrips:
         """Whether a command sets the velocity of a body."""
         raise NotImplementedError
 
-    def _setup_grips(self) -> None:
+    def _setup_grasp_support(self) -> None:
         self._free_bodies = {tree.root for tree in self.trees if is_alone(tree, self.scene.bodies)}
         self._attached_loads: dict[int, tuple[Placement, Array]] = {}
         self.stopped_fingers: set[int] = set()
-        self._passing: set[tuple[int, int]] = set()
-        self._held_up: dict[int, int] = {}
-        self._gripped: dict[int, int] = {}
+        self._disabled_pairs: set[tuple[int, int]] = set()
+        self._hold_counts: dict[int, int] = {}
+        self._grasp_counts: dict[int, int] = {}
 
     def surroundings(self, bodies: Collection[int]) -> tuple[list[int], Array]:
         """Bodies whose boxes meet the common box of ``bodies``, in order, and the corners (2, 3) of that."""
@@ -93,80 +94,84 @@ class BulletGrips:
         rows = sorted((row[8], row[5], row[7]) for row in found)
         return Gaps(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
 
-    def disable_collision(self, body: int, other: int, passes: bool) -> None:
-        """Switch contacts between two bodies off, or on again unless the scene has them off."""
-        (self._passing.add if passes else self._passing.discard)((body, other))
+    def disable_collision(self, body: int, other: int, disabled: bool) -> None:
+        """Disable collision between two bodies, or enable it again unless the scene disables it."""
+        (self._disabled_pairs.add if disabled else self._disabled_pairs.discard)((body, other))
         a, b = self.place_of[body], self.place_of[other]
-        touch = not passes and other not in self.scene.bodies[body].no_collision_with
-        pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(touch), physicsClientId=self.client)
+        collide = not disabled and other not in self.scene.bodies[body].no_collision_with
+        pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(collide), physicsClientId=self.client)
+
+    def set_stopped(self, fingers: Collection[int], stopped: bool) -> None:
+        """Record that ``fingers`` are stopped on a thread, or no longer."""
+        self.stopped_fingers = self.stopped_fingers | set(fingers) if stopped else self.stopped_fingers - set(fingers)
 
     # --- joints -----------------------------------------------------------------------------
 
     def stop_joint(self, joint: int, position: float, effort: float) -> None:
-        """Keep a joint at ``position`` however it is commanded; it reports ``effort``."""
+        """Stop a joint at ``position`` whatever its command; it reports ``effort``."""
         self._tree_of_joint[joint].stop(joint, position, effort)
 
     def slow_joint(self, joint: int, low: float, high: float, strength: float) -> None:
         """Keep the velocity of a joint's motor between ``low`` and ``high``, and its effort below ``strength``."""
         self._tree_of_joint[joint].slow(joint, low, high, strength)
 
-    def let_joint(self, joint: int) -> None:
+    def release_joint(self, joint: int) -> None:
         """End `stop_joint` and `slow_joint`."""
         self._tree_of_joint[joint].let(joint)
 
     def joint_driven(self, joint: int) -> bool:
-        """Whether anything commands a joint; else it is limp."""
+        """Whether a command drives a joint."""
         control = self._tree_of_joint[joint]
         return bool(control.mode[control.row[joint]] != FREE)
 
     def joint_position(self, joint: int) -> float:
-        """Where a joint is now."""
+        """Position of a joint now."""
         control = self._tree_of_joint[joint]
         return float(control.read(np.array([control.row[joint]]))[0, 0])
 
-    def pull(self, joint: int, stiffness: float) -> float:
-        """Effort that a joint's command asks for; see `TreeControl.pull`."""
+    def requested_effort(self, joint: int, stiffness: float) -> float:
+        """Effort that a joint's command requests; see `TreeControl.pull`."""
         return self._tree_of_joint[joint].pull(joint, stiffness)
 
-    def pending(self, body: int) -> Array:
-        """Impulse and moment (6,) about its centre that a body was given for the coming tick so far."""
+    def pending_impulse(self, body: int) -> Array:
+        """Impulse and moment (6,) about a body's centre that act in the coming tick so far."""
         return self._impulses.get(body, np.zeros(6))
 
     # --- mass -------------------------------------------------------------------------------
 
-    def hold_up(self, body: int, held: bool, gripped: bool = False) -> None:
-        """Note that one more, or one less, holds ``body``; one that is ``gripped`` by pads gets heavier itself.
+    def set_held(self, body: int, held: bool, grasped: bool = False) -> None:
+        """Count one more holder of ``body``, or one less; a body that pads have ``grasped`` gets added mass.
 
-        What a constraint holds is as heavy as its holder anyway.
+        A welded body needs none: it is as heavy as its holder.
         """
         change = 1 if held else -1
-        for counts in (self._held_up, self._gripped) if gripped else (self._held_up,):
+        for counts in (self._hold_counts, self._grasp_counts) if grasped else (self._hold_counts,):
             counts[body] = counts.get(body, 0) + change
             if counts[body] == 0:
                 del counts[body]
-        if gripped and body in self._free_bodies:
+        if grasped and body in self._free_bodies:
             self._update_mass(body)
 
     def _update_mass(self, body: int) -> None:
-        """Give Bullet the mass that a body pushes with, and note by what the weight of that is off.
+        """Set the mass of a body in Bullet, and record the force that corrects the weight of the added part.
 
-        What is held has its own weight, what is driven falls as before: its command makes up for that.
+        A held body keeps its own weight; a commanded body falls as before, and its command corrects that.
         """
-        place, led = self.place_of[body], self.driven(body)
-        least = MIN_COMMANDED_MASS if led else MIN_HELD_MASS if body in self._gripped else 0.0
+        place, commanded = self.place_of[body], self.driven(body)
+        least = MIN_COMMANDED_MASS if commanded else MIN_HELD_MASS if body in self._grasp_counts else 0.0
         mass, inertia = self._at_least(least, body)
         pybullet.changeDynamics(
             place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self.client
         )
         extra = mass - place.body.mass
         if extra > 0.0:
-            fall = place.body.gravity if led else np.zeros(3)
+            fall = place.body.gravity if commanded else np.zeros(3)
             self._attached_loads[body] = place, extra * (fall - self._world_gravity)
         else:
             self._attached_loads.pop(body, None)
 
     def mass_of(self, body: int) -> tuple[float, Array]:
-        """Mass and principal moments (3,) by which a body resists forces now."""
+        """Mass and principal moments (3,) of a body in its response to forces now."""
         held = body in self._free_bodies and self.is_held(body)
         return self._at_least(MIN_HELD_MASS if held else 0.0, body)
 
@@ -177,33 +182,33 @@ class BulletGrips:
         return scale * described.mass, scale * inertia_of(described)
 
     def _update_commanded(self, body: int, before: bool) -> None:
-        """Have a light free body push as firmly as what drives it, since a command that drives it came or went."""
+        """Update the mass of a light free body after a command that drives it began or ended."""
         light = body in self._free_bodies and self.scene.bodies[body].mass < MIN_COMMANDED_MASS
         if light and self.driven(body) != before:
             self._update_mass(body)
 
     def is_held(self, body: int) -> bool:
         """Whether something holds a body."""
-        return body in self._held_up
+        return body in self._hold_counts
 
     def carry(self, body: int, wrench: Array) -> None:
-        """Move the added mass of a body along with its holders, which takes ``wrench`` (6,) in the coming tick."""
+        """Apply ``wrench`` (6,) in the coming tick, which moves the added mass of a body with its holders."""
         if body in self._attached_loads:
             self._attached_loads[body][0].load(wrench.tolist())
 
     def _apply_attached_loads(self) -> None:
-        """Take the weight of added mass off again, for the coming tick."""
+        """Cancel the weight of added mass in the coming tick."""
         for place, lift in self._attached_loads.values():
             place.push(lift)
 
-    def _weigh_again(self) -> None:
-        """Give a new Bullet world the masses of bodies that are gripped, or driven by commands."""
+    def _restore_masses(self) -> None:
+        """Set the masses of grasped and commanded bodies in a new Bullet world."""
         for body in sorted(self._free_bodies):
             light = self.scene.bodies[body].mass < MIN_COMMANDED_MASS
-            if body in self._gripped or (light and self.driven(body)):
+            if body in self._grasp_counts or (light and self.driven(body)):
                 self._update_mass(body)
 
-    def _part_again(self) -> None:
-        """Switch off the contacts in a new Bullet world that `disable_collision` switched off."""
-        for body, other in sorted(self._passing):
+    def _restore_disabled_pairs(self) -> None:
+        """Repeat every `disable_collision` in a new Bullet world."""
+        for body, other in sorted(self._disabled_pairs):
             self.disable_collision(body, other, True)
