@@ -28,7 +28,7 @@ from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
 from ligature.model.parts import body_of, joint_of, sensor_of
 from ligature.model.piercing import Hole, Needle
-from ligature.model.rods import rod_chains, without_ties_between
+from ligature.model.rods import rod_chains, without_joints_between
 from ligature.model.scene import (
     Actuator,
     Attachment,
@@ -144,10 +144,12 @@ class SceneBuilder:
         self._arrivals.report_orphans()
         self._lost.name_what_goes_along(self.diagnostics)
         self.diagnostics += self._arrivals.diagnostics
-        rods, between = without_ties_between(rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints)
+        rods, between = without_joints_between(
+            rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints
+        )
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
-        self._report_ties(between)
+        self._report_joints_between(between)
         self._report_sensors(rod_bodies)
         forest, loops = trees.articulations(self.bodies, self.joints, rod_bodies, rod_joints)
         start, closures, moved = assemble(self.bodies, self.joints, forest, loops)
@@ -189,8 +191,8 @@ class SceneBuilder:
             roots=self.resolver.roots,
         )
 
-    def _report_ties(self, joints: Iterable[Joint]) -> None:
-        """Joints between two elements of rods: a rod is tied to bodies."""
+    def _report_joints_between(self, joints: Iterable[Joint]) -> None:
+        """Joints between two elements of rods: a rod attaches to bodies only."""
         for joint in joints:
             message = f"joint '{joint.identity.key}' joins two elements of rods; it is left out"
             hint = "join an element and a body, or write 'ligature rod: false' for one of the two chains"
