@@ -130,9 +130,7 @@ def _load_launch(
     builder.diagnostics += found
     if world is not None:
         _add_environment(world, builder, resolver)
-        before = builder.counts()
-        builder.add_cameras_and_lights(world, world.top.text("namespace"), -1)
-        builder.arrive(before)
+        builder.add_world(world)
     for document in _extra(files, resolver, builder):
         builder.diagnostics += document.diagnostics
         builder.add_model(document, shaders)
