@@ -182,7 +182,7 @@ class _Assembly:
             return True
         one, two = (self.bodies[end].identity.identifier for end in ends)
         if all(end in self.tree_of for end in ends):
-            why, hint = f"neither '{one}' nor '{two}' has a mass", "give one a mass, or remove the joint"
+            why, hint = f"neither '{one}' nor '{two}' has a mass", "set a mass on one of them, or remove the joint"
         else:
             why, hint = f"'{one}' or '{two}' is an element of a rod", "opt out with 'ligature rod: false'"
         message = f"joint '{joint.identity.key}' has no effect: {why}"

@@ -189,16 +189,16 @@ class SceneBuilder:
     def _report_joints_between(self, joints: Iterable[Joint]) -> None:
         """Joints between two elements of rods: a rod attaches to bodies only."""
         for joint in joints:
-            message = f"joint '{joint.identity.key}' joins two elements of rods; it is left out"
-            hint = "join an element and a body, or write 'ligature rod: false' for one of the two chains"
+            message = f"joint '{joint.identity.key}' connects two rod elements; ignoring it"
+            hint = "connect an element and a body, or set 'ligature rod: false' for one of the two chains"
             self.report(Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "rod"))
 
     def _report_sensors(self, rod_bodies: frozenset[int]) -> None:
         """Resistance sensors on rods push what they touch and not the rod."""
         for sensor in self.sensors:
             if sensor.type is SensorType.RESISTANCE and sensor.parent in rod_bodies:
-                message = f"resistance sensor '{sensor.identity.key}' does not push back the rod that it is on"
-                hint = "put it on a body, or write 'ligature rod: false'"
+                message = f"resistance sensor '{sensor.identity.key}' applies no force to the rod that carries it"
+                hint = "mount it on a body, or set 'ligature rod: false'"
                 self.report(Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod"))
 
     def _report_piercing(self, needles: tuple[Needle, ...], holes: tuple[Hole, ...]) -> None:
@@ -283,9 +283,9 @@ class SceneBuilder:
         groups = [int(g) for g in element.numbers("collision groups")]
         for group in groups:
             if not 0 <= group <= 999:
-                message = f"collision group {group} of body '{element.key}' is dropped"
+                message = f"collision group {group} of body '{element.key}' is outside 0 to 999; ignoring it"
                 mark = element.mark_of("collision groups")
-                self.report(Diagnostic(Severity.WARNING, message, mark, "groups are 0 to 999", "group"))
+                self.report(Diagnostic(Severity.WARNING, message, mark, "use 0 to 999", "group"))
         return tuple(g for g in groups if 0 <= g <= 999)
 
     def _add_mounts(self, parts: Mounts, model: Model) -> None:
@@ -340,12 +340,14 @@ class SceneBuilder:
             if parent is None or child is None:
                 continue
             if parent == child:
-                message = f"joint '{element.key}' joins a body to itself"
+                message = f"joint '{element.key}' has the same body as parent and child"
                 self.report(Diagnostic(Severity.ERROR, message, element.mark, "name two bodies", "joint"))
                 continue
             if not np.any(element.vector("parent axis")) or not np.any(element.vector("child axis")):
                 message = f"joint '{element.key}' has an axis of length zero"
-                self.report(Diagnostic(Severity.ERROR, message, element.mark, "give a direction", "joint"))
+                self.report(
+                    Diagnostic(Severity.ERROR, message, element.mark, "set a direction of non-zero length", "joint")
+                )
                 continue
             identity = self._identity("joint", element, model)
             scales = (self._scales[parent], self._scales[child])

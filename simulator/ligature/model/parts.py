@@ -87,7 +87,7 @@ def _warn_no_mass(element: Element, context: FileContext) -> None:
     ignored = [key for key in _INERTIAL_KEYS if element.has(key)]
     severity = Severity.WARNING if ignored else Severity.INFO
     rest = f", and its {', '.join(ignored)} has no effect" if ignored else ""
-    message = f"body '{element.key}' has no 'mass': 1 kg is taken{rest}"
+    message = f"body '{element.key}' has no 'mass'; using 1 kg{rest}"
     context.report(Diagnostic(severity, message, element.mark, "add mass: kilograms; 0 makes it static", "mass"))
 
 
