@@ -4,7 +4,7 @@ from setuptools import find_packages, setup
 
 setup(
     name="ligature",
-    version="0.1.0",
+    version="0.2.0",
     description="An open simulator for robot-assisted suturing",
     license="BSD-3-Clause",
     python_requires=">=3.10",

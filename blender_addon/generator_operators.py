@@ -7,7 +7,7 @@ import numpy as np
 
 from . import making
 from .ligature.authoring.generate import (
-    Holder,
+    Anchor,
     Needle,
     Thread,
     jaw_grasp_set,
@@ -76,7 +76,7 @@ class ADF_OT_add_needle(ThreadSettings, bpy.types.Operator):
             add_parts(collection, suture(self.thread(), needle_end(spec), parent=body.adf.key))
             hang_by_text(collection)
         elif self.with_thread == "CHAIN":
-            add_parts(collection, suture_chain(self.thread(), T @ needle_end(spec), "Thread", holder_of(body)))
+            add_parts(collection, suture_chain(self.thread(), T @ needle_end(spec), "Thread", anchor_of(body)))
         return {"FINISHED"}
 
 
@@ -99,7 +99,7 @@ class ADF_OT_add_suture(ThreadSettings, bpy.types.Operator):
             add_parts(collection, suture(self.thread(), np.linalg.inv(T_parent) @ T, parent=key))
             hang_by_text(collection)
         else:
-            add_parts(collection, suture_chain(self.thread(), T, "Thread", holder_of(body) if key else None))
+            add_parts(collection, suture_chain(self.thread(), T, "Thread", anchor_of(body) if key else None))
         return {"FINISHED"}
 
 
@@ -127,7 +127,7 @@ class ADF_OT_add_hole(bpy.types.Operator):
         body = active_body(context, ("BODY",))
         collection = making.file_of(body)
         parts = suture_hole(
-            self.name, making.cursor_pose(context.scene), holder_of(body), decimal(self.radius), decimal(self.wire),
+            self.name, making.cursor_pose(context.scene), anchor_of(body), decimal(self.radius), decimal(self.wire),
             decimal(self.stiffness), 1.0, decimal(self.travel),
         )  # fmt: skip
         add_parts(collection, parts)
@@ -176,9 +176,9 @@ class ADF_OT_add_endoscope(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def holder_of(body):
+def anchor_of(body):
     """A body as what holds a generated part."""
-    return Holder(body.adf.key, rest_pose(body), inertial_frame(body))
+    return Anchor(body.adf.key, rest_pose(body), inertial_frame(body))
 
 
 def hang_by_text(collection):

@@ -207,13 +207,13 @@ class _Importer:
             path = self.resolver.resolve(file, self.folder)
             if path not in self.files:
                 self.files[path] = load_mesh(path, self.resolver)
-            self._tell_missing_textures(element, self.files[path])
+            self._report_missing_textures(element, self.files[path])
         except (MeshError, AdfError) as error:
             self.done.problems.append(f"{element.kind} '{element.key}': {error}")
             return None
         return self.files[path]
 
-    def _tell_missing_textures(self, element: Element, mesh: Mesh) -> None:
+    def _report_missing_textures(self, element: Element, mesh: Mesh) -> None:
         looks = {part.material for part in mesh.parts if part.material is not None}
         named = sorted({file for look in looks for file in (look.texture, look.normal_map) if file is not None})
         for file in named:

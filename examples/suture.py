@@ -20,7 +20,7 @@ from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks import Measures, Monitor, SutureScore, judge_suture
-from ligature.tasks.throws import UP, NeedleArc, Throw, best_grip, pose_of
+from ligature.tasks.throws import UP, NeedleArc, Throw, best_grasp, pose_of
 from PIL import Image
 
 SCENE = Path(__file__).resolve().parents[1] / "scenes" / "suturing" / "launch.yaml"
@@ -73,7 +73,7 @@ class Surgeon:
     # --- time and seeing --------------------------------------------------------------------
 
     def wait(self, seconds: float) -> None:
-        """Let time pass, and look at it all the while."""
+        """Advance the simulation, and look at it all the while."""
         for _ in range(max(1, round(seconds / STREAM))):
             self.simulation.step(round(STREAM / self.simulation.dt))
             self.monitor.observe(self.simulation.state[0])
@@ -189,19 +189,21 @@ class Surgeon:
     def pick_up(self, name: str, throw: Throw) -> None:
         """Take the needle from the pad near its tip, and hold it up before the entry."""
         waiting = frame(np.eye(3), MEETING * UP) @ throw.arc_at(-BEFORE, self.arc)
-        grip = self._grip(name, PICK_DEPTHS, [waiting], self.needle(), upright=True)
-        self.take(name, grip)
+        grasp = self._grasp(name, PICK_DEPTHS, [waiting], self.needle(), upright=True)
+        self.take(name, grasp)
         T = self.tool(name)
         self.line(name, frame(np.eye(3), MEETING * UP) @ T)
         self.move(name, waiting @ inverse(self.needle()) @ self.tool(name))
 
-    def _grip(self, name: str, depths: tuple[float, ...], way: list[Array], now: Array, upright: bool = False) -> Array:
+    def _grasp(
+        self, name: str, depths: tuple[float, ...], way: list[Array], now: Array, upright: bool = False
+    ) -> Array:
         """Pose (4, 4) of the tool in the arc frame that reaches the whole way, and where the needle is now."""
         kinematics, base = self.arms[name].kinematics, self._base[name]
-        grip = best_grip(self.arc, depths, kinematics, base, way, now, self.hole("Entry", 1), upright)
-        if grip is None:
+        grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.hole("Entry", 1), upright)
+        if grasp is None:
             raise Failure(f"{name} cannot hold the needle so that it reaches the whole throw")
-        return grip.tool_in_arc(self.arc)
+        return grasp.tool_in_arc(self.arc)
 
     def drive(self, name: str, throw: Throw) -> None:
         """Turn the needle, which ``name`` holds, in at the entry and out at the exit."""
@@ -216,7 +218,7 @@ class Surgeon:
         tip = throw.towards_exit + BEYOND
         rest = self.arc.end - self.arc.begin
         way = [throw.arc_at(a, self.arc) for a in np.linspace(tip, throw.towards_exit + rest + 0.3, 10)]
-        self.take(name, self._grip(name, PULL_DEPTHS, way, self.needle()))
+        self.take(name, self._grasp(name, PULL_DEPTHS, way, self.needle()))
         self.leave(other)
         self.turn(name, throw, tip, throw.towards_exit + rest + 0.3)
         T = self.tool(name)
@@ -225,7 +227,7 @@ class Surgeon:
     def hand_over(self, giver: str, taker: str, throw: Throw) -> None:
         """The needle goes to the arm that drives the next throw."""
         way = [throw.arc_at(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
-        self.take(taker, self._grip(taker, HOLD_DEPTHS, way, self.needle()))
+        self.take(taker, self._grasp(taker, HOLD_DEPTHS, way, self.needle()))
         self.leave(giver)
 
     def suture(self, pairs: tuple[int, ...], driver: str = "PSM2", puller: str = "PSM1") -> None:

@@ -39,7 +39,7 @@ OPENING, RING = 0.0015, 0.0004
 NEARER = 0.05
 """How far along Y the pad lies from its place in `suturing_small`: there both arms reach all four pairs."""
 
-GRIP = {"friction": 0.15, "drag": 5.0}
+TISSUE = {"friction": 0.15, "drag": 5.0}
 """How the tissue holds what passes through a hole, N and N s/m: a thread runs through all eight holes in the end."""
 
 CAMERA = ((0.0307, 0.362, 0.852), (0.69813, 0.0, -3.14158))
@@ -159,7 +159,7 @@ def ghosts() -> dict[str, Any]:
             "collision groups": [],
             "visible": False,
             "passive": False,
-            "ligature tissue": GRIP,
+            "ligature tissue": TISSUE,
         }
     return document
 

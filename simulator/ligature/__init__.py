@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ligature.model.load import SceneError, load
     from ligature.model.scene import Scene
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = ["Scene", "SceneError", "Simulation", "load"]
 

@@ -97,7 +97,7 @@ def test_a_repeated_entry_makes_two_objects(model) -> None:
 
 def test_a_joint_without_type_is_revolute_with_a_warning(model) -> None:
     document = model(JOINT)
-    assert "joint 'J' has no 'type'; it is taken as revolute" in messages(document)[0]
+    assert "joint 'J' has no 'type'; using revolute" in messages(document)[0]
     assert document.elements("joints")[0].value("type") is None
 
 

@@ -61,7 +61,7 @@ def test_joint_keys_that_contradict_the_type_are_reported(tmp_path: Path, kind: 
         ),
         (
             "  look at: {x: 1, y: 0, z: 0}\n  publish image interval: 0\n",
-            "has 0 as 'publish image interval'; 1 is taken",
+            "has 0 as 'publish image interval'; using 1",
         ),
     ],
 )
@@ -77,7 +77,7 @@ def test_cameras_that_show_nothing_are_reported(tmp_path: Path, keys: str, words
         ("bodies", "  namespace: /a\n", "has a namespace without '/' at its end; write '/a/'"),
         ("bodies", "  publish frequency: {low: 9, high: 3}\n", "publishes at 9 Hz without commands and at 3 Hz with them"),
         ("bodies", "  plugins: [{name: p}]\n", "a plug-in of body 'X' lacks name or filename; it is left out"),
-        ("sensors", "  type: proximity\n", "has no rays, so it senses nothing; give array, mesh or parametric"),
+        ("sensors", "  type: proximity\n", "has no rays, so it senses nothing; add 'array', 'mesh' or 'parametric'"),
         ("sensors", "  type: contact\n  distance threshold: -1\n", "asks for penetration; 0 is contact"),
         ("bodies", "  mass: -1\n", "'mass' of body 'X' is not usable; expected at least 0, not -1"),
     ],

@@ -11,7 +11,7 @@ from ligature.adf.frames import pose_matrix
 from ligature.adf.update import Item, new_text
 from ligature.authoring.generate import (
     STEEL,
-    Holder,
+    Anchor,
     Needle,
     Parts,
     Thread,
@@ -81,10 +81,10 @@ def test_needle_thread_and_hole_simulate_and_stay_finite(tmp_path: Path, chain: 
     T_end = T @ needle_end(Needle())
     thread = Thread(length=0.05, elements=20)
     parts = needle(Needle(), T_world=T) + suture_hole(
-        "Entry1", pose_matrix((0.1, 0, 0.01), (0, 0, 0)), Holder("BODY ground", GROUND_POSE)
+        "Entry1", pose_matrix((0.1, 0, 0.01), (0, 0, 0)), Anchor("BODY ground", GROUND_POSE)
     )
     parts += (
-        suture_chain(thread, T_end, holder=Holder("BODY Needle", T, needle_frame(parts)))
+        suture_chain(thread, T_end, anchor=Anchor("BODY Needle", T, needle_frame(parts)))
         if chain
         else suture(thread, needle_end(Needle()), parent="BODY Needle")
     )
@@ -115,7 +115,7 @@ def needle_frame(parts: Parts) -> np.ndarray:
 def test_a_chain_starts_where_the_needle_ends_also_when_its_principal_axes_are_turned() -> None:
     inertial = needle_frame(needle(Needle()))
     assert np.abs(inertial[:3, :3] - np.eye(3)).max() > 0.01
-    items = suture_chain(Thread(), needle_end(Needle()), holder=Holder("BODY Needle", np.eye(4), inertial)).items
+    items = suture_chain(Thread(), needle_end(Needle()), anchor=Anchor("BODY Needle", np.eye(4), inertial)).items
     joint, first = items[-1].values, items[0].values
     names = ("parent pivot", "child pivot", "parent axis", "child axis", "offset", "joint offset")
     keys = JointKeys(*(joint[name] for name in names))

@@ -37,14 +37,14 @@ def poses() -> st.SearchStrategy[np.ndarray]:
     )
 
 
-def told_apart(a: np.ndarray, b: np.ndarray) -> bool:
+def distinct(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether the format turns one axis into the other as they are, so that no tilt is lost (ADF §15.1)."""
     return 0.0011 < np.arccos(np.clip(a @ b, -1, 1)) < 3.1399
 
 
 def representable(keys: JointKeys, parent_inertial: np.ndarray, child_inertial: np.ndarray) -> bool:
     """Whether the format puts the child where it stands."""
-    return told_apart(parent_inertial[:3, :3].T @ keys.parent_axis, child_inertial[:3, :3].T @ keys.child_axis)
+    return distinct(parent_inertial[:3, :3].T @ keys.parent_axis, child_inertial[:3, :3].T @ keys.child_axis)
 
 
 @settings(max_examples=60, deadline=None)
@@ -54,7 +54,7 @@ def test_solved_keys_put_joint_and_child_where_they_stand(
 ) -> None:
     keys = joint_keys(joint, child, parent_inertial, child_inertial, prismatic)
     axis = parent_inertial[:3, :3].T @ keys.parent_axis
-    exact = told_apart(np.eye(3)[0 if prismatic else 2], axis)
+    exact = distinct(np.eye(3)[0 if prismatic else 2], axis)
     placed = joint_pose(keys, parent_inertial, child_inertial, prismatic)
     np.testing.assert_allclose(placed, joint, atol=1e-5 if exact else 5e-3)
     error = np.abs(child_pose(keys, parent_inertial, child_inertial, prismatic) - child).max()

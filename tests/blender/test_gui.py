@@ -94,9 +94,9 @@ def run_session(script: str, display: str, scripts: Path, tmp_path: Path) -> tup
             process.kill()
             process.wait()
     output = f"{log.read_text(errors='replace')}\nafter {time.monotonic() - start:.0f} s, status {process.returncode}"
-    told = [line for line in output.splitlines() if line.startswith("RESULT ")]
-    assert told, output[-5000:]
-    found = json.loads(told[-1].removeprefix("RESULT "))
+    report = [line for line in output.splitlines() if line.startswith("RESULT ")]
+    assert report, output[-5000:]
+    found = json.loads(report[-1].removeprefix("RESULT "))
     assert found["errors"] == [], "\n".join(found["errors"])
     assert "Traceback" not in output and "Error: Python" not in output, output[-5000:]
     for name in found["pictures"]:
@@ -129,9 +129,9 @@ def test_panels_draw_operators_are_undone_and_nothing_is_left(session: Callable[
     assert (background["begun"], background["most"]) == (["RUNNING_MODAL"], 1) and background["pieces"] >= 2
     assert ended == {"before": 1, "after": 0, "pieces": background["pieces"], "left": background["pieces"]}
     assert len(found["dragged"]) == 3
-    for label, told in found["dragged"].items():
-        assert abs(told["after"] - told["before"]) > 1e-3, label
-        assert told["undone"] == pytest.approx(told["before"], abs=1e-7), label
+    for label, report in found["dragged"].items():
+        assert abs(report["after"] - report["before"]) > 1e-3, label
+        assert report["undone"] == pytest.approx(report["before"], abs=1e-7), label
 
 
 def test_the_tutorial_drives_to_a_scene_that_moves(session: Callable[[str], tuple[dict, str]], tmp_path: Path) -> None:

@@ -107,4 +107,4 @@ def test_check_takes_the_models_that_run_takes(tmp_path: Path) -> None:
     assert "bad.yaml:2:" in everything and "none.yaml' does not exist" in everything
     status, output = check("-l", "0,1")
     assert status == 1 and "bad.yaml:2:" in output and "none.yaml' does not exist" not in output
-    assert "there is no model 7" in check("-l", "0,7")[1]
+    assert "model index 7 is out of range" in check("-l", "0,7")[1]

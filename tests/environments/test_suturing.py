@@ -80,9 +80,9 @@ def test_turning_the_needle_along_its_arc_inserts_it() -> None:
     observation, info = env.reset(seed=3)
     goal, first, total, done, angle = env.goal, info["distance"], 0.0, False, -0.4
     base = frame(env.base_rotation, env.base_position)
-    grip = inverse(pose7_matrix(observation[14:21]) @ goal.arc.T_body_arc) @ base @ pose7_matrix(env.setpoint)
+    T_arc_tool = inverse(pose7_matrix(observation[14:21]) @ goal.arc.T_body_arc) @ base @ pose7_matrix(env.setpoint)
     for _ in range(150):
-        wanted = inverse(base) @ goal.throw.arc_at(angle, goal.arc) @ grip
+        wanted = inverse(base) @ goal.throw.arc_at(angle, goal.arc) @ T_arc_tool
         now = pose7_matrix(env.setpoint)
         action = np.zeros(7)
         action[:3] = (wanted - now)[:3, 3] / 0.001

@@ -72,7 +72,7 @@ def test_both_arms_reach_every_pair_of_holes() -> None:
             way = [throw.arc_at(a, arc) for a in turns]
             kinematics, base = surgeon.arms[name].kinematics, surgeon._base[name]
             above = surgeon.hole("Entry", pair)
-            assert throws.best_grip(arc, depths, kinematics, base, way, way[0], above), (pair, name)
+            assert throws.best_grasp(arc, depths, kinematics, base, way, way[0], above), (pair, name)
 
 
 @pytest.mark.slow

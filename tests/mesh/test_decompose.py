@@ -103,7 +103,7 @@ def test_when_coacd_hangs_the_hull_stands_in_and_a_warning_reports_it(
 
 
 @pytest.mark.parametrize(("threshold", "text"), [(0.0, "threshold is 0; it must be from 0.01 to 1"), (2.0, "is 2;")])
-def test_thresholds_that_make_no_sense_are_refused(mesh: Mesh, threshold: float, text: str) -> None:
+def test_thresholds_out_of_range_are_rejected(mesh: Mesh, threshold: float, text: str) -> None:
     with pytest.raises(DecompositionError, match=text):
         decompose(mesh, threshold)
 

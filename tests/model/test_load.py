@@ -71,7 +71,7 @@ def test_without_mass_the_inertial_block_has_no_effect_and_that_is_stated(lab) -
     scene = lab(m=text)
     assert scene.bodies[0].mass == 1.0
     assert np.allclose(scene.bodies[0].inertia, 2 / 3)
-    assert "has no 'mass': 1 kg is taken, and its inertia has no effect" in said(scene)
+    assert "has no 'mass'; using 1 kg, and its inertia has no effect" in said(scene)
 
 
 def test_a_joint_finds_its_body_in_the_file_before_the_world(lab) -> None:
@@ -163,7 +163,7 @@ def test_a_camera_that_hangs_on_another_resolves_although_its_own_name_holds_the
 
 def test_a_parent_that_never_comes_is_reported(lab) -> None:
     text = "bodies: [BODY a]\nBODY a: {name: a, mass: 1}\nlights: [L]\nL: {name: L, parent: BODY none}\n"
-    assert "has the parent 'BODY none', that is missing or not unique" in said(lab(m=text))
+    assert "has the parent 'BODY none', which is missing or ambiguous" in said(lab(m=text))
 
 
 def test_cameras_look_along_minus_x_with_z_up(lab) -> None:
@@ -199,7 +199,7 @@ def test_a_file_without_bodies_cannot_run(tmp_path: Path) -> None:
 def test_an_index_beyond_the_list_is_reported(lab, tmp_path: Path) -> None:
     lab(m=bodies("a"))
     scene = ligature.load(tmp_path / "launch.yaml", models=[0, 7])
-    assert "there is no model 7; 'multibody configs' lists 1, counted from 0" in said(scene)
+    assert "model index 7 is out of range; 'multibody configs' lists 1, counted from 0" in said(scene)
 
 
 def chain(extra: str = "") -> str:

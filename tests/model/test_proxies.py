@@ -113,4 +113,6 @@ def test_a_proxy_that_is_missing_is_a_finding(launch: Path) -> None:
     assert scene.input_devices[2].proxy == -1
     texts = [str(found) for found in scene.diagnostics]
     assert any("nowhere.yaml" in text for text in texts), texts
-    assert any("there is no input device 7; 'input devices' lists 3, counted from 0" in text for text in texts), texts
+    assert any(
+        "input device index 7 is out of range; 'input devices' lists 3, counted from 0" in text for text in texts
+    ), texts

@@ -67,7 +67,7 @@ def test_a_thread_on_a_thread_is_an_error_with_its_place(tmp_path: Path) -> None
     }
     file = write(tmp_path, bodies={"BALL": BALL}, sutures=threads)
     (error,) = errors(file)
-    assert "joins two elements of rods" in error.message and error.mark is not None
+    assert "connects two rod elements" in error.message and error.mark is not None
     ligature.Simulation(ligature.load(file)).step(10)
 
 

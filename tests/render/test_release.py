@@ -98,7 +98,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("thing", ["closed", "dropped", "blind", "drawn", "viewed", "kept_sizes", "kept_points"])
-def test_memory_stays_bounded_when_things_are_made_again_and_again(scene: Path, thing: str) -> None:
+def test_memory_use_stays_bounded_when_things_are_made_again_and_again(scene: Path, thing: str) -> None:
     command = [sys.executable, "-c", PROGRAM, str(scene), thing, str(ROUNDS)]
     run = subprocess.run(command, capture_output=True, text=True, timeout=240)
     assert run.returncode == 0, run.stderr

@@ -24,7 +24,7 @@ def scene() -> Scene:
     return ligature.load(SCENES / "suturing" / "launch.yaml")
 
 
-def led_through(attempt: Attempt, scene: Scene, pair: int) -> Any:
+def driven_through(attempt: Attempt, scene: Scene, pair: int) -> Any:
     """Drives the needle of ``scene`` along its arc through holes that are laid out for it; returns the last state."""
     scenery, state = attempt.monitor.scenery, new_state(scene)[0]
     base, middle, tip = scenery.points
@@ -53,7 +53,7 @@ def test_tasks_have_the_challenges_numbers() -> None:
 
 def test_an_insertion_is_reported_with_the_challenges_fields(scene: Scene) -> None:
     attempt = Attempt(scene, "insertion")
-    led_through(attempt, scene, 2)
+    driven_through(attempt, scene, 2)
     score = attempt.judge()
     assert [(p.pair, p.exit) for p in attempt.monitor.passages] == [(2, False), (2, True)]
     report = score.report()
@@ -68,7 +68,7 @@ def test_an_insertion_is_reported_with_the_challenges_fields(scene: Scene) -> No
 
 def test_a_reset_of_the_scene_begins_anew(scene: Scene) -> None:
     attempt = Attempt(scene, "insertion")
-    state = led_through(attempt, scene, 1)
+    state = driven_through(attempt, scene, 1)
     assert attempt.judge().success
     state["resets"] += 1
     state["sim_time"] = 9.0
@@ -93,7 +93,7 @@ def test_a_reported_pose_is_judged_in_the_frame_of_the_camera_body(scene: Scene)
 
 def test_a_suture_names_the_misses_of_all_holes(scene: Scene) -> None:
     attempt = Attempt(scene, "suture", pairs=1)
-    led_through(attempt, scene, 1)
+    driven_through(attempt, scene, 1)
     report = attempt.judge().report()
     assert {"success", "completion_time", "axial", "entry1_lateral", "exit1_lateral"} == set(report)
 
@@ -103,7 +103,7 @@ def test_progress_is_the_share_of_holes_passed_in_their_order(scene: Scene) -> N
                                      (2, "insertion", 4, 1.0)):  # fmt: skip
         attempt = Attempt(scene, task, pairs)
         assert attempt.progress == 0.0
-        led_through(attempt, scene, pair)
+        driven_through(attempt, scene, pair)
         assert attempt.progress == share, (pair, task, pairs)
 
 

@@ -154,9 +154,7 @@ def _bad(element: Element, key: Key, error: BadValue) -> Diagnostic:
     message = f"'{key.path}' of {element.kind} '{element.key}' is not usable"
     if key.type is Type.CHOICE and isinstance(error.node, Scalar) and not error.node.text and key.fault is Fault.VALUE:
         message = f"'{key.path}' of {element.kind} '{element.key}' is empty"  # the Blender add-on writes '' for none
-        return Diagnostic(
-            Severity.DEBUG, message, error.node.mark, f"{key.default or 'the default'} is taken", "choice"
-        )
+        return Diagnostic(Severity.DEBUG, message, error.node.mark, f"{key.default or 'the default'} is used", "choice")
     return _fault(key, message, error.node.mark, f"expected {error.expected}", "range" if error.unusable else "value")
 
 

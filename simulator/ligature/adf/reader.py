@@ -282,7 +282,7 @@ def _typeless_is_revolute(element: Element, found: list[Diagnostic]) -> list[Dia
     if element.has("type"):
         return found
     others = [d for d in found if not (d.code == "missing" and "the key 'type'" in d.message)]
-    message = f"joint '{element.key}' has no 'type'; it is taken as revolute"
+    message = f"joint '{element.key}' has no 'type'; using revolute"
     return [*others, Diagnostic(Severity.WARNING, message, element.mark, "add type: revolute", "type")]
 
 

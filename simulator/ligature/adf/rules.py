@@ -101,14 +101,14 @@ def joint_limits(element: Element) -> Iterator[Diagnostic]:
     has_low, has_high = element.has("joint limits.low"), element.has("joint limits.high")
     if kind in _LIMITED and has_low != has_high:
         message = f"has only '{'low' if has_low else 'high'}' of its limits, so it is unlimited"
-        yield _finding(element, Severity.WARNING, "joint limits", message, "give low and high")
+        yield _finding(element, Severity.WARNING, "joint limits", message, "set low and high")
     if kind in _SPRINGS and not (has_low and has_high):
-        hint = "give joint limits: {low, high}"
+        hint = "set joint limits: {low, high}"
         yield _finding(element, Severity.WARNING, "type", f"is a {kind} without limits, which locks it", hint)
     lacking = [axis for axis in "xyz" if not element.has(f"joint limits.{axis}")]
     if kind == "cone twist" and element.has("joint limits") and lacking:
         message = f"is a cone twist without '{', '.join(lacking)}' in 'joint limits'"
-        yield _finding(element, Severity.ERROR, "joint limits", message, "give half angles x, y, z", "missing")
+        yield _finding(element, Severity.ERROR, "joint limits", message, "set half angles x, y, z", "missing")
 
 
 def joint_springs(element: Element) -> Iterator[Diagnostic]:
@@ -145,7 +145,7 @@ def sensor_rays(element: Element) -> Iterator[Diagnostic]:
     """A ray sensor needs rays (§17.2), a contact sensor a distance (§17.4)."""
     if element.text("type") in _RAYS:
         if not any(element.has(path) for path in ("array", "mesh", "parametric")):
-            hint = "give array, mesh or parametric"
+            hint = "add 'array', 'mesh' or 'parametric'"
             yield _finding(element, Severity.WARNING, "type", "has no rays, so it senses nothing", hint)
     elif element.number("distance threshold") < 0.0:
         yield _finding(element, Severity.WARNING, "distance threshold", "asks for penetration", "0 is contact")
@@ -169,7 +169,7 @@ def camera_view(element: Element) -> Iterator[Diagnostic]:
         yield _finding(element, Severity.WARNING, "clipping plane", message, "0 < near < far")
     for path in ("publish image interval", "publish depth interval"):
         if element.integer(path) == 0:
-            yield _finding(element, Severity.WARNING, path, f"has 0 as '{path}'; 1 is taken", "count from 1")
+            yield _finding(element, Severity.WARNING, path, f"has 0 as '{path}'; using 1", "count from 1")
 
 
 def wheels(element: Element) -> Iterator[Diagnostic]:
@@ -197,7 +197,7 @@ def world_surroundings(element: Element) -> Iterator[Diagnostic]:
     lacking = [face for face in faces if not element.text(f"skybox.{face}")]
     if element.has("skybox") and lacking:
         message = f"has a skybox without {', '.join(lacking)}"
-        yield _finding(element, Severity.WARNING, "skybox", message, "it is left out; give all six")
+        yield _finding(element, Severity.WARNING, "skybox", message, "ignoring it; set all six")
 
 
 _COMMON: tuple[Rule, ...] = (names, frequencies, plugins)

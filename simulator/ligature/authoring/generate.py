@@ -37,7 +37,7 @@ class Parts:
 
 
 @dataclass(frozen=True, eq=False)
-class Holder:
+class Anchor:
     """A body that holds something: its key, its pose in the world, its inertial frame in the body."""
 
     key: str
@@ -127,10 +127,10 @@ def suture(spec: Thread, T_start: Array, name: str = "Suture", parent: str = "")
     return Parts((Item("suture", name, values),))
 
 
-def suture_chain(spec: Thread, T_start: Array, name: str = "Thread", holder: Holder | None = None) -> Parts:
+def suture_chain(spec: Thread, T_start: Array, name: str = "Thread", anchor: Anchor | None = None) -> Parts:
     """A thread as capsules and six-DOF springs, which every simulator of the format can load.
 
-    ``T_start`` is in the world; ``holder`` holds the start. The stiffness of a joint is that of a rod of the
+    ``T_start`` is in the world; ``anchor`` holds the start. The stiffness of a joint is that of a rod of the
     element's length: E·I over length for bending, G·J over length for twist, with I = πd⁴/64 and J = 2I.
     """
     step = spec.length / spec.elements
@@ -162,15 +162,15 @@ def suture_chain(spec: Thread, T_start: Array, name: str = "Thread", holder: Hol
     for i in range(1, spec.elements):
         T_joint = poses[i - 1] @ frame(np.eye(3), (0.0, 0.0, step / 2.0))
         items.append(_spring(bodies[i - 1], bodies[i], poses[i - 1], poses[i], T_joint, stiffness, spec.damping_time))
-    if holder is not None:
-        ends = _joint_ends(holder, f"BODY {bodies[0]}", poses[0], T_start)
+    if anchor is not None:
+        ends = _joint_ends(anchor, f"BODY {bodies[0]}", poses[0], T_start)
         values = {"name": f"{name} start", **ends, "type": "fixed", "passive": True}
         items.append(Item("joint", f"JOINT {name} start", values))
     return Parts(tuple(items))
 
 
 def suture_hole(
-    name: str, T_world: Array, holder: Holder, radius: float = 0.0015, wire: float = 0.0003,
+    name: str, T_world: Array, anchor: Anchor, radius: float = 0.0015, wire: float = 0.0003,
     stiffness: float = 100.0, damping: float = 1.0, travel: float = 0.001,
 ) -> Parts:  # fmt: skip
     """A ring of four capsules around Z, held to a body by a six-DOF spring, with a ghost that feels the needle."""
@@ -200,7 +200,7 @@ def suture_hole(
     angular = {f"joint limits.angular.{end}.{a}": 0.0 for end in ("low", "high") for a in "xyz"}
     joint = Item("joint", f"JOINT {name}", {
         "name": f"{name}-spring",
-        **_joint_ends(holder, f"BODY {name}", T_world, T_world),
+        **_joint_ends(anchor, f"BODY {name}", T_world, T_world),
         "type": "six dof spring",
         **linear,
         **angular,
@@ -316,12 +316,12 @@ def _tube(spec: Needle, stations: Array) -> tuple[Array, Any]:
     return vertices, found
 
 
-def _joint_ends(holder: Holder, child: str, T_child: Array, T_joint: Array) -> dict[str, Any]:
+def _joint_ends(anchor: Anchor, child: str, T_child: Array, T_joint: Array) -> dict[str, Any]:
     """The keys that state which bodies a joint holds, and where; all poses in the world."""
-    to_parent = inverse(holder.T_world)
-    keys = joint_keys(to_parent @ T_joint, to_parent @ T_child, holder.T_inertial)
+    to_parent = inverse(anchor.T_world)
+    keys = joint_keys(to_parent @ T_joint, to_parent @ T_child, anchor.T_inertial)
     return {
-        "parent": holder.key,
+        "parent": anchor.key,
         "child": child,
         "parent pivot": keys.parent_pivot,
         "child pivot": keys.child_pivot,
@@ -347,7 +347,7 @@ def _spring(
     springs = {f"stiffness.angular.{a}": k for a, k in zip("xyz", stiffness, strict=True)}
     dampers = {f"damping.angular.{a}": k * damping_time for a, k in zip("xyz", stiffness, strict=True)}
     locked = {f"{what}.linear.{a}": 0.0 for what in ("stiffness", "damping") for a in "xyz"}
-    ends = _joint_ends(Holder(f"BODY {before}", T_before), f"BODY {after}", T_after, T_joint)
+    ends = _joint_ends(Anchor(f"BODY {before}", T_before), f"BODY {after}", T_after, T_joint)
     values = {
         "name": f"{before}-{after}",
         **ends,

@@ -13,7 +13,7 @@ from ligature.simulation import Simulation
 from ligature.tasks.passages import PassageWatch
 from ligature.tasks.scenery import Scenery
 from ligature.tasks.scores import RECOMMENDED_AXIAL, judge_insertion
-from ligature.tasks.throws import UP, NeedleArc, Throw, best_grip
+from ligature.tasks.throws import UP, NeedleArc, Throw, best_grasp
 
 Array = NDArray[np.float64]
 
@@ -155,10 +155,10 @@ class Insert:
         self._last = self.throw.towards_exit + RECOMMENDED_AXIAL / self.arc.radius + self.MORE
         T_base = pose7_matrix(poses[_base_of(simulation, arm)])
         way = [self.throw.arc_at(a, self.arc) for a in np.linspace(-self.BEFORE, self._last, 12)]
-        grip = best_grip(self.arc, self.DEPTHS, arm.kinematics, T_base, way, way[0], entry)
-        if grip is None:
+        grasp = best_grasp(self.arc, self.DEPTHS, arm.kinematics, T_base, way, way[0], entry)
+        if grasp is None:
             raise ValueError(f"{arm.name} cannot hold the needle so that it reaches the whole throw")
-        self._take(simulation, arm, way[0], inverse(T_base) @ way[0] @ grip.tool_in_arc(self.arc))
+        self._take(simulation, arm, way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc))
 
     def _take(self, simulation: Simulation, arm: PsmArm, T_world_arc: Array, T_base_tool: Array) -> None:
         """Close the jaws on the needle, put where it is wanted."""

@@ -30,7 +30,7 @@ Files with three digits are off by up to 2 mm and 0.003 rad; those whose locatio
 ROUNDING = 1e-3
 """Positions (m, rad) below which a location that was rounded to three digits means zero."""
 
-TOLD_M, TOLD_RAD = 2e-3, 0.02
+REPORTED_M, REPORTED_RAD = 2e-3, 0.02
 """A body that starts at least this far from where its joint and its location agree is reported."""
 
 CLOSED = 1e-9
@@ -158,7 +158,7 @@ class _Assembly:
         self.coordinates[joint.index] = values
         E = inverse(motion(axes, values)) @ D
         metres, radians = float(np.linalg.norm(E[:3, 3])), _angle(E[:3, :3])
-        if metres > TOLD_M or radians > TOLD_RAD:
+        if metres > REPORTED_M or radians > REPORTED_RAD:
             name, key = self.bodies[outer].identity.identifier, joint.identity.key
             message = (
                 f"'{name}' starts {1e3 * metres:.3g} mm and {radians:.3g} rad off its location, where '{key}' holds it"
@@ -182,7 +182,7 @@ class _Assembly:
             return True
         one, two = (self.bodies[end].identity.identifier for end in ends)
         if all(end in self.tree_of for end in ends):
-            why, hint = f"neither '{one}' nor '{two}' has a mass", "give one a mass, or remove the joint"
+            why, hint = f"neither '{one}' nor '{two}' has a mass", "set a mass on one of them, or remove the joint"
         else:
             why, hint = f"'{one}' or '{two}' is an element of a rod", "opt out with 'ligature rod: false'"
         message = f"joint '{joint.identity.key}' has no effect: {why}"

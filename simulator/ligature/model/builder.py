@@ -1,7 +1,8 @@
 """Builds a scene file by file, in the order in which AMBF creates objects.
 
-References to bodies are settled at once, parents of attached objects when they arrive. An object
-that cannot be built is reported and left out; the rest goes on.
+A file is converted whole (`ligature.model.conversion`); here its parts get their names, find the bodies that they name
+and are joined. Parents of mounted objects are settled when they arrive. An object that cannot be built is reported and
+left out; the rest goes on.
 """
 
 from __future__ import annotations
@@ -14,21 +15,23 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
 from ligature.adf.nodes import Scalar, Sequence
-from ligature.model import attached, proxies, trees
+from ligature.model import proxies, trees
 from ligature.model.arms import find_arms
 from ligature.model.assembly import assemble
-from ligature.model.frames import pose_matrix
-from ligature.model.geometry import FileContext, GeometryError, shader_files
+from ligature.model.conversion import ModelParts, Mounts, Part, converted, mounts
+from ligature.model.frames import Array
+from ligature.model.geometry import GeometryError
 from ligature.model.holes import find_holes
 from ligature.model.jaws import find_jaws
 from ligature.model.lookup import candidates
 from ligature.model.lost import LostBodies
+from ligature.model.mounted import actuator_of
 from ligature.model.naming import Names, merged
 from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
-from ligature.model.parts import body_of, joint_of, sensor_of
+from ligature.model.parts import joint_of
 from ligature.model.piercing import Hole, Needle
-from ligature.model.rods import rod_chains, without_ties_between
+from ligature.model.rods import rod_chains, without_joints_between
 from ligature.model.scene import (
     Actuator,
     Attachment,
@@ -86,21 +89,18 @@ class SceneBuilder:
         top = document.top
         model = Model(len(self.models), document.path, top.text("namespace"))
         self.models.append(model)
-        shaders = shader_files(top, "shaders", document.path.parent) or shaders
-        context = FileContext(
-            document.path.parent, top.text("high resolution path"), top.text("low resolution path"),
-            self.resolver, self.report,
-        )  # fmt: skip
         before = {kind: len(self._list(kind)) for kind in KINDS}
-        local = self._add_bodies(document, model, context, shaders)
+        self._note_unusable(document, model)
+        parts = converted(document, self.resolver, shaders, self.world.gravity)
+        local = self._add_bodies(parts, model)
         if not top.flag("ligature rod"):
             self._no_rod.update(local)
-        self._add_sutures(document, model, local)
-        self._add_ghosts(document, model, context)
-        self._add_sensors(document, model, local)
+        self._add_sutures(document, parts.gravity, model, local)
+        self._add_ghosts(parts, model)
+        self._add_sensors(parts, model, local)
         self._add_actuators(document, model, local)
         self._add_joints(document, model, local)
-        self.add_cameras_and_lights(document, model.namespace, model.index)
+        self._add_mounts(parts.mounts, model)
         if top.flag("ignore inter-collision"):
             self._silent_files.append(local)
         self.arrive(before)
@@ -128,26 +128,23 @@ class SceneBuilder:
         """Number of objects by kind."""
         return {kind: len(self._list(kind)) for kind in KINDS}
 
-    def add_cameras_and_lights(self, document: Document, namespace: str, model: int) -> None:
-        """Create the cameras and lights of a world or model file."""
-        for element in document.elements("lights"):
-            identity = self._identity("light", element, namespace, model)
-            self.lights.append(attached.light(element, len(self.lights), identity))
-            self._wait("light", identity, len(self.lights) - 1)
-        for element in document.elements("cameras"):
-            identity = self._identity("camera", element, namespace, model)
-            self.cameras.append(attached.camera(element, len(self.cameras), identity, document.path.parent))
-            self._wait("camera", identity, len(self.cameras) - 1)
+    def add_world(self, document: Document) -> None:
+        """Create the cameras and lights of the world file."""
+        before = self.counts()
+        self._add_mounts(mounts(document), Model(-1, document.path, document.top.text("namespace")))
+        self.arrive(before)
 
     def finish(self) -> Scene:
         """The scene of everything added."""
         self._arrivals.report_orphans()
         self._lost.name_what_goes_along(self.diagnostics)
         self.diagnostics += self._arrivals.diagnostics
-        rods, between = without_ties_between(rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints)
+        rods, between = without_joints_between(
+            rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints
+        )
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
-        self._report_ties(between)
+        self._report_joints_between(between)
         self._report_sensors(rod_bodies)
         forest, loops = trees.articulations(self.bodies, self.joints, rod_bodies, rod_joints)
         start, closures, moved = assemble(self.bodies, self.joints, forest, loops)
@@ -189,19 +186,19 @@ class SceneBuilder:
             roots=self.resolver.roots,
         )
 
-    def _report_ties(self, joints: Iterable[Joint]) -> None:
-        """Joints between two elements of rods: a rod is tied to bodies."""
+    def _report_joints_between(self, joints: Iterable[Joint]) -> None:
+        """Joints between two elements of rods: a rod attaches to bodies only."""
         for joint in joints:
-            message = f"joint '{joint.identity.key}' joins two elements of rods; it is left out"
-            hint = "join an element and a body, or write 'ligature rod: false' for one of the two chains"
+            message = f"joint '{joint.identity.key}' connects two rod elements; ignoring it"
+            hint = "connect an element and a body, or set 'ligature rod: false' for one of the two chains"
             self.report(Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "rod"))
 
     def _report_sensors(self, rod_bodies: frozenset[int]) -> None:
         """Resistance sensors on rods push what they touch and not the rod."""
         for sensor in self.sensors:
             if sensor.type is SensorType.RESISTANCE and sensor.parent in rod_bodies:
-                message = f"resistance sensor '{sensor.identity.key}' does not push back the rod that it is on"
-                hint = "put it on a body, or write 'ligature rod: false'"
+                message = f"resistance sensor '{sensor.identity.key}' applies no force to the rod that carries it"
+                hint = "mount it on a body, or set 'ligature rod: false'"
                 self.report(Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod"))
 
     def _report_piercing(self, needles: tuple[Needle, ...], holes: tuple[Hole, ...]) -> None:
@@ -225,28 +222,22 @@ class SceneBuilder:
         }  # fmt: skip
         return lists[kind]
 
-    def _identity(self, kind: str, element: Element, namespace: str, model: int) -> Identity:
-        return self._names[kind].identity(element, namespace, model)
+    def _identity(self, kind: str, element: Element, model: Model) -> Identity:
+        return self._names[kind].identity(element, model.namespace, model.index)
 
     def _wait(self, kind: str, identity: Identity, index: int) -> None:
         self._arrivals.wait(kind, index, identity.identifier, identity.parent_text, identity.mark)
 
-    def _add_bodies(
-        self, document: Document, model: Model, context: FileContext, shaders: ShaderFiles | None
-    ) -> list[int]:
-        own = document.top.has("gravity")
-        gravity = np.array(document.top.vector("gravity")) if own else self.world.gravity
+    def _add_bodies(self, parts: ModelParts, model: Model) -> list[int]:
         local = []
-        self._note_unusable(document, model)
-        for element in document.elements("bodies"):
-            identity = self._identity("body", element, model.namespace, model.index)
-            try:
-                body = body_of(element, len(self.bodies), identity, context, gravity, shaders)
-            except GeometryError as error:
+        for part in parts.bodies:
+            element, identity = part.element, self._identity("body", part.element, model)
+            self.diagnostics += part.findings
+            if part.make is None:
                 self._names["body"].identifiers.pop()
-                self._lost.add(identity.identifier, len(self.diagnostics))
-                self.report(error.diagnostic)
+                self._lost.add(identity.identifier, len(self.diagnostics) - 1)
                 continue
+            body = part.make(index=len(self.bodies), identity=identity)
             self.bodies.append(body)
             self._scales.append(element.number("scale"))
             self._groups.append(self._valid_groups(element))
@@ -267,9 +258,7 @@ class SceneBuilder:
                     self._lost.add(model.namespace + item.text, place)
                     break
 
-    def _add_sutures(self, document: Document, model: Model, local: list[int]) -> None:
-        own = document.top.has("gravity")
-        gravity = np.array(document.top.vector("gravity")) if own else self.world.gravity
+    def _add_sutures(self, document: Document, gravity: Array, model: Model, local: list[int]) -> None:
         for element in document.elements("sutures"):
             parent = self._body(element, "parent", local, "") if element.text("parent") else None
             if parent is None and element.text("parent"):
@@ -294,57 +283,54 @@ class SceneBuilder:
         groups = [int(g) for g in element.numbers("collision groups")]
         for group in groups:
             if not 0 <= group <= 999:
-                message = f"collision group {group} of body '{element.key}' is dropped"
+                message = f"collision group {group} of body '{element.key}' is outside 0 to 999; ignoring it"
                 mark = element.mark_of("collision groups")
-                self.report(Diagnostic(Severity.WARNING, message, mark, "groups are 0 to 999", "group"))
+                self.report(Diagnostic(Severity.WARNING, message, mark, "use 0 to 999", "group"))
         return tuple(g for g in groups if 0 <= g <= 999)
 
-    def _add_ghosts(self, document: Document, model: Model, context: FileContext) -> None:
-        for element in document.elements("ghost objects"):
-            identity = self._identity("ghost", element, model.namespace, model.index)
-            try:
-                ghost = attached.ghost(element, len(self.ghosts), identity, context)
-            except GeometryError as error:
-                self._names["ghost"].identifiers.pop()
-                self.report(error.diagnostic)
-                continue
-            self.ghosts.append(ghost)
-            self._wait("ghost", identity, ghost.index)
+    def _add_mounts(self, parts: Mounts, model: Model) -> None:
+        kinds: tuple[tuple[str, tuple[Part[Any], ...]], ...] = (("light", parts.lights), ("camera", parts.cameras))
+        for kind, each in kinds:
+            made = self._list(kind)
+            for part in each:
+                assert part.make is not None  # every camera and light can be built
+                identity = self._identity(kind, part.element, model)
+                self._wait(kind, identity, len(made))
+                made.append(part.make(index=len(made), identity=identity))
 
-    def _add_sensors(self, document: Document, model: Model, local: list[int]) -> None:
-        for element in document.elements("sensors"):
+    def _add_ghosts(self, parts: ModelParts, model: Model) -> None:
+        for part in parts.ghosts:
+            self.diagnostics += part.findings
+            if part.make is not None:
+                identity = self._identity("ghost", part.element, model)
+                self._wait("ghost", identity, len(self.ghosts))
+                self.ghosts.append(part.make(index=len(self.ghosts), identity=identity))
+
+    def _add_sensors(self, parts: ModelParts, model: Model, local: list[int]) -> None:
+        for part in parts.sensors:
+            element = part.element
             parent = self._body(element, "parent", local, "")
             if parent is None:
                 continue
-            try:
-                rays = attached.sensor_rays(element, document.path.parent, self.resolver)
-            except GeometryError as error:
-                self.report(error.diagnostic)
+            self.diagnostics += part.findings
+            if part.make is None:
                 continue
-            identity = self._identity("sensor", element, model.namespace, model.index)
-            sensor = sensor_of(element, len(self.sensors), identity, parent, rays)
-            if sensor.type is not SensorType.CONTACT and not len(rays):
+            identity = self._identity("sensor", element, model)
+            sensor = part.make(index=len(self.sensors), identity=identity, parent=parent)
+            if sensor.type is not SensorType.CONTACT and not len(sensor.rays):
                 self._names["sensor"].identifiers.pop()
                 message = f"sensor '{element.key}' has no rays and is left out"
-                self.report(
-                    Diagnostic(Severity.WARNING, message, element.mark, "give array, mesh or parametric", "sensor")
-                )
+                hint = "add 'array', 'mesh' or 'parametric'"
+                self.report(Diagnostic(Severity.WARNING, message, element.mark, hint, "sensor"))
                 continue
             self.sensors.append(sensor)
 
     def _add_actuators(self, document: Document, model: Model, local: list[int]) -> None:
         for element in document.elements("actuators"):
             parent = self._body(element, "parent", local, "")
-            if parent is None:
-                continue
-            identity = self._identity("actuator", element, model.namespace, model.index)
-            T_body_actuator = self.bodies[parent].T_body_inertial @ pose_matrix(*element.pose("location"))
-            self.actuators.append(
-                Actuator(
-                    len(self.actuators), identity, parent, T_body_actuator,
-                    element.flag("visible"), element.number("visible size"), attached.slip(element),
-                )
-            )  # fmt: skip
+            if parent is not None:
+                identity = self._identity("actuator", element, model)
+                self.actuators.append(actuator_of(element, len(self.actuators), identity, self.bodies[parent]))
 
     def _add_joints(self, document: Document, model: Model, local: list[int]) -> None:
         for element in document.elements("joints"):
@@ -354,14 +340,16 @@ class SceneBuilder:
             if parent is None or child is None:
                 continue
             if parent == child:
-                message = f"joint '{element.key}' joins a body to itself"
+                message = f"joint '{element.key}' has the same body as parent and child"
                 self.report(Diagnostic(Severity.ERROR, message, element.mark, "name two bodies", "joint"))
                 continue
             if not np.any(element.vector("parent axis")) or not np.any(element.vector("child axis")):
                 message = f"joint '{element.key}' has an axis of length zero"
-                self.report(Diagnostic(Severity.ERROR, message, element.mark, "give a direction", "joint"))
+                self.report(
+                    Diagnostic(Severity.ERROR, message, element.mark, "set a direction of non-zero length", "joint")
+                )
                 continue
-            identity = self._identity("joint", element, model.namespace, model.index)
+            identity = self._identity("joint", element, model)
             scales = (self._scales[parent], self._scales[child])
             self.joints.append(
                 joint_of(element, len(self.joints), identity, self.bodies[parent], self.bodies[child], scales)

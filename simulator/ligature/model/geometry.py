@@ -162,7 +162,7 @@ def primitive(element: Element, shape_key: str, geometry: str, T: Array) -> Coll
         normal = np.array(element.vector(f"{geometry}.normal"))
         length = float(np.linalg.norm(normal))
         if length == 0.0:
-            raise _error(element, geometry, "the normal of the plane is zero", "give a direction")
+            raise _error(element, geometry, "the normal of the plane is zero", "set a direction of non-zero length")
         return Collider(Plane(normal / length, (element.value(f"{geometry}.offset") or 0.0) / length), T)
     round_shapes: dict[str, type[Cylinder] | type[Capsule] | type[Cone]]
     round_shapes = {"CYLINDER": Cylinder, "CAPSULE": Capsule, "CONE": Cone}
@@ -286,7 +286,7 @@ def _mesh_path(element: Element, name: str, key: str, context: FileContext, leve
     if high is not None and high.is_file():
         context.report(
             Diagnostic(
-                Severity.WARNING, f"'{text}' does not exist; the high-resolution mesh is taken",
+                Severity.WARNING, f"'{text}' does not exist; using the high-resolution mesh",
                 element.mark_of(key), f"looked for {path}", "mesh",
             )
         )  # fmt: skip

@@ -83,7 +83,7 @@ def load(
     elif document.kind == "model":
         scene = _load_models([document], files, resolver, start.stem, arms)
     else:
-        message = f"'{start}' is {document.kind} file, not a launch or model file"
+        message = f"'{start}' is a {document.kind} file, not a launch or model file"
         raise SceneError(Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file"))
     if not scene.bodies:
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
@@ -130,9 +130,7 @@ def _load_launch(
     builder.diagnostics += found
     if world is not None:
         _add_environment(world, builder, resolver)
-        before = builder.counts()
-        builder.add_cameras_and_lights(world, world.top.text("namespace"), -1)
-        builder.arrive(before)
+        builder.add_world(world)
     for document in _extra(files, resolver, builder):
         builder.diagnostics += document.diagnostics
         builder.add_model(document, shaders)
@@ -215,7 +213,7 @@ def _selected(
     documents = []
     for index in range(count) if models is None else models:
         if not 0 <= index < count:
-            message = f"there is no model {index}; 'multibody configs' lists {count}, counted from 0"
+            message = f"model index {index} is out of range; 'multibody configs' lists {count}, counted from 0"
             builder.report(Diagnostic(Severity.ERROR, message, launch.top.mark_of("multibody configs"), "", "index"))
             continue
         reference = launch.models[index]
@@ -252,7 +250,9 @@ def _add_devices(
     builder.devices += [_device(element) for element in elements]
     for index in dict.fromkeys(chosen):
         if not 0 <= index < len(elements):
-            message = f"there is no input device {index}; 'input devices' lists {len(elements)}, counted from 0"
+            message = (
+                f"input device index {index} is out of range; 'input devices' lists {len(elements)}, counted from 0"
+            )
             builder.report(Diagnostic(Severity.ERROR, message, document.top.mark_of("input devices"), "", "index"))
         elif elements[index].text("simulated multibody"):
             proxy = _proxy(elements[index], document, builder, resolver, shaders)

@@ -94,7 +94,7 @@ def find_needles(
 
 
 def _tail(joint: Joint, body: int) -> Array:
-    """Where a thread is tied to ``body``, in its inertial frame."""
+    """Where a thread is attached to ``body``, in its inertial frame."""
     return np.asarray((joint.T_parent_a if joint.parent == body else joint.T_child_b)[:3, 3])
 
 

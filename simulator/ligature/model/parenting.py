@@ -37,9 +37,15 @@ class Arrivals:
     def report_orphans(self) -> None:
         """State which objects found no parent."""
         for identifier, text, mark in self.waiting.values():
-            message = f"'{identifier}' has the parent '{text}', that is missing or not unique"
+            message = f"'{identifier}' has the parent '{text}', which is missing or ambiguous"
             self.diagnostics.append(
-                Diagnostic(Severity.WARNING, message, mark, "its location is taken in the world frame", "parent")
+                Diagnostic(
+                    Severity.WARNING,
+                    message,
+                    mark,
+                    "its location is read in the world frame; name one existing object",
+                    "parent",
+                )
             )
 
     def _settle(self, newcomer: Key, identifier: str) -> None:
@@ -49,7 +55,7 @@ class Arrivals:
             elif text == identifier or text in identifier:
                 parent = newcomer
                 if text != identifier:
-                    message = f"parent '{text}' is taken to be '{identifier}'"
+                    message = f"parent '{text}' is incomplete; using '{identifier}'"
                     self.diagnostics.append(Diagnostic(Severity.INFO, message, mark, "", "parent"))
             else:
                 parent = None

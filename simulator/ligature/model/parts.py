@@ -1,9 +1,12 @@
-"""Bodies, joints and attached objects of one element each, before references are settled.
+"""Bodies, joints and sensors of one element each; bodies and sensors before they have index and identity.
 
 Frames and units as in `ligature.model.scene`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -31,15 +34,11 @@ _INERTIAL_KEYS = ("inertia", "inertial offset", "gravity")
 SIX = tuple(f"{half}.{axis}" for half in ("linear", "angular") for axis in "xyz")
 
 
-def body_of(
-    element: Element,
-    index: int,
-    identity: Identity,
-    context: FileContext,
-    gravity: Array,
-    shaders: ShaderFiles | None,
-) -> Body:
-    """A body without its joints; ``gravity`` (3,) holds unless the body has its own. Raises `GeometryError`."""
+def body_of(element: Element, context: FileContext, gravity: Array, shaders: ShaderFiles | None) -> Callable[..., Body]:
+    """Makes a body, without its joints, of ``index`` and ``identity``.
+
+    ``gravity`` (3,) holds unless the body has its own. Raises `GeometryError`.
+    """
     inertial_block = element.has("mass")
     if not inertial_block:
         _warn_no_mass(element, context)
@@ -54,9 +53,8 @@ def body_of(
         size = estimate_size(shapes, T_body_inertial, margin)
         inertia = np.zeros(3) if size is None else box_inertia(mass, size)
     own_gravity = inertial_block and element.has("gravity")
-    return Body(
-        index=index,
-        identity=identity,
+    return partial(
+        Body,
         mass=mass,
         inertia=inertia,
         T_body_inertial=T_body_inertial,
@@ -89,7 +87,7 @@ def _warn_no_mass(element: Element, context: FileContext) -> None:
     ignored = [key for key in _INERTIAL_KEYS if element.has(key)]
     severity = Severity.WARNING if ignored else Severity.INFO
     rest = f", and its {', '.join(ignored)} has no effect" if ignored else ""
-    message = f"body '{element.key}' has no 'mass': 1 kg is taken{rest}"
+    message = f"body '{element.key}' has no 'mass'; using 1 kg{rest}"
     context.report(Diagnostic(severity, message, element.mark, "add mass: kilograms; 0 makes it static", "mass"))
 
 
@@ -207,13 +205,11 @@ def _cone_twist(element: Element, kind: JointType) -> tuple[float, float, float]
     )
 
 
-def sensor_of(element: Element, index: int, identity: Identity, parent: int, rays: Array) -> Sensor:
-    """A sensor on the body ``parent`` with its ``rays`` (n, 2, 3) in the sensor frame."""
-    return Sensor(
-        index=index,
-        identity=identity,
+def sensor_of(element: Element, rays: Array) -> Callable[..., Sensor]:
+    """Makes a sensor with its ``rays`` (n, 2, 3) in the sensor frame of ``index``, ``identity`` and ``parent``."""
+    return partial(
+        Sensor,
         type=SensorType[element.text("type")],
-        parent=parent,
         T_body_sensor=pose_matrix(*element.pose("location")),
         rays=rays,
         range=element.number("range"),

@@ -40,7 +40,7 @@ def rod_chains(bodies: Sequence[Body], joints: Sequence[Joint], opted_out: froze
     return tuple(chains)
 
 
-def without_ties_between(
+def without_joints_between(
     chains: Sequence[RodChain], joints: Sequence[Joint]
 ) -> tuple[tuple[RodChain, ...], tuple[Joint, ...]]:
     """The chains with the anchors that a rod can have, to bodies outside all rods, and the joints that are none."""

@@ -515,7 +515,7 @@ class RodChain:
     """A chain of bodies that is simulated as one elastic rod (DESIGN §4.1), from end to end.
 
     ``bodies`` are the elements in order, ``joints`` the joints between neighbours. ``anchors`` are
-    the joints that tie an element to a body outside the chain. ``radius`` in metres, ``lengths``
+    the joints that attach an element to a body outside the chain. ``radius`` in metres, ``lengths``
     (n,) the rest length of each element between its joint pivots, along the element's local axis.
     """
 

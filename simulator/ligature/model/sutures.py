@@ -133,7 +133,7 @@ def _bend(
 
 
 def _swage(element: Element, identity: Identity, index: int, parent: Body, first: Body, length: float) -> Joint:
-    """The fixed joint that ties the start of the thread to its parent."""
+    """The fixed joint that attaches the start of the thread to its parent."""
     T_parent_start = pose_matrix(*element.pose("location"))
     T_inertial = np.linalg.inv(parent.T_body_inertial) @ T_parent_start
     T_zero = T_parent_start @ frame(np.eye(3), (0.0, 0.0, length / 2))

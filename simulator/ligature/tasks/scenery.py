@@ -52,7 +52,7 @@ class Scenery:
             raise MissingBodies(
                 f"the scene '{scene.name}' has {len(holes)} pairs of holes Entry1, Exit1, …, not {pairs}"
             )
-        thread = next((rod.bodies for rod in scene.rods if _tied(scene, rod, needle.body)), ())
+        thread = next((rod.bodies for rod in scene.rods if _attached(scene, rod, needle.body)), ())
         tips = tuple(arm.tip for arm in scene.arms if arm.kind is ArmKind.PSM)
         return cls(
             needle.body, along @ T[:3, :3].T + T[:3, 3], tuple(a for a, _ in holes), tuple(b for _, b in holes), tips,
@@ -75,6 +75,6 @@ def _pairs(scene: Scene) -> list[tuple[int, int]]:
     return [(pair["Entry"], pair["Exit"]) for _, pair in sorted(found.items()) if len(pair) == 2]
 
 
-def _tied(scene: Scene, rod: Any, body: int) -> bool:
+def _attached(scene: Scene, rod: Any, body: int) -> bool:
     """Whether a rod is anchored to a body."""
     return any(body in (scene.joints[j].parent, scene.joints[j].child) for j in rod.anchors)

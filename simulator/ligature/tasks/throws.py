@@ -23,7 +23,7 @@ PAD = 0.0094
 """Metres from the control point of a tool to where it holds: near the end of its fingers, as the needle lies flat."""
 
 SHAFT_RADIUS, WRIST_RADIUS = 0.00425, 0.0026
-SHAFT_END, PALM, PINCH = 3, 4, 5
+SHAFT_END, PALM, JAW = 3, 4, 5
 """Radii of the instrument in metres, and which link frames of a PSM are at the end of its shaft."""
 
 LEAST_CLEARANCE = 0.0006
@@ -68,7 +68,7 @@ class NeedleArc:
 
 
 @dataclass(frozen=True)
-class Grip:
+class NeedleGrasp:
     """How a tool holds a needle: ``depth`` metres from its tip; ``tilt``, ``pivot`` and ``flipped`` describe how."""
 
     depth: float
@@ -122,16 +122,16 @@ class Throw:
         return frame(self.axes @ axis_rotation((0.0, 0.0, 1.0), tip - arc.end), self.centre)
 
 
-def grips(depths: Sequence[float], upright: bool) -> Iterator[Grip]:
+def grasps(depths: Sequence[float], upright: bool) -> Iterator[NeedleGrasp]:
     """All ways to hold a needle that are worth a try; ``upright`` ones stand on its plane, to pick it up."""
     for depth in depths:
         for tilt in (0.0,) if upright else TILTS:
             for pivot in (0.0,) if upright else PIVOTS:
                 for flipped in (False, True):
-                    yield Grip(depth, float(tilt), float(pivot), flipped)
+                    yield NeedleGrasp(depth, float(tilt), float(pivot), flipped)
 
 
-def best_grip(
+def best_grasp(
     arc: NeedleArc,
     depths: Sequence[float],
     kinematics: Psm,
@@ -140,8 +140,8 @@ def best_grip(
     now: Array,
     surface: Array,
     upright: bool = False,
-) -> Grip | None:
-    """The grip farthest from the limits of a tool's joints of those that reach ``way`` (k, 4, 4) without a swing.
+) -> NeedleGrasp | None:
+    """The grasp farthest from the limits of a tool's joints of those that reach ``way`` (k, 4, 4) without a swing.
 
     It must also reach the needle where it is ``now`` (4, 4), from 15 mm behind, and on the way keep clear of the
     tissue, whose upper side is level through the point ``surface`` (3,).
@@ -149,8 +149,8 @@ def best_grip(
     T_base = inverse(T_world_base)
     best, best_margin = None, 0.0
     span = kinematics.upper - kinematics.lower
-    for grip in grips(depths, upright):
-        T_arc_tool = grip.tool_in_arc(arc)
+    for grasp in grasps(depths, upright):
+        T_arc_tool = grasp.tool_in_arc(arc)
         path = kinematics.inverse(np.array([T_base @ T @ T_arc_tool for T in way]))
         if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max(initial=0.0) > JUMP:
             continue
@@ -164,9 +164,9 @@ def best_grip(
             continue
         q = np.vstack([path.q, start.q])
         inside = np.minimum(q - kinematics.lower, kinematics.upper - q) / span
-        margin = float(inside.min()) - 0.05 * abs(grip.tilt) - 0.05 * abs(grip.pivot)
+        margin = float(inside.min()) - 0.05 * abs(grasp.tilt) - 0.05 * abs(grasp.pivot)
         if best is None or margin > best_margin:
-            best, best_margin = grip, margin
+            best, best_margin = grasp, margin
     return best
 
 
@@ -176,10 +176,10 @@ def clearance(kinematics: Psm, q: Array, T_world_base: Array, up: Array) -> floa
     The end of the shaft is a disc, the wrist a ball about its yaw axis.
     """
     frames = T_world_base @ kinematics.frames(q)
-    palm, pinch = frames[:, PALM, :3, 3] @ up, frames[:, PINCH, :3, 3] @ up
+    palm, jaw = frames[:, PALM, :3, 3] @ up, frames[:, JAW, :3, 3] @ up
     along = frames[:, SHAFT_END, :3, 2] @ up
     disc = palm - SHAFT_RADIUS * np.sqrt(np.maximum(1.0 - along**2, 0.0))
-    return float(min(disc.min(), (pinch - WRIST_RADIUS).min()))
+    return float(min(disc.min(), (jaw - WRIST_RADIUS).min()))
 
 
 def pose_of(pose7: Array) -> Array:

@@ -29,20 +29,20 @@ def plain(value):
 
 def scene_print():
     """Everything of the scene that a user could miss after an undo."""
-    told = []
+    report = []
     bpy.context.view_layer.update()
     for obj in sorted(bpy.data.objects, key=lambda o: o.name):
-        told.append([obj.name, [[round(v, 6) for v in row] for row in obj.matrix_world], plain(obj.get("adf"))])
-        told.append([obj.parent.name if obj.parent else "", obj.data.name if obj.data else "", list(obj.color)])
-        told.append([len(obj.modifiers), obj.hide_render, obj.display_type, obj.select_get(), obj.empty_display_type])
+        report.append([obj.name, [[round(v, 6) for v in row] for row in obj.matrix_world], plain(obj.get("adf"))])
+        report.append([obj.parent.name if obj.parent else "", obj.data.name if obj.data else "", list(obj.color)])
+        report.append([len(obj.modifiers), obj.hide_render, obj.display_type, obj.select_get(), obj.empty_display_type])
         if obj.type == "MESH":
-            told.append([len(obj.data.vertices), len(obj.data.polygons), [slot.name for slot in obj.material_slots]])
+            report.append([len(obj.data.vertices), len(obj.data.polygons), [slot.name for slot in obj.material_slots]])
     for collection in sorted(bpy.data.collections, key=lambda c: c.name):
-        told.append([collection.name, sorted(o.name for o in collection.objects), plain(collection.get("adf"))])
+        report.append([collection.name, sorted(o.name for o in collection.objects), plain(collection.get("adf"))])
     scene = bpy.context.scene
-    told.append([plain(scene.get("adf")), plain(scene.get("adf_rest")), scene.frame_end, len(bpy.data.actions)])
-    told.append(getattr(bpy.context.view_layer.objects.active, "name", ""))
-    return json.dumps(told)
+    report.append([plain(scene.get("adf")), plain(scene.get("adf_rest")), scene.frame_end, len(bpy.data.actions)])
+    report.append(getattr(bpy.context.view_layer.objects.active, "name", ""))
+    return json.dumps(report)
 
 
 @step
@@ -365,11 +365,11 @@ def decompose_in_the_background():
 
 
 def wait_for_pieces():
-    told = RESULT["background"]
-    told["waited"] += 1
-    told["most"] = max(told["most"], len(workers()))
-    told["pieces"] = len(pieces())
-    if not told["pieces"] and told["waited"] < 600:
+    report = RESULT["background"]
+    report["waited"] += 1
+    report["most"] = max(report["most"], len(workers()))
+    report["pieces"] = len(pieces())
+    if not report["pieces"] and report["waited"] < 600:
         STEPS.insert(0, wait_for_pieces)
 
 

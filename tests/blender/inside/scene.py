@@ -32,9 +32,9 @@ def model():
 
 def scene_print():
     """Everything that the user could miss: transforms, data, roles, selection."""
-    told = []
+    report = []
     for obj in sorted(bpy.data.objects, key=lambda o: o.name):
-        told.append(
+        report.append(
             [
                 obj.name,
                 [list(row) for row in obj.matrix_basis],
@@ -47,6 +47,6 @@ def scene_print():
                 len(obj.modifiers),
             ]
         )
-    told.append(sorted((c.name, len(c.objects)) for c in bpy.data.collections))
-    told.append([len(bpy.data.meshes), len(bpy.data.materials), len(bpy.data.scenes)])
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
+    report.append(sorted((c.name, len(c.objects)) for c in bpy.data.collections))
+    report.append([len(bpy.data.meshes), len(bpy.data.materials), len(bpy.data.scenes)])
+    return hashlib.sha256(json.dumps(report).encode()).hexdigest()

@@ -23,10 +23,10 @@ def snapshot(folder):
 def fails(operator, words, **arguments):
     """Runs an operator that must report an error which states ``words``; returns the report."""
     before = scene_print()
-    with pytest.raises(RuntimeError, match=words) as told:
+    with pytest.raises(RuntimeError, match=words) as report:
         operator(**arguments)
     assert scene_print() == before
-    return str(told.value)
+    return str(report.value)
 
 
 @pytest.mark.parametrize(
@@ -70,8 +70,8 @@ def test_a_malformed_mesh_is_reported_with_its_body_and_never_overwritten(tmp_pa
     (tmp_path / "m.yaml").write_text(MODEL)
     (tmp_path / "part.OBJ").write_text(text)
     before = snapshot(tmp_path)
-    collection, told = opened(tmp_path / "m.yaml")
-    assert "BODY part" in told and "part.OBJ" in told and "outside" not in told
+    collection, report = opened(tmp_path / "m.yaml")
+    assert "BODY part" in report and "part.OBJ" in report and "outside" not in report
     bpy.ops.adf.export_file(filepath=str(tmp_path / "m.yaml"), collection=collection.name)
     assert snapshot(tmp_path) == before
 
@@ -80,8 +80,8 @@ def test_one_bad_object_costs_itself_only(tmp_path):
     (tmp_path / "part.OBJ").write_text(GOOD_OBJ)
     text = MODEL.replace("joints: []", "joints: [JOINT a]")
     (tmp_path / "m.yaml").write_text(text + "JOINT a:\n  name: a\n  type: hinge\n  parent: BODY part\n")
-    collection, told = opened(tmp_path / "m.yaml")
-    assert "JOINT a" in told and "child axis" in told
+    collection, report = opened(tmp_path / "m.yaml")
+    assert "JOINT a" in report and "child axis" in report
     assert "BODY part" in {obj.adf.key for obj in collection.objects}
     bpy.ops.adf.export_file(filepath=str(tmp_path / "out.yaml"), collection=collection.name)
     assert (tmp_path / "out.yaml").read_bytes() == (tmp_path / "m.yaml").read_bytes()
@@ -92,8 +92,8 @@ def test_a_missing_texture_is_reported_with_its_body_and_its_name_stays_in_the_f
     (tmp_path / "part.OBJ").write_text("mtllib part.mtl\nusemtl skin\n" + GOOD_OBJ)
     (tmp_path / "part.mtl").write_text("newmtl skin\nKd 1 0 0\nmap_Kd gone.png\n")
     before = snapshot(tmp_path)
-    collection, told = opened(tmp_path / "m.yaml")
-    assert "BODY part" in told and "gone.png" in told
+    collection, report = opened(tmp_path / "m.yaml")
+    assert "BODY part" in report and "gone.png" in report
     bpy.ops.adf.export_file(filepath=str(tmp_path / "m.yaml"), collection=collection.name)
     assert snapshot(tmp_path) == before
 
@@ -180,8 +180,8 @@ def test_an_object_without_a_place_is_named_and_nothing_is_written(tmp_path, val
         change = "scale" if value == 0.0 else "location"
         kept = tuple(getattr(obj, change))
         setattr(obj, change, (value, *kept[1:]))
-        told = "has a scale of zero" if value == 0.0 else "has a transform that is not a number"
-        fails(bpy.ops.adf.export_file, f"'{obj.name}' {told}", **target)
+        report = "has a scale of zero" if value == 0.0 else "has a transform that is not a number"
+        fails(bpy.ops.adf.export_file, f"'{obj.name}' {report}", **target)
         assert snapshot(tmp_path) == before
         setattr(obj, change, kept)
     assert bpy.ops.adf.export_file(**target) == {"FINISHED"}
@@ -216,8 +216,8 @@ def test_a_path_that_cannot_be_written_is_named(tmp_path, place):
     (tmp_path / "folder").mkdir()
     before = snapshot(tmp_path)
     path = place.format(tmp_path)
-    told = fails(bpy.ops.adf.export_file, "cannot be written", filepath=path, collection=collection.name)
-    assert str(Path(path).parent) in told and collection.name in told
+    report = fails(bpy.ops.adf.export_file, "cannot be written", filepath=path, collection=collection.name)
+    assert str(Path(path).parent) in report and collection.name in report
     assert snapshot(tmp_path) == before
 
 

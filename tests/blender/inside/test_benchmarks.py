@@ -233,12 +233,12 @@ def test_b13_a_decomposition_can_be_cancelled_at_once_and_is_kept(monkeypatch, t
     job.cancel()
     assert time.monotonic() - start < 0.5 and job.finished
     job = Job(vertices, faces, settings)
-    told = set()
+    report = set()
     while not job.finished:
-        told.add(job.progress)
+        report.add(job.progress)
         time.sleep(0.05)
-    told.add(job.progress)
-    assert (1, 0.0) in told and max(share for _, share in told) == 1.0 and max(parts for parts, _ in told) >= 2
+    report.add(job.progress)
+    assert (1, 0.0) in report and max(share for _, share in report) == 1.0 and max(parts for parts, _ in report) >= 2
     pieces = job.pieces()
     start = time.monotonic()
     again = Job(vertices, faces, settings)

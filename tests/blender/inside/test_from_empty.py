@@ -124,14 +124,14 @@ def check_simulation(target):
         [python, "-c", SIMULATE, str(target)], capture_output=True, text=True, env=environment, timeout=270
     )
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout.splitlines()[-1])
-    assert told["errors"] == [] and told["ghosts"] == 2 and told["cameras"] == 3 and told["lights"] == 1
-    for name, (_, end) in told["bodies"].items():
+    report = json.loads(done.stdout.splitlines()[-1])
+    assert report["errors"] == [] and report["ghosts"] == 2 and report["cameras"] == 3 and report["lights"] == 1
+    for name, (_, end) in report["bodies"].items():
         assert np.isfinite(end).all(), name
-    needle = next(v for k, v in told["bodies"].items() if k.endswith("Needle"))
+    needle = next(v for k, v in report["bodies"].items() if k.endswith("Needle"))
     assert needle[1][2] < needle[0][2] - 0.005
     for name, height in (("ground", -0.01), ("link1", 0.28), ("link2", 0.42), ("phantom", 0.02)):
-        start, end = next(v for k, v in told["bodies"].items() if k.endswith(name))
+        start, end = next(v for k, v in report["bodies"].items() if k.endswith(name))
         assert start[2] == pytest.approx(height, abs=1e-6)
         assert abs(end[2] - height) < 0.06
 

@@ -237,9 +237,9 @@ def test_what_would_not_be_written_as_it_looks_is_reported():
     bpy.ops.adf.make(role="BODY")
     bpy.context.scene.unit_settings.system, bpy.context.scene.unit_settings.scale_length = "METRIC", 0.001
     bpy.ops.adf.check()
-    told = {f.rule: f.message for f in bpy.context.scene.adf.findings}
-    assert told["not-a-mesh"] == "rim: its shape is a curve, which is not written"
-    assert told["unit-scale"] == "Scene: its unit scale is 0.001, and lengths are written as metres"
+    report = {f.rule: f.message for f in bpy.context.scene.adf.findings}
+    assert report["not-a-mesh"] == "rim: its shape is a curve, which is not written"
+    assert report["unit-scale"] == "Scene: its unit scale is 0.001, and lengths are written as metres"
 
 
 def test_a_launch_file_among_dropped_files_is_opened_with_all_that_it_names():

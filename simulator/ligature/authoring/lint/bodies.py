@@ -212,10 +212,10 @@ def overlap_at_rest(subject: Subject) -> Iterator[Finding]:
     """Bodies that start inside each other are thrown apart."""
     if subject.document.top.flag("ignore inter-collision"):
         return
-    tied = {frozenset((a.key, b.key)) for a, b in _joined_pairs(subject)}
+    joined = {frozenset((a.key, b.key)) for a, b in _joined_pairs(subject)}
     placed = [(body, _world_shapes(subject, body)) for body in subject.bodies.values() if subject.shapes(body)]
     for (a, shapes_a), (b, shapes_b) in combinations(placed, 2):
-        if frozenset((a.key, b.key)) in tied or not (subject.moves(a) or subject.moves(b)) or _apart_by_groups(a, b):
+        if frozenset((a.key, b.key)) in joined or not (subject.moves(a) or subject.moves(b)) or _apart_by_groups(a, b):
             continue
         depth = max((_depth(s, t) for s in shapes_a for t in shapes_b), default=0.0)
         if depth > OVERLAP:

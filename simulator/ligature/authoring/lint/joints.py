@@ -131,7 +131,9 @@ def axes_nearly_antiparallel(subject: Subject) -> Iterator[Finding]:
         b = _turn(child).T @ np.asarray(joint.vector("child axis"))
         length = np.linalg.norm(a) * np.linalg.norm(b)
         if length == 0.0:
-            yield Finding("axis-zero", Severity.ERROR, joint.key, "an axis is zero", "give a direction")
+            yield Finding(
+                "axis-zero", Severity.ERROR, joint.key, "an axis is zero", "set a direction of non-zero length"
+            )
             continue
         angle = float(np.arccos(np.clip(a @ b / length, -1.0, 1.0)))
         if 3.13 < angle < np.pi - 1e-6:

@@ -59,7 +59,7 @@ def from_mjcf(model: Any) -> Converted:
     groups = _need_groups(model, notes)
     items = [_body(model, body, solid[body], poses, groups, meshes, notes) for body in bodies]
     items += [_plane(model, g, poses) for g in range(model.ngeom) if model.geom_type[g] == _PLANE]
-    _tell_rest(model, notes)
+    _note_unsupported(model, notes)
     top = {"gravity": vector(model.opt.gravity)}
     return Converted(Parts((*items, *joints), meshes), notes, top)
 
@@ -71,8 +71,8 @@ def _bodies(model: Any, notes: list[str]) -> list[int]:
         if owner == body:
             found.append(body)
         else:
-            holder = name_of(model, "body", owner)
-            notes.append(f"body '{name_of(model, 'body', body)}' has no mass; its geoms are part of '{holder}'")
+            owner_name = name_of(model, "body", owner)
+            notes.append(f"body '{name_of(model, 'body', body)}' has no mass; its geoms are part of '{owner_name}'")
         if model.body_mocapid[body] >= 0:
             notes.append(f"body '{name_of(model, 'body', body)}' is moved by motion capture; here it stands still")
     return found
@@ -95,8 +95,8 @@ def _body(
     drawn = [g for g in geoms if model.geom_group[g] < _HIDDEN_GROUPS and _colour(model, g)[3] > 0.0]
     touched = [g for g in geoms if _collides(model, g)]
     for prefix, chosen in (("", drawn), ("collision ", touched)):
-        told = notes if prefix or not touched else []  # what is drawn and collides is reported once
-        values.update(shape_keys(name, prefix, *_shapes(model, chosen, poses[body], poses, told), meshes))
+        notes_of_group = notes if prefix or not touched else []  # what is drawn and collides is reported once
+        values.update(shape_keys(name, prefix, *_shapes(model, chosen, poses[body], poses, notes_of_group), meshes))
     if "mesh" in values:
         values["use material"] = False
     elif drawn:
@@ -201,7 +201,7 @@ def _triangles(model: Any, mesh: int) -> tuple[Array, Any]:
     return vertices, np.asarray(model.mesh_face[first : first + count], dtype=np.int32)
 
 
-def _tell_rest(model: Any, notes: list[str]) -> None:
+def _note_unsupported(model: Any, notes: list[str]) -> None:
     """What of the model has no counterpart."""
     for size, kind, plural in _LEFT_OUT:
         count = int(getattr(model, size, 0))

@@ -37,7 +37,7 @@ def joints_of(model: Any, body: int, poses: list[Array], notes: list[str]) -> It
     if kinds == [_FREE] or (not joints and is_static(model, body)):
         return
     for joint in joints:
-        _tell_joint(model, joint, notes)
+        _note_unsupported(model, joint, notes)
     if not joints:
         label, values, T_joint = name, {"type": "fixed"}, np.eye(4)
     elif kinds == [_BALL]:
@@ -194,7 +194,7 @@ def _six_keys(model: Any, used: dict[int, tuple[int, float]]) -> dict[str, Any]:
     return values
 
 
-def _tell_joint(model: Any, joint: int, notes: list[str]) -> None:
+def _note_unsupported(model: Any, joint: int, notes: list[str]) -> None:
     """What of a joint has no counterpart."""
     name, kind, dof = name_of(model, "jnt", joint), int(model.jnt_type[joint]), int(model.jnt_dofadr[joint])
     lost = []

@@ -1,10 +1,12 @@
-"""Ghosts, cameras, lights and ray sensors of one element each; parents are settled by the builder.
+"""Objects mounted on bodies: ghosts, cameras, lights and ray sensors of one element each, before parents are settled.
 
 Frames and units as in `ligature.model.scene`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,33 +18,39 @@ from ligature.model.frames import Array, axis_rotation, pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
 from ligature.model.parts import camera_frame, light_frame
 from ligature.model.piercing import Tissue
-from ligature.model.scene import Attachment, Camera, Ghost, Identity, Light, SensorType, Slip
+from ligature.model.scene import Actuator, Attachment, Body, Camera, Ghost, Identity, Light, SensorType, Slip
 
 STATIC_CUTOFF = np.pi / 2
 """Largest half angle of a light; larger ones are clamped (§19)."""
 
 
-def ghost(element: Element, index: int, identity: Identity, context: FileContext) -> Ghost:
-    """A ghost object (§16); raises `GeometryError` when it has no shape."""
+def ghost_of(element: Element, context: FileContext) -> Callable[..., Ghost]:
+    """Makes a ghost object (§16) of ``index`` and ``identity``; raises `GeometryError` when it has no shape."""
     fallback = pose_matrix(*element.pose("inertial offset")) if element.has("inertial offset") else np.eye(4)
     shapes = colliders(element, context, fallback)
     if not shapes:
         message = f"ghost object '{element.key}' has no collision shape and is left out"
         raise GeometryError(Diagnostic(Severity.ERROR, message, element.mark, "add 'collision shape'", "geometry"))
-    return Ghost(
-        index,
-        identity,
-        Attachment(None, pose_matrix(*element.pose("location"))),
-        shapes,
-        visual(element, context, None),
-        tuple(int(g) for g in element.numbers("collision groups")),
-        element.number("collision margin"),
-        element.value("ligature hole"),
-        _tissue(element),
+    return partial(
+        Ghost,
+        attachment=Attachment(None, pose_matrix(*element.pose("location"))),
+        colliders=shapes,
+        visual=visual(element, context, None),
+        collision_groups=tuple(int(g) for g in element.numbers("collision groups")),
+        collision_margin=element.number("collision margin"),
+        hole=element.value("ligature hole"),
+        tissue=_tissue(element),
     )
 
 
-def slip(element: Element) -> Slip | None:
+def actuator_of(element: Element, index: int, identity: Identity, parent: Body) -> Actuator:
+    """An actuator on ``parent``."""
+    T_body_actuator = parent.T_body_inertial @ pose_matrix(*element.pose("location"))
+    visible, size = element.flag("visible"), element.number("visible size")
+    return Actuator(index, identity, parent.index, T_body_actuator, visible, size, _slip(element))
+
+
+def _slip(element: Element) -> Slip | None:
     """How an actuator yields; None for one that holds rigidly."""
     if not element.has("ligature slip"):
         return None
@@ -56,18 +64,17 @@ def _tissue(element: Element) -> Tissue:
     return Tissue(**{name: value for name, value in values.items() if value is not None})
 
 
-def light(element: Element, index: int, identity: Identity) -> Light:
-    """A light (§19)."""
+def light_of(element: Element) -> Callable[..., Light]:
+    """Makes a light (§19) of ``index`` and ``identity``."""
     direction = np.array(element.vector("direction")) if element.has("direction") else None
     rpy = element.vector("location.orientation")
-    return Light(
-        index,
-        identity,
-        Attachment(None, light_frame(np.array(element.vector("location")), direction, rpy)),
-        element.number("spot exponent"),
-        min(max(element.number("cutoff angle"), 0.0), STATIC_CUTOFF),
-        element.integer("shadow quality"),
-        (
+    return partial(
+        Light,
+        attachment=Attachment(None, light_frame(np.array(element.vector("location")), direction, rpy)),
+        spot_exponent=element.number("spot exponent"),
+        cutoff=min(max(element.number("cutoff angle"), 0.0), STATIC_CUTOFF),
+        shadow_quality=element.integer("shadow quality"),
+        attenuation=(
             element.number("attenuation.constant"),
             element.number("attenuation.linear"),
             element.number("attenuation.quadratic"),
@@ -75,16 +82,15 @@ def light(element: Element, index: int, identity: Identity) -> Light:
     )
 
 
-def camera(element: Element, index: int, identity: Identity, folder: Path) -> Camera:
-    """A camera (§18); shader paths are joined to ``folder``."""
+def camera_of(element: Element, folder: Path) -> Callable[..., Camera]:
+    """Makes a camera (§18) of ``index`` and ``identity``; shader paths are joined to ``folder``."""
     T = camera_frame(*(np.array(element.vector(k)) for k in ("location", "look at", "up")))
     stereo = None
     if element.has("stereo"):
         stereo = (element.number("stereo.eye separation"), element.number("stereo.focal length"))
     matrix = element.value("projection matrix")
-    return Camera(
-        index=index,
-        identity=identity,
+    return partial(
+        Camera,
         attachment=Attachment(None, T),
         near=element.number("clipping plane.near"),
         far=element.number("clipping plane.far"),
