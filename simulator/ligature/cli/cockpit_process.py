@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, tell
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.cockpit.address import TOKEN_VARIABLE, AddressError, read_address
 from ligature.cockpit.pictures import Pictures
 from ligature.model.state import state_dtype
+from ligature.process import end_with_parent, tell
 
 if TYPE_CHECKING:
     from ligature.ros.health import TopicHealth

@@ -7,11 +7,11 @@ from typing import NoReturn
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, tell
 from ligature.bus.stop import Stop, stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.model.scene import Scene
 from ligature.model.state import state_dtype
+from ligature.process import end_with_parent, tell
 
 SCENE_TIMEOUT = 10.0
 """Seconds to wait for the end of the run, for which the physics process gives the reasons."""

@@ -14,12 +14,12 @@ import numpy as np
 import ligature
 from ligature.adf import Severity
 from ligature.bus import Block, BusError, Mailbox, Pace, Pacer, Recording, Throttle
-from ligature.bus.process import end_with_parent, tell
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.cli.recorder import Recorder
 from ligature.model.commands import Command
 from ligature.model.messages import Message, handle
+from ligature.process import end_with_parent, tell
 from ligature.simulation import Simulation
 
 TICK = 1e-3

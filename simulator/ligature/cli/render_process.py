@@ -13,13 +13,13 @@ import numpy as np
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, tell
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.joining import SCENE_TIMEOUT
 from ligature.cli.options import RunOptions
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Camera, Scene
 from ligature.model.state import new_state, state_dtype
+from ligature.process import end_with_parent, tell
 from ligature.render import CameraView, ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
 from ligature.render.calibration import calibrations
 from ligature.render.sensor import IDEAL

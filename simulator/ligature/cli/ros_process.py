@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ligature.bus.process import tell
 from ligature.cli.joining import give_up, join_run
+from ligature.process import tell
 
 
 def main() -> None:

@@ -7,10 +7,10 @@ import time
 
 import ligature
 from ligature.bus import Block, BusError, Outbox
-from ligature.bus.process import end_with_parent, tell
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.model.state import new_state, state_dtype
+from ligature.process import end_with_parent, tell
 from ligature.render import RenderUnavailable
 from ligature.render.viewer import Figures, Viewer
 from ligature.render.window import Window
