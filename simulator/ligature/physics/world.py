@@ -64,7 +64,12 @@ _KEPT = ("_held_up", "_gripped", "_passing", "stopped_fingers", "_impulses", "_n
 
 def failure(what: str, error: Exception) -> Diagnostic:
     """The finding that ``what`` failed with an exception, and that its command is cleared therefore."""
-    text = f"{what} failed, and its command is cleared: {type(error).__name__}: {str(error)[:MOST_CHARACTERS]}"
+    return failed(f"{what} failed, and its command is cleared", error)
+
+
+def failed(what: str, error: Exception) -> Diagnostic:
+    """The finding that an exception was raised, ``what`` states where."""
+    text = f"{what}: {type(error).__name__}: {str(error)[:MOST_CHARACTERS]}"
     return Diagnostic(Severity.ERROR, text, code="failed")
 
 
@@ -83,6 +88,10 @@ class Controllers(Subsystem):
 
     def reset(self) -> None:
         """Nothing: it is part of the world."""
+
+    def recover(self) -> None:
+        """Clear the commands of all bodies and joints."""
+        self._world.clear_commands()
 
     def snapshot(self) -> None:
         """Nothing: it is part of the world."""
@@ -192,6 +201,11 @@ class World(Subsystem, BulletQueries, BulletGrips):
         for joint in self.scene.bodies[body].joints:
             if joint in self._tree_of_joint:
                 self._tree_of_joint[joint].release(joint)
+
+    def clear_commands(self) -> None:
+        """Clear the commands of all bodies; their joints go limp."""
+        for body in self.scene.bodies:
+            self.release(body.index)
 
     # --- the tick ---------------------------------------------------------------------------
 
@@ -368,6 +382,11 @@ class World(Subsystem, BulletQueries, BulletGrips):
         self._weigh_again()
         self.hold_again(held)
         self._next_handle = handle
+
+    def recover(self) -> None:
+        """Put every body back, and clear all commands."""
+        self.clear_commands()
+        self.reset()
 
     def _restart(self, index: int, tree: Tree) -> None:
         self.place_of[tree.root].put(matrix_pose7(self.scene.start.roots[tree.root]))

@@ -82,6 +82,11 @@ class Actuators(Subsystem):
         """Go on holding what constraints hold; threads and what pads hold were let go."""
         self._holds = [hold if hold is not None and self._holder.holds(hold.handle) else None for hold in self._holds]
 
+    def recover(self) -> None:
+        """Let go of everything."""
+        for actuator in range(len(self._holds)):
+            self.release(actuator)
+
     def snapshot(self) -> list[_Hold | None]:
         """What every actuator holds; the constraints themselves are part of the physics."""
         return self._holds
