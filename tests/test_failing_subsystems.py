@@ -107,7 +107,8 @@ def test_a_subsystem_that_failed_rests_goes_on_and_is_reported_anew(
     assert calls[:4] == [0, 10, 20, 21]
     assert sum(problem.code == "failed" for problem in simulation.problems) == 2
     assert finite(simulation)
-    assert np.abs(simulation.state["body_twist"]).max() < 1.0, "what pushed bodies meanwhile acts at once"
+    speeds = np.abs(simulation.state["body_twist"][0, :, :3])
+    assert speeds.max() < 0.1, "what pushed bodies meanwhile acts at once"
 
 
 def test_a_step_that_fails_clears_the_commands_that_may_have_caused_it(

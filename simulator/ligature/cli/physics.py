@@ -36,6 +36,9 @@ ALARMS = ("speed", "diverged")
 
 ALARM_BYTES = 240
 
+MOST_NOTED = 8
+"""Findings a second that `/diagnostics` gets, the worst ones."""
+
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
 
@@ -177,6 +180,9 @@ class Loop:
             if problem.code in ALARMS:
                 figures["alarms"] += 1
                 figures["alarm"] = str(problem).encode("utf-8")[:ALARM_BYTES]
+        worst = sorted(self._simulation.problems, key=lambda problem: -problem.severity)
+        for problem in reversed(worst[:MOST_NOTED]):
+            self._block.note(problem.severity, str(problem))
         for problem in self._simulation.problems[:5]:
             tell("warning", str(problem))
         self._simulation.problems.clear()
