@@ -37,7 +37,7 @@ from ligature.model.messages import Message, handle
 from ligature.model.scene import Actuator, Body, Camera, Joint, Light, Scene
 from ligature.model.state import StateRecord, new_state
 from ligature.model.subsystem import Subsystem
-from ligature.physics import Controllers, World, failure
+from ligature.physics import Controllers, World, failed, failure
 from ligature.physics.guard import Guard
 from ligature.robots.commands import ArmCommand
 from ligature.sensing.actuators import Actuators
@@ -54,6 +54,9 @@ Handle = TypeVar("Handle")
 PHASES = ("control", "suture", "bodies", "sensing", "state")
 """What the time of a tick is spent on, in order."""
 
+
+REST = 1000
+"""Ticks for which a subsystem that failed is left out, and for which another failure of its kind is not reported."""
 
 GUARD_TICKS = 10
 """Ticks between two looks at bodies that are too fast: one takes 5 µs."""
@@ -228,6 +231,9 @@ class Simulation:
         }
         """What a tick does, phase by phase: all subsystems in the order of their steps."""
         self._subsystems = [subsystem for phase in self._tick.values() for subsystem in phase]
+        self._resting: dict[int, int] = {}
+        """Subsystems that are left out, by their number, and the tick from which each goes on."""
+        self._reported: dict[tuple[str, str], int] = {}
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._handlers: dict[type[Message], Callable[[Any], None]] = {
@@ -263,17 +269,54 @@ class Simulation:
         for phase, subsystems in self._tick.items():
             with self.phases[phase]:
                 for subsystem in subsystems:
-                    subsystem.step(self._clock.since_reset)
+                    if self._resting and self._rests(subsystem):
+                        continue
+                    try:
+                        subsystem.step(self._clock.since_reset)
+                    except Exception as error:  # nothing ends a run but its user
+                        self._leave_out(subsystem, error)
         self._clock.advance()
+
+    def _leave_out(self, subsystem: Subsystem, error: Exception) -> None:
+        """A step raised: the subsystem goes on from the start of the scene, without commands, after a rest."""
+        self._report(subsystem, "step", f"is put back to its start and left out for {REST * self.dt:g} s", error)
+        self._guarded(subsystem, "recover")
+        self._resting[self._subsystems.index(subsystem)] = self._clock.tick + REST
+
+    def _rests(self, subsystem: Subsystem) -> bool:
+        """Whether a subsystem is left out in this tick; it may be the one in which it goes on."""
+        number = self._subsystems.index(subsystem)
+        if self._resting.get(number, 0) > self._clock.tick:
+            return True
+        if self._resting.pop(number, None) is not None:  # Bullet adds up what pushes bodies meanwhile
+            self._guarded(subsystem, "recover")
+        return False
+
+    def _guarded(self, subsystem: Subsystem, name: str, *arguments: StateRecord) -> None:
+        """Have a subsystem do something other than a step; what it raises is reported, and the others go on."""
+        try:
+            getattr(subsystem, name)(*arguments)
+        except Exception as error:
+            self._report(subsystem, name, "goes on without", error)
+
+    def _report(self, part: Subsystem | Guard, name: str, outcome: str, error: Exception) -> None:
+        """Report a failure, unless the same method of the same part failed a moment ago."""
+        what, now = (type(part).__name__, name), self._clock.tick
+        if now >= self._reported.get(what, 0):
+            self._reported[what] = now + REST
+            self.problems.append(failed(f"'{name}' of {what[0]} failed, which {outcome}", error))
 
     def _watch(self) -> None:
         """Report what moves as nothing commands."""
         passed = self._clock.tick - self._watched
         if passed >= GUARD_TICKS:
             self._watched = self._clock.tick
-            alarm = self._guard.check(passed * self.dt)
-            if alarm is not None:
-                self.problems.append(alarm)
+            try:
+                alarm = self._guard.check(passed * self.dt)
+            except Exception as error:
+                self._report(self._guard, "check", "goes on without", error)
+            else:
+                self.problems += [alarm] if alarm is not None else []
 
     def _watch_anew(self) -> None:
         """Bodies were put elsewhere: they have the motion that the state has."""
@@ -284,12 +327,12 @@ class Simulation:
         """Fill the state record: what is, then what sensors make of it. Looking changes nothing."""
         with self.phases["state"]:
             for subsystem in self._subsystems:
-                subsystem.write_state(self.state)
+                self._guarded(subsystem, "write_state", self.state)
                 self.problems += subsystem.take_problems()
             self._clock.write_state(self.state, self.dt, self.ticks_per_update)
         with self.phases["sensing"]:
             for subsystem in self._subsystems:
-                subsystem.sense(self.state)
+                self._guarded(subsystem, "sense", self.state)
 
     @property
     def insertions(self) -> tuple[Insertion, ...]:
@@ -361,7 +404,8 @@ class Simulation:
         """
         for subsystem in reversed(self._subsystems):
             if not (bodies_only and subsystem is self._mounts):
-                subsystem.reset()
+                self._guarded(subsystem, "reset")
+        self._resting.clear()
         self._clock.restart()
         self._write_state()
         self._watch_anew()
@@ -374,7 +418,11 @@ class Simulation:
         Bullet keeps contacts that nobody can read. A snapshot drops them here, too, as `restore` does: a run that
         is snapshot goes on with other last bits than one that is not.
         """
-        parts = {"clock": self._clock, **{f"{n}": s.snapshot() for n, s in enumerate(self._subsystems)}}
+        parts = {
+            "clock": self._clock,
+            "resting": self._resting,
+            **{f"{n}": s.snapshot() for n, s in enumerate(self._subsystems)},
+        }
         taken = Snapshot(copy.deepcopy(parts), self.state.copy())
         self.restore(taken)
         return taken
@@ -382,7 +430,7 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot of this scene, taken here or elsewhere."""
         parts = copy.deepcopy(dict(snapshot.parts))
-        self._clock = parts["clock"]
+        self._clock, self._resting = parts["clock"], parts["resting"]
         for n, subsystem in reversed(list(enumerate(self._subsystems))):
             subsystem.restore(parts[f"{n}"])
         self.state[:] = snapshot.state

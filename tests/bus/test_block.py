@@ -158,3 +158,13 @@ def test_leftovers_of_another_user_are_left_alone(monkeypatch: pytest.MonkeyPatc
         patched.setattr(Path, "unlink", refuse)
         assert leftover.name not in remove_leftovers()
     leftover.unlink()
+
+
+def test_findings_are_kept_once_each_and_the_oldest_gives_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ligature.bus.block.FOLDER", tmp_path)
+    block = Block.create("findings", np.dtype([("x", "f8")]))
+    for number in (*range(10), 5, 5, 9):
+        block.note(2, f"finding {number} " + "é" * 300)
+    texts = [bytes(row["text"]).decode("utf-8", "ignore") for row in block.figures["findings"][0]]
+    assert sorted(text.split()[1] for text in texts) == [str(number) for number in range(2, 10)]
+    block.close()

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from ligature.bus.process import end_with_parent
+from ligature.process import end_with_parent
 
 BEGIN = """
 import os, signal, sys, threading, time

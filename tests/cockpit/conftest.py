@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 from ligature.bus import Block
 from ligature.bus.block import FOLDER
-from ligature.bus.process import end_with_parent
 from ligature.cockpit.stage import VIEW_ANGLE, first_view
 from ligature.model.frames import pose7_matrix
 from ligature.model.state import new_state
+from ligature.process import end_with_parent
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"

@@ -21,7 +21,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ligature.bus.process import end_with_parent
+from ligature.process import end_with_parent
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -36,7 +36,7 @@ STAGES = ("loading", "starting one", "physics ready", "ros ready", "first state"
 LONGEST = 1.5
 """Seconds from there to the end of a run at most: until it has reached the next stage or two."""
 
-START = 90.0
+START = 300.0
 """Seconds that a run is given to reach its stage."""
 
 _MARK = "LIGATURE_KILLS"

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import logging
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +18,7 @@ from ligature.adf import Resolver
 from ligature.mesh import Mesh, MeshPart, collision_parts, combined, hull_properties, load_mesh
 from ligature.mesh import decompose as module
 from ligature.mesh.decompose import DecompositionError, convex_pieces, decompose, obj_text
+from ligature.process import end_with_parent
 
 from tests.mesh.shapes import CUBE, ell
 
@@ -111,3 +119,54 @@ def test_thresholds_out_of_range_are_rejected(mesh: Mesh, threshold: float, text
 def test_a_mesh_without_triangles_is_refused() -> None:
     with pytest.raises(DecompositionError, match="the mesh holds no triangle"):
         decompose(Mesh(Path("/m.obj"), ()))
+
+
+LONG_WORK = """
+import io, json
+import numpy as np
+from scipy.spatial import ConvexHull
+from ligature.mesh.decompose import _run_coacd
+rng = np.random.default_rng(0)
+points = rng.normal(size=(900, 3))
+points /= np.linalg.norm(points, axis=1, keepdims=True)
+faces = ConvexHull(points).simplices
+stored = io.BytesIO()
+np.savez(stored, vertices=points * rng.uniform(0.3, 1.0, (900, 1)), faces=faces.astype(np.int32))
+_run_coacd(stored.getvalue(), json.dumps({"threshold": 0.01, "mcts_iterations": 2000, "resolution": 10000}), 300.0)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_coacd_ends_with_the_process_that_waits_for_it(number: int) -> None:
+    waiting = subprocess.Popen([sys.executable, "-c", LONG_WORK], preexec_fn=end_with_parent)
+    try:
+        worker = _eventually(lambda: _worker_of(waiting.pid))
+    finally:
+        waiting.send_signal(number)
+        waiting.wait()
+    _eventually(lambda: not _lives(worker))
+
+
+def _eventually(condition: Callable[[], Any]) -> Any:
+    """What ``condition`` returns once it is true."""
+    deadline = time.monotonic() + 60.0
+    while not (found := condition()):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    return found
+
+
+def _worker_of(parent: int) -> int | None:
+    """The process of CoACD that ``parent`` has started, once it is Python's and no longer a copy of the parent."""
+    for child in Path(f"/proc/{parent}/task/{parent}/children").read_text().split():
+        with suppress(OSError):
+            if b"coacd_process" in Path(f"/proc/{child}/cmdline").read_bytes():
+                return int(child)
+    return None
+
+
+def _lives(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False

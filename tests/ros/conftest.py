@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ligature.bus.process import end_with_parent
+from ligature.process import end_with_parent
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"

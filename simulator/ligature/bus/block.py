@@ -54,13 +54,15 @@ FIGURES = np.dtype(
         ("recording", "u8"),
         ("alarms", "u8"),
         ("alarm", "S240"),
+        ("findings", [("time", "f8"), ("severity", "u1"), ("text", "S400")], 8),
     ]
 )
 """Figures of the running loop; times in seconds, ``physics_beat`` on the monotonic clock.
 
 ``frames`` are pictures drawn for clients, ``frame_seconds`` is how long the last round of them took. ``recording`` is 1
 while a recording goes on that was asked for during the run. ``alarms`` counts bodies that moved as no command asks for
-or diverged; ``alarm`` is the newest, in UTF-8.
+or diverged; ``alarm`` is the newest, in UTF-8. ``findings`` are the last different ones of all kinds, each with the
+time at which it was noted last on the monotonic clock, 0 for none.
 """
 
 _STATE_AT = 4096
@@ -175,6 +177,15 @@ class Block:
     def active(self) -> bool:
         """Whether the physics process gave a sign of life within `PHYSICS_TIMEOUT`."""
         return self.age < PHYSICS_TIMEOUT
+
+    def note(self, severity: int, text: str) -> None:
+        """Keep a finding for `/diagnostics`, in place of the same one, or of the oldest."""
+        findings = self.figures["findings"][0]
+        words = text.encode("utf-8")[: findings.dtype["text"].itemsize]
+        same = np.flatnonzero(findings["text"] == words)
+        place = int(same[0]) if len(same) else int(np.argmin(findings["time"]))
+        findings["text"][place], findings["severity"][place] = words, severity
+        findings["time"][place] = time.monotonic()
 
     def beat(self) -> None:
         """Give a sign of life of the physics process."""

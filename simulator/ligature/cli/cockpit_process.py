@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ligature.bus.process import report
+from ligature.process import report
 from ligature.cli.process import Run, run_process
 from ligature.cockpit.address import TOKEN_VARIABLE, AddressError, read_address
 from ligature.cockpit.pictures import Pictures

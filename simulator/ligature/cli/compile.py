@@ -13,6 +13,7 @@ from rich.console import Console
 
 import ligature
 from ligature.cli.demo import EXAMPLE
+from ligature.process import end_with_parent
 
 SCENES = tuple(EXAMPLE.parents[1] / "scenes" / name / "launch.yaml" for name in ("suturing", "peg_transfer"))
 """Scenes of the repository that between them need nearly all kernels."""
@@ -43,7 +44,9 @@ def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
 def _start(scene: Path, console: Console) -> tuple[subprocess.Popen[str], threading.Thread]:
     """A process that runs ``scene``, and the thread that shows what it prints."""
     command = [sys.executable, "-m", "ligature.cli.compile", str(scene)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8")
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", preexec_fn=end_with_parent
+    )
 
     def show() -> None:
         assert process.stdout is not None

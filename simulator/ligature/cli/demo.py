@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ligature.bus.process import end_with_parent
+from ligature.process import end_with_parent
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "suture.py"
 

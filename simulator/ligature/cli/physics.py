@@ -12,7 +12,7 @@ import numpy as np
 
 from ligature.adf import Severity
 from ligature.bus import Block, Mailbox, Pace, Pacer, Recording, Throttle
-from ligature.bus.process import report
+from ligature.process import report
 from ligature.cli.options import RunOptions
 from ligature.cli.process import Run, run_process
 from ligature.cli.recorder import Recorder
@@ -33,6 +33,9 @@ ALARMS = ("speed", "diverged")
 """Codes of findings that `/diagnostics` repeats."""
 
 ALARM_BYTES = 240
+
+MOST_NOTED = 8
+"""Findings a second that `/diagnostics` gets, the worst ones."""
 
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
@@ -166,6 +169,9 @@ class Loop:
             if problem.code in ALARMS:
                 figures["alarms"] += 1
                 figures["alarm"] = str(problem).encode("utf-8")[:ALARM_BYTES]
+        worst = sorted(self._simulation.problems, key=lambda problem: -problem.severity)
+        for problem in reversed(worst[:MOST_NOTED]):
+            self._block.note(problem.severity, str(problem))
         for problem in self._simulation.problems[:5]:
             report("warning", str(problem))
         self._simulation.problems.clear()

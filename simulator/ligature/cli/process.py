@@ -1,6 +1,6 @@
 """How every process of a run begins, and how it leaves a run that it cannot be part of.
 
-Each has one argument, the run's options as text, and reports to the supervisor by lines (`ligature.bus.process`).
+Each has one argument, the run's options as text, and reports to the supervisor by lines (`ligature.process`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, report
+from ligature.process import end_with_parent, report
 from ligature.bus.stop import Stop, stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.model.scene import Scene

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ligature.bus.process import end_with_parent
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.process import end_with_parent
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m|\[[0-9.]+\]: |\[ ?(INFO|WARN|ERROR)\] ")
 _LOUD = ("error", "less than", "what()")

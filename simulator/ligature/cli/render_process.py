@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ligature.bus import Block
-from ligature.bus.process import report
+from ligature.process import report
 from ligature.cli.options import RunOptions
 from ligature.cli.process import Run, run_process
 from ligature.model.optics import stereo_partners

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ligature.bus.process import report
+from ligature.process import report
 from ligature.cli.process import Run, run_process
 
 

@@ -18,10 +18,10 @@ from rich.console import Console
 from rich.markup import escape
 
 from ligature.bus.block import remove, remove_leftovers
-from ligature.bus.process import end_with_parent, lower_priority
 from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
 from ligature.cli import master
 from ligature.cli.options import RunOptions
+from ligature.process import end_with_parent, lower_priority
 
 MASTER_TIMEOUT = 15.0
 LAST_TIMEOUT = 1.8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from ligature.bus.process import report
+from ligature.process import report
 from ligature.cli.process import Run, run_process
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from ligature.bus import Outbox
-from ligature.bus.process import report
+from ligature.process import report
 from ligature.cli.process import Run, run_process
 from ligature.model.state import new_state
 from ligature.render import RenderUnavailable

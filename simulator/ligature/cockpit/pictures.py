@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.bus import Block, BusError
-from ligature.bus.process import end_with_parent, lower_priority
 from ligature.model.optics import EYES, stereo_partners
 from ligature.model.scene import Scene
 from ligature.model.state import new_state, state_dtype
+from ligature.process import end_with_parent, lower_priority
 
 HEIGHT = 240
 """Pixels of a picture from top to bottom."""

@@ -1,8 +1,9 @@
 """Runs CoACD in a process of its own, so that a crash, a hang or Ctrl-C in its native code harms nobody else.
 
-``python -m ligature.mesh.coacd_process INPUT OUTPUT SETTINGS``: INPUT is an npz file of ``vertices`` (n, 3) and
+``python -m ligature.mesh.coacd_process INPUT OUTPUT SETTINGS PARENT``: INPUT is an npz file of ``vertices`` (n, 3) and
 ``faces`` (m, 3), OUTPUT gets one array (k, 3) of vertices per convex piece, SETTINGS is a JSON
-object of keyword arguments of ``coacd.run_coacd``. Any length unit.
+object of keyword arguments of ``coacd.run_coacd``, PARENT the id of the process that waits: this one ends with it.
+Any length unit.
 """
 
 from __future__ import annotations
@@ -12,9 +13,12 @@ import sys
 
 import numpy as np
 
+from ligature.process import end_with_parent
 
-def main(source: str, target: str, settings: str) -> None:
+
+def main(source: str, target: str, settings: str, parent: str) -> None:
     """Decompose the mesh of ``source`` into ``target``."""
+    end_with_parent(int(parent))
     import coacd
 
     coacd.set_log_level("error")

@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import logging
+import os
 import subprocess
 import sys
 import tempfile
@@ -176,12 +177,13 @@ def _run_coacd(mesh: bytes, settings: str, limit: float) -> bytes:
     with tempfile.TemporaryDirectory(prefix="ligature-coacd-") as folder:
         source, target = Path(folder, "mesh.npz"), Path(folder, "pieces.npz")
         source.write_bytes(mesh)
-        command = [sys.executable, "-m", "ligature.mesh.coacd_process", str(source), str(target), settings]
+        words = (str(source), str(target), settings, str(os.getpid()))
+        command = [sys.executable, "-m", "ligature.mesh.coacd_process", *words]
         try:
             done = subprocess.run(command, capture_output=True, timeout=limit, check=False)
         except subprocess.TimeoutExpired:
             raise DecompositionError(f"CoACD took longer than {limit:g} s") from None
         if done.returncode or not target.is_file():
-            words = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
-            raise DecompositionError(f"CoACD ended with status {done.returncode}: {' '.join(words)}")
+            last = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
+            raise DecompositionError(f"CoACD ended with status {done.returncode}: {' '.join(last)}")
         return target.read_bytes()

@@ -36,6 +36,10 @@ class Subsystem(ABC):
     def reset(self) -> None:
         """Go back to the start of the scene, to the bit; what commands hold on to stays."""
 
+    def recover(self) -> None:
+        """Go on after a step that raised: from the start of the scene, and without what commands may have caused it."""
+        self.reset()
+
     @abstractmethod
     def snapshot(self) -> Any:
         """Everything that lasts from tick to tick, as plain data; the caller copies it."""

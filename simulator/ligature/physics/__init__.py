@@ -4,6 +4,6 @@ from ligature.physics.quiet import import_quietly
 
 import_quietly("pybullet")
 
-from ligature.physics.world import Controllers, World, failure  # noqa: E402
+from ligature.physics.world import Controllers, World, failed, failure  # noqa: E402
 
-__all__ = ["Controllers", "World", "failure"]
+__all__ = ["Controllers", "World", "failed", "failure"]

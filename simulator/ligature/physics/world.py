@@ -72,7 +72,12 @@ _KEPT = (
 
 def failure(what: str, error: Exception) -> Diagnostic:
     """The finding that ``what`` failed with an exception, and that its command is cleared therefore."""
-    text = f"{what} failed, and its command is cleared: {type(error).__name__}: {str(error)[:MOST_CHARACTERS]}"
+    return failed(f"{what} failed, and its command is cleared", error)
+
+
+def failed(what: str, error: Exception) -> Diagnostic:
+    """The finding that an exception was raised, ``what`` states where."""
+    text = f"{what}: {type(error).__name__}: {str(error)[:MOST_CHARACTERS]}"
     return Diagnostic(Severity.ERROR, text, code="failed")
 
 
@@ -91,6 +96,10 @@ class Controllers(Subsystem):
 
     def reset(self) -> None:
         """Nothing: it is part of the world."""
+
+    def recover(self) -> None:
+        """Clear the commands of all bodies and joints."""
+        self._world.clear_commands()
 
     def snapshot(self) -> None:
         """Nothing: it is part of the world."""
@@ -200,6 +209,11 @@ class World(Subsystem, BulletQueries, GraspSupport):
         for joint in self.scene.bodies[body].joints:
             if joint in self._tree_of_joint:
                 self._tree_of_joint[joint].release(joint)
+
+    def clear_commands(self) -> None:
+        """Clear the commands of all bodies; their joints go limp."""
+        for body in self.scene.bodies:
+            self.release(body.index)
 
     # --- the tick ---------------------------------------------------------------------------
 
@@ -376,6 +390,11 @@ class World(Subsystem, BulletQueries, GraspSupport):
         self._restore_masses()
         self.restore_welds(held)
         self._next_handle = handle
+
+    def recover(self) -> None:
+        """Put every body back, and clear all commands."""
+        self.clear_commands()
+        self.reset()
 
     def _restart(self, index: int, tree: Tree) -> None:
         self.place_of[tree.root].put(matrix_pose7(self.scene.start.roots[tree.root]))

@@ -5,9 +5,13 @@ from __future__ import annotations
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from ligature.adf import Severity
 from ligature.bus import Block
 
 PERIOD = 1.0
+FRESH = 60.0
+"""Seconds for which a finding sets the level of its status."""
+
 SLOW = 0.95
 """Real-time factor below which the status is a warning."""
 
@@ -65,6 +69,23 @@ class Diagnostics:
             )
             for arm, why in self.faults.items()
         ]
-        array = DiagnosticArray(status=[status, *faults])
+        array = DiagnosticArray(status=[status, self._findings(now), *faults])
         array.header.stamp = rospy.Time.now()
         self._publisher.publish(array)
+
+    def _findings(self, now: float) -> DiagnosticStatus:
+        """What went wrong in bodies, actuators and other parts of the simulation, the newest first."""
+        found = sorted(
+            (row for row in self._block.figures["findings"][0] if row["time"] > 0.0), key=lambda r: -r["time"]
+        )
+        fresh = [row for row in found if now - row["time"] < FRESH]
+        status = DiagnosticStatus(name="ligature: simulation", hardware_id="ligature", message="nothing failed lately")
+        if fresh:
+            failed = any(row["severity"] >= Severity.ERROR for row in fresh)
+            status.level = DiagnosticStatus.ERROR if failed else DiagnosticStatus.WARN
+            status.message = bytes(fresh[0]["text"]).decode("utf-8", "ignore")
+        status.values = [
+            KeyValue(key=f"{now - row['time']:.0f} s ago", value=bytes(row["text"]).decode("utf-8", "ignore"))
+            for row in found
+        ]
+        return status

@@ -85,6 +85,11 @@ class Actuators(Subsystem):
         """Keep welded bodies; threads and grasped bodies were released."""
         self._attached = [attached if attached and self._lasts(attached) else None for attached in self._attached]
 
+    def recover(self) -> None:
+        """Release everything."""
+        for actuator in range(len(self._attached)):
+            self.release(actuator)
+
     def snapshot(self) -> list[_Attached | None]:
         """The body of every actuator; its attachment or grasp is part of the physics."""
         return self._attached

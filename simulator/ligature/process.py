@@ -17,12 +17,13 @@ _PR_SET_PDEATHSIG = 1
 _prctl = ctypes.CDLL(None).prctl
 
 
-def end_with_parent() -> None:
+def end_with_parent(parent: int | None = None) -> None:
     """Ask Linux to terminate this process when its parent dies, also by ``kill -9``.
 
+    ``parent`` is its process id, as the parent itself passed it on: one that died before this call is noticed, too.
     Runs between fork and exec too, where nothing may be loaded any more: other threads may have held locks.
     """
-    parent = os.getppid()
+    parent = os.getppid() if parent is None else parent
     _prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:
         sys.exit(0)
