@@ -118,6 +118,37 @@ def assemble(
     return builder.start(), tuple(builder.closures), builder.diagnostics
 
 
+def coupled(
+    bodies: Sequence[Body], joints: Sequence[Joint], forest: Sequence[Articulation], loops: Sequence[Chain]
+) -> list[tuple[list[int], list[Chain]]]:
+    """Trees that ``loops`` couple, with the loops; point-to-point joints last: files add them to complete ones."""
+    tree_of = {link.body: k for k, tree in enumerate(forest) for link in tree.links}
+    static = {k for k, tree in enumerate(forest) if len(tree.links) == 1 and bodies[tree.links[0].body].static}
+    group = list(range(len(forest)))
+
+    def find(k: int) -> int:
+        while group[k] != k:
+            k = group[k]
+        return k
+
+    for chain in loops:
+        ends = [tree_of[body] for body in (chain.inner, chain.outer)]
+        if not static & set(ends):
+            a, b = (find(k) for k in ends)
+            group[max(a, b)] = min(a, b)
+    found: dict[int, tuple[list[int], list[Chain]]] = {}
+    for chain in loops:
+        ends = [tree_of[body] for body in (chain.inner, chain.outer)]
+        moving = next(k for k in ends if k not in static)
+        trees, chains = found.setdefault(find(moving), ([], []))
+        chains.append(chain)
+        trees += [k for k in dict.fromkeys(ends) if k not in trees]
+    for trees, chains in found.values():
+        trees.sort()
+        chains.sort(key=lambda chain: (joints[chain.joint].type is JointType.P2P, chain.joint))
+    return list(found.values())
+
+
 class _Assembly:
     """The steps of `assemble`."""
 
@@ -136,7 +167,7 @@ class _Assembly:
                 assert link.joint is not None
                 self._place(joints[link.joint], link.body, exact=k in looped)
         self.closures: list[Closure] = []
-        for trees, chains in self._components():
+        for trees, chains in coupled(bodies, joints, forest, self.chains):
             self._close(trees, chains)
 
     def start(self) -> Start:
@@ -191,36 +222,6 @@ class _Assembly:
 
     def _chain(self, joint: Joint) -> Chain:
         return chain_of(joint, forward=not self.bodies[joint.child].static)
-
-    def _components(self) -> list[tuple[list[int], list[Chain]]]:
-        """Trees that loops couple, with the loops; point-to-point joints last: files add them to complete ones."""
-        group = list(range(len(self.forest)))
-        static = {k for k, tree in enumerate(self.forest) if self._is_lone_static(tree)}
-
-        def find(k: int) -> int:
-            while group[k] != k:
-                k = group[k]
-            return k
-
-        for chain in self.chains:
-            ends = [self.tree_of[body] for body in (chain.inner, chain.outer)]
-            a, b = (find(k) for k in ends) if not static & set(ends) else (0, 0)
-            if not static & set(ends):
-                group[max(a, b)] = min(a, b)
-        found: dict[int, tuple[list[int], list[Chain]]] = {}
-        for chain in self.chains:
-            ends = [self.tree_of[body] for body in (chain.inner, chain.outer)]
-            moving = next(k for k in ends if k not in static)
-            trees, chains = found.setdefault(find(moving), ([], []))
-            chains.append(chain)
-            trees += [k for k in dict.fromkeys(ends) if k not in trees]
-        for trees, chains in found.values():
-            trees.sort()
-            chains.sort(key=lambda chain: (self.joints[chain.joint].type is JointType.P2P, chain.joint))
-        return list(found.values())
-
-    def _is_lone_static(self, tree: Articulation) -> bool:
-        return len(tree.links) == 1 and self.bodies[tree.links[0].body].static
 
     def _close(self, trees: list[int], chains: list[Chain]) -> None:
         """Assemble the loops of one mechanism, and find what of them its other joints hold already."""
