@@ -35,6 +35,12 @@ CLOSING = 0.8
 PACE = 1.0
 """Speed in m/s at which gaps are closed at most: a loop that came apart must not throw its bodies."""
 
+TORN = 0.005
+"""Gap in metres from which on a loop comes apart: what it holds is damped then."""
+
+TORN_DAMPING = (8.0, 1.0)
+"""Linear and angular damping in 1/s of the trees of such a loop; at 50 m/s Bullet makes it 0.4 in a tick of 1 ms."""
+
 
 class Closures:
     """The constraints of a scene's loops, made where the scene starts, for ticks of ``dt``."""
@@ -50,29 +56,49 @@ class Closures:
         ends: list[tuple[int, Array, int, Array]] = []
         self._ends = ends
         motions.forget_all()
-        for closure in scene.closures:
+        held = [closure for closure in scene.closures if needs_link(scene, closure) or not closure.free]
+        for closure in held:
             if needs_link(scene, closure):
                 self._hold_end(closure)
-            elif not closure.free:
+            else:
                 self._hold_point(closure)
-        self._looped = sorted({place_of[body].tree for c in scene.closures for body in (c.inner, c.outer)})
-        self._rows = np.array([[one, other] for one, _, other, _ in ends], dtype=np.int64).T
-        self._points = np.array([[one, other] for _, one, _, other in ends]).transpose(1, 0, 2) if ends else None
+        self._rows = np.array([[one, other] for one, _, other, _ in ends], dtype=np.int64).reshape(-1, 2).T
+        self._points = np.array([[one, other] for _, one, _, other in ends]).reshape(-1, 2, 3).transpose(1, 0, 2)
+        self._joined = [(self._place_of[c.inner].tree, self._place_of[c.outer].tree) for c in held]
+        self._looped = sorted({tree for pair in self._joined for tree in pair})
+        self._torn: set[int] = set()
 
     def pace(self) -> None:
-        """Have the coming tick close gaps by no more than `PACE` allows."""
-        if self._points is None:
+        """Have the coming tick close gaps by no more than `PACE` allows, and damp loops that come apart.
+
+        What it sets follows from where the bodies are, so that snapshots need not keep it.
+        """
+        if not self._looped:
             return
         for tree in self._looped:
             self._motions.links(tree)
         one, other = (
             _placed(self._motions.pose[rows], points) for rows, points in zip(self._rows, self._points, strict=True)
         )
-        widest = float(np.sqrt(((one - other) ** 2).sum(axis=1).max()))
+        gaps = np.sqrt(((one - other) ** 2).sum(axis=1))
+        widest = float(gaps.max())
         share = CLOSING if CLOSING * widest <= PACE * self._dt else PACE * self._dt / widest
         if share != self._share:
             self._share = share
             pybullet.setPhysicsEngineParameter(erp=share, physicsClientId=self._client)
+        torn = {tree for k in np.flatnonzero(gaps > TORN) for tree in self._joined[k]} if widest > TORN else set()
+        if torn != self._torn:
+            self._damp(torn)
+
+    def _damp(self, torn: set[int]) -> None:
+        """Damp the trees ``torn`` and no others more than their files state."""
+        for index in sorted(torn ^ self._torn):
+            tree = self._trees[index]
+            linear, angular = np.maximum(TORN_DAMPING, tree.damping) if index in torn else tree.damping
+            pybullet.changeDynamics(
+                tree.uid, -1, linearDamping=float(linear), angularDamping=float(angular), physicsClientId=self._client
+            )
+        self._torn = torn
 
     def _hold_end(self, closure: Closure) -> None:
         """Join the end of a closing joint to its outer body."""
