@@ -47,7 +47,7 @@ class Reach:
 
 
 def reaches(scene: Scene) -> list[Reach]:
-    """How far each joint of a loop goes that has limits and can be commanded; those of large mechanisms are left out."""
+    """How far each joint of a loop goes that has limits and can be commanded; large mechanisms are left out."""
     chains = [chain_of(scene.joints[c.joint], scene.joints[c.joint].child == c.outer) for c in scene.closures]
     slack = {c.joint: c.slack for c in scene.closures}
     commanded = {joint for body in scene.bodies for joint in body.joints}

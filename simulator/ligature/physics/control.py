@@ -413,9 +413,7 @@ class TreeControl:
         self._driven_links = [self.links[row] for row in self._driven]
         self._driven_strength = self._strength[self._driven].tolist()
         self._pushed_links = [self.links[row] for row in self._pushed]
-        self._varies = bool(
-            (self._yield_stiffness[self._driven] > 0.0).any() or self._by_force(self._driven).any()
-        )
+        self._varies = bool((self._yield_stiffness[self._driven] > 0.0).any() or self._by_force(self._driven).any())
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""

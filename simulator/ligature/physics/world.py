@@ -340,9 +340,7 @@ class World(Subsystem, BulletQueries, BulletGrips):
 
     def _heal(self) -> None:
         """Put trees that diverged back to where the scene starts, with all that loops join to them."""
-        diverged = [
-            k for k in range(len(self.trees)) if not all(abs(v) < MAX_SPEED for v in self._motions.speeds(k))
-        ]
+        diverged = [k for k in range(len(self.trees)) if not all(abs(v) < MAX_SPEED for v in self._motions.speeds(k))]
         for k in diverged:
             name = self.scene.bodies[self.trees[k].root].identity.identifier
             message = f"'{name}' diverged and was put back to its initial pose"

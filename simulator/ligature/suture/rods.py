@@ -107,6 +107,12 @@ class Rods:
         """Number of the element that a body is in its rod."""
         return self._of_body[body][1]
 
+    def pose7(self, body: int) -> Array:
+        """Pose (7,) of an element's body frame now."""
+        rod, element = self._of_body[body]
+        pose: Array = rod.body_poses[element]
+        return pose
+
     def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
         """Let the elements around ``element`` of a rod pass through ``bodies``; None ends that."""
         rod = self.rods[number]
