@@ -217,7 +217,7 @@ class Simulation:
         self._world = World(scene, dt)
         self._suture = Suture(scene, self._world, dt)
         self._mounts = Mounts(scene)
-        self._rays = Rays(scene, self._world)
+        self._rays = Rays(scene, self._world, self._suture.rods)
         self._touches = Touches(self._world)
         self.arms = ArmSet(scene, self._world, dt)
         actuator_grasps, rods = ActuatorGrasps(scene, self._world), self._suture.rods

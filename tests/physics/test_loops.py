@@ -162,3 +162,75 @@ def test_a_joint_starts_where_the_locations_state_within_its_limits(
     sim = Simulation(ligature.load(tmp_path / "model.yaml"))
     assert sim.joints["J"].position == pytest.approx(expected)
     sim.close()
+
+
+def _chain_file(folder: Path, children: int, joint: str, static: bool = True) -> Path:
+    """A model file of ``children`` bodies on one base, by inline blocks ``joint``."""
+    names = [f"B{i}" for i in range(children)]
+    lines = [f"bodies: [A, {', '.join(names)}]", f"joints: [{', '.join('J' + n for n in names)}]"]
+    lines += [f"A: {{name: A, mass: {0 if static else 1}}}", *(f"{n}: {{name: {n}, mass: 1}}" for n in names)]
+    pivots = "parent pivot: {x: 0, y: 0, z: 0}, child pivot: {x: 0, y: 0, z: 0}"
+    axes = "parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}"
+    lines += [f"J{n}: {{name: J{n}, parent: A, child: {n}, {pivots}, {axes}, {joint}}}" for n in names]
+    (folder / "model.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder / "model.yaml"
+
+
+@pytest.mark.parametrize(
+    ("children", "joint"), [(200, "type: revolute"), (40, "type: cone twist, joint limits: {x: 1, y: 1, z: 1}")]
+)
+def test_more_links_than_a_tree_has_are_errors_with_their_place(children: int, joint: str, tmp_path: Path) -> None:
+    scene = ligature.load(_chain_file(tmp_path, children, joint))
+    errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
+    assert errors and all("more than 128 degrees of freedom" in d.message and d.mark is not None for d in errors)
+    sim = Simulation(scene)
+    sim.step(3)
+    assert np.isfinite(sim.state["body_pose"]).all()
+    sim.close()
+
+
+def test_an_axis_that_is_locked_off_zero_stays_there(tmp_path: Path) -> None:
+    linear = "linear: {low: {x: 0.2, y: 0, z: 0}, high: {x: 0.2, y: 0, z: 0}}"
+    angular = "angular: {low: {x: 0, y: 0.5, z: -1}, high: {x: 0, y: 0.5, z: 1}}"
+    file = _chain_file(tmp_path, 1, f"type: six dof, joint limits: {{{linear}, {angular}}}")
+    sim = Simulation(ligature.load(file))
+    for _ in range(10):
+        sim.step(50)
+        D = pose7_matrix(sim.state["body_pose"][0, 1])
+        values, metres, radians = joint_coordinates(sim.scene.joints[0], D)
+        assert max(metres, radians) < 1e-3
+        assert values[[0, 2]] == pytest.approx([0.2, 0.5], abs=1e-3)
+    sim.close()
+
+
+def test_a_controller_with_force_output_moves_a_light_link_without_throwing_it(tmp_path: Path) -> None:
+    """Damping of 0.014 N·m·s on 4e-7 kg·m²: D dt is 35 times the inertia."""
+    control = "controller: {P: 7, I: 0, D: 0.014}, controller output type: FORCE"
+    file = _chain_file(tmp_path, 1, f"type: revolute, joint limits: {{low: -1, high: 1}}, {control}")
+    text = file.read_text().replace(
+        "B0: {name: B0, mass: 1}", "B0: {name: B0, mass: 0.005, inertia: {ix: 4e-7, iy: 4e-7, iz: 4e-7}}"
+    )  # noqa: E501
+    file.write_text(text)
+    sim = Simulation(ligature.load(file))
+    sim.bodies["A"].command_joints([0.5])
+    for _ in range(500):
+        sim.step()
+        assert abs(sim.joints["JB0"].velocity) < 300.0
+    assert sim.joints["JB0"].position == pytest.approx(0.5, abs=1e-3)
+    sim.close()
+
+
+def test_a_loop_that_diverges_restarts_as_a_whole(tmp_path: Path) -> None:
+    text = linkage(np.random.default_rng(3), "spatial")
+    (tmp_path / "model.yaml").write_text("namespace: /ambf/env/\n" + text, encoding="utf-8")
+    sim = Simulation(ligature.load(tmp_path / "model.yaml"))
+    start = sim.state["body_pose"].copy()
+    sim.step(100)
+    sim._world._motions.everything()
+    moving = next(k for k, tree in enumerate(sim._world.trees) if tree.axes)
+    for k in sim._world._joined([moving]):
+        sim._world._restart(k, sim._world.trees[k])
+    sim._world.write_state(sim.state)
+    np.testing.assert_allclose(sim.state["body_pose"], start, atol=1e-9)
+    assert gaps(sim).max() < 1e-6
+    sim.close()

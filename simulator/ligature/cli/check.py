@@ -9,6 +9,7 @@ from rich.console import Console
 
 import ligature
 from ligature.adf import AdfError, Diagnostic, Document, Resolver, Severity, read_any
+from ligature.model import reach
 
 _STYLES = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "", Severity.DEBUG: "dim"}
 
@@ -53,7 +54,7 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
         return list(error.diagnostics)
-    return _distinct([*document.diagnostics, *scene.diagnostics])
+    return _distinct([*document.diagnostics, *scene.diagnostics, *reach.findings(scene)])
 
 
 def _has_bodies(document: Document) -> bool:

@@ -6,10 +6,10 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ligature.process import report
 from ligature.cli.process import Run, run_process
 from ligature.cockpit.address import TOKEN_VARIABLE, AddressError, read_address
 from ligature.cockpit.pictures import Pictures
+from ligature.process import report
 
 if TYPE_CHECKING:
     from ligature.ros.health import TopicHealth

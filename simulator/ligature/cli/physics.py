@@ -12,12 +12,12 @@ import numpy as np
 
 from ligature.adf import Severity
 from ligature.bus import Block, Mailbox, Pace, Pacer, Recording, Throttle
-from ligature.process import report
 from ligature.cli.options import RunOptions
 from ligature.cli.process import Run, run_process
 from ligature.cli.recorder import Recorder
 from ligature.model.commands import Command
 from ligature.model.messages import Message, handle
+from ligature.process import report
 from ligature.simulation import Simulation
 
 TICK = 1e-3

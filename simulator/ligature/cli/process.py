@@ -12,11 +12,11 @@ from typing import NoReturn
 
 import ligature
 from ligature.bus import Block, BusError
-from ligature.process import end_with_parent, report
 from ligature.bus.stop import Stop, stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.model.scene import Scene
 from ligature.model.state import state_dtype
+from ligature.process import end_with_parent, report
 
 END_TIMEOUT = 10.0
 """Seconds that a process which cannot go on waits for the end of the run, before it is started again."""

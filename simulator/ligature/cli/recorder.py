@@ -14,11 +14,11 @@ from pathlib import Path
 
 from ligature.bus import Block, Recording
 from ligature.bus.events import RUN
-from ligature.process import report
 from ligature.bus.record import Excerpt, Header, Journal, Moment, RecordWriter
 from ligature.bus.recording import file_name
 from ligature.cli.options import RunOptions
 from ligature.model.commands import Command
+from ligature.process import report
 from ligature.simulation import Simulation
 
 FOLDER = Path("recordings")

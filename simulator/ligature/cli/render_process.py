@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from ligature.bus import Block
-from ligature.process import report
 from ligature.cli.options import RunOptions
 from ligature.cli.process import Run, run_process
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Camera, Scene
 from ligature.model.state import new_state
+from ligature.process import report
 from ligature.render import CameraView, ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
 from ligature.render.calibration import calibrations
 from ligature.render.sensor import IDEAL

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ligature.process import report
 from ligature.cli.process import Run, run_process
+from ligature.process import report
 
 
 def main() -> None:

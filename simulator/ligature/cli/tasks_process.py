@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from ligature.process import report
 from ligature.cli.process import Run, run_process
+from ligature.process import report
 
 
 def main() -> None:

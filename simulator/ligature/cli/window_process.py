@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 
 from ligature.bus import Outbox
-from ligature.process import report
 from ligature.cli.process import Run, run_process
 from ligature.model.state import new_state
+from ligature.process import report
 from ligature.render import RenderUnavailable
 from ligature.render.viewer import Figures, Viewer
 from ligature.render.window import Window

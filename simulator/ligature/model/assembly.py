@@ -18,6 +18,7 @@ from ligature.model.axes import Axis, axes_of
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_quaternion, matrix_rpy
 from ligature.model.mechanism import Chain, Mechanism, chain_of, rotation
 from ligature.model.scene import Articulation, Body, Closure, Joint, JointType, Start
+from ligature.model.trees import MOST_LINKS, links_of
 
 Array = NDArray[np.float64]
 
@@ -118,6 +119,37 @@ def assemble(
     return builder.start(), tuple(builder.closures), builder.diagnostics
 
 
+def coupled(
+    bodies: Sequence[Body], joints: Sequence[Joint], forest: Sequence[Articulation], loops: Sequence[Chain]
+) -> list[tuple[list[int], list[Chain]]]:
+    """Trees that ``loops`` couple, with the loops; point-to-point joints last: files add them to complete ones."""
+    tree_of = {link.body: k for k, tree in enumerate(forest) for link in tree.links}
+    static = {k for k, tree in enumerate(forest) if len(tree.links) == 1 and bodies[tree.links[0].body].static}
+    group = list(range(len(forest)))
+
+    def find(k: int) -> int:
+        while group[k] != k:
+            k = group[k]
+        return k
+
+    for chain in loops:
+        ends = [tree_of[body] for body in (chain.inner, chain.outer)]
+        if not static & set(ends):
+            a, b = (find(k) for k in ends)
+            group[max(a, b)] = min(a, b)
+    found: dict[int, tuple[list[int], list[Chain]]] = {}
+    for chain in loops:
+        ends = [tree_of[body] for body in (chain.inner, chain.outer)]
+        moving = next(k for k in ends if k not in static)
+        trees, chains = found.setdefault(find(moving), ([], []))
+        chains.append(chain)
+        trees += [k for k in dict.fromkeys(ends) if k not in trees]
+    for trees, chains in found.values():
+        trees.sort()
+        chains.sort(key=lambda chain: (joints[chain.joint].type is JointType.P2P, chain.joint))
+    return list(found.values())
+
+
 class _Assembly:
     """The steps of `assemble`."""
 
@@ -127,7 +159,10 @@ class _Assembly:
         self.bodies, self.joints, self.forest = bodies, joints, forest
         self.diagnostics: list[Diagnostic] = []
         self.tree_of = {link.body: k for k, tree in enumerate(forest) for link in tree.links}
-        self.chains = [self._chain(joints[j]) for j in loops if self._closes(joints[j])]
+        self.links = [
+            sum(links_of(joints[link.joint]) for link in tree.links if link.joint is not None) for tree in forest
+        ]
+        self.chains = [self._chain(joints[j]) for j in loops if self._closes(joints[j]) and self._fits(joints[j])]
         self.coordinates: dict[int, Array] = {}
         self.roots = {tree.links[0].body: bodies[tree.links[0].body].T_world_body for tree in forest}
         looped = {t for chain in self.chains for t in (self.tree_of[chain.inner], self.tree_of[chain.outer])}
@@ -136,7 +171,7 @@ class _Assembly:
                 assert link.joint is not None
                 self._place(joints[link.joint], link.body, exact=k in looped)
         self.closures: list[Closure] = []
-        for trees, chains in self._components():
+        for trees, chains in coupled(bodies, joints, forest, self.chains):
             self._close(trees, chains)
 
     def start(self) -> Start:
@@ -189,38 +224,25 @@ class _Assembly:
         self.diagnostics.append(Diagnostic(Severity.INFO, message, joint.identity.mark, hint, "loop"))
         return False
 
+    def _fits(self, joint: Joint) -> bool:
+        """Whether the tree that a closing joint starts from has links left for it; report one that has not."""
+        inner = self._chain(joint).inner
+        tree = self.tree_of[inner]
+        needed = 0 if joint.type is JointType.P2P else links_of(joint)
+        if self.links[tree] + needed <= MOST_LINKS:
+            self.links[tree] += needed
+            return True
+        root = self.bodies[self.forest[tree].links[0].body].identity.identifier
+        message = (
+            f"joint '{joint.identity.key}' is left out: with it the bodies joined to '{root}' have more than "
+            f"{MOST_LINKS} degrees of freedom"
+        )
+        hint = "join fewer bodies to it, or make joints of theirs fixed by merging bodies"
+        self.diagnostics.append(Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "loop"))
+        return False
+
     def _chain(self, joint: Joint) -> Chain:
         return chain_of(joint, forward=not self.bodies[joint.child].static)
-
-    def _components(self) -> list[tuple[list[int], list[Chain]]]:
-        """Trees that loops couple, with the loops; point-to-point joints last: files add them to complete ones."""
-        group = list(range(len(self.forest)))
-        static = {k for k, tree in enumerate(self.forest) if self._is_lone_static(tree)}
-
-        def find(k: int) -> int:
-            while group[k] != k:
-                k = group[k]
-            return k
-
-        for chain in self.chains:
-            ends = [self.tree_of[body] for body in (chain.inner, chain.outer)]
-            a, b = (find(k) for k in ends) if not static & set(ends) else (0, 0)
-            if not static & set(ends):
-                group[max(a, b)] = min(a, b)
-        found: dict[int, tuple[list[int], list[Chain]]] = {}
-        for chain in self.chains:
-            ends = [self.tree_of[body] for body in (chain.inner, chain.outer)]
-            moving = next(k for k in ends if k not in static)
-            trees, chains = found.setdefault(find(moving), ([], []))
-            chains.append(chain)
-            trees += [k for k in dict.fromkeys(ends) if k not in trees]
-        for trees, chains in found.values():
-            trees.sort()
-            chains.sort(key=lambda chain: (self.joints[chain.joint].type is JointType.P2P, chain.joint))
-        return list(found.values())
-
-    def _is_lone_static(self, tree: Articulation) -> bool:
-        return len(tree.links) == 1 and self.bodies[tree.links[0].body].static
 
     def _close(self, trees: list[int], chains: list[Chain]) -> None:
         """Assemble the loops of one mechanism, and find what of them its other joints hold already."""
@@ -241,7 +263,10 @@ class _Assembly:
         moved = {body: float(np.linalg.norm(after[body][:3, 3] - before[body][:3, 3])) for body in after}
         self._report_assembled(mechanism, x, moved, file_gap, corrected)
         for k, chain in enumerate(chains):
-            free = redundant[k]
+            # with no link left a direction that the others hold as well is held twice
+            tree = self.tree_of[chain.inner]
+            free = redundant[k] if self.links[tree] + len(redundant[k]) <= MOST_LINKS else ()
+            self.links[tree] += len(free)
             self.closures.append(Closure(chain.joint, chain.inner, chain.outer, free, slack[k]))
             if free:
                 self._report_redundant(chain, slack[k])

@@ -73,12 +73,13 @@ def _useful(low: float | None, high: float | None) -> tuple[float | None, float 
 
 
 def _six(joint: Joint) -> tuple[Axis, ...]:
+    """Free axes; one that is locked elsewhere than at zero is an axis whose limits meet there."""
     six = joint.six_dof
     assert six is not None
     axes = []
     for i in _ORDER:
         low, high = float(six.low[i]), float(six.high[i])
-        if low == high:
+        if low == high == 0.0:
             continue
         limits: tuple[float | None, float | None] = (None, None) if low > high else (low, high)
         axes.append(

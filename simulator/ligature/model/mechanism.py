@@ -80,6 +80,7 @@ class Mechanism:
         self.bodies, self.chains = bodies, list(chains)
         self._trees = []
         self._column: dict[int, int] = {}
+        self._axes: dict[int, int] = {}
         self._base: dict[int, int] = {}
         self._low: list[float] = []
         self._high: list[float] = []
@@ -122,7 +123,7 @@ class Mechanism:
         return needed
 
     def _open(self, chain: Chain) -> None:
-        self._column[chain.joint] = len(self._units)
+        self._column[chain.joint], self._axes[chain.joint] = len(self._units), len(chain.axes)
         self._add([
             (-np.inf if a.low is None else a.low, np.inf if a.high is None else a.high, a.prismatic) for a in chain.axes
         ])  # fmt: skip
@@ -166,6 +167,10 @@ class Mechanism:
     def column(self, joint: int) -> int:
         """Where the coordinates of a joint begin."""
         return self._column[joint]
+
+    def columns(self, joint: int) -> slice:
+        """The coordinates of a joint."""
+        return slice(self._column[joint], self._column[joint] + self._axes[joint])
 
     # --- kinematics -------------------------------------------------------------------------
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from ligature.model.axes import axes_of
 from ligature.model.scene import Articulation, Body, Joint, JointType, Link
 
 TREE_TYPES = tuple(kind for kind in JointType if kind is not JointType.P2P)
 """Joints that a tree can hold, as one link per free axis."""
 
-MAX_LINKS = 120
-"""Links of one tree; Bullet allows 128."""
+MOST_LINKS = 128
+"""Links that Bullet allows in a tree, those at the ends of closing joints included."""
+
+MAX_LINKS = 112
+"""Links of the joints that a tree holds; the others are for closing joints."""
 
 
 @dataclass
@@ -85,18 +89,24 @@ def _tree(
 ) -> Articulation:
     links = [Link(root, None, -1)]
     placed.add(root)
-    position = 0
+    position = count = 0
     while position < len(links):
         body = links[position].body
         for joint in edges.get(body, ()):
             other = joint.child if joint.parent == body else joint.parent
-            if other in placed or bodies[other].static or len(links) >= MAX_LINKS:
+            if other in placed or bodies[other].static or count + links_of(joint) > MAX_LINKS:
                 continue
+            count += links_of(joint)
             placed.add(other)
             used.add(joint.index)
             links.append(Link(other, joint.index, position))
         position += 1
     return Articulation(tuple(links))
+
+
+def links_of(joint: Joint) -> int:
+    """Links that a joint takes in a tree, the body that it carries included: one for each free axis."""
+    return max(1, len(axes_of(joint) or ()))
 
 
 def silent_pairs(

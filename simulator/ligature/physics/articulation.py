@@ -111,6 +111,8 @@ class Tree:
     """Position of every degree of freedom as the scene starts."""
     ends: dict[int, int]
     """Link at the end of each closing joint that starts from this tree."""
+    damping: tuple[float, float] = (0.0, 0.0)
+    """Linear and angular damping by Bullet, in 1/s."""
 
     @property
     def moving_links(self) -> list[int]:
@@ -340,6 +342,7 @@ def _set_dynamics(client: int, tree: Tree, plan: _Plan, bodies: Sequence[Body]) 
     alone = not tree.frames
     linear = 0.0 if alone else max((decay_rate(b.linear_damping) for b in members), default=0.0)
     angular = 0.0 if alone else max((decay_rate(b.angular_damping) for b in members), default=0.0)
+    tree.damping = linear, angular
     pybullet.changeDynamics(tree.uid, -1, linearDamping=linear, angularDamping=angular, physicsClientId=client)
     for link, (mass, inertia) in enumerate(zip(plan.masses, plan.inertias, strict=True)):
         pybullet.changeDynamics(

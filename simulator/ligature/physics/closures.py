@@ -29,21 +29,76 @@ MAX_FORCE = 1e5
 """Force in newtons that a closure may use; enough for any arm, finite so that a jam does not explode."""
 
 
+CLOSING = 0.8
+"""Part of a loop's gap that is closed within a tick; Bullet's 0.2 lets a swinging linkage open by 0.5 mm."""
+
+PACE = 1.0
+"""Speed in m/s at which gaps are closed at most: a loop that came apart must not throw its bodies."""
+
+TORN = 0.005
+"""Gap in metres from which on a loop comes apart: what it holds is damped then."""
+
+TORN_DAMPING = (8.0, 1.0)
+"""Linear and angular damping in 1/s of the trees of such a loop; at 50 m/s Bullet makes it 0.4 in a tick of 1 ms."""
+
+
 class Closures:
-    """The constraints of a scene's loops, made where the scene starts."""
+    """The constraints of a scene's loops, made where the scene starts, for ticks of ``dt``."""
 
     def __init__(
-        self, client: int, scene: Scene, trees: Sequence[Tree], place_of: Mapping[int, Placement], motions: Motions
-    ) -> None:
+        self, client: int, scene: Scene, trees: Sequence[Tree], place_of: Mapping[int, Placement], motions: Motions,
+        dt: float,
+    ) -> None:  # fmt: skip
         self._client, self._scene, self._trees = client, scene, trees
         self._place_of, self._motions = place_of, motions
         self.ids: list[int] = []
+        self._dt, self._share = dt, CLOSING
+        ends: list[tuple[int, Array, int, Array]] = []
+        self._ends = ends
         motions.forget_all()
-        for closure in scene.closures:
+        held = [closure for closure in scene.closures if needs_link(scene, closure) or not closure.free]
+        for closure in held:
             if needs_link(scene, closure):
                 self._hold_end(closure)
-            elif not closure.free:
+            else:
                 self._hold_point(closure)
+        self._rows = np.array([[one, other] for one, _, other, _ in ends], dtype=np.int64).reshape(-1, 2).T
+        self._points = np.array([[one, other] for _, one, _, other in ends]).reshape(-1, 2, 3).transpose(1, 0, 2)
+        self._joined = [(self._place_of[c.inner].tree, self._place_of[c.outer].tree) for c in held]
+        self._looped = sorted({tree for pair in self._joined for tree in pair})
+        self._torn: set[int] = set()
+
+    def pace(self) -> None:
+        """Have the coming tick close gaps by no more than `PACE` allows, and damp loops that come apart.
+
+        What it sets follows from where the bodies are, so that snapshots need not keep it.
+        """
+        if not self._looped:
+            return
+        for tree in self._looped:
+            self._motions.links(tree)
+        one, other = (
+            _placed(self._motions.pose[rows], points) for rows, points in zip(self._rows, self._points, strict=True)
+        )
+        gaps = np.sqrt(((one - other) ** 2).sum(axis=1))
+        widest = float(gaps.max())
+        share = CLOSING if CLOSING * widest <= PACE * self._dt else PACE * self._dt / widest
+        if share != self._share:
+            self._share = share
+            pybullet.setPhysicsEngineParameter(erp=share, physicsClientId=self._client)
+        torn = {tree for k in np.flatnonzero(gaps > TORN) for tree in self._joined[k]} if widest > TORN else set()
+        if torn != self._torn:
+            self._damp(torn)
+
+    def _damp(self, torn: set[int]) -> None:
+        """Damp the trees ``torn`` and no others more than their files state."""
+        for index in sorted(torn ^ self._torn):
+            tree = self._trees[index]
+            linear, angular = np.maximum(TORN_DAMPING, tree.damping) if index in torn else tree.damping
+            pybullet.changeDynamics(
+                tree.uid, -1, linearDamping=float(linear), angularDamping=float(angular), physicsClientId=self._client
+            )
+        self._torn = torn
 
     def _hold_end(self, closure: Closure) -> None:
         """Join the end of a closing joint to its outer body."""
@@ -58,12 +113,18 @@ class Closures:
         T_outer_end = inverse(self._frame(closure.outer)) @ T_world_link @ T_link_end
         kind = pybullet.JOINT_POINT2POINT if point else pybullet.JOINT_FIXED
         self._create(kind, (tree.uid, link), (outer.uid, outer.link), T_link_end, T_outer_end)
+        self._watch(self._motions.row(inner.tree, link), T_link_end, outer, T_outer_end)
 
     def _hold_point(self, closure: Closure) -> None:
         inner, outer = self._place_of[closure.inner], self._place_of[closure.outer]
         T_inner = self._chain(closure).T_inner
         T_outer_end = inverse(self._frame(closure.outer)) @ self._frame(closure.inner) @ T_inner
         self._create(pybullet.JOINT_POINT2POINT, (inner.uid, inner.link), (outer.uid, outer.link), T_inner, T_outer_end)
+        self._watch(self._motions.row(inner.tree, inner.link), T_inner, outer, T_outer_end)
+
+    def _watch(self, row: int, T_inner_end: Array, outer: Placement, T_outer_end: Array) -> None:
+        ends = T_inner_end[:3, 3], self._motions.row(outer.tree, outer.link), T_outer_end[:3, 3]
+        self._ends.append((row, *ends))
 
     def _chain(self, closure: Closure) -> Chain:
         joint = self._scene.joints[closure.joint]
@@ -83,3 +144,11 @@ class Closures:
         )  # fmt: skip
         pybullet.changeConstraint(constraint, maxForce=MAX_FORCE, physicsClientId=self._client)
         self.ids.append(int(constraint))
+
+
+def _placed(poses: Array, points: Array) -> Array:
+    """Points (k, 3) of frames at ``poses`` (k, 7) in the world."""
+    axis = poses[:, 3:6]
+    turned = np.cross(axis, points)
+    turned = 2.0 * (poses[:, 6:7] * turned + np.cross(axis, turned))
+    return np.asarray(poses[:, :3] + points + turned)

@@ -4,12 +4,16 @@ Positions are radians or metres, efforts N·m or N. The PID follows ADF specific
 derivative taken implicitly: with velocity output ``v = P e + I ∫e + D ė`` and ``ė = ṫ − v`` the
 joint's velocity is ``v = (P e + I ∫e + D ṫ) / (1 + D)``. Evaluated explicitly, as the reference
 does, a D near 1 chatters at the rate of the loop; the implicit form is the same law without it.
+
+With force output the effort is ``P e + I ∫e + D (ṫ − v)``. It goes to a motor of that strength, whose velocity is the
+one at which the effort vanishes: Bullet's solver finds the effort along with all contacts and loops, so that it is
+the law's where the joint is heavy enough for it to act in full over a tick, and less where it would overshoot.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,26 +65,29 @@ def outputs(
     stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, max_velocity: Array,
     max_deceleration: Array,
     position: Array, velocity: Array, dt: float,
-    integral: Array, last_error: Array, kick: Array, kick_ticks: Integers, motor: Array, effort: Array,
+    integral: Array, kick: Array, kick_ticks: Integers, motor: Array, asked: Array, effort: Array,
 ) -> None:  # fmt: skip
-    """Motor velocities and efforts of one tick for n axes, all arrays (n,); the last eight change."""
+    """Motor velocities and efforts of one tick for n axes, all arrays (n,); the last six change.
+
+    ``asked`` is what a motor with force output exerts at most, ``effort`` what acts beside motors.
+    """
     for k in range(mode.shape[0]):
-        motor[k] = effort[k] = 0.0
+        motor[k] = asked[k] = effort[k] = 0.0
         if mode[k] == POSITION:
             error = target[k] - position[k]
             if turns[k]:
                 error = (error + np.pi) % (2 * np.pi) - np.pi
             integral[k] += error * dt
             pull = p[k] * error + i[k] * integral[k]
+            jump = 0.0
+            if kick_ticks[k] > 0:
+                jump = kick[k]
+                kick_ticks[k] -= 1
             if force_output[k]:
-                effort[k] = pull + d[k] * (error - last_error[k]) / dt
+                asked[k] = pull + d[k] * (jump - velocity[k])
+                motor[k] = jump + _vanishing(pull, d[k], STOP_GAIN / dt * abs(error))
             else:
-                jump = 0.0
-                if kick_ticks[k] > 0:
-                    jump = kick[k]
-                    kick_ticks[k] -= 1
                 motor[k] = (pull + d[k] * jump) / (1.0 + d[k])
-            last_error[k] = error
         elif mode[k] == SERVO:
             error = target[k] - position[k]
             closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * max_deceleration[k] * abs(error)))
@@ -91,6 +98,14 @@ def outputs(
             effort[k] = target[k]
         if sprung[k]:
             effort[k] += stiffness[k] * (rest[k] - position[k]) - damping[k] * velocity[k]
+
+
+@compiled
+def _vanishing(pull: float, damping: float, most: float) -> float:
+    """Velocity at which a damper takes up ``pull``, at most ``most``."""
+    if abs(pull) > damping * most:
+        return np.copysign(most, pull)
+    return pull / damping if damping > 0.0 else 0.0
 
 
 class TreeControl:
@@ -126,10 +141,9 @@ class TreeControl:
         self._yield_stiffness = np.zeros(n)
         self.owned = np.zeros(n, dtype=bool)
         self._integral = np.zeros(n)
-        self._last_error = np.zeros(n)
         self._kick = np.zeros(n)
         self._kick_ticks = np.zeros(n, dtype=np.int64)
-        self._motor, self._effort = np.zeros(n), motions.push[motions.slices[index]]
+        self._motor, self._asked, self._effort = np.zeros(n), np.zeros(n), motions.push[motions.slices[index]]
         self._laden = False
         self._driven: list[int] = []
         self._stops: dict[int, float] = {}
@@ -190,13 +204,13 @@ class TreeControl:
         if self.mode[row] != POSITION:
             self._motions.joints(self._index)
             self._integral[row] = 0.0
-            self._last_error[row] = value - self.position[row]
-            previous = self.position[row]
+            # the reference's first derivative of a force is zero, that of a velocity the whole way
+            previous = value if self._force_output[row] else self.position[row]
         else:
             previous = self.target[row]
         self._switch(row, POSITION, value)
         jump = self._way(row, value - previous)
-        if jump != 0.0 and not self._force_output[row]:
+        if jump != 0.0:
             ticks = max(1, round(KICK_SECONDS / self._dt))
             left = self._kick[row] * self._kick_ticks[row]
             self._kick[row] = (left + jump / self._dt) / ticks
@@ -292,7 +306,7 @@ class TreeControl:
         if mode == SERVO:
             return float((self._yield_stiffness[row] or stiffness) * behind)
         if mode == POSITION:
-            return float(self._effort[row] if self._force_output[row] else stiffness * behind)
+            return float(self._asked[row] if self._force_output[row] else stiffness * behind)
         return 0.0
 
     def _switch(self, row: int, mode: int, target: float) -> None:
@@ -331,8 +345,8 @@ class TreeControl:
             self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
             self._damping, self._rest, self.target, self._pace, self._max_velocity,
             self._max_deceleration, self.position,
-            self.velocity, self._dt, self._integral, self._last_error, self._kick, self._kick_ticks, self._motor,
-            self._effort,
+            self.velocity, self._dt, self._integral, self._kick, self._kick_ticks, self._motor,
+            self._asked, self._effort,
         )  # fmt: skip
         if self._laden:
             self._motions.apply_gravity(self._index)
@@ -360,14 +374,15 @@ class TreeControl:
             )
 
     def _strengths(self) -> list[float]:
-        """Largest effort of each driven motor; one that gives pulls in proportion to its following error."""
-        if not (self._yields or self._slowed):
+        """Largest effort of each driven motor; one that yields pulls in proportion to its following error."""
+        if not (self._varies or self._slowed):
             return self._driven_strength
         rows = self._driven
         spring = self._yield_stiffness[rows] * np.abs(self.target[rows] - self.position[rows])
         strength = self._strength[rows]
         yielding = np.minimum(spring + GIVING_FRICTION, strength)
         limits = np.where(self._yield_stiffness[rows] > 0.0, yielding, strength)
+        limits = np.where(self._by_force(rows), np.abs(self._asked[rows]), limits)
         for i, row in enumerate(rows):
             if row in self._slowed:
                 low, high, most = self._slowed[row]
@@ -378,10 +393,14 @@ class TreeControl:
         efforts: list[float] = limits.tolist()
         return efforts
 
+    def _by_force(self, rows: Sequence[int]) -> Flags:
+        """Whether the axes ``rows`` (k,) follow a position by an effort."""
+        return np.asarray((self.mode[rows] == POSITION) & self._force_output[rows], dtype=bool)
+
     def _sort(self) -> None:
         """Sort the axes into those that a motor drives and those that an effort pushes; stop idle motors."""
-        by_motor = (self.mode == VELOCITY) | (self.mode == SERVO) | ((self.mode == POSITION) & ~self._force_output)
-        by_effort = self._laden | self._sprung | (self.mode == FORCE) | ((self.mode == POSITION) & self._force_output)
+        by_motor = (self.mode == VELOCITY) | (self.mode == SERVO) | (self.mode == POSITION)
+        by_effort = self._laden | self._sprung | (self.mode == FORCE)
         # An effort whose speed is bounded is a motor of that strength.
         stopped = [*self._stops, *(row for row in self._slowed if self.mode[row] == FORCE)]
         by_motor[stopped], by_effort[stopped] = True, False
@@ -394,7 +413,7 @@ class TreeControl:
         self._driven_links = [self.links[row] for row in self._driven]
         self._driven_strength = self._strength[self._driven].tolist()
         self._pushed_links = [self.links[row] for row in self._pushed]
-        self._yields = bool((self._yield_stiffness[self._driven] > 0.0).any())
+        self._varies = bool((self._yield_stiffness[self._driven] > 0.0).any() or self._by_force(self._driven).any())
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
@@ -417,7 +436,7 @@ class TreeControl:
 
 
 _KEPT = (
-    "mode", "target", "_integral", "_last_error", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",
+    "mode", "target", "_integral", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",
     "_yield_stiffness",
     "owned", "_stops", "_slowed",
 )  # fmt: skip

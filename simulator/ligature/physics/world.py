@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import weakref
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem, kept, put_back
 from ligature.physics.articulation import Tree, build, inertia_of, is_alone
 from ligature.physics.bodies import BodyControl, Placement
-from ligature.physics.closures import Closures
+from ligature.physics.closures import CLOSING, Closures
 from ligature.physics.control import TreeControl
 from ligature.physics.drive import Drive
 from ligature.physics.grasp_support import GraspSupport
@@ -42,9 +42,6 @@ SOLVER_ITERATIONS = 50
 
 LOOP_ITERATIONS = 200
 """The same where loops close: with 50, links of grams beside ones of kilograms part by 2 mm, with 200 by 0.1 mm."""
-
-CLOSING = 0.8
-"""Part of a loop's gap that is closed within a tick; Bullet's 0.2 lets a swinging linkage open by 0.5 mm."""
 
 NEAR = 0.002
 """Gap in metres up to which Bullet prepares contacts; its 20 mm takes half of the time of a needle on a phantom."""
@@ -150,7 +147,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
         )
         self._damped = self._damping_factors()
         self._silence_pairs()
-        self._closures = Closures(self.client, scene, self.trees, self.place_of, self._motions)
+        self._closures = Closures(self.client, scene, self.trees, self.place_of, self._motions, self.dt)
         self._readout = Readout(self.client, scene, self.trees, self._motions, self.place_of)
         self._parting = Parting(self.client, self.dt)
         self._setup_queries()
@@ -247,6 +244,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
 
     def step(self, tick: int = 0) -> None:
         """Advance Bullet by one tick, and put back what diverged in it."""
+        self._closures.pace()
         pybullet.stepSimulation(physicsClientId=self.client)
         self._parting.step()
         self._motions.expire()
@@ -363,13 +361,26 @@ class World(Subsystem, BulletQueries, GraspSupport):
         return found
 
     def _heal(self) -> None:
-        """Put trees that diverged back to where the scene starts."""
-        for k, tree in enumerate(self.trees):
-            if not all(abs(speed) < MAX_SPEED for speed in self._motions.speeds(k)):
-                self._restart(k, tree)
-                name = self.scene.bodies[tree.root].identity.identifier
-                message = f"'{name}' diverged and was put back to its initial pose"
-                self.report(Diagnostic(Severity.ERROR, message, code="diverged"))
+        """Put trees that diverged back to where the scene starts, with all that loops join to them."""
+        diverged = [k for k in range(len(self.trees)) if not all(abs(v) < MAX_SPEED for v in self._motions.speeds(k))]
+        for k in diverged:
+            name = self.scene.bodies[self.trees[k].root].identity.identifier
+            message = f"'{name}' diverged and was put back to its initial pose"
+            self.report(Diagnostic(Severity.ERROR, message, code="diverged"))
+        for k in sorted(self._joined(diverged)):
+            self._restart(k, self.trees[k])
+
+    def _joined(self, trees: Iterable[int]) -> set[int]:
+        """``trees`` and those that loops join to them, over any number of trees that move."""
+        ends = [{self.place_of[body].tree for body in (c.inner, c.outer)} for c in self.scene.closures]
+        still = {k for k, tree in enumerate(self.trees) if tree.static and not tree.axes}
+        joined, before = set(trees), -1
+        while len(joined) > before:
+            before = len(joined)
+            for pair in ends:
+                if pair & joined - still:
+                    joined |= pair
+        return joined
 
     def reset(self) -> None:
         """Put every body back to its initial pose, at rest.

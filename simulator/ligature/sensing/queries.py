@@ -36,11 +36,15 @@ class Queries(Protocol):
         """Contact points of ``body`` whose distance is at most ``threshold``."""
 
 
-class Pushable(Queries, Protocol):
-    """Bodies that sensors push."""
+class Posed(Protocol):
+    """Bodies that are somewhere."""
 
     def pose7(self, body: int) -> Array:
         """Pose (7,) of a body now."""
+
+
+class Pushable(Queries, Posed, Protocol):
+    """Bodies that sensors push."""
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming step."""

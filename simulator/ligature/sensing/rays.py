@@ -16,7 +16,7 @@ from ligature.model.hits import RayHits
 from ligature.model.scene import Scene, Sensor, SensorType
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem, kept, put_back
-from ligature.sensing.queries import Pushable
+from ligature.sensing.queries import Posed, Pushable
 
 Array = NDArray[np.float64]
 
@@ -24,10 +24,11 @@ Array = NDArray[np.float64]
 class Rays(Subsystem):
     """The rays of all sensors of a scene, one after the other, in the order of the state record.
 
-    Resistance sensors push in every tick; rays are measured when the state is written.
+    Resistance sensors push in every tick; rays are measured when the state is written. ``elements`` gives the poses of
+    rod elements, which ``queries`` lacks.
     """
 
-    def __init__(self, scene: Scene, queries: Pushable) -> None:
+    def __init__(self, scene: Scene, queries: Pushable, elements: Posed) -> None:
         self._queries = queries
         self.sensors = [s for s in scene.sensors if s.type is not SensorType.CONTACT]
         counts = [len(s.rays) for s in self.sensors]
@@ -36,7 +37,7 @@ class Rays(Subsystem):
         n = int(ends[-1])
         self.hits = RayHits(np.full(n, -1, dtype=np.int32), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
         pushing = [s for s in self.sensors if s.type is SensorType.RESISTANCE]
-        self._stick = [_Stick(sensor, sensor.parent not in scene.rod_bodies) for sensor in pushing]
+        self._stick = [_Stick(sensor, elements if sensor.parent in scene.rod_bodies else None) for sensor in pushing]
 
     def step(self, tick: int) -> None:
         """Apply the forces of every resistance sensor in the coming step of the bodies."""
@@ -86,10 +87,13 @@ def _segments(sensor: Sensor, T_world_parent: Array) -> Array:
 
 
 class _Stick:
-    """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3)."""
+    """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3).
 
-    def __init__(self, sensor: Sensor, pushes_back: bool) -> None:
-        self._sensor, self._pushes_back = sensor, pushes_back
+    A sensor on a rod finds its parent among ``elements`` and does not push it back.
+    """
+
+    def __init__(self, sensor: Sensor, elements: Posed | None) -> None:
+        self._sensor, self._elements = sensor, elements
         n = len(sensor.rays)
         self._body = np.full(n, -1, dtype=np.int64)
         self._on_sensed, self._on_parent = np.zeros((n, 3)), np.zeros((n, 3))
@@ -105,7 +109,7 @@ class _Stick:
     def step(self, bodies: Pushable) -> None:
         """Push the bodies that the rays hit, and the parent back."""
         parent = self._sensor.parent
-        T_parent = pose7_matrix(bodies.pose7(parent))
+        T_parent = pose7_matrix((self._elements or bodies).pose7(parent))
         segments = _segments(self._sensor, T_parent)
         hits = bodies.ray_test(segments[:, 0], segments[:, 1])
         poses = {body: pose7_matrix(bodies.pose7(body)) for body in set(hits.body.tolist()) if body >= 0}
@@ -115,7 +119,7 @@ class _Stick:
                 continue
             force = self._force(ray, segments[ray], hits, T_parent, poses[body])
             bodies.apply_force(body, force, hits.point[ray])
-            if self._pushes_back:
+            if self._elements is None:
                 bodies.apply_force(parent, -force, hits.point[ray])
 
     def _force(self, ray: int, segment: Array, hits: RayHits, T_parent: Array, T_sensed: Array) -> Array:

@@ -107,6 +107,12 @@ class Rods:
         """Number of a body's element in its rod."""
         return self._of_body[body][1]
 
+    def pose7(self, body: int) -> Array:
+        """Pose (7,) of an element's body frame now."""
+        rod, element = self._of_body[body]
+        pose: Array = rod.body_poses[element]
+        return pose
+
     def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
         """Disable collision of ``bodies`` with the elements around ``element`` of a rod; None enables it again."""
         rod = self.rods[number]
