@@ -9,21 +9,28 @@ import io
 import os
 import random
 import struct
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import ligature
+import numpy as np
 import pytest
+from ligature.bus import Block
+from ligature.bus.block import FOLDER
+from ligature.model.state import new_state
 
+from tests.fuzz.commands import _floats
 from tests.ros.conftest import BIN, SMALL, Program
 
 pytestmark = pytest.mark.ros
 FLOAT = (0.0, -0.0, 5e-324, 1e-5, 1.0, -1.0, 0.3, 1e3, -1e6, 1e12, 1.7e308, float("inf"), float("-inf"), float("nan"))
 WORDS = ("", "enable", "disable", "home", "unhome", "pause", "resume", "adopt", "\0", "é" * 90, "x" * 5000)
 LENGTHS = (0, 1, 3, 4, 6, 7, 8, 40, 500)
-MESSAGES = 12
-"""Messages on each topic of the short form."""
+SHORT, FLOOD = 800, 75_000
+"""Messages of the short form, and of the long one over both scenes."""
 
 LONG = 1_000_000
 GROWTH = 60
@@ -59,10 +66,11 @@ def _value(default: Any, type_: str, rng: random.Random, long: bool) -> Any:
 
 
 @pytest.fixture(scope="module")
-def simulator(start: Callable[..., Program]) -> Program:
+def simulator(start: Callable[..., Program]) -> Iterator[Program]:
     program = start(BIN / "ligature", "run", SMALL, "-p", "200")
-    program.wait_for("first state published")
-    return program
+    program.wait_for("first state published", 300.0)
+    yield program
+    program.end(30.0)
 
 
 def commands(node: Any) -> dict[str, Any]:
@@ -82,30 +90,84 @@ def megabytes(pid: int) -> float:
     return int(fields[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-@pytest.mark.slow
-def test_nothing_that_a_client_sends_ends_the_run_or_fills_its_memory(
-    simulator: Program, node: Any, listen: Callable[..., Any], publish: Callable[..., Any]
-) -> None:
-    from ambf_msgs.msg import WorldState
-
+def flood(program: Program, node: Any, scene: Path, messages: int, most_growth: float) -> None:
+    """Send ``messages`` in all to every topic and see that the run is alive, finite, bounded, and answers."""
     topics, rng = commands(node), random.Random(7)
     assert any(topic.endswith("/trajectory_j/set_ratio") for topic in topics)
     assert len(topics) > 150 and all(topics.values())
-    pids = simulator.children()
+    pids = program.children()
     before = megabytes(pids["ros_process"])
-    for topic, class_ in topics.items():
-        publisher = publish(topic, class_)
-        for _ in range(MESSAGES):
-            publisher.publish(filled(class_, rng))
-        publisher.publish(filled(class_, rng, long=True))
+    publishers = {topic: node.Publisher(topic, class_, queue_size=1000) for topic, class_ in topics.items()}
+    deadline = time.monotonic() + 60.0
+    while not all(publisher.get_num_connections() for publisher in publishers.values()):
+        assert time.monotonic() < deadline, "a topic of the simulator takes no connection"
+        time.sleep(0.05)
+    for topic, publisher in publishers.items():
+        for _ in range(max(1, messages // len(topics))):
+            publisher.publish(filled(topics[topic], rng))
+        publisher.publish(filled(topics[topic], rng, long=True))
     time.sleep(1.0)
-    world = listen("/ambf/env/World/State", WorldState)
-    # a world command of the flood may have stopped its clock; the watchdog lets it go on
-    step = world.wait().sim_step
-    world.wait(lambda message: message.sim_step > step, 20.0)
-    assert simulator.children() == pids, simulator.output
-    assert megabytes(pids["ros_process"]) < before + GROWTH
-    assert "bytes; the maximum is" in simulator.output
+    for publisher in publishers.values():
+        publisher.unregister()
+    after = megabytes(pids["ros_process"])
+    sys.stdout.write(f"{messages} messages on {len(topics)} topics: {before:.0f} MB before, {after:.0f} MB after\n")
+    assert program.children() == pids, program.output
+    assert after < before + most_growth
+    assert "bytes; the maximum is" in program.output
+    loaded = ligature.load(scene)
+    (bus,) = FOLDER.glob(f"ligature-{program.process.pid}-*")
+    state = new_state(loaded)
+    block = Block.attach(bus.name, state.dtype)
+    try:
+        # a world command of the flood may have stopped its clock; the watchdog lets it go on
+        assert block.read(state)
+        tick = int(state["tick"][0])
+        deadline = time.monotonic() + 20.0
+        while int(state["tick"][0]) <= tick:
+            assert time.monotonic() < deadline, "the clock stands still"
+            time.sleep(0.05)
+            block.read(state)
+        for name, values in _floats(state):
+            assert np.isfinite(values).all(), f"{name} is not finite"
+    finally:
+        block.close()
+    for arm in loaded.arms:
+        answers(node, arm.name)
+
+
+def answers(node: Any, arm: str) -> None:
+    """An arm takes a state command, whatever was sent before."""
+    from crtk_msgs.msg import OperatingState, StringStamped
+
+    states: list[str] = []
+    listener = node.Subscriber(f"/{arm}/operating_state", OperatingState, lambda m: states.append(m.state))
+    publisher = node.Publisher(f"/{arm}/state_command", StringStamped, queue_size=10)
+    for word, wanted in (("disable", "DISABLED"), ("enable", "ENABLED")):
+        deadline = time.monotonic() + 20.0
+        while states[-1:] != [wanted]:
+            assert time.monotonic() < deadline, f"{arm} does not answer '{word}': {states[-3:]}"
+            publisher.publish(StringStamped(string=word))
+            time.sleep(0.2)
+    listener.unregister()
+    publisher.unregister()
+
+
+@pytest.mark.slow
+def test_nothing_that_a_client_sends_ends_the_run_or_fills_its_memory(simulator: Program, node: Any) -> None:
+    flood(simulator, node, SMALL, SHORT, GROWTH)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("name", ["suturing_small", "suturing"])
+def test_seventy_five_thousand_messages_on_both_scenes(start: Callable[..., Program], node: Any, name: str) -> None:
+    scene = SMALL.parents[1] / name / "launch.yaml"
+    program = start(BIN / "ligature", "run", scene, "-p", "200")
+    program.wait_for("first state published", 300.0)
+    try:
+        flood(program, node, scene, FLOOD // 2, GROWTH)
+    finally:
+        program.end(30.0)
 
 
 @pytest.mark.slow

@@ -251,3 +251,24 @@ def test_parameters_of_cameras_and_lights_are_on_the_server(node: Any) -> None:
 def test_only_types_that_every_client_survives_are_advertised(node: Any) -> None:
     types = {type_ for _, type_ in node.get_published_topics("/ambf")}
     assert "ambf_msgs/SensorState" not in types and "ambf_msgs/ContactSensorState" not in types
+
+
+def test_diagnostics_have_the_text_of_what_an_actuator_could_not_do(
+    listen: Callable[..., Any], publish: Callable[..., Any]
+) -> None:
+    from ambf_msgs.msg import ActuatorCmd
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+    command = ActuatorCmd(actuate=True)
+    command.body_name.data = "a body of no scene"
+    publish("/ambf/env/ghosts/psm2/Actuator0/Command", ActuatorCmd).publish(command)
+
+    def shown(array: Any) -> bool:
+        found = [status for status in array.status if status.name == "ligature: simulation"]
+        return any(
+            status.level >= DiagnosticStatus.WARN
+            and any("'a body of no scene'" in pair.value for pair in status.values)
+            for status in found
+        )
+
+    listen("/diagnostics", DiagnosticArray).wait(shown, 20.0)
