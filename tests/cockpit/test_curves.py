@@ -15,7 +15,7 @@ from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from viser import ViserServer
 
-from tests.tasks.test_attempt import led_through
+from tests.tasks.test_attempt import driven_through
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -44,7 +44,7 @@ def test_the_score_rises_with_each_hole_and_falls_with_a_reset(
     curves = Curves(scene, task)
     curves.show(server.gui)
     assert curves._attempt is not None
-    state = led_through(SimpleNamespace(monitor=curves._attempt.monitor, observe=curves.observe), scene, 1)
+    state = driven_through(SimpleNamespace(monitor=curves._attempt.monitor, observe=curves.observe), scene, 1)
     curves.refresh(state)
     times, score = score_of(curves).data
     assert np.all(np.diff(times) > 0)
