@@ -12,7 +12,7 @@ from ligature.adf import Severity
 from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_quaternion, pose7_matrix
 from ligature.model.reach import reaches
-from ligature.model.scene import Joint, JointType, Scene
+from ligature.model.scene import Joint, JointType, OutputType, Scene
 
 from tests.physics.test_loops import gaps
 
@@ -145,10 +145,14 @@ def _reached(scene: Scene, joint: Joint, goal: float) -> tuple[float, float]:
 
 
 def _driven(scene: Scene) -> list[Joint]:
-    """Joints with limits and a motor that somebody can command."""
+    """Joints with limits and a motor that somebody can command; an effort without gains moves nothing."""
     commanded = {joint for body in scene.bodies for joint in body.joints}
     kinds = (JointType.REVOLUTE, JointType.PRISMATIC)
-    return [j for j in scene.joints if j.type in kinds and j.low is not None and j.index in commanded]
+    return [
+        j for j in scene.joints
+        if j.type in kinds and j.low is not None and j.index in commanded
+        and (j.output is OutputType.VELOCITY or j.controller.p > 0.0)
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("side", [-0.8, 0.8])
