@@ -182,7 +182,7 @@ def _chain_file(folder: Path, children: int, joint: str, static: bool = True) ->
 def test_more_links_than_a_tree_has_are_errors_with_their_place(children: int, joint: str, tmp_path: Path) -> None:
     scene = ligature.load(_chain_file(tmp_path, children, joint))
     errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
-    assert errors and all("more than 128 degrees of freedom" in d.message and d.mark is not None for d in errors)
+    assert errors and all("more than 120 degrees of freedom" in d.message and d.mark is not None for d in errors)
     sim = Simulation(scene)
     sim.step(3)
     assert np.isfinite(sim.state["body_pose"]).all()

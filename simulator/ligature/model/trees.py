@@ -11,8 +11,8 @@ from ligature.model.scene import Articulation, Body, Joint, JointType, Link
 TREE_TYPES = tuple(kind for kind in JointType if kind is not JointType.P2P)
 """Joints that a tree can hold, as one link per free axis."""
 
-MOST_LINKS = 128
-"""Links that Bullet allows in a tree, those at the ends of closing joints included."""
+MOST_LINKS = 120
+"""Links of a tree, those at the ends of closing joints included; Bullet fails with 128."""
 
 MAX_LINKS = 112
 """Links of the joints that a tree holds; the others are for closing joints."""
