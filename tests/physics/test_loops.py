@@ -177,7 +177,7 @@ def _chain_file(folder: Path, children: int, joint: str, static: bool = True) ->
 
 
 @pytest.mark.parametrize(
-    ("children", "joint"), [(200, "type: revolute"), (40, "type: cone twist, joint limits: {x: 1, y: 1, z: 1}")]
+    ("children", "joint"), [(200, "type: revolute"), (60, "type: cone twist, joint limits: {x: 1, y: 1, z: 1}")]
 )
 def test_more_links_than_a_tree_has_are_errors_with_their_place(children: int, joint: str, tmp_path: Path) -> None:
     scene = ligature.load(_chain_file(tmp_path, children, joint))
