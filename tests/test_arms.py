@@ -300,9 +300,9 @@ def test_commands_that_travelled_do_what_calls_do_and_refusals_become_warnings(w
     whole.apply(MoveJp(0, (0.1, 0, 0.12, 0, 0, 0)))
     assert psm.is_busy
     whole.apply(MoveJp(0, (0.1,) * 4))
-    told = [(event.name, event.value) for event in psm.events]
-    assert ("goal_reached", False) in told
-    assert any(name == "warning" and "move_jp takes 6 numbers" in value for name, value in told)
+    reported = [(event.name, event.value) for event in psm.events]
+    assert ("goal_reached", False) in reported
+    assert any(name == "warning" and "move_jp takes 6 numbers" in value for name, value in reported)
     with pytest.raises(ValueError, match="finite"):
         whole.apply(ServoJp(0, (float("nan"),) * 6))
 

@@ -77,9 +77,9 @@ def test_what_a_subsystem_raises_is_reported_once_and_the_run_goes_on(
         simulation.step(3)
     assert simulation._clock.tick == tick + 6
     assert set(counts.values()) == {6}
-    told = [str(problem) for problem in simulation.problems if problem.code == "failed"]
-    assert len([text for text in told if f"'{method}' of {name} failed" in text]) == 1, told
-    assert all("ZeroDivisionError: broken on purpose" in text and len(text) < 600 for text in told)
+    reported = [str(problem) for problem in simulation.problems if problem.code == "failed"]
+    assert len([text for text in reported if f"'{method}' of {name} failed" in text]) == 1, reported
+    assert all("ZeroDivisionError: broken on purpose" in text and len(text) < 600 for text in reported)
     assert finite(simulation)
     simulation.problems.clear()
     simulation.reset()

@@ -59,7 +59,7 @@ def read(file: Path) -> dict[tuple[int, int], Row]:
     return {(row["throws"], row["seed"]): row for row in rows}
 
 
-def told(row: Row) -> str:
+def reported(row: Row) -> str:
     """One line about one seed."""
     end = f"sutured, holes missed by {row['miss']:.2f} mm at worst" if row["success"] else f"FAILED: {row['why']}"
     pace = row["simulated"] / row["took"]
@@ -121,7 +121,7 @@ def main() -> int:
         row = attempt(seed, given.throws)
         with given.into.open("a", encoding="utf-8") as kept:
             kept.write(json.dumps(row) + "\n")
-        sys.stdout.write(told(row) + "\n")
+        sys.stdout.write(reported(row) + "\n")
         sys.stdout.flush()
     sys.stdout.write("\n".join(table(list(read(given.into).values()))) + "\n")
     return 0

@@ -273,7 +273,7 @@ def whip(axes: Any) -> str:
 
 
 def momentum(axes: Any) -> str:
-    """A thread that moves pulls along a body tied to it."""
+    """A thread that moves pulls along a body attached to it."""
     worst = 0.0
     for mass in (1e-7, 1e-3, 0.5):
         description = from_material(line(20, 0.1), 1e-3, 1e8, 1100.0, gravity=(0, 0, 0))
@@ -291,7 +291,7 @@ def momentum(axes: Any) -> str:
         error = np.abs(np.array(sums) - sums[0]) / scale
         axes.semilogy(DT * np.arange(300), np.maximum(error, 1e-17), label=f"body of {mass:g} kg")
         worst = max(worst, float(error.max()))
-    axes.set(title="momentum of thread and tied body", xlabel="t, s", ylabel="error")
+    axes.set(title="momentum of thread and attached body", xlabel="t, s", ylabel="error")
     return f"{worst:.0e}"
 
 

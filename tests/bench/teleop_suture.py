@@ -122,7 +122,7 @@ class Arm:
         return float(np.linalg.norm([f.x, f.y, f.z]))
 
     def effort(self) -> float:
-        """What the drive does that pushes hardest, in N or N m."""
+        """What the drive does with the largest effort, in N or N m."""
         return float(np.abs(patiently(self._joints.fresh).effort).max())
 
 
@@ -149,7 +149,7 @@ class Hand:
         if isinstance(self.driver, Pen):
             self.driver.press(int(grey), int(closed))
         else:
-            self.driver.grip = float(closed)
+            self.driver.grasp = float(closed)
             self.driver.buttons[0] = grey
 
     def follows(self, name: str) -> bool:
@@ -198,10 +198,10 @@ class Operator(suture.Surgeon):
         topic = scene.bodies[found.body].identity.topic
         self._seen = Latest(rospy, f"{topic}/State", RigidBodyState)
         self.arc = NeedleArc.of(found, scene.bodies[found.body])
-        told = [arm for arm in scene.arms if arm.kind is ArmKind.PSM]
-        self._base = {arm.name: scene.bodies[arm.base].T_world_body for arm in told}
-        self.arms: Any = {arm.name: Kinematic(psm_kinematics(scene, arm)[0]) for arm in told}
-        self.psms = {arm.name: Arm(rospy, arm.name) for arm in told}
+        reported = [arm for arm in scene.arms if arm.kind is ArmKind.PSM]
+        self._base = {arm.name: scene.bodies[arm.base].T_world_body for arm in reported}
+        self.arms: Any = {arm.name: Kinematic(psm_kinematics(scene, arm)[0]) for arm in reported}
+        self.psms = {arm.name: Arm(rospy, arm.name) for arm in reported}
         self.ecm = Latest(rospy, "/ECM/measured_cp", PoseStamped)
         bases = {name: Latest(rospy, f"/SUJ/{name}/local/measured_cp", PoseStamped) for name in (*self._base, "ECM")}
         hands = {"PSM1": Hand(Pen(rospy), "pen", rospy), "PSM2": Hand(Paddle(rospy), "paddle", rospy)}
@@ -323,12 +323,12 @@ class Operator(suture.Surgeon):
         assert lifted > 0.01, f"the needle was lifted by {1e3 * lifted:.1f} mm only"
         self.done(f"reached, grasped, and lifted by {1e3 * lifted:.0f} mm with the pen")
         self.hand_over(puller, driver, throw)
-        grip = self.in_hand(driver)
+        grasp = self.in_hand(driver)
         self.done("handed over to the arm of the Hydra")
         self.drive(driver, throw)
         for side in ("Entry", "Exit"):
             self.note("hole to needle, mm", 1e3 * self.off_the_needle(self.hole(side, 1)))
-        slipped = apart(self.in_hand(driver), grip)
+        slipped = apart(self.in_hand(driver), grasp)
         self.done(f"driven in at Entry1 and out at Exit1; it slipped by {slipped[0]:.1f} mm in the jaw")
         self.pull_out(puller, driver, throw)
         out = self.needle()[2, 3] - self.hole("Exit", 1)[2]
@@ -390,7 +390,7 @@ class Operator(suture.Surgeon):
         assert apart(held, self.needle())[0] < 0.5, "the needle was dropped"
         self.done("the pen drove PSM2 and then PSM1 again, which held the needle")
 
-    def lead_camera(self, rospy: Any) -> None:
+    def drive_camera(self, rospy: Any) -> None:
         """Both hands pull the scene near while the pedal is pressed."""
         from sensor_msgs.msg import Joy
         from std_msgs.msg import Bool
@@ -464,9 +464,9 @@ class Operator(suture.Surgeon):
             driver.T = frame(driver.T[:3, :3], driver.T[:3, 3] + (step if k < 20 else -step / 3.0))
             time.sleep(0.01)
         until(lambda: word in self.pen.status("PSM1"), lambda: self.pen.status("PSM1"))
-        told, arm.setpoints = arm.setpoints, None
-        last = told[-1][1]
-        changed = [t for t, p in told if np.linalg.norm(p - last) > 1e-6]
+        reported, arm.setpoints = arm.setpoints, None
+        last = reported[-1][1]
+        changed = [t for t, p in reported if np.linalg.norm(p - last) > 1e-6]
         return 1e3 * max(0.0, changed[-1] - struck) if changed else np.inf
 
 
@@ -487,7 +487,7 @@ def operate() -> dict[str, float]:
     operator.suture_once()
     operator.clutches()
     operator.switch(rospy)
-    operator.lead_camera(rospy)
+    operator.drive_camera(rospy)
     operator.faults(rospy)
     sys.stdout.write(
         f"{operator.free} rests in the air; leaning on something: {', '.join(operator.leaning) or 'none'}\n"

@@ -52,7 +52,7 @@ def test_enable_and_home_work(served: Served, operator: Person) -> None:
 
 
 def test_what_the_page_records_is_simulated_again_bit_for_bit(served: Served, operator: Person, folder: Path) -> None:
-    def told(name: str, answer: str) -> bool:
+    def reported(name: str, answer: str) -> bool:
         """Whether the page answers so to that name; a busy browser may lose a click, and one clicks again."""
         operator.writes("Record as", name)
         until(lambda: not operator.ticked("Record"), "the page shows that nothing is recorded")
@@ -61,8 +61,8 @@ def test_what_the_page_records_is_simulated_again_bit_for_bit(served: Served, op
             until(lambda: answer in operator.text, answer, 10.0)
         return answer in operator.text
 
-    until(lambda: told("../mine", "'../mine' is not a valid name of a recording"), "a bad name is rejected")
-    until(lambda: told("mine", "recording to 'recordings/mine.record' from"), "what happens is recorded")
+    until(lambda: reported("../mine", "'../mine' is not a valid name of a recording"), "a bad name is rejected")
+    until(lambda: reported("mine", "recording to 'recordings/mine.record' from"), "what happens is recorded")
     before = served.arm("PSM1")["measured_js"][0, 0]
     operator.drags(operator.slider("yaw °"), 8)
     until(lambda: abs(served.arm("PSM1")["measured_js"][0, 0] - before) > np.deg2rad(1.0), "the arm has moved")

@@ -141,7 +141,7 @@ class Trial:
         self._fingers = [finger for jaw in scene.jaws for finger in jaw.fingers]
         self._handle = self.sim.bodies[scene.bodies[self.body].identity.identifier]
         self._goal = self._handle.pose
-        self.fastest = 0.0
+        self.top_speed = 0.0
 
     # --- what is commanded --------------------------------------------------------------------
 
@@ -207,7 +207,7 @@ class Trial:
 
     def _step(self) -> None:
         self.sim.step(self.update)
-        self.fastest = max(self.fastest, self._speed())
+        self.top_speed = max(self.top_speed, self._speed())
 
     def _speed(self) -> float:
         return float(np.linalg.norm(self._handle.twist[:3]))
@@ -252,10 +252,10 @@ class Trial:
         for goal in self._goals():
             self._move(goal)
         self._release()
-        had, floor, controlled = self._speed(), self._floor(), self.fastest
+        had, floor, controlled = self._speed(), self._floor(), self.top_speed
         height = max(float(self._handle.pose[2]) - floor, 0.0)
         limit = float(np.sqrt(had**2 + 2.0 * 9.81 * height)) + STORED
-        self.fastest = 0.0
+        self.top_speed = 0.0
         others = 0.0
         end, last = self.sim.time + after, None
         faults: list[str] = []
@@ -268,8 +268,8 @@ class Trial:
         pose = self._handle.pose
         if not all(np.isfinite(self.sim.state[name]).all() for name in ("body_pose", "body_twist", "joint_position")):
             faults.append("the state is not finite")
-        if self.fastest > limit:
-            faults.append(f"it was {self.fastest:.2f} m/s fast, at most {limit:.2f} is explained")
+        if self.top_speed > limit:
+            faults.append(f"it was {self.top_speed:.2f} m/s fast, at most {limit:.2f} is explained")
         if others > max(10.0 * (limit + controlled), 10.0):
             faults.append(f"another body was {others:.1f} m/s fast")
         low, high = self._box()
@@ -281,7 +281,7 @@ class Trial:
             faults.append(f"it still moves at {self._speed():.3f} m/s")
         faults += [str(p) for p in self.sim.problems if p.code == "diverged"]
         self.sim.close()
-        return Verdict(self.stage, self.number, self.update, tuple(faults), had, self.fastest)
+        return Verdict(self.stage, self.number, self.update, tuple(faults), had, self.top_speed)
 
     def _prepare(self) -> None:
         """On a stage with arms: home them, and close the jaws more or less."""

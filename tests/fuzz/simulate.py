@@ -52,10 +52,10 @@ def _run(loaded: Scene, case: Case, strict: bool) -> None:
                         f"'{name}' is not finite after {tick + STRIDE} ticks"
                     )
             speeds = np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1)
-            fastest = int(speeds.argmax())
-            key = loaded.bodies[fastest].identity.key
-            assert not strict or speeds[fastest] < FAST, (
-                f"'{key}' moves at {speeds[fastest]:.0f} m/s after {tick + STRIDE} ticks; {simulation.problems[:1]}"
+            top_speed = int(speeds.argmax())
+            key = loaded.bodies[top_speed].identity.key
+            assert not strict or speeds[top_speed] < FAST, (
+                f"'{key}' moves at {speeds[top_speed]:.0f} m/s after {tick + STRIDE} ticks; {simulation.problems[:1]}"
             )
         diverged = [str(problem) for problem in simulation.problems if problem.code == "diverged"]
         assert not (strict and diverged), diverged[0]

@@ -71,9 +71,9 @@ def test_what_an_arm_raises_becomes_its_fault_and_the_others_go_on(
             simulation.apply(Hold(0))
             simulation.apply(Reset())
             simulation.step(10)
-        told = [value for arm, name, value in simulation.arms.events() if (arm, name) == (0, "error")]
-        assert told and all("ZeroDivisionError: broken on purpose" in text for text in told)
-        assert len(told) == 1, "a fault is reported once"
+        reported = [value for arm, name, value in simulation.arms.events() if (arm, name) == (0, "error")]
+        assert reported and all("ZeroDivisionError: broken on purpose" in text for text in reported)
+        assert len(reported) == 1, "a fault is reported once"
         assert first.operating_state.state is State.FAULT
         assert all(other.operating_state.state is State.ENABLED for other in others)
         first.disable()
@@ -107,8 +107,8 @@ def test_homing_that_would_take_hours_ends_in_a_fault_not_the_run(scene: Scene) 
     simulation.apply(StateCommand(0, "home"))
     simulation.step(300)
     assert arm.operating_state.state is State.FAULT
-    told = [value for index, name, value in simulation.arms.events() if (index, name) == (0, "error")]
-    assert len(told) == 1 and "trajectory_j/set_ratio" in told[0]
+    reported = [value for index, name, value in simulation.arms.events() if (index, name) == (0, "error")]
+    assert len(reported) == 1 and "trajectory_j/set_ratio" in reported[0]
     simulation.apply(TrajectorySetRatio(0, 1.0))
     for word in ("disable", "home"):
         simulation.apply(StateCommand(0, word))
@@ -153,9 +153,13 @@ def test_what_the_controller_of_a_body_raises_clears_its_command_and_is_reported
         patch.setattr(f"ligature.physics.bodies.{part}", broken)
         simulation.apply(command)
         simulation.step(3)
-    told = [str(problem) for problem in simulation.problems]
-    assert len(told) == 1
-    assert body.identity.identifier in told[0] and "ZeroDivisionError: broken" in told[0] and len(told[0]) < 600
+    reported = [str(problem) for problem in simulation.problems]
+    assert len(reported) == 1
+    assert (
+        body.identity.identifier in reported[0]
+        and "ZeroDivisionError: broken" in reported[0]
+        and len(reported[0]) < 600
+    )
     simulation.step(3)
     assert len(simulation.problems) == 1
     simulation.close()

@@ -45,7 +45,7 @@ def test_the_jaws_of_the_corpus_hold_its_needle_when_lifted_and_shaken(corpus: P
     middles = [0.5 * (points.min(axis=0) + points.max(axis=0)) for points in pieces]
     along = middles[PIECE + 1] - middles[PIECE - 1]
     along /= np.linalg.norm(along)
-    H = pose7_matrix(world.motion(jaw.holder)[0])
+    H = pose7_matrix(world.motion(jaw.palm)[0])
     fingers = [pose7_matrix(world.motion(finger)[0])[:3, 1] for finger in jaw.fingers]
     axis, pivot = H[:3, :3] @ jaw.axis, H[:3, :3] @ jaw.pivot + H[:3, 3]
     way = fingers[0] + fingers[1] - (fingers[0] + fingers[1]) @ axis * axis

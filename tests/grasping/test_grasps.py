@@ -123,7 +123,7 @@ def test_an_arm_feels_the_needle_it_holds(held: Theatre) -> None:
     sim.step(1500)
     thread = sum(sim.scene.bodies[b].mass for b in sim.scene.rods[0].bodies)
     weight = 9.8 * (held.needle.body.mass + thread)
-    wrench = sim._world.contact_wrench(held.tools("PSM1"), held.holder("PSM1")[:3, 3])
+    wrench = sim._world.contact_wrench(held.tools("PSM1"), held.palm("PSM1")[:3, 3])
     assert wrench[:3] == pytest.approx([0, 0, -weight], abs=0.1 * weight)
 
 
@@ -157,10 +157,10 @@ def test_nothing_bursts_when_what_is_held_is_put_elsewhere(held: Theatre, what: 
     else:
         for joint, by in zip(sim.scene.arms[0].joints[:2], (0.2, 0.1), strict=True):
             sim._world.set_joint_position(joint, sim._world.joint_position(joint) + by)
-    fastest = 0.0
+    top_speed = 0.0
     for _ in range(100):
         sim.step(2)
-        fastest = max(fastest, float(np.abs(held.needle.twist[:3]).max()))
+        top_speed = max(top_speed, float(np.abs(held.needle.twist[:3]).max()))
     assert np.isfinite(held.needle.pose).all()
-    assert fastest < 5.0
+    assert top_speed < 5.0
     assert not sim.problems

@@ -22,7 +22,7 @@ class Stretched(Theatre):
         self.rod = self.sim._suture.rods.rods[0]
         for element in range(len(self.rod.positions)):
             self.rod.set_gravity(element, (0.0, 0.0, 0.0))
-        H = self.holder("PSM1")
+        H = self.palm("PSM1")
         axis, between = H[:3, 2], H[:3, 3] - DEPTH * H[:3, 1]
         along = self.rod.positions[ELEMENT + 5] - self.rod.positions[ELEMENT - 5]
         R, N = minimal_rotation(along / np.linalg.norm(along), axis), pose7_matrix(self.needle.pose)

@@ -11,7 +11,7 @@ from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
 
-T_HOLDER_TIP = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+T_PALM_TIP = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 NEEDLE_AT = np.array([0.03, 0.28, 0.765, 0.27436727, -0.95455669, 0.02253886, 0.11417583])
 """Where both arms reach the needle with straight wrists."""
 
@@ -43,18 +43,18 @@ class Theatre:
                 return
         raise AssertionError("an arm does not arrive")
 
-    def holder(self, name: str) -> np.ndarray:
+    def palm(self, name: str) -> np.ndarray:
         """Pose (4, 4) of the body that an arm's fingers sit on, inertial frame."""
-        return pose7_matrix(self.sim._world.motion(self._jaw(name).holder)[0])
+        return pose7_matrix(self.sim._world.motion(self._jaw(name).palm)[0])
 
     def needle_in_jaw(self, name: str) -> np.ndarray:
         """Pose (4, 4) of the needle as the arm's jaw sees it."""
-        return inverse(self.holder(name)) @ pose7_matrix(self.sim._world.motion(self.needle.body.index)[0])
+        return inverse(self.palm(name)) @ pose7_matrix(self.sim._world.motion(self.needle.body.index)[0])
 
     def tools(self, name: str) -> list[int]:
         """Bodies at the end of an arm."""
         jaw = self._jaw(name)
-        return [jaw.holder, *jaw.fingers]
+        return [jaw.palm, *jaw.fingers]
 
     def _jaw(self, name: str):
         return next(jaw for jaw in self.sim.scene.jaws if jaw.name == name)
@@ -69,7 +69,7 @@ class Theatre:
         H[:3, :3] = np.column_stack([np.cross(-way, along), -way, along])
         H[:3, 3] = T[:3, 3] - (DEPTH + back) * way
         arm = next(a for a in self.sim.scene.arms if a.name == name)
-        return matrix_pose7(inverse(pose7_matrix(self.sim._world.pose7(arm.base))) @ H @ T_HOLDER_TIP)
+        return matrix_pose7(inverse(pose7_matrix(self.sim._world.pose7(arm.base))) @ H @ T_PALM_TIP)
 
     def reach(self, name: str, back: float = 0.0) -> None:
         """Move an arm to the needle, or ``back`` metres before it."""

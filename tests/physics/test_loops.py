@@ -22,7 +22,7 @@ GAP, WORST = 1e-4, 3e-3
 RATIO, GAP_BEYOND = 300.0, 5e-4
 """Ratio of masses from which on Bullet's solver holds a loop less well, and what it may open by then."""
 
-FASTEST = 20.0
+MAX_SPEED = 20.0
 """Speed in m/s that no linkage of a metre reaches that falls from rest."""
 
 
@@ -40,12 +40,12 @@ def gaps(sim: Simulation) -> NDArray[np.float64]:
 
 def run(sim: Simulation, ticks: int) -> tuple[NDArray[np.float64], float]:
     """The widest gap (m) of each of ``ticks``, and the largest speed (m/s) within them."""
-    widest, fastest = np.zeros(ticks), 0.0
+    widest, top_speed = np.zeros(ticks), 0.0
     for k in range(ticks):
         sim.step()
         widest[k] = gaps(sim).max()
-        fastest = max(fastest, float(np.linalg.norm(sim.state["body_twist"][0, :, :3], axis=1).max()))
-    return widest, fastest
+        top_speed = max(top_speed, float(np.linalg.norm(sim.state["body_twist"][0, :, :3], axis=1).max()))
+    return widest, top_speed
 
 
 def check(text: str, folder: Path, ticks: int) -> None:
@@ -58,13 +58,13 @@ def check(text: str, folder: Path, ticks: int) -> None:
     for body in scene.bodies:
         moved = np.linalg.norm(sim.state["body_pose"][0, body.index, :3] - body.T_world_body[:3, 3])
         assert moved < 0.02, body.identity.key
-    widest, fastest = run(sim, ticks)
+    widest, top_speed = run(sim, ticks)
     sim.close()
     assert not sim.problems
     masses = [body.mass for body in scene.bodies if not body.static]
     assert np.quantile(widest, 0.9) < (GAP if max(masses) < RATIO * min(masses) else GAP_BEYOND)
     assert widest.max() < WORST
-    assert fastest < FASTEST
+    assert top_speed < MAX_SPEED
 
 
 CASES = [(kind, closing) for kind in KINDS for closing in (CLOSING if kind != "spatial" else ("p2p",))]

@@ -55,9 +55,9 @@ def test_a_body_in_free_flight_feels_nothing(simulate: Make) -> None:
 
 
 def test_a_held_body_weighs_on_its_holder(simulate: Make) -> None:
-    text = "bodies: [Floor, A]\nactuators: [Grip]\n" + FLOOR + _box("A", 0.5, 1.0)
-    grip = "Grip: {name: Grip, type: Constraint, parent: Floor, location: {position: {x: 0, y: 0, z: 0.3}, orientation: {r: 0.3, p: 0.5, y: 0.9}}}\n"
-    sim = simulate(text + grip)
+    text = "bodies: [Floor, A]\nactuators: [Gripper]\n" + FLOOR + _box("A", 0.5, 1.0)
+    actuator = "Gripper: {name: Gripper, type: Constraint, parent: Floor, location: {position: {x: 0, y: 0, z: 0.3}, orientation: {r: 0.3, p: 0.5, y: 0.9}}}\n"
+    sim = simulate(text + actuator)
     sim.apply(ActuatorCommand(0, True, body="A"))
     sim.bodies["A"].command_wrench([0, 0, 0, 0.1, 0.2, 0.3])
     sim.step(500)

@@ -55,6 +55,6 @@ def ready() -> PsmArm:
 
 
 @pytest.fixture
-def told() -> Callable[[Arm, str], list[object]]:
+def reported() -> Callable[[Arm, str], list[object]]:
     """Values of an arm's events of one name."""
     return lambda arm, name: [event.value for event in arm.events if event.name == name]

@@ -15,7 +15,7 @@ from ligature.robots.psm_arm import LEAST_DEPTH, MAX_ACCELERATION, MAX_VELOCITY,
 
 from tests.robots.conftest import DT, advance
 
-Told = Callable[[Arm, str], list[object]]
+Reported = Callable[[Arm, str], list[object]]
 
 
 def test_a_servo_step_is_the_set_point_at_once_and_never_busy(ready: PsmArm) -> None:
@@ -40,7 +40,7 @@ def test_wrong_joint_arrays_are_refused_and_change_nothing(ready: PsmArm, values
     assert not ready.is_busy
 
 
-def test_a_move_keeps_velocity_and_acceleration_limits_and_ends_at_its_goal(ready: PsmArm, told: Told) -> None:
+def test_a_move_keeps_velocity_and_acceleration_limits_and_ends_at_its_goal(ready: PsmArm, reported: Reported) -> None:
     goal = np.array([0.8, -0.5, 0.2, 2.0, -1.0, 1.0])
     ready.move_jp(goal)
     rows = []
@@ -52,7 +52,7 @@ def test_a_move_keeps_velocity_and_acceleration_limits_and_ends_at_its_goal(read
     assert (np.abs(speed) <= MAX_VELOCITY * (1 + 1e-6)).all()
     assert (np.abs(np.diff(speed, axis=0)) / DT <= MAX_ACCELERATION * 1.01).all()
     assert q[-1] == pytest.approx(goal, abs=1e-9)
-    assert told(ready, "goal_reached") == [True]
+    assert reported(ready, "goal_reached") == [True]
 
 
 def test_a_move_at_a_tenth_of_speed_and_acceleration_takes_the_time_that_they_allow(ready: PsmArm) -> None:
@@ -65,18 +65,18 @@ def test_a_move_at_a_tenth_of_speed_and_acceleration_takes_the_time_that_they_al
     assert ready.time - start == pytest.approx(0.5 / v + v / a, abs=3 * DT)
 
 
-def test_a_move_of_no_length_is_busy_for_a_moment_and_reaches_its_goal(ready: PsmArm, told: Told) -> None:
+def test_a_move_of_no_length_is_busy_for_a_moment_and_reaches_its_goal(ready: PsmArm, reported: Reported) -> None:
     ready.move_jp(ready.setpoint_js().position)
     assert ready.is_busy
     advance(ready, 0.03)
     assert ready.is_busy
     advance(ready, 0.1)
     assert not ready.is_busy
-    assert [list(value)[2] for value in told(ready, "operating_state")] == [True, False]  # type: ignore[call-overload]
-    assert told(ready, "goal_reached") == [True]
+    assert [list(value)[2] for value in reported(ready, "operating_state")] == [True, False]  # type: ignore[call-overload]
+    assert reported(ready, "goal_reached") == [True]
 
 
-def test_a_newer_move_takes_over_without_a_jump(ready: PsmArm, told: Told) -> None:
+def test_a_newer_move_takes_over_without_a_jump(ready: PsmArm, reported: Reported) -> None:
     ready.move_jp([1.0, 0, 0.12, 0, 0, 0])
     advance(ready, 0.4)
     speed = ready.setpoint_js().velocity[0]
@@ -85,15 +85,15 @@ def test_a_newer_move_takes_over_without_a_jump(ready: PsmArm, told: Told) -> No
     assert ready.setpoint_js().velocity[0] == pytest.approx(speed, abs=MAX_ACCELERATION[0] * 2 * DT)
     advance(ready, 3.0)
     assert ready.setpoint_js().position[0] == pytest.approx(0.0, abs=1e-9)
-    assert told(ready, "goal_reached") == [False, True]
+    assert reported(ready, "goal_reached") == [False, True]
 
 
-def test_a_servo_interrupts_a_move(ready: PsmArm, told: Told) -> None:
+def test_a_servo_interrupts_a_move(ready: PsmArm, reported: Reported) -> None:
     ready.move_jp([1.0, 0, 0.12, 0, 0, 0])
     advance(ready, 0.2)
     ready.servo_jp([0.0, 0, 0.12, 0, 0, 0])
     assert not ready.is_busy
-    assert told(ready, "goal_reached") == [False]
+    assert reported(ready, "goal_reached") == [False]
 
 
 def test_a_relative_move_begins_at_the_goal_of_the_running_one(ready: PsmArm) -> None:
@@ -216,7 +216,7 @@ def test_the_jaw_moves_with_the_busy_flag_of_the_arm(ready: PsmArm) -> None:
     assert ready.jaw.setpoint_js().position == pytest.approx([np.deg2rad(-20)], abs=1e-5)
 
 
-def test_jaw_and_joints_move_side_by_side(ready: PsmArm, told: Told) -> None:
+def test_jaw_and_joints_move_side_by_side(ready: PsmArm, reported: Reported) -> None:
     assert ready.jaw is not None
     ready.move_jp([1.0, 0, 0.12, 0, 0, 0])
     ready.jaw.move_jp([0.5])
@@ -225,12 +225,12 @@ def test_jaw_and_joints_move_side_by_side(ready: PsmArm, told: Told) -> None:
     advance(ready, 3.0)
     assert ready.measured_js().position[0] == pytest.approx(1.0)
     assert ready.jaw.measured_js().position == pytest.approx([0.5])
-    assert told(ready, "goal_reached") == [True]
+    assert reported(ready, "goal_reached") == [True]
 
 
-def test_another_instrument_brings_its_own_limits(ready: PsmArm, told: Told) -> None:
+def test_another_instrument_brings_its_own_limits(ready: PsmArm, reported: Reported) -> None:
     ready.set_tool_type("MEGA_NEEDLE_DRIVER:420194")
-    assert told(ready, "tool_type") == ["MEGA_NEEDLE_DRIVER:420194"]
+    assert reported(ready, "tool_type") == ["MEGA_NEEDLE_DRIVER:420194"]
     ready.servo_jp([0, 0, 0.12, 0, 1.39, 0])
     assert ready.setpoint_js().position[4] == pytest.approx(1.2217)
     with pytest.raises(Rejected, match="set_tool_type: there is no instrument 1"):
@@ -255,13 +255,13 @@ def test_ratios_outside_their_range_are_refused(ready: PsmArm, ratio: float) -> 
     assert ready.joints.ratio_v == 1.0
 
 
-def test_a_lasting_following_error_is_a_fault_that_disable_ends(ready: PsmArm, told: Told) -> None:
+def test_a_lasting_following_error_is_a_fault_that_disable_ends(ready: PsmArm, reported: Reported) -> None:
     ready.servo_jp([0.9, 0, 0.12, 0, 0, 0])
     ready.joints.plant.read()[0, 0] = 0.0
     for _ in range(300):
         ready.watch(0.005)
     assert ready.operating_state.state.name == "FAULT"
-    (error,) = told(ready, "error")
+    (error,) = reported(ready, "error")
     assert "joint yaw is 0.9 away from its set-point" in str(error)
     with pytest.raises(Rejected):
         ready.enable()

@@ -138,7 +138,7 @@ MOVES: dict[str, Callable[[PsmArm], None]] = {
 MOTIONS = {**SERVOS, **MOVES}
 
 
-def told(arm: PsmArm, name: str) -> list[object]:
+def reported(arm: PsmArm, name: str) -> list[object]:
     """Values of the events ``name`` since the last look."""
     found = [event.value for event in arm.events if event.name == name]
     arm.events.clear()
@@ -168,7 +168,9 @@ def test_every_accepted_command_is_answered_by_a_new_event(state):
             arm.events.clear()
             arm.state_command(command)
             settle(arm)
-            assert told(arm, "operating_state"), f"{command} reported nothing: a client that waits would wait for ever"
+            assert reported(arm, "operating_state"), (
+                f"{command} reported nothing: a client that waits would wait for ever"
+            )
 
 
 @pytest.mark.parametrize("state", MADE)
@@ -191,7 +193,7 @@ def test_motion_is_for_homed_arms_only(state, motion):
         assert arm.is_busy == (motion in MOVES), "moves make an arm busy, servo does not"
         settle(arm)
         assert arm.operating_state == before
-        assert told(arm, "goal_reached") == ([True] if motion in MOVES else [])
+        assert reported(arm, "goal_reached") == ([True] if motion in MOVES else [])
         return
     with pytest.raises(Rejected, match="not ready"):
         MOTIONS[motion](arm)
@@ -210,7 +212,7 @@ def test_a_moving_arm_stops_for_a_state_command(command, motion):
     arm.state_command(command)
     if command != "unhome":
         assert not arm.is_busy
-        assert told(arm, "goal_reached") == [False]
+        assert reported(arm, "goal_reached") == [False]
         stopped = arm.setpoint_js().position
         run(arm, 0.5)
         np.testing.assert_allclose(arm.setpoint_js().position, stopped, atol=1e-12)
@@ -227,7 +229,7 @@ def test_a_streamed_command_ends_a_move_of_the_same_joints(motion):
     arm.events.clear()
     SERVOS[motion](arm)
     assert not arm.is_busy
-    assert told(arm, "goal_reached") == [False]
+    assert reported(arm, "goal_reached") == [False]
 
 
 @pytest.mark.parametrize("motion", MOVES)
@@ -240,7 +242,7 @@ def test_a_move_is_busy_then_idle_even_when_it_goes_nowhere(motion):
         else:
             MOVES[motion](arm)
         settle(arm)
-        busy = [value[2] for value in told(arm, "operating_state")]
+        busy = [value[2] for value in reported(arm, "operating_state")]
         assert busy == [True, False]
 
 

@@ -151,7 +151,7 @@ TURNED = 0.05
 """Angle in radians to its goal within which a body that is driven has arrived."""
 
 
-def lead(stage: Stage, handle: Any, target: Callable[[], np.ndarray], step: float, arrived: float) -> None:
+def drive(stage: Stage, handle: Any, target: Callable[[], np.ndarray], step: float, arrived: float) -> None:
     """Command poses on the way to ``target()``, ``step`` metres ahead at most, until it is ``arrived`` metres near."""
     for _ in range(1000):
         goal, here = target(), measured(handle)
@@ -171,7 +171,7 @@ def set_up_task_3(stage: Stage, psm: Psm, needle: Any) -> None:
     psm.servo_jp(TASK_3_JOINTS)
     psm.set_jaw_angle(0.8)
     stage.until(lambda: np.allclose(psm.measured_jp(), TASK_3_JOINTS, atol=5e-3), 5.0)
-    lead(stage, needle, lambda: measured(psm.yaw_link) @ NEEDLE_IN_JAWS, NEEDLE_STEP, 0.0005)
+    drive(stage, needle, lambda: measured(psm.yaw_link) @ NEEDLE_IN_JAWS, NEEDLE_STEP, 0.0005)
     for _ in range(round(CLOSING[psm.tool_id] / 0.01)):
         psm.set_jaw_angle(0.0)
         stage.sleep(0.01)

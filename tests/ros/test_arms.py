@@ -259,9 +259,11 @@ def test_states_follow_the_reference_sequence(arm):
     before = len(arm.state.events)
     assert arm.enable(1.0)
     assert arm.home(5.0)
-    told = [(e.state, e.is_homed, e.is_busy) for e in arm.state.events[before:]]
-    told = told[told.index(("DISABLED", False, True)) :]  # what was reported before belongs to 'disable' and 'unhome'
-    short = [told[0], *(state for last, state in zip(told, told[1:], strict=False) if state != last)]
+    reported = [(e.state, e.is_homed, e.is_busy) for e in arm.state.events[before:]]
+    reported = reported[
+        reported.index(("DISABLED", False, True)) :
+    ]  # what was reported before belongs to 'disable' and 'unhome'
+    short = [reported[0], *(state for last, state in zip(reported, reported[1:], strict=False) if state != last)]
     assert short == [
         ("DISABLED", False, True), ("ENABLED", False, False), ("ENABLED", False, True), ("ENABLED", True, False),
     ]  # fmt: skip
@@ -374,7 +376,7 @@ def test_goals_beyond_the_limits_are_clipped_not_refused(arm):
 
 @pytest.mark.parametrize("bad", ["short", "long", "empty", "nan", "infinite"])
 @on_every_arm
-def test_joint_commands_that_make_no_sense_change_nothing(arm, bad):
+def test_joint_commands_that_are_invalid_change_nothing(arm, bad):
     start = arm.setpoint_jp()
     values = {
         "short": start[:-1] + 0.1, "long": [*start, 0.1], "empty": [], "nan": start * np.nan,
@@ -429,14 +431,14 @@ def test_ratios_are_echoed_and_slow_moves_down(arm, listen):
     start = arm.setpoint_jp()
     step = np.zeros(len(start))
     step[0] = 0.2
-    fastest = {}
+    top_speed = {}
     for ratio, goal in ((0.25, start + step), (1.0, start)):
         arm.say("trajectory_j/set_ratio", Float64(ratio))
         ratios.wait(lambda message, ratio=ratio: message.data == ratio)
         setpoints.messages.clear()
         assert arm.move_jp(goal).wait()
-        fastest[ratio] = max(abs(message.velocity[0]) for message in setpoints.messages)
-    assert fastest[0.25] < 0.6 * fastest[1.0]  # half of it where the move is too short for full speed
+        top_speed[ratio] = max(abs(message.velocity[0]) for message in setpoints.messages)
+    assert top_speed[0.25] < 0.6 * top_speed[1.0]  # half of it where the move is too short for full speed
     arm.say("trajectory_j/set_ratio", Float64(1.5))
     time.sleep(0.2)
     assert ratios.messages[-1].data == 1.0

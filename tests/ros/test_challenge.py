@@ -19,7 +19,7 @@ from tests.ros.challenge import (
     Stage,
     angle,
     distance,
-    lead,
+    drive,
     measured,
     message,
     set_up_task_3,
@@ -197,7 +197,7 @@ def test_the_camera_body_is_driven_in_small_steps_and_the_cameras_ride_on_it(sta
     start, on_frame = measured(frame), measured(camera)
     goal = start @ turned(1, 0.05)
     goal[:3, 3] += [0.01, -0.005, 0.004]
-    lead(stage, frame, lambda: goal, CAMERA_STEP, 1e-5)
+    drive(stage, frame, lambda: goal, CAMERA_STEP, 1e-5)
     stage.until(lambda: angle(measured(frame), goal) < 1e-4, 1.0)
     assert distance(measured(camera), on_frame) < 1e-9
     frame.set_pose(message(start))
@@ -227,7 +227,7 @@ def test_a_needle_driven_through_entry_and_exit_is_two_insertions_in_order(
     above = path[0].copy()
     above[2, 3] += 0.03
     for pose in (above, path[0]):
-        lead(stage, needle, lambda pose=pose: pose, NEEDLE_STEP, 0.0005)
+        drive(stage, needle, lambda pose=pose: pose, NEEDLE_STEP, 0.0005)
     insertions = Insertions(needle, holes)
     for pose in path:
         # slowly: a needle that lags behind cuts the corner

@@ -44,7 +44,7 @@ class Run:
         self.now, self.hz, self.wakes, self.missed = 100.0, hz, 0, 0
 
     def turn(self, seconds: float) -> list[int]:
-        """Let time pass; returns how many messages each outlet sent."""
+        """Advance time; returns how many messages each outlet sent."""
         before, end = [len(sink.messages) for sink in self.sinks], self.now + seconds
         while (due := self.schedule.next_due(self.now)) < end:
             self.now = max(self.now, due)

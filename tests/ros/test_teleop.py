@@ -266,9 +266,9 @@ def test_what_devices_stated_is_written_down_and_can_be_stated_again(
     assert teleop.end(20.0) == 0
     replay = Replay(teleop.record)
     assert replay.devices == {"pen", "paddle"}
-    told = [*replay.due(0.0), *replay.due(1e6)]
-    assert sum(name == "reading" for name, _ in told) > 1000
-    assert [value for name, value in told if name == "camera"] == [True, False]
+    reported = [*replay.due(0.0), *replay.due(1e6)]
+    assert sum(name == "reading" for name, _ in reported) > 1000
+    assert [value for name, value in reported if name == "camera"] == [True, False]
     lines = teleop.record.read_text().splitlines()
     (tmp_path / "part.jsonl").write_text("\n".join(_first_motion(lines)) + "\n")
     (tmp_path / "teleop.yaml").write_text(CONFIG)

@@ -100,13 +100,13 @@ def test_messages_of_a_type_that_is_no_pose_are_reported_and_the_pen_is_heard_on
     from geometry_msgs.msg import PoseStamped
     from std_msgs.msg import String
 
-    told: list[str] = []
-    monkeypatch.setattr(node, "logerr_throttle_identical", lambda _, text: told.append(text))
+    reported: list[str] = []
+    monkeypatch.setattr(node, "logerr_throttle_identical", lambda _, text: reported.append(text))
     device, readings = adapter("touch", "/mixed/")
     wrong = publish("/mixed/pose", String)
-    until(lambda: wrong.publish("here") or told)
-    assert "/mixed/pose: /ligature_tests" in told[0]
-    assert "sends std_msgs/String, which cannot be read here" in told[0]
+    until(lambda: wrong.publish("here") or reported)
+    assert "/mixed/pose: /ligature_tests" in reported[0]
+    assert "sends std_msgs/String, which cannot be read here" in reported[0]
     assert not readings
     wrong.unregister()
     pose = publish("/mixed/pose", PoseStamped)

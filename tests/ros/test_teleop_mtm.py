@@ -124,11 +124,11 @@ def test_locks_and_scale_are_reported_and_move_nothing(
     assert apart(settled(arms, "PSM1"), before)[0] < 0.05
     lock.publish(False)
     scale.publish(0.4)
-    told = listen("/MTMR_PSM1/scale", Float64)
-    assert told.wait(lambda m: m.data == 0.4)
+    reported = listen("/MTMR_PSM1/scale", Float64)
+    assert reported.wait(lambda m: m.data == 0.4)
     scale.publish(7.0)
     time.sleep(0.2)
-    assert told.messages[-1].data == 0.4
+    assert reported.messages[-1].data == 0.4
     assert apart(settled(arms, "PSM1"), before)[0] < 0.05
 
 

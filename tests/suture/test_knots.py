@@ -33,8 +33,8 @@ class TwoArms:
         turn, radius = np.linspace(0.0, 3.6, 200), 0.018
         bend = np.stack([radius * np.sin(turn), radius * (1.0 - np.cos(turn))], axis=1)
         away = np.array([np.cos(turn[-1]), np.sin(turn[-1])])
-        lead = np.linspace([-0.04, 0.0], [0.0, 0.0], 50)[:-1]
-        flat = np.vstack([lead, bend, bend[-1] + np.linspace(0.0, 0.075, 100)[1:, None] * away])
+        drive = np.linspace([-0.04, 0.0], [0.0, 0.0], 50)[:-1]
+        flat = np.vstack([drive, bend, bend[-1] + np.linspace(0.0, 0.075, 100)[1:, None] * away])
         points, self.length = _resample(np.column_stack([flat, np.zeros(len(flat))]), n)
         self.bench = kit.Bench([kit.body(LEFT, None, at=points[0]), kit.body(RIGHT, None, at=points[-1])])
         # So viscous a medium that the thread stays where it is driven; a braid that creeps for 10 ms when bent.

@@ -33,7 +33,7 @@ def test_element_without_length_is_named(kit):
         replace(description, ends=ends)
 
 
-def test_tie_to_an_unknown_body_is_refused(kit):
+def test_attachment_to_an_unknown_body_is_refused(kit):
     description = kit.from_material(kit.line(5, 0.1), 1e-3, 1e9, 1100.0)
     none = np.zeros(3)
     attachment = Attachment(0, 9, np.eye(4), np.eye(4), none, none, none, *FREE)
@@ -42,7 +42,7 @@ def test_tie_to_an_unknown_body_is_refused(kit):
 
 
 def _messy(kit):
-    """A thread falling on a tilted box and on itself, tied to a free body."""
+    """A thread falling on a tilted box and on itself, attached to a free body."""
     s = np.linspace(0.0, 1.0, 41)
     points = np.stack([0.02 * np.cos(9 * s), 0.015 * np.sin(9 * s), 0.012 + 0.01 * s], axis=1)
     bench = kit.Bench(

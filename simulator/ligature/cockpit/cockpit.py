@@ -38,7 +38,7 @@ PERIOD = 0.01
 STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD = 0.05, 0.2, 0.4
 """Seconds between turns of the loop, poses, words and controls, and curves."""
 
-TOLD = ("warning", "error")
+REPORTED = ("warning", "error")
 """Events of an arm that are shown beside it."""
 
 
@@ -271,7 +271,7 @@ class Cockpit:
         for event in self._block.events.read():
             if event.arm == RUN:
                 self._recorded = str(event.value)
-            elif event.name in TOLD:
+            elif event.name in REPORTED:
                 self._arms[event.arm].note = str(event.value)
                 if "servo" in str(event.value):
                     self._pursuits[event.arm].stop()

@@ -17,13 +17,13 @@ from ligature.robots.poses import rotation_vector
 Array = NDArray[np.float64]
 
 LINEAR, ANGULAR = 0.1, 1.5
-"""Fastest goals of a tip, in m/s and rad/s."""
+"""Maximum velocity of goals of a tip, in m/s and rad/s."""
 
 JAW = 2.0
-"""Fastest goals of a jaw or gripper in rad/s."""
+"""Maximum velocity of goals of a jaw or gripper in rad/s."""
 
 JOINT = {"revolute": 1.0, "prismatic": 0.1}
-"""Fastest goals of a joint in rad/s and m/s."""
+"""Maximum velocity of goals of a joint in rad/s and m/s."""
 
 
 @dataclass(eq=False)

@@ -28,8 +28,8 @@ class ActuatorGrasps:
         """Grasp ``child`` where it is, between pads in a frame (4, 4) of body ``parent``; returns the grasp's
         number."""
         bodies = self._scene.bodies
-        T_holder_patch = inverse(bodies[parent].T_body_inertial) @ T_parent_frame
-        patch = Patch(T_holder_patch, slip.half_width, slip.friction * bodies[child].friction)
+        T_palm_patch = inverse(bodies[parent].T_body_inertial) @ T_parent_frame
+        patch = Patch(T_palm_patch, slip.half_width, slip.friction * bodies[child].friction)
         grasp, ride = begin(self._world, parent, child, patch)
         grasp.normal_force = slip.normal_force
         self._added += 1

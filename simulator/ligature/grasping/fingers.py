@@ -58,7 +58,7 @@ class Fingers:
 
     def axis(self) -> tuple[Array, Array]:
         """The common axis (3,) of both fingers and a point (3,) on it, now."""
-        T = pose7_matrix(self._world.motion(self.jaw.holder)[0])
+        T = pose7_matrix(self._world.motion(self.jaw.palm)[0])
         return T[:3, :3] @ self.jaw.axis, T[:3, :3] @ self.jaw.pivot + T[:3, 3]
 
     def closing(self, finger: int, axis: Array, lever: Array) -> Array:

@@ -62,8 +62,8 @@ class Motions(NamedTuple):
     body_pose: Array  # (7,)
     body_twist: Array  # (6,) after the tick without the grasps
     inverse: Array  # (4,) inverse of the body's mass and principal moments
-    holder_pose: Array  # (g, 7)
-    holder_twist: Array  # (g, 6)
+    palm_pose: Array  # (g, 7)
+    palm_twist: Array  # (g, 6)
     ride: Array  # (g, 6) velocity of the holders at the body's centre in the last tick
     pending: Array  # (6,) impulse and moment already applied to the body in this tick
     attached_load: Array  # (6,) force and moment that accelerate the mass added to the body
@@ -114,9 +114,9 @@ open_motions, open_grasps, open_scratch = opener(motions(1)), opener(grasp_array
 
 
 @inlined
-def _place(g, body_pose, holder_pose, grasps, room):
+def _place(g, body_pose, palm_pose, grasps, room):
     """Pose of patch ``g`` in the world, and the error of the body's pose against its held pose."""
-    h, p, b, held, R, S, at = holder_pose[g], grasps.patch[g], body_pose, grasps.held[g], room.R[g], room.S, room.at[g]
+    h, p, b, held, R, S, at = palm_pose[g], grasps.patch[g], body_pose, grasps.held[g], room.R[g], room.S, room.at[g]
     matrix_of(h[3], h[4], h[5], h[6], S)
     x, y, z = rotate(S, p[0], p[1], p[2])
     at[0], at[1], at[2] = h[0] + x, h[1] + y, h[2] + z
@@ -285,7 +285,7 @@ def _sweep(g, body_pose, inverse_mass, grasps, room, dt):
 def predict_free(motion_table, room_table, own_mass, gravity, dt):
     """Advance `Motions.body_twist` from the start of a tick to its end, as if all grasps released the body.
 
-    The mass and inertia added to its ``own_mass`` move with the holders, by the mean change of `Motions.ride`, which is
+    The mass and inertia added to its ``own_mass`` move with the palms, by the mean change of `Motions.ride`, which is
     updated. ``gravity`` (3,) acts on the own mass alone.
     """
     moves, room = open_motions(motion_table), open_scratch(room_table)
@@ -295,7 +295,7 @@ def predict_free(motion_table, room_table, own_mass, gravity, dt):
     for k in range(6):
         attached_load[k], room.step[k] = 0.0, 0.0
     for g in range(n):
-        h, t, now, ride = moves.holder_pose[g], moves.holder_twist[g], room.ask, moves.ride[g]
+        h, t, now, ride = moves.palm_pose[g], moves.palm_twist[g], room.ask, moves.ride[g]
         vx, vy, vz = cross(t[3], t[4], t[5], pose[0] - h[0], pose[1] - h[1], pose[2] - h[2])
         now[0], now[1], now[2], now[3], now[4], now[5] = t[0] + vx, t[1] + vy, t[2] + vz, t[3], t[4], t[5]
         for k in range(6):
@@ -327,15 +327,15 @@ def solve(motion_table, grasp_table, room_table, dt):
     """
     moves, grasps, room = open_motions(motion_table), open_grasps(grasp_table), open_scratch(room_table)
     body_pose, body_twist, impulse = moves.body_pose, moves.body_twist, moves.impulse
-    holder_pose, holder_twist, inverse_mass = moves.holder_pose, moves.holder_twist, moves.inverse[0]
+    palm_pose, palm_twist, inverse_mass = moves.palm_pose, moves.palm_twist, moves.inverse[0]
     n = grasps.patch.shape[0]
     _inverse_inertia(body_pose, moves.inverse[1:], room.S, room.W)
     for k in range(6):
         room.twist[k] = body_twist[k]
     for g in range(n):
-        _place(g, body_pose, holder_pose, grasps, room)
-        at, h = room.at[g], holder_pose[g]
-        _velocity(room.R[g], holder_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
+        _place(g, body_pose, palm_pose, grasps, room)
+        at, h = room.at[g], palm_pose[g]
+        _velocity(room.R[g], palm_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
         _fill_impedance(g, inverse_mass, at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
         for row in range(6):
             change = room.drift[g, row] - grasps.pace[g, row]
@@ -352,7 +352,7 @@ def solve(motion_table, grasp_table, room_table, dt):
     for k in range(6):
         impulse[0, k] = 0.0
     for g in range(n):
-        at, h, load, total = room.at[g], holder_pose[g], grasps.load[g], room.step
+        at, h, load, total = room.at[g], palm_pose[g], grasps.load[g], room.step
         fx, fy, fz = rotate(room.R[g], load[0], load[1], load[2])
         mx, my, mz = rotate(room.R[g], load[3], load[4], load[5])
         for side in range(2):

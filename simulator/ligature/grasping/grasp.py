@@ -31,11 +31,11 @@ LEAST_FORCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """The contact patch of two pads: ``T_holder_patch`` (4, 4) in the holder's inertial frame, its z axis normal
+    """The contact patch of two pads: ``T_palm_patch`` (4, 4) in the holder's inertial frame, its z axis normal
     to the pads; ``half_width`` of the pads in metres; Coulomb ``friction`` of one pad.
     """
 
-    T_holder_patch: Array
+    T_palm_patch: Array
     half_width: float
     friction: float
 
@@ -57,7 +57,7 @@ class Grasp:
     ----------
     patch
         Where the pads touch.
-    T_holder_body
+    T_palm_body
         (4, 4) pose of the body's inertial frame in that of the jaw's holder, as grasped.
 
     Attributes
@@ -72,32 +72,32 @@ class Grasp:
         (2,) metres and radians that the body has slipped since it was grasped.
     """
 
-    def __init__(self, patch: Patch, T_holder_body: Array) -> None:
+    def __init__(self, patch: Patch, T_palm_body: Array) -> None:
         self.patch = patch
-        self.patch_pose = matrix_pose7(patch.T_holder_patch)
-        self.held = matrix_pose7(inverse(patch.T_holder_patch) @ T_holder_body)
+        self.patch_pose = matrix_pose7(patch.T_palm_patch)
+        self.held = matrix_pose7(inverse(patch.T_palm_patch) @ T_palm_body)
         self.normal_force = 0.0
         self.load = np.zeros(6)
         self.slipped = np.zeros(2)
         self.slides = np.zeros(2, dtype=np.bool_)
         self.pace, self.lag = np.zeros(6), np.zeros(6)
 
-    def begin(self, holder: Motion) -> None:
+    def begin(self, palm: Motion) -> None:
         """Record the holder's velocity at the start of the grasp."""
-        T = self.world_patch(holder.pose)
-        velocity = holder.velocity_at(T[:3, 3])
+        T = self.world_patch(palm.pose)
+        velocity = palm.velocity_at(T[:3, 3])
         self.pace = np.concatenate([T[:3, :3].T @ velocity[:3], T[:3, :3].T @ velocity[3:]])
 
-    def world_patch(self, holder_pose: Array) -> Array:
-        """Pose (4, 4) of the patch with the holder's inertial frame at ``holder_pose`` (7,)."""
-        return np.asarray(pose7_matrix(holder_pose) @ self.patch.T_holder_patch)
+    def world_patch(self, palm_pose: Array) -> Array:
+        """Pose (4, 4) of the patch with the holder's inertial frame at ``palm_pose`` (7,)."""
+        return np.asarray(pose7_matrix(palm_pose) @ self.patch.T_palm_patch)
 
-    def move_patch(self, T_holder_patch: Array) -> None:
+    def move_patch(self, T_palm_patch: Array) -> None:
         """Move the patch on the holder; body and loads stay."""
-        T_holder_body = self.patch.T_holder_patch @ pose7_matrix(self.held)
-        self.patch = replace(self.patch, T_holder_patch=T_holder_patch)
-        self.patch_pose = matrix_pose7(T_holder_patch)
-        self.held = matrix_pose7(inverse(T_holder_patch) @ T_holder_body)
+        T_palm_body = self.patch.T_palm_patch @ pose7_matrix(self.held)
+        self.patch = replace(self.patch, T_palm_patch=T_palm_patch)
+        self.patch_pose = matrix_pose7(T_palm_patch)
+        self.held = matrix_pose7(inverse(T_palm_patch) @ T_palm_body)
 
     def share(self) -> float:
         """Used share of the limit surface in the last tick, 0 to 1."""
@@ -141,14 +141,14 @@ class GraspSolver:
         return self.motions.impulse
 
 
-def solve_once(grasps: Sequence[Grasp], holders: Sequence[Motion], body: Motion, dt: float) -> Array:
+def solve_once(grasps: Sequence[Grasp], palms: Sequence[Motion], body: Motion, dt: float) -> Array:
     """One `GraspSolver.solve` for a body and holders with the given motion."""
     solver = GraspSolver(len(grasps))
     at = solver.motions
     at.body_pose[:], at.body_twist[:] = body.pose, body.twist
     at.inverse[0], at.inverse[1:] = body.inverse_mass, body.inverse_inertia
-    for g, holder in enumerate(holders):
-        at.holder_pose[g], at.holder_twist[g] = holder.pose, holder.twist
+    for g, palm in enumerate(palms):
+        at.palm_pose[g], at.palm_twist[g] = palm.pose, palm.twist
     return solver.solve(grasps, dt)
 
 

@@ -25,7 +25,7 @@ from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem, kept, put_back
 from ligature.physics import World
 from ligature.suture import Rods
-from ligature.suture.rod import Pads
+from ligature.suture.rod import JawPads
 
 Array = NDArray[np.float64]
 
@@ -64,19 +64,19 @@ class JawGrasp(BodyGrasp):
     """A body between the pads of one jaw.
 
     ``levers`` (m) are those of the pads about the axis of the fingers, ``positions`` (rad) the joint positions at which
-    the fingers stop, ``holder_at`` (3,) the position of the holder in the last tick, and ``checked`` (m) the slip at
+    the fingers stop, ``palm_at`` (3,) the position of the palm in the last tick, and ``checked`` (m) the slip at
     the last check.
     """
 
     levers: tuple[float, float]
     positions: tuple[float, float]
-    holder_at: Array
+    palm_at: Array
     checked: float = 0.0
 
-    def jumped(self, holder_at: Array) -> bool:
-        """Whether the holder, now at ``holder_at`` (3,), was put elsewhere since the last call."""
-        before, self.holder_at = self.holder_at, holder_at
-        return bool(np.abs(holder_at - before).max() > JUMP)
+    def jumped(self, palm_at: Array) -> bool:
+        """Whether the holder, now at ``palm_at`` (3,), was put elsewhere since the last call."""
+        before, self.palm_at = self.palm_at, palm_at
+        return bool(np.abs(palm_at - before).max() > JUMP)
 
 
 class Grasps(Subsystem, Mapping[str, Held | None]):
@@ -98,11 +98,11 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._actuator_grasps, self._actuated = actuator_grasps, actuated
         self._fingers = [Fingers(jaw, world) for jaw in scene.jaws]
         tree_of = {link.body: tree for tree in scene.articulations for link in tree.links}
-        self._own = [{link.body for link in tree_of[jaw.holder].links} for jaw in scene.jaws]
+        self._own = [{link.body for link in tree_of[jaw.palm].links} for jaw in scene.jaws]
         self._actuators = [[a.index for a in scene.actuators if a.parent in own] for own in self._own]
         self._jaw_grasps: list[JawGrasp | None] = [None for _ in scene.jaws]
         self._thread_grasps: list[thread_grasps.ThreadGrasp | None] = [None for _ in scene.jaws]
-        self._pads: list[Pads | None] = [None for _ in scene.jaws]
+        self._pads: list[JawPads | None] = [None for _ in scene.jaws]
         self._disabled: list[list[int]] = [[] for _ in scene.jaws]
         self._near = [False for _ in scene.jaws]
         self._impulses = ImpulseExchange(world)
@@ -129,7 +129,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         if held is None:
             return None
         grasp = held.grasp
-        R = grasp.world_patch(self._world.motion(self._scene.jaws[index].holder)[0])[:3, :3]
+        R = grasp.world_patch(self._world.motion(self._scene.jaws[index].palm)[0])[:3, :3]
         wrench = np.concatenate([R @ grasp.load[:3], R @ grasp.load[3:]])
         name = self._scene.jaws[index].name
         return Held(name, held.body, grasp.normal_force, wrench, grasp.slipped.copy(), grasp.share())
@@ -143,7 +143,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         held = self._jaw_grasps[index]
         if held is None:
             raise ValueError(f"the jaw of {name} holds nothing")
-        return held.grasp.world_patch(self._world.motion(self._scene.jaws[index].holder)[0])
+        return held.grasp.world_patch(self._world.motion(self._scene.jaws[index].palm)[0])
 
     # --- the tick ---------------------------------------------------------------------------
 
@@ -188,12 +188,12 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
 
     def _grasp(self, index: int, body: int, faces: tuple[Facing, Facing]) -> None:
         fingers, jaw = self._fingers[index], self._scene.jaws[index]
-        holder = self._world.motion(jaw.holder)[0]
-        T_holder_patch = inverse(pose7_matrix(holder)) @ _patch_pose(fingers, faces)
+        palm = self._world.motion(jaw.palm)[0]
+        T_palm_patch = inverse(pose7_matrix(palm)) @ _patch_pose(fingers, faces)
         friction = self._friction(jaw, self._scene.bodies[body].friction)
-        grasp, ride = begin(self._world, jaw.holder, body, Patch(T_holder_patch, jaw.half_width, friction))
+        grasp, ride = begin(self._world, jaw.palm, body, Patch(T_palm_patch, jaw.half_width, friction))
         levers = faces[0].lever, faces[1].lever
-        held = JawGrasp(body, jaw.holder, grasp, ride, levers, fingers.positions(), holder[:3])
+        held = JawGrasp(body, jaw.palm, grasp, ride, levers, fingers.positions(), palm[:3])
         self._jaw_grasps[index] = held
         self._replace_contacts(index, held)
         self._world.set_held(body, True, grasped=True)
@@ -260,7 +260,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         fingers = self._fingers[index]
         efforts = fingers.efforts()
         force = min(effort / max(lever, LEAST_LEVER) for effort, lever in zip(efforts, held.levers, strict=True))
-        if force <= 0.0 or held.jumped(self._world.motion(fingers.jaw.holder)[0][:3]):
+        if force <= 0.0 or held.jumped(self._world.motion(fingers.jaw.palm)[0][:3]):
             self._release(index)
             return
         held.grasp.normal_force = force
@@ -277,8 +277,8 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         if faces is None or room > PRESENT:
             self._release(index)
             return
-        T_holder_world = inverse(pose7_matrix(self._world.motion(fingers.jaw.holder)[0]))
-        held.grasp.move_patch(T_holder_world @ _patch_pose(fingers, faces))
+        T_palm_world = inverse(pose7_matrix(self._world.motion(fingers.jaw.palm)[0]))
+        held.grasp.move_patch(T_palm_world @ _patch_pose(fingers, faces))
         held.levers = faces[0].lever, faces[1].lever
         held.positions = fingers.moved(held.positions, (0.5 * room, 0.5 * room), held.levers)
 

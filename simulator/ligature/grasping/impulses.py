@@ -18,20 +18,20 @@ Array = NDArray[np.float64]
 
 @dataclass
 class BodyGrasp:
-    """The scene's ``body`` held by friction; the pads belong to the body ``holder``.
+    """The scene's ``body`` held by friction; the pads belong to the body ``palm``.
 
     ``ride`` (6,) is the holder's velocity at the body's centre in the last tick.
     """
 
     body: int
-    holder: int
+    palm: int
     grasp: Grasp
     ride: Array
 
 
-def begin(world: World, holder: int, body: int, patch: Patch) -> tuple[Grasp, Array]:
+def begin(world: World, palm: int, body: int, patch: Patch) -> tuple[Grasp, Array]:
     """A grasp of ``body`` where it is now, and its first `BodyGrasp.ride`."""
-    at = Motion(*world.motion(holder), 0.0, np.zeros(3))
+    at = Motion(*world.motion(palm), 0.0, np.zeros(3))
     T_world_body = pose7_matrix(world.motion(body)[0])
     grasp = Grasp(patch, inverse(pose7_matrix(at.pose)) @ T_world_body)
     grasp.begin(at)
@@ -54,7 +54,7 @@ class ImpulseExchange:
         at = solver.motions
         world.read_motion(body, at.body_pose, at.body_twist)
         for g, grasp in enumerate(grasps):
-            world.read_motion(grasp.holder, at.holder_pose[g], at.holder_twist[g])
+            world.read_motion(grasp.palm, at.palm_pose[g], at.palm_twist[g])
             at.ride[g] = grasp.ride
         mass, inertia = world.mass_of(body)
         at.inverse[0], at.inverse[1:], at.pending[:] = 1.0 / mass, 1.0 / inertia, world.pending_impulse(body)
@@ -65,4 +65,4 @@ class ImpulseExchange:
         impulses = solver.solve([grasp.grasp for grasp in grasps], world.dt)
         world.apply_impulse(body, impulses[0, :3], impulses[0, 3:])
         for grasp, impulse in zip(grasps, impulses[1:], strict=True):
-            world.apply_impulse(grasp.holder, impulse[:3], impulse[3:])
+            world.apply_impulse(grasp.palm, impulse[:3], impulse[3:])

@@ -15,7 +15,7 @@ from ligature.grasping.fingers import FACING, LEAST_LEVER, TOUCH, Fingers
 from ligature.model.frames import pose7_matrix
 from ligature.physics import World
 from ligature.suture import Rods
-from ligature.suture.rod import Pads, Rod
+from ligature.suture.rod import JawPads, Rod
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def begin(number: int, rods: Rods, world: World, fingers: Fingers, friction: flo
     )  # fmt: skip
 
 
-def keep(thread: ThreadGrasp, rods: Rods, world: World, fingers: Fingers) -> Pads | None:
+def keep(thread: ThreadGrasp, rods: Rods, world: World, fingers: Fingers) -> JawPads | None:
     """The pads for the coming tick; None when the fingers open or the thread has slipped out."""
     rod, finger = rods.rods[thread.rod], fingers.jaw.fingers[0]
     force = min(fingers.efforts()) / max(thread.lever, LEAST_LEVER)
@@ -80,7 +80,7 @@ def keep(thread: ThreadGrasp, rods: Rods, world: World, fingers: Fingers) -> Pad
     thread.force = rod.grasped(finger)[1]
     fingers.stop(thread.positions, (force * thread.lever, force * thread.lever))
     rods.exclude(thread.rod, fingers.jaw.fingers, element)
-    return Pads(finger, thread.points, thread.normal, 2.0 * thread.friction * force)
+    return JawPads(finger, thread.points, thread.normal, 2.0 * thread.friction * force)
 
 
 def within(rods: Rods, box: Array) -> bool:

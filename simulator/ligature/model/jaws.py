@@ -43,16 +43,16 @@ def find_jaws(bodies: Sequence[Body], joints: Sequence[Joint], arms: Sequence[Ar
     """The jaws of a scene: any two bodies with shapes at the end of a tree whose revolute joints share an axis."""
     inner = Counter(joint.parent for joint in joints)
     names = {arm.tip: arm.name for arm in arms}
-    by_holder: dict[int, list[Joint]] = {}
+    by_palm: dict[int, list[Joint]] = {}
     for joint in joints:
         finger = bodies[joint.child]
         if joint.type is JointType.REVOLUTE and not inner[joint.child] and finger.colliders and not finger.static:
-            by_holder.setdefault(joint.parent, []).append(joint)
+            by_palm.setdefault(joint.parent, []).append(joint)
     found = []
-    for holder, pair in by_holder.items():
+    for palm, pair in by_palm.items():
         if len(pair) == 2 and _share_axis(*pair):
-            name = names.get(holder, bodies[holder].identity.identifier)
-            found.append(_jaw(bodies, name, holder, pair[0], pair[1]))
+            name = names.get(palm, bodies[palm].identity.identifier)
+            found.append(_jaw(bodies, name, palm, pair[0], pair[1]))
     return tuple(found)
 
 
@@ -61,7 +61,7 @@ def _share_axis(one: Joint, two: Joint) -> bool:
     return bool(apart < SAME_PLACE and abs(one.T_parent_a[:3, 2] @ two.T_parent_a[:3, 2]) > PARALLEL)
 
 
-def _jaw(bodies: Sequence[Body], name: str, holder: int, one: Joint, two: Joint) -> Jaw:
+def _jaw(bodies: Sequence[Body], name: str, palm: int, one: Joint, two: Joint) -> Jaw:
     axis, pivot = one.T_parent_a[:3, 2], one.T_parent_a[:3, 3]
     shapes = [_points(bodies, joint) for joint in (one, two)]
     directions = [_direction(points, axis, pivot) for points in shapes]
@@ -72,7 +72,7 @@ def _jaw(bodies: Sequence[Body], name: str, holder: int, one: Joint, two: Joint)
     same = float(np.sign(one.T_parent_a[:3, 2] @ two.T_parent_a[:3, 2]))
     width = min(_pad_width(points, axis, pivot) for points in shapes)
     return Jaw(
-        name, holder, (one.child, two.child), (one.index, two.index), (first, -first * same),
+        name, palm, (one.child, two.child), (one.index, two.index), (first, -first * same),
         axis, pivot, 0.5 * width, reach,
     )  # fmt: skip
 
@@ -80,9 +80,9 @@ def _jaw(bodies: Sequence[Body], name: str, holder: int, one: Joint, two: Joint)
 def _points(bodies: Sequence[Body], joint: Joint) -> Array:
     """Corners (n, 3) of a finger's shapes in the holder's I, at joint position zero."""
     body = bodies[joint.child]
-    to_holder = joint.T_parent_a @ inverse(joint.T_child_b) @ inverse(body.T_body_inertial)
+    to_palm = joint.T_parent_a @ inverse(joint.T_child_b) @ inverse(body.T_body_inertial)
     points = np.vstack([_corners(part) for part in body.colliders])
-    return np.asarray(points @ to_holder[:3, :3].T + to_holder[:3, 3])
+    return np.asarray(points @ to_palm[:3, :3].T + to_palm[:3, 3])
 
 
 def _corners(part: Collider) -> Array:

@@ -585,14 +585,14 @@ class ArmDescription:
 class Jaw:
     """Two fingers on one body.
 
-    ``holder`` is that body, ``fingers`` the two others, ``joints`` theirs; ``opening`` (2,) is +1 where the jaw
+    ``palm`` is that body, ``fingers`` the two others, ``joints`` theirs; ``opening`` (2,) is +1 where the jaw
     opens as the joint's position grows, else -1. ``axis`` (3,) and ``pivot`` (3,) are the axis of the fingers in
     the holder's inertial frame. ``half_width`` is half the width of the pads along it, ``reach`` the length of
     the fingers. ``name`` is that of the arm, else the holder's identifier.
     """
 
     name: str
-    holder: int
+    palm: int
     fingers: tuple[int, int]
     joints: tuple[int, int]
     opening: tuple[float, float]

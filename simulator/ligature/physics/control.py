@@ -271,7 +271,7 @@ class TreeControl:
         row = self.row[joint]
         fresh = row not in self._stops
         self._stops[row] = position
-        self._motions.told[self._motions.slices[self._index].start + row] = effort
+        self._motions.sent[self._motions.slices[self._index].start + row] = effort
         self._slowed.pop(row, None)
         if fresh:
             self._sort()
@@ -287,7 +287,7 @@ class TreeControl:
     def let(self, joint: int) -> None:
         """End `stop` and `slow`."""
         row = self.row[joint]
-        self._motions.told.pop(self._motions.slices[self._index].start + row, None)
+        self._motions.sent.pop(self._motions.slices[self._index].start + row, None)
         if (self._slowed.pop(row, None) or self._stops.pop(row, None)) is not None:
             self._sort()
 

@@ -22,9 +22,9 @@ class Drive:
     ----------
     world, joints
         Where the joints are, and their indices.
-    fastest
+    max_velocity
         Largest speeds (n,) at which set-points are followed.
-    hardest
+    max_deceleration
         Decelerations (n,) with which the joints brake before a set-point.
     give
         Stiffness in N·m/rad with which the motors yield to a load; 0 is as strong as they are.

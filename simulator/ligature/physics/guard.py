@@ -19,7 +19,7 @@ from ligature.physics.world import World
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-FASTEST = 50.0
+MAX_SPEED = 50.0
 """Speed in m/s that nothing in an operating room has."""
 
 LEAP = 10.0
@@ -43,7 +43,7 @@ def _suspect(twist: Array, gyration: Array, mass: Array, rigid: Flags, before: A
     of the last call and takes that of this one. A body leaps when the energy of all bodies grew with its own: what
     another one hits does not.
     """
-    worst, max_velocity, gained = -1, FASTEST * FASTEST, 0.0
+    worst, max_velocity, gained = -1, MAX_SPEED * MAX_SPEED, 0.0
     leaper, farthest, share = -1, leap, 0.0
     for i in range(mass.shape[0]):
         v = twist[i, 0] * twist[i, 0] + twist[i, 1] * twist[i, 1] + twist[i, 2] * twist[i, 2]

@@ -162,7 +162,7 @@ class Motions:
         self._frame, self._speed = np.zeros((n, 7)), np.zeros((n, 6))
         self._joints = np.zeros((3, axes[-1]))
         self.position, self.velocity, self.effort = self._joints
-        self.told: dict[int, float] = {}
+        self.sent: dict[int, float] = {}
         self.reaction = np.zeros((axes[-1], 6))
         self.push = np.zeros(axes[-1])
         self._uids = [tree.uid for tree in trees]
@@ -248,7 +248,7 @@ class Motions:
             if links:
                 states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
                 self.position[rows], self.velocity[rows], reaction, self.effort[rows] = zip(*states, strict=True)
-                for axis, effort in self.told.items():
+                for axis, effort in self.sent.items():
                     self.effort[axis] = effort
                 if self._measured[tree]:
                     self.reaction[rows] = reaction

@@ -62,7 +62,7 @@ _KEPT = (
     "stopped_fingers",
     "_impulses",
     "_next_handle",
-    "_told_owned",
+    "_owned_reported",
 )
 """Attributes that last from tick to tick as they are."""
 
@@ -113,7 +113,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
         self.dt = dt
         self._cache = CollisionCache()
         self.problems: list[Diagnostic] = []
-        self._told_owned: set[int] = set()
+        self._owned_reported: set[int] = set()
         self._create()
 
     def _create(self) -> None:
@@ -176,13 +176,13 @@ class World(Subsystem, BulletQueries, GraspSupport):
             if tree is not None:
                 type_ = types[i] if i < len(types) else CommandType.FORCE
                 if tree.owned[tree.row[joint]] and type_ is not CommandType.FORCE:
-                    self._tell_owned(body)
+                    self._report_owned(body)
                 tree.command(self.scene.joints[joint], type_, value)
 
-    def _tell_owned(self, body: Body) -> None:
+    def _report_owned(self, body: Body) -> None:
         """State once for each body that an arm owns its joints."""
-        if body.index not in self._told_owned:
-            self._told_owned.add(body.index)
+        if body.index not in self._owned_reported:
+            self._owned_reported.add(body.index)
             message = f"joint commands to '{body.identity.identifier}' have no effect: its arm is enabled"
             self.report(Diagnostic(Severity.WARNING, message, hint="disable the arm", code="owned"))
 
@@ -322,12 +322,12 @@ class World(Subsystem, BulletQueries, GraspSupport):
         """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
         if self.driven(body):
             return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
-        holders = [self.scene.bodies[held.parent] for held in self._welds.values() if held.child == body]
+        palms = [self.scene.bodies[held.parent] for held in self._welds.values() if held.child == body]
         held_mass, held_inertia = self.mass_of(body)
         own = self.scene.bodies[body]
-        mass = held_mass - own.mass + sum(holder.mass for holder in holders)
+        mass = held_mass - own.mass + sum(palm.mass for palm in palms)
         inertia = held_inertia - inertia_of(own)
-        inertia += sum((np.full(3, inertia_of(holder).max()) for holder in holders), np.zeros(3))
+        inertia += sum((np.full(3, inertia_of(palm).max()) for palm in palms), np.zeros(3))
         control = self._body_controls.get(body)
         forced = control is not None and control.type is CommandType.FORCE
         return mass, inertia, control.target.copy() if control is not None and forced else np.zeros(6)
@@ -424,7 +424,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
         return {
             "trees": trees,
             "controls": [control.snapshot() for control in self._controls],
-            "told": dict(self._motions.told),
+            "sent": dict(self._motions.sent),
             "parting": self._parting.snapshot(),
             "held": self.welds(),
             "bodies": {body: control.snapshot() for body, control in self._body_controls.items()},
@@ -440,7 +440,7 @@ class World(Subsystem, BulletQueries, GraspSupport):
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
-        self._motions.told.update(snapshot["told"])
+        self._motions.sent.update(snapshot["sent"])
         for control, state in zip(self._controls, snapshot["controls"], strict=True):
             control.restore(state)
         for body, state in snapshot["bodies"].items():

@@ -120,7 +120,7 @@ class Arm(Device):
             axes.hold()
             if not any(other.moving for other in self._groups()):
                 self._busy = False
-                self._tell_state()
+                self._emit_state()
         if axes is self.joints:
             self._pushing = None
 
@@ -191,7 +191,7 @@ class Arm(Device):
         self._require_joints("hold")
         self._stop_moves()
         self._hold_all()
-        self._tell_state()
+        self._emit_state()
 
     def free(self) -> None:
         """Let the joints move freely, with no effort."""
@@ -199,7 +199,7 @@ class Arm(Device):
         self._stop_moves()
         self._pushing = None
         self.joints.push(np.zeros(self.joints.n))
-        self._tell_state()
+        self._emit_state()
 
     def place_jp(self, position: ArrayLike) -> None:
         """Put the joints somewhere at once: for setting up an experiment, not a thing a real arm can do."""

@@ -64,13 +64,13 @@ class Device:
         self._home = home
         self._following_bound = np.asarray(following_bound, dtype=float)
         self._state, self._homed, self._busy = State.DISABLED, False, False
-        self._told: OperatingState | None = None
+        self._emitted: OperatingState | None = None
         self._pending: Action | None = None
         self._due = 0.0
         self._busy_until = 0.0
         self._homing = False
         self._astray = 0.0
-        self._tell_state()
+        self._emit_state()
 
     # --- operating state --------------------------------------------------------------------
 
@@ -135,7 +135,7 @@ class Device:
             self._begin_home()
         elif step is Action.UNHOME:
             self._homed = False
-        self._tell_state(again=True)
+        self._emit_state(again=True)
 
     def adopt(self) -> None:
         """Be enabled and homed at once, where the arm stands: for clients that know no states."""
@@ -144,7 +144,7 @@ class Device:
         self._state, self._homed, self._pending = State.ENABLED, True, None
         self._busy = self._homing = False
         self._hold_all()
-        self._tell_state()
+        self._emit_state()
 
     def _power_up(self, then: Action) -> None:
         self._pending, self._due, self._busy = then, self.time + POWER_UP_SECONDS, True
@@ -183,12 +183,12 @@ class Device:
         if self._state is not State.FAULT:
             self.emit("error", f"{self.name}: {why[:MOST_CHARACTERS]}")
         self._switch_off(State.FAULT)
-        self._tell_state()
+        self._emit_state()
 
-    def _tell_state(self, again: bool = False) -> None:
+    def _emit_state(self, again: bool = False) -> None:
         state = self.operating_state
-        if again or state != self._told:
-            self._told = state
+        if again or state != self._emitted:
+            self._emitted = state
             self.emit("operating_state", [int(state.state), state.is_homed, state.is_busy])
 
     def emit(self, name: str, value: Any) -> None:
@@ -222,12 +222,12 @@ class Device:
         self._stop_moves()
         for axes in self._groups():
             axes.settle()
-        self._tell_state()
+        self._emit_state()
 
     def _begin_busy(self) -> None:
         self._busy_until = self.time + SHORTEST_BUSY
         self._busy = True
-        self._tell_state(again=True)
+        self._emit_state(again=True)
 
     # --- time -------------------------------------------------------------------------------
 
@@ -236,7 +236,7 @@ class Device:
         self.time += dt
         if self._pending is not None and self.time >= self._due:
             self._powered()
-            self._tell_state()
+            self._emit_state()
         if self._state is State.ENABLED:
             self._advance(dt)
 
@@ -252,7 +252,7 @@ class Device:
             self._homing = False
             self._finish_home()
         self.emit("goal_reached", True)
-        self._tell_state()
+        self._emit_state()
 
     def _finish_home(self) -> None:
         self._homed = True
@@ -275,7 +275,7 @@ class Device:
     # --- snapshots --------------------------------------------------------------------------
 
     _KEPT: tuple[str, ...] = (
-        "time", "_state", "_homed", "_busy", "_told", "_pending", "_due", "_busy_until", "_homing", "_astray",
+        "time", "_state", "_homed", "_busy", "_emitted", "_pending", "_due", "_busy_until", "_homing", "_astray",
     )  # fmt: skip
 
     def snapshot(self) -> dict[str, Any]:

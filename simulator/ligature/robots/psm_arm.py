@@ -123,7 +123,7 @@ class PsmArm(Arm):
         """Pretend that the instrument was put on or taken off; without it only the first joints may move."""
         self.tool_present = bool(present)
         self._homed = self._homed and self.tool_present
-        self._tell_state()
+        self._emit_state()
         if present:
             self.emit("tool_type", self.tool_type)
 

@@ -36,9 +36,11 @@ class ArmRecord:
         if status != self._status:
             self._status = status
             self._fill_status(record)
-        grip = arm.gripper if isinstance(arm, MtmArm) else arm.jaw.axes if isinstance(arm, PsmArm) and arm.jaw else None
-        if grip is not None:
-            opening, wanted = grip.readings()
+        fingers = (
+            arm.gripper if isinstance(arm, MtmArm) else arm.jaw.axes if isinstance(arm, PsmArm) and arm.jaw else None
+        )
+        if fingers is not None:
+            opening, wanted = fingers.readings()
             record["jaw_measured_js"], record["jaw_setpoint_js"] = opening[:, 0], wanted[:, 0]
         placed = arm.base_frame.tobytes(), tool, arm.cf_orientation_absolute
         described = (measured.tobytes(), setpoint.tobytes(), wrench.tobytes(), *placed)

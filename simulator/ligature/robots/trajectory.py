@@ -23,7 +23,7 @@ class JointTrajectory:
         State of motion (n,) at the start.
     goal
         Where to end at rest (n,).
-    fastest, hardest
+    max_velocity, max_acceleration
         Limits of velocity and acceleration (n,).
 
     Raises

@@ -191,7 +191,7 @@ class Follower:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._next = 0.0
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self.cameras = {camera.index: camera for camera in scene.cameras}
         self.lights = {light.index: light_with(light, {}) for light in scene.lights}
         self.sensors = {camera.index: sensor_with({}) for camera in scene.cameras}
@@ -216,9 +216,9 @@ class Follower:
             into[item.index] = make(values)
         except ValueError as error:
             text = f"{item.identity.topic}: {error}; keeping the previous values"
-            if text not in self._told:
+            if text not in self._reported:
                 rospy.logwarn(text)
-            self._told.add(text)
+            self._reported.add(text)
 
 
 def server_parameters() -> Any:

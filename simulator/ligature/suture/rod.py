@@ -55,7 +55,7 @@ class Partner:
 
 
 @dataclass(frozen=True, eq=False)
-class Pads:
+class JawPads:
     """The pads of a jaw that grasp whatever element of a rod passes between them.
 
     ``points`` (p, 3) are the contact points and ``normal`` (3,) points across them, in the inertial frame of the
@@ -112,7 +112,7 @@ class Rod:
         self.partners = tuple(partners)
         self.dt = dt
         self.constraints: list[PointConstraint] = []
-        self._pads: tuple[Pads, ...] = ()
+        self._pads: tuple[JawPads, ...] = ()
         n = len(description.mass)
         known = {partner.body: partner for partner in partners}
         for attachment in description.attachments:
@@ -410,7 +410,7 @@ class Rod:
         self._near = None
         self._constraint_rows = self._gather_constraints()
 
-    def set_pads(self, pads: Sequence[Pads]) -> None:
+    def set_pads(self, pads: Sequence[JawPads]) -> None:
         """Grasp the elements between ``pads`` from now on, and no others."""
         if [p.body for p in pads] != [p.body for p in self._pads]:
             self._near = None
@@ -453,13 +453,13 @@ class Rod:
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds the impulse on each partner."""
         a, b, c = self._touches
-        last, next_, spare = (self._touch_tables[id(touches)] for touches in self._touches)
+        last, next_, scratch = (self._touch_tables[id(touches)] for touches in self._touches)
         nodes, joints, shapes, work = self._tables
         if self._pads:
             self._find_grasped()
         constraints, points = self._constraint_rows
         run_tick(
-            self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, spare,
+            self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, scratch,
             work, self._passage_table, self._owner, constraints, points, self._motion, self._met, self._counts,
             self._self_skip, self._stiffness, self.impulse, self.tension, MAX_SPEED, self.dt,
         )  # fmt: skip
@@ -481,7 +481,7 @@ _KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_
 """Attributes of a `Rod` that do."""
 
 
-def _grasp_rows(pads: Pads) -> list[Array]:
+def _grasp_rows(pads: JawPads) -> list[Array]:
     """Rows (3, 2, 3) of `ligature.suture.point_constraints`, one for each point of a pair of pads."""
     rows = []
     for point in pads.points:

@@ -104,18 +104,18 @@ def _one_step(
 
 @kernel
 def run_tick(
-    first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, spare, work_table,
+    first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, scratch, work_table,
     passage_table, owner, constraints, points, motion, met, counts, self_skip, stiffness, impulse, tension, max_speed,
     dt,
 ):  # fmt: skip
-    """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``spare``.
+    """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``scratch``.
 
     Groups of arrays come as the tables of `ligature.suture.tables`. ``counts`` returns: contacts found,
-    contacts for which there was no room, Newton steps, whether the contacts lie in ``spare``, and whether all
+    contacts for which there was no room, Newton steps, whether the contacts lie in ``scratch``, and whether all
     elements are finite and slower than ``max_speed``.
     """
     nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
-    a, b, c, work = open_touches(last), open_touches(next_), open_touches(spare), open_work(work_table)
+    a, b, c, work = open_touches(last), open_touches(next_), open_touches(scratch), open_work(work_table)
     passages = open_passages(passage_table)
     _place(nodes, motion, met)
     _keep(nodes, joints, work)

@@ -18,7 +18,7 @@ PEDALS = ("clutch", "camera")
 
 
 @dataclass
-class PairTold:
+class PairState:
     """What a pair reports of itself."""
 
     leader: str
@@ -39,7 +39,7 @@ class TeleopRemote:
 
     def __init__(self, prefix: str = "/") -> None:
         self._prefix = prefix
-        self.pairs: dict[str, PairTold] = {}
+        self.pairs: dict[str, PairState] = {}
         self.scale = 0.0
         self._early: dict[str, bool] = {}
         self._subscribers: list[Any] = []
@@ -67,7 +67,7 @@ class TeleopRemote:
             match = _PAIR.match("/" + topic.removeprefix(self._prefix)) if type_ == "std_msgs/Bool" else None
             if match is None:
                 continue
-            pair = PairTold(match["leader"], match["follower"])
+            pair = PairState(match["leader"], match["follower"])
             if pair.name in self.pairs:
                 continue
             pair.selected = self._early.get(pair.name, False)
@@ -77,7 +77,7 @@ class TeleopRemote:
                 self._listen(f"{root}/{name}", kind, self._keeper(pair, name))
 
     @staticmethod
-    def _keeper(pair: PairTold, name: str) -> Any:
+    def _keeper(pair: PairState, name: str) -> Any:
         return lambda message: setattr(pair, name, message.data)
 
     # --- what a console asks for ---------------------------------------------------------------

@@ -114,7 +114,7 @@ def build_grid(
         raise ValueError(f"filled must mark at least one of the {shape} cells, not have shape {filled.shape}")
     layers = np.zeros(shape, dtype=np.int64) if layer is None else np.asarray(layer, dtype=np.int64)
     number = np.full(shape, -1)
-    cell_site = np.argwhere(filled.transpose(2, 1, 0))[:, ::-1]  # x runs fastest
+    cell_site = np.argwhere(filled.transpose(2, 1, 0))[:, ::-1]  # x varies first
     number[tuple(cell_site.T)] = np.arange(len(cell_site))
     joined = _joined(number, cuts, shape)
     corner_node, site = _nodes(number, joined, cell_site)

@@ -236,10 +236,10 @@ def follow_tip(points, paths, held, dt, drop):
     if p < 0 or held.passing[p] == 0 or where in (TOUCHES, SLIDES):
         return -1
     if where in (CUTS, TENTS):
-        lead = paths.node[p, paths.count[p] - 1]
+        front = paths.node[p, paths.count[p] - 1]
         if paths.cut[p] >= held.room[0]:
             held.tip[0] = TENTS
-        resists = points.cutting[lead] + (points.exit[lead] if held.tip[0] == TENTS else 0.0)
+        resists = points.cutting[front] + (points.exit[front] if held.tip[0] == TENTS else 0.0)
         # Or what is left of what the tip has just broken.
         held.limit[0] = max(resists, held.limit[0] * math.exp(-dt / drop))
     elif where == LEAVES:
@@ -320,18 +320,18 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
     tx, ty, tz, nx, ny, nz = shape[3], shape[4], shape[5], shape[6], shape[7], shape[8]
     rx, ry, rz = shape[0] - shape[11], shape[1] - shape[12], shape[2] - shape[13]
     if where in (CUTS, TENTS, LEAVES):
-        lead = -1
+        front = -1
         for k in range(paths.count[tip_path]):
             if held.engaged[paths.node[tip_path, k]]:
-                lead = k
-        if lead >= 0:
-            i = paths.node[tip_path, lead]
+                front = k
+        if front >= 0:
+            i = paths.node[tip_path, front]
             at = points.at[i]
             _set_row(rows, m, TIP, i, tx, ty, tz, rx, ry, rz)
             slid = 0.0
             for a in range(3):
                 slid += shape[3 + a] * (at[a] - _base(points, held, contact, i, s, a))
-            rows.rest[m] = paths.s[tip_path, lead] + held.sigma[i] - paths.cut[tip_path] + slid
+            rows.rest[m] = paths.s[tip_path, front] + held.sigma[i] - paths.cut[tip_path] + slid
             rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = 0.0, held.limit[0], points.soft[i], held.tip_side[0]
             m += 1
     elif where in (TOUCHES, SLIDES):

@@ -216,9 +216,9 @@ class NeedleInTissue:
         h, paths = self._held, self._paths
         path = int(h.tip[1])
         k = int(paths.count[path]) - 1
-        lead = int(paths.node[path, k])
-        s = float(paths.s[path, k] + h.sigma[lead])
-        if not h.engaged[lead] or s < paths.s[path, k] + SPACING or k + 2 >= MOST_NODES or h.tip[0] == states.TENTS:
+        front = int(paths.node[path, k])
+        s = float(paths.s[path, k] + h.sigma[front])
+        if not h.engaged[front] or s < paths.s[path, k] + SPACING or k + 2 >= MOST_NODES or h.tip[0] == states.TENTS:
             return
         cell = self._locate(self._shape[:3])
         if cell < 0:
@@ -257,8 +257,8 @@ class NeedleInTissue:
         h, x, grid = self._held, self._interface.elastic.x, self._interface.elastic.grid
         path = int(h.tip[1])
         k = int(self._paths.count[path]) - 1
-        lead = int(self._paths.node[path, k])
-        sigma = max(float(h.sigma[lead]), 0.0)
+        front = int(self._paths.node[path, k])
+        sigma = max(float(h.sigma[front]), 0.0)
         back = min(sigma, 2e-3)
         tip, tangent = self._shape[:3], self._shape[3:6]
         face, ahead = cross_surface(

@@ -44,10 +44,10 @@ SCENE_BODIES = ("Needle", *(f"{side}{i}" for side in ("Entry", "Exit") for i in 
 TASK_3_JOINTS = (-0.4, -0.22, 0.139, -1.64, -0.37, -0.11)
 TASK_3_ARM = "PSM2"
 TASK_3_OPEN = 0.8
-TASK_3_GRIP = frame(rpy_matrix(-np.pi / 2, 0.0, 0.0), (0.00997302, -0.00521514, 0.00323717))
+TASK_3_GRASP = frame(rpy_matrix(-np.pi / 2, 0.0, 0.0), (0.00997302, -0.00521514, 0.00323717))
 """Pose of the needle in the tool yaw link, with which task 3 begins (§4.5)."""
 
-TASK_3_SECONDS = {"reach": 1.5, "bring": 3.0, "grip": 0.3}
+TASK_3_SECONDS = {"reach": 1.5, "bring": 3.0, "grasp": 0.3}
 ARRIVED = 5e-4
 
 
@@ -109,12 +109,12 @@ class ChallengeFace:
         end = time.monotonic() + TASK_3_SECONDS["bring"]
         while time.monotonic() < end:
             poses = self._state["body_pose"]
-            goal = matrix_pose7(pose7_matrix(poses[arm.description.tip]) @ TASK_3_GRIP)
+            goal = matrix_pose7(pose7_matrix(poses[arm.description.tip]) @ TASK_3_GRASP)
             self._push(BodyCommand(needle, CommandType.POSITION, tuple(goal.tolist())))
             if np.linalg.norm(goal[:3] - poses[needle][:3]) < ARRIVED:
                 break
             time.sleep(0.02)
-        end = time.monotonic() + TASK_3_SECONDS["grip"]
+        end = time.monotonic() + TASK_3_SECONDS["grasp"]
         while time.monotonic() < end:
             arm.jaw(0.0)
             time.sleep(0.01)

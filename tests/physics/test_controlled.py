@@ -24,19 +24,19 @@ def sim(simulate: Make) -> Simulation:
     return simulate(SCENE)
 
 
-def led(sim: Simulation, x: float) -> None:
+def control(sim: Simulation, x: float) -> None:
     sim.bodies["Ball"].command_pose([x, 0, 1, 0, 0, 0, 1])
 
 
 def test_a_light_body_pushes_a_heavy_one_aside(sim: Simulation) -> None:
-    led(sim, 0.05)
+    control(sim, 0.05)
     sim.step(2000)
     assert sim.bodies["Ball"].pose[:3] == pytest.approx([0.05, 0, 1], abs=1e-4)
     assert sim.bodies["Block"].pose[0] > 0.069
 
 
 def test_released_it_falls_by_its_own_weight(sim: Simulation) -> None:
-    led(sim, 0.0)
+    control(sim, 0.0)
     sim.step(200)
     assert sim.bodies["Ball"].pose[:3] == pytest.approx([0, 0, 1], abs=1e-6)
     sim.bodies["Ball"].command_wrench([0.0] * 6)
@@ -48,7 +48,7 @@ def test_released_it_falls_by_its_own_weight(sim: Simulation) -> None:
 
 
 def test_a_snapshot_of_a_driven_body_continues_with_the_same_bits(sim: Simulation) -> None:
-    led(sim, 0.05)
+    control(sim, 0.05)
     sim.step(300)
     snapshot = sim.snapshot()
     sim.step(300)
