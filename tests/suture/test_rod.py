@@ -156,7 +156,7 @@ def test_body_teleported_onto_a_thread_never_makes_it_diverge(kit):
     assert np.abs(rod.twists[:, :3]).max() < 1.0
 
 
-def test_grip_holds_an_element_to_a_moving_body_until_released(kit):
+def test_attachment_holds_an_element_to_a_moving_body_until_released(kit):
     bench = kit.Bench([kit.body(0, Box(np.full(3, 0.001)), at=(0.025, 0.0, 0.02))])
     rod = bench.add(kit.from_material(kit.line(20, 0.05), 0.4e-3, 1e8, 1100.0))
     T = np.eye(4)
