@@ -56,7 +56,7 @@ PHASES = ("control", "suture", "bodies", "sensing", "state")
 
 
 GUARD_TICKS = 10
-"""Ticks between two looks at bodies that are too fast: one takes 5 µs."""
+"""Ticks between two looks at bodies that are too fast, however ticks are shared out over calls."""
 
 
 class Stopwatch:
@@ -228,6 +228,11 @@ class Simulation:
         }
         """What a tick does, phase by phase: all subsystems in the order of their steps."""
         self._subsystems = [subsystem for phase in self._tick.values() for subsystem in phase]
+        self._steps = [
+            (self.phases[phase], [s.step for s in subsystems if type(s).step is not Subsystem.step])
+            for phase, subsystems in self._tick.items()
+        ]
+        """The same for the hot loop: the stopwatch of each phase, and what steps in it."""
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._handlers: dict[type[Message], Callable[[Any], None]] = {
@@ -253,27 +258,32 @@ class Simulation:
 
     def step(self, ticks: int = 1) -> None:
         """Advance by ``ticks`` ticks and write the state; how ticks are shared out over calls changes nothing."""
-        for _ in range(ticks):
+        for left in range(ticks - 1, -1, -1):
             self._advance()
+            if left and self._clock.tick % GUARD_TICKS == 0:
+                self._world.write_state(self.state)
+                self._suture.write_state(self.state)
+                self._watch()
         self._write_state()
-        self._watch()
+        if ticks > 0 and self._clock.tick % GUARD_TICKS == 0:
+            self._watch()
 
     def _advance(self) -> None:
         """One tick: commands become motor targets and forces, threads and grasps exchange impulses, bodies move."""
-        for phase, subsystems in self._tick.items():
-            with self.phases[phase]:
-                for subsystem in subsystems:
-                    subsystem.step(self._clock.since_reset)
+        tick, now = self._clock.since_reset, clock.perf_counter()
+        for stopwatch, steps in self._steps:
+            for step in steps:
+                step(tick)
+            begin, now = now, clock.perf_counter()
+            stopwatch.seconds += now - begin
         self._clock.advance()
 
     def _watch(self) -> None:
-        """Report what moves as nothing commands."""
-        passed = self._clock.tick - self._watched
-        if passed >= GUARD_TICKS:
-            self._watched = self._clock.tick
-            alarm = self._guard.check(passed * self.dt)
-            if alarm is not None:
-                self.problems.append(alarm)
+        """Report what moves as nothing commands; the state has the motion of all bodies."""
+        passed, self._watched = self._clock.tick - self._watched, self._clock.tick
+        alarm = self._guard.check(passed * self.dt)
+        if alarm is not None:
+            self.problems.append(alarm)
 
     def _watch_anew(self) -> None:
         """Bodies were put elsewhere: they have the motion that the state has."""
