@@ -105,9 +105,8 @@ def test_when_coacd_hangs_the_hull_stands_in_and_a_warning_reports_it(
     with caplog.at_level(logging.WARNING):
         (piece,) = convex_pieces(*ell(), "/ell.obj")
     assert len(piece) == 10
-    assert (
-        "/ell.obj collides as its convex hull: CoACD took longer than 0.001 s; run 'ligature decompose'" in caplog.text
-    )
+    assert "/ell.obj collides as its convex hull: CoACD took longer than 0.001 s" in caplog.text
+    assert "run 'ligature decompose' on it" in caplog.text
 
 
 @pytest.mark.parametrize(("threshold", "text"), [(0.0, "threshold is 0; it must be from 0.01 to 1"), (2.0, "is 2;")])
@@ -132,7 +131,7 @@ points /= np.linalg.norm(points, axis=1, keepdims=True)
 faces = ConvexHull(points).simplices
 stored = io.BytesIO()
 np.savez(stored, vertices=points * rng.uniform(0.3, 1.0, (900, 1)), faces=faces.astype(np.int32))
-_run_coacd(stored.getvalue(), json.dumps({"threshold": 0.01, "mcts_iterations": 2000, "resolution": 10000}), 300.0)
+_run_coacd(stored.getvalue(), json.dumps({"threshold": 0.01, "mcts_iterations": 2000, "resolution": 10000}), 300.0, "mesh")
 """
 
 
@@ -170,3 +169,74 @@ def _lives(process: int) -> bool:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
     except (FileNotFoundError, ProcessLookupError):
         return False
+
+
+@pytest.mark.parametrize("lasting", [True, False])
+def test_a_failure_is_kept_with_its_reason_when_another_try_would_end_the_same(
+    lasting: bool, cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    runs = []
+
+    def fail(*arguments: object) -> bytes:
+        runs.append(arguments)
+        raise DecompositionError("CoACD chokes", lasting)
+
+    monkeypatch.setattr(module, "_run_coacd", fail)
+    for _ in range(2):
+        caplog.clear()
+        assert len(convex_pieces(*ell(), "/ell.obj")) == 1
+        assert "/ell.obj collides as its convex hull: CoACD chokes" in caplog.text
+    assert len(runs) == (1 if lasting else 2)
+    assert ("in an earlier run" in caplog.text) == lasting
+    assert len(list(cache.rglob("*.txt"))) == lasting
+    convex_pieces(ell()[0] * 2.0, ell()[1], "/larger.obj")
+    assert len(runs) == (2 if lasting else 3)
+
+
+@pytest.mark.parametrize(
+    ("code", "lasting"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", False),
+        ("raise MemoryError", False),
+        ("import no_such_module", False),
+        ("import os; os.abort()", True),
+        ("raise RuntimeError('not a manifold')", True),
+    ],
+)
+def test_only_what_the_mesh_causes_lasts(code: str, lasting: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    wait = module._wait
+    monkeypatch.setattr(module, "_wait", lambda command, *rest: wait([command[0], "-c", code], *rest))
+    with pytest.raises(DecompositionError, match="CoACD ended with status") as found:
+        module._run_coacd(b"", "{}", 60.0, "/ell.obj")
+    assert found.value.lasting == lasting
+
+
+def test_a_decomposition_that_takes_long_is_reported_while_it_lasts(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(module, "PROGRESS_SECONDS", 0.01)
+    with caplog.at_level(logging.WARNING):
+        convex_pieces(*ell(), "/ell.obj")
+    assert "still decomposing /ell.obj after" in caplog.text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fine_mesh_is_simplified_to_the_same_shape_and_bits(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n, most = int(rng.integers(40, 80)), int(rng.integers(500, 3000))
+    u, v = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    around, tube = 2 * np.pi * u / n, 2 * np.pi * v / n
+    out = 0.03 + 0.01 * np.cos(tube)
+    ring = np.stack([out * np.cos(around), out * np.sin(around), 0.01 * np.sin(tube)], axis=-1).reshape(-1, 3)
+    at = u * n + v, (u + 1) % n * n + v, (u + 1) % n * n + (v + 1) % n, u * n + (v + 1) % n
+    faces = np.concatenate([np.stack([at[i].ravel() for i in k], axis=1) for k in ((0, 1, 2), (0, 2, 3))])
+    faces = faces.astype(np.int32)
+    points, corners = module.simplified(ring, faces, most)
+    assert most // 4 < len(corners) <= most
+    assert corners.dtype == np.int32 and corners.max() < len(points)
+    again = module.simplified(ring, faces, most)
+    assert points.tobytes() == again[0].tobytes() and corners.tobytes() == again[1].tobytes()
+    # every vertex is close to the ring's surface, and its hole stays open
+    off = np.abs(np.hypot(np.hypot(points[:, 0], points[:, 1]) - 0.03, points[:, 2]) - 0.01)
+    assert off.max() < 0.004
+    assert module.simplified(ring, faces, len(faces))[1] is faces

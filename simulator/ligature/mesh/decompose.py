@@ -12,9 +12,11 @@ import io
 import json
 import logging
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -41,14 +43,34 @@ QUICK: dict[str, Any] = {
 They bound the search by iterations, so that the pieces are the same on a busy machine.
 """
 
+MOST_FACES = 20000
+"""Most triangles that `convex_pieces` hands to CoACD, whose time grows with them; finer meshes are simplified."""
+
+FINEST_GRID = 256
+"""Cells along the longest edge of a mesh's box in the first try of `simplified`."""
+
 HANG_LIMIT = 3600.0
-"""Seconds after which CoACD counts as hanging; nothing of it is kept, and the next start tries again."""
+"""Seconds after which CoACD counts as hanging."""
+
+PROGRESS_SECONDS = 4.0
+"""Seconds between two lines about a decomposition that goes on."""
+
+_FROM_OUTSIDE = tuple(-s for s in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP))
+_MACHINE_ERRORS = ("ImportError", "ModuleNotFoundError", "MemoryError", "OSError")
+"""Ends of CoACD that state nothing about the mesh: another try may do better."""
 
 _log = logging.getLogger(__name__)
 
 
 class DecompositionError(ValueError):
-    """A mesh that cannot be decomposed; the message states why."""
+    """A mesh that cannot be decomposed; the message states why.
+
+    ``lasting`` is true when another try would end the same.
+    """
+
+    def __init__(self, message: str, lasting: bool = False) -> None:
+        super().__init__(message)
+        self.lasting = lasting
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,17 +124,44 @@ def obj_text(hulls: Sequence[Array], library: str) -> tuple[str, str]:
 def convex_pieces(vertices: Array, faces: NDArray[np.int32], source: str = "") -> list[Array]:
     """Convex pieces (n, 3) of a triangle mesh that moves: its hull when that is close, else a decomposition.
 
-    When CoACD fails, the hull stands for the mesh and a warning names its file ``source``.
+    A mesh of more than `MOST_FACES` triangles is simplified first. When CoACD fails, the hull stands for the mesh and
+    a warning names its file ``source``.
     """
     whole = hull_vertices(vertices)
     if _convex_enough(vertices, faces):
         return [whole]
     try:
-        return list(_cached_hulls(vertices, faces, QUICK, HANG_LIMIT, source))
+        return list(_cached_hulls(*simplified(vertices, faces), QUICK, HANG_LIMIT, source))
     except DecompositionError as error:
         name = source or f"a moving mesh of {len(faces)} triangles"
         _log.warning("%s collides as its convex hull: %s; run 'ligature decompose' on it", name, error)
         return [whole]
+
+
+def simplified(vertices: Array, faces: NDArray[np.int32], most: int = MOST_FACES) -> tuple[Array, NDArray[np.int32]]:
+    """A triangle mesh of at most ``most`` triangles, the same one if it has no more.
+
+    The vertices (n, 3) within each cell of a grid become one at their mean, triangles (m, 3) that collapse or
+    coincide go; the grid is made coarser until few enough are left. Method: Rossignac and Borrel, "Multi-resolution
+    3D approximations for rendering complex scenes", 1993. Equal arguments give equal bits.
+    """
+    cells, corners = float(FINEST_GRID), faces
+    low = vertices.min(axis=0)
+    size = float((vertices.max(axis=0) - low).max())
+    points = vertices
+    while len(corners) > most:
+        places = np.floor((vertices - low) * (cells / size)).astype(np.int64)
+        _, cell_of, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+        cell_of = cell_of.reshape(-1)
+        sums = [np.bincount(cell_of, vertices[:, axis], len(counts)) for axis in range(3)]
+        points = np.column_stack(sums) / counts[:, None]
+        corners = cell_of[faces]
+        a, b, c = corners.T
+        corners = corners[(a != b) & (b != c) & (c != a)]
+        _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
+        corners = corners[np.sort(first)].astype(np.int32)
+        cells *= 0.8
+    return points, corners
 
 
 def _convex_enough(vertices: Array, faces: NDArray[np.int32]) -> bool:
@@ -136,17 +185,32 @@ def _cached_hulls(
     words = json.dumps(settings, sort_keys=True)
     key = hashlib.sha256(vertices.tobytes() + faces.astype(np.int32).tobytes() + words.encode()).hexdigest()
     path = cache_folder() / "decomposition" / f"{key[:32]}.npz"
+    failure = path.with_suffix(".txt")
     hulls = _stored_hulls(path)
     if hulls:
         return hulls
+    if failure.is_file():
+        reason = failure.read_text("utf-8", "replace")
+        raise DecompositionError(f"{reason} (in an earlier run; delete {failure} to try again)")
     name = source or "a mesh"
     _log.warning("decomposing %s, %d triangles, into convex pieces; this is done once", name, len(faces))
-    data = _run_coacd(stored.getvalue(), words, limit)
+    try:
+        data = _run_coacd(stored.getvalue(), words, limit, name)
+        hulls = _solid_hulls(data)
+    except DecompositionError as error:
+        if error.lasting:
+            _keep(failure, str(error).encode())
+        raise
+    _keep(path, data)
+    return hulls
+
+
+def _keep(path: Path, data: bytes) -> None:
+    """Write what was found, if the cache can be written."""
     try:
         write_atomically(path, data)
     except OSError as error:
         _log.warning("%s cannot be written (%s): the mesh will be decomposed again next time", path, error.strerror)
-    return _solid_hulls(data)
 
 
 def _stored_hulls(path: Path) -> tuple[Array, ...]:
@@ -168,22 +232,42 @@ def _solid_hulls(data: bytes) -> tuple[Array, ...]:
         except ValueError:
             continue
     if not hulls:
-        raise DecompositionError("CoACD found no piece with a volume")
+        raise DecompositionError("CoACD found no piece with a volume", lasting=True)
     return tuple(hulls)
 
 
-def _run_coacd(mesh: bytes, settings: str, limit: float) -> bytes:
-    """Content of the npz file of pieces that CoACD makes of the npz file ``mesh``; raises `DecompositionError`."""
+def _run_coacd(mesh: bytes, settings: str, limit: float, name: str) -> bytes:
+    """Content of the npz file of pieces that CoACD makes of the npz file ``mesh``; raises `DecompositionError`.
+
+    Logs a line with the ``name`` of the mesh every few seconds.
+    """
     with tempfile.TemporaryDirectory(prefix="ligature-coacd-") as folder:
         source, target = Path(folder, "mesh.npz"), Path(folder, "pieces.npz")
         source.write_bytes(mesh)
         words = (str(source), str(target), settings, str(os.getpid()))
         command = [sys.executable, "-m", "ligature.mesh.coacd_process", *words]
-        try:
-            done = subprocess.run(command, capture_output=True, timeout=limit, check=False)
-        except subprocess.TimeoutExpired:
-            raise DecompositionError(f"CoACD took longer than {limit:g} s") from None
-        if done.returncode or not target.is_file():
-            last = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
-            raise DecompositionError(f"CoACD ended with status {done.returncode}: {' '.join(last)}")
+        status, error = _wait(command, limit, name)
+        if status or not target.is_file():
+            lasting = status not in _FROM_OUTSIDE and not error.startswith(_MACHINE_ERRORS)
+            raise DecompositionError(f"CoACD ended with status {status}: {error}", lasting)
         return target.read_bytes()
+
+
+def _wait(command: Sequence[str], limit: float, name: str) -> tuple[int, str]:
+    """Exit status and last line of errors of a command that may take ``limit`` seconds."""
+    begin = time.monotonic()
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        try:
+            while True:
+                passed = time.monotonic() - begin
+                try:
+                    _, errors = process.communicate(timeout=min(PROGRESS_SECONDS, max(0.0, limit - passed)))
+                    break
+                except subprocess.TimeoutExpired:
+                    passed = time.monotonic() - begin
+                    if passed >= limit:
+                        raise DecompositionError(f"CoACD took longer than {limit:g} s", lasting=True) from None
+                    _log.warning("still decomposing %s after %.0f s", name, passed)
+        finally:
+            process.kill()
+    return process.returncode, " ".join(errors.decode("utf-8", "replace").strip().splitlines()[-1:])
