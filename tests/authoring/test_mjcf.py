@@ -349,7 +349,7 @@ def test_without_mujoco_it_is_reported_how_to_get_the_release_that_is_tested(
     pinned = next(
         line for line in (ROOT / "requirements-dev.txt").read_text().splitlines() if line.startswith("mujoco==")
     )
-    assert done.exit_code == 1 and f"get it by 'pip install {pinned}'" in done.output
+    assert done.exit_code == 1 and f"run 'pip install {pinned}'" in done.output
 
 
 MODELS = sorted((Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets").glob("*.xml"))

@@ -114,7 +114,7 @@ def test_an_open_jaw_lets_the_needle_fall(held: Theatre) -> None:
     assert sim.grasps["PSM1"] is None
     assert held.needle.pose[2] < height - 0.01
     assert sim._world.mass_of(held.needle.body.index)[0] == held.needle.body.mass
-    assert not any(held.needle.body.index in passing for passing in sim.grasps.snapshot()["_passing"])
+    assert not any(held.needle.body.index in passing for passing in sim.grasps.snapshot()["_disabled"])
 
 
 def test_an_arm_feels_the_needle_it_holds(held: Theatre) -> None:

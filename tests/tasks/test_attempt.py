@@ -87,7 +87,7 @@ def test_a_reported_pose_is_judged_in_the_frame_of_the_camera_body(scene: Scene)
     report = attempt.judge(frame(np.eye(3), (0.0, 0.004, -1.0))).report()
     assert report["E_base"] == report["E_mid"] == report["E_tip"] == pytest.approx(0.004)
     assert report["total"] == pytest.approx(0.012)
-    with pytest.raises(ValueError, match="judged by the pose that is reported"):
+    with pytest.raises(ValueError, match="needs the reported pose"):
         attempt.judge()
 
 
