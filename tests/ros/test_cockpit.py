@@ -37,7 +37,7 @@ def teleop(simulator: Any, start: Callable[..., Any], tmp_path_factory: pytest.T
     file = tmp_path_factory.mktemp("teleop") / "teleop.yaml"
     file.write_text(CONFIG)
     program = start(BIN / "ligature", "teleop", file)
-    program.wait_for("leading:")
+    program.wait_for("driving:")
     return program
 
 

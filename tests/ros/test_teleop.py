@@ -72,7 +72,7 @@ def teleop(arms: dict[str, Any], start: Callable[..., Any], tmp_path_factory: py
     (folder / "teleop.yaml").write_text(CONFIG)
     program = start(BIN / "ligature", "teleop", folder / "teleop.yaml", "--record", folder / "record.jsonl")
     program.record = folder / "record.jsonl"
-    program.wait_for("leading:")
+    program.wait_for("driving:")
     return program
 
 

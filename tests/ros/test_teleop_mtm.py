@@ -34,7 +34,7 @@ def simulator(start: Callable[..., Any], arms_scene: Path, tmp_path_factory: pyt
     program.wait_for("first state published")
     file = tmp_path_factory.mktemp("teleop") / "teleop.yaml"
     file.write_text(CONFIG)
-    start(BIN / "ligature", "teleop", file).wait_for("leading:")
+    start(BIN / "ligature", "teleop", file).wait_for("driving:")
     return program
 
 
