@@ -183,7 +183,7 @@ def test_joint_types_that_are_missing_mean_force_and_extra_values_are_left_out(s
     "message", [RigidBodyCmd(cartesian_cmd_type=7), RigidBodyCmd(joint_cmds=[0.0], joint_cmds_types=[5])]
 )
 def test_unknown_command_types_state_what_would_be_right(scene: Scene, message: RigidBodyCmd) -> None:
-    with pytest.raises(ValueError, match="0 force, 1 position, 2 velocity"):
+    with pytest.raises(ValueError, match=r"0 \(force\), 1 \(position\) or 2 \(velocity\)"):
         conversion.body_command(message, body(scene, "psm1/baselinksimple"))
 
 
