@@ -97,6 +97,7 @@ CACHES: dict[str, str] = {
             "TreeControl._client",
             "Lift._client",
             "Closures._client",
+            "Parting._client",
             "Weld.constraint",
         ),
         "Bullet's own numbers",

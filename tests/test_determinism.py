@@ -188,7 +188,7 @@ def test_a_restore_puts_back_every_attribute_that_steps_change(name: str) -> Non
 @pytest.mark.parametrize(
     ("name", "module", "table", "field"),
     [
-        ("suturing_small", control, "_KEPT", "_yield_stiffness"),
+        ("suturing_small", control, "_KEPT", "mode"),
         ("suturing_small", control, "_KEPT", "target"),
         ("suturing_small", rod, "JOINTS_KEPT", "load"),
         ("suturing_small", rod, "NODES_KEPT", "w"),

@@ -437,7 +437,6 @@ class TreeControl:
 
 _KEPT = (
     "mode", "target", "_integral", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",
-    "_yield_stiffness",
-    "owned", "_stops", "_slowed",
+    "_yield_stiffness", "owned", "_stops", "_slowed", "_asked",
 )  # fmt: skip
 """Attributes of a `TreeControl` that last from tick to tick."""
