@@ -79,7 +79,7 @@ def test_later_passes_feel_friction_alone(kit):
     needle = _down(kit, block)
     first, depth, _ = _pass(needle)
     plateau = MATERIAL.friction * depth[-1]
-    back = needle.advance(-0.0145, 0.04)
+    back = needle.advance(-0.015, 0.04)
     assert -back.min() <= 1.02 * plateau
     assert needle.needle.depth == 0.0
     assert needle.needle.where == states.OUTSIDE
