@@ -156,7 +156,7 @@ def test_what_cannot_be_recorded_is_reported_and_the_run_goes_on(
         Path("recordings").write_text("a file")
         words = "cannot record: File exists: 'recordings/mine.record'"
     elif what == "no page":
-        words = "cannot record this run: the run was begun without a page"
+        words = "cannot record this run: the run was started without --cockpit and without --record"
     if what == "name":
         run.push(Recording("../mine"))
         assert run.loop._mailbox.last_rejection.startswith("'../mine' is not a valid name of a recording")

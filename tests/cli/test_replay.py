@@ -72,7 +72,7 @@ def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) ->
     writer.finish(record.updates, record.end)
     status, text = said(path)
     assert status == 1
-    assert "the run ended otherwise" in text
+    assert "the run ended in another state" in text
 
 
 def test_a_file_that_is_missing_or_cut_off_is_reported(recorded: Path, tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def test_pages_of_other_sites_are_kept_out(port: int, open_port: int) -> None:
 def test_a_name_that_was_bent_to_this_machine_is_refused(open_port: int) -> None:
     status, text, _ = get(open_port, Host=f"evil.example:{open_port}")
     assert status == 403
-    assert "is not the name of this machine" in text
+    assert "is not a name of this machine" in text
     assert get(open_port, Host=f"localhost:{open_port}")[0] == 200
 
 

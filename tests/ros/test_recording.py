@@ -158,7 +158,7 @@ def test_what_cannot_be_scored_is_reported(session: Session, tmp_path: Path) -> 
     cut.write_bytes(session.bag.read_bytes()[:200_000])
     small = ROOT / "scenes" / "suturing_small" / "launch.yaml"
     for words, message in (
-        (("insertion", cut, SCENE), "the bag is cut off"),
+        (("insertion", cut, SCENE), "the bag is truncated"),
         (("insertion", session.bag), "name the launch file"),
         (("insertion", session.bag, small), "has 0 pairs of holes"),
         (("pose_estimation", session.bag, SCENE), "no pose is reported on"),
