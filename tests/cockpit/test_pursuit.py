@@ -15,7 +15,13 @@ def run(pursuits: ArmPursuits, dt: float = 0.01, most: int = 10000) -> list[tupl
     """What is commanded until everything is reached."""
     found = []
     while pursuits.active and len(found) < most:
-        found += [(command.verb, np.array(command.values)) for command in pursuits.advance(dt)]
+        found += [
+            (
+                command.verb,
+                np.array(next(getattr(command, name) for name in ("position", "pose") if hasattr(command, name))),
+            )
+            for command in pursuits.advance(dt)
+        ]
     return found
 
 
