@@ -28,7 +28,7 @@ def test_motions_that_report_nothing_are_refused() -> None:
         axes_of_motions(x / 10, np.array([0, 0.1, 0]))
     with pytest.raises(Unclear, match="must be about 90°"):
         axes_of_motions(x, np.array([0.1, 0.05, 0.0]))
-    with pytest.raises(Unclear, match="no right-handed frame"):
+    with pytest.raises(Unclear, match="do not form a right-handed frame"):
         axes_of_words("right", "up", "away")
 
 

@@ -16,6 +16,10 @@ from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
 
 
+END_TIMEOUT = 10.0
+"""Seconds that the end may take: a recording is written, and arms are left in order."""
+
+
 def teleop(
     file: Path, record: Path | None, replay: Path | None, calibrate: str | None, check: bool,
     devices: tuple[int, ...] | None, console: Console,
@@ -64,7 +68,9 @@ def _on_ros(
             block = calibration_of(wanted, calibrate, console.input, console.print)
             console.print(block, markup=False, end="")
             return 0
-        stop = stop_on_signal((signal.SIGINT, signal.SIGTERM))  # not before: Ctrl-C ends a question of the guide
+        stop = stop_on_signal(
+            (signal.SIGINT, signal.SIGTERM), END_TIMEOUT
+        )  # not before: Ctrl-C ends a question of the guide
         with ExitStack() as files:
             recorder = Recorder(files.enter_context(record.open("w", encoding="utf-8"))) if record else None
             node = Teleop(wanted, recorder, Replay(replay) if replay else None)
