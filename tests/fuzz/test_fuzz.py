@@ -13,7 +13,6 @@ from tests.fuzz.attempt import attempt
 from tests.fuzz.run import SCENE_LIMIT, SCENES, mutant, run
 from tests.fuzz.seeds import Seed, seeds, write_scene
 
-
 KNOWN = 30
 """The one scene of these that still passes 50 m/s: overlapping bodies on chains of light links (`docs/physics.md`)."""
 

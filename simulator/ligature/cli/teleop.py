@@ -15,7 +15,6 @@ from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
 
-
 END_TIMEOUT = 10.0
 """Seconds that the end may take: a recording is written, and arms are left in order."""
 
