@@ -54,6 +54,53 @@ TISSUE = (
     Key("ligature tissue.drag", N, unit="N s/m", doc="along what passes", status=Status.OURS, least=0.0),
 )
 
+_TISSUES = {name: name for name in ("silicone pad", "skin", "fat", "stomach", "liver")}
+
+
+def _material(block: str) -> tuple[Key, ...]:
+    """What tissue is made of; numbers come before those of the named material."""
+
+    def number(name: str, unit: str, doc: str, least: float = 0.0, most: float | None = None) -> Key:
+        path = f"{block}.{name}"
+        return Key(path, N, unit=unit, doc=doc, least=least, most=most, status=Status.OURS, fault=Fault.OBJECT)
+
+    doc = "named material, whose numbers hold where none is given"
+    return (
+        Key(f"{block}.material", C, doc=doc, choices=_TISSUES, status=Status.OURS, fault=Fault.OBJECT),
+        number("youngs modulus", "Pa", "Young's modulus", 1.0, 1e9),
+        number("poisson ratio", "", "Poisson's ratio, at most 0.499", 0.0, 0.499),
+        number("density", "kg/m³", "density", 1.0),
+        number("damping time", "s", "viscous over elastic stress"),
+        number("puncture force", "N", "at which a needle's tip enters"),
+        number("exit force", "N", "at which it leaves, over that of cutting"),
+        number("cutting force", "N", "at the tip while it cuts"),
+        number("friction", "N/m", "along needle or thread, for each metre inside"),
+        number("strength", "N/m", "load across, for each metre, that tears"),
+        number("least angle", "rad", "to the surface; flatter tips slide", 0.0, 1.57),
+    )
+
+
+SOFT_TISSUE = (
+    Key("ligature tissue", MAP, doc="the body is soft tissue, docs/tissue.md", status=Status.OURS),
+    *_material("ligature tissue"),
+    Key("ligature tissue.cell size", N, unit="m", doc="edge of its cells; some 600 cells when absent",
+        least=1e-5, status=Status.OURS, fault=Fault.OBJECT),
+    Key("ligature tissue.fixed", Type.TEXTS, ("-z",), doc="faces that its rigid body holds, of -x +x -y +y -z +z",
+        status=Status.OURS),
+    Key("ligature tissue.carried by", T, "", doc="body that it is fixed to", status=Status.OURS),
+    Key("ligature tissue.surface friction", N, None, doc="coefficient of its surface; `friction.static` when absent",
+        least=0.0, status=Status.OURS, fault=Fault.OBJECT),
+    Key("ligature tissue.slits", Type.MAPS, doc="slits, and wounds without tissue", status=Status.OURS),
+    Key("ligature tissue.slits[].from", V, unit="m", doc="corner of a box in B; flat along one axis it is a slit",
+        required=True, most=FARTHEST, status=Status.OURS, fault=Fault.OBJECT),
+    Key("ligature tissue.slits[].to", V, unit="m", doc="opposite corner", required=True, most=FARTHEST,
+        status=Status.OURS, fault=Fault.OBJECT),
+    Key("ligature tissue.layers", Type.MAPS, doc="layers from the top (+z of B) down", status=Status.OURS),
+    Key("ligature tissue.layers[].thickness", N, unit="m", doc="thickness; the lowest layer takes the rest", least=0.0,
+        status=Status.OURS, fault=Fault.OBJECT),
+    *_material("ligature tissue.layers[]"),
+)  # fmt: skip
+
 BODY = (
     *IDENTITY,
     Key("parent", T, "", doc="reference to a parent object, of newer revisions of AMBF", status=Status.IGNORED),
@@ -94,6 +141,7 @@ BODY = (
     *ignored(("enable feedback",), "belongs to joints"),
     ROD,
     Key("ligature needle", F, doc="false: never taken for a needle; else recognised", status=Status.OURS),
+    *SOFT_TISSUE,
 )
 
 
