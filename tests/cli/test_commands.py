@@ -128,7 +128,7 @@ def test_render_refuses_what_it_cannot_write(tmp_path: Path) -> None:
     assert "finite" in ligature("render", SMALL, "--camera", "cameraL", "--seconds", "nan").stderr
 
 
-def test_demo_needs_the_repository(
+def test_demo_names_the_example_that_is_missing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from ligature.cli import demo
@@ -136,7 +136,7 @@ def test_demo_needs_the_repository(
 
     monkeypatch.setattr(demo, "EXAMPLE", tmp_path / "suture.py")
     assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 2
-    assert "comes with the repository" in capsys.readouterr().out
+    assert f"the demonstration '{tmp_path / 'suture.py'}' is missing" in capsys.readouterr().out
     (tmp_path / "suture.py").write_text(
         "import sys; sys.exit(0 if sys.argv[1:4] == ['--throws', '2', '--seed'] else 3)"
     )

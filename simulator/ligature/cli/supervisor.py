@@ -21,6 +21,7 @@ from ligature.bus.block import remove, remove_leftovers
 from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
 from ligature.cli import master
 from ligature.cli.options import RunOptions
+from ligature.cli.ros_packages import ros_problem
 from ligature.process import end_with_parent, lower_priority
 
 MASTER_TIMEOUT = 15.0
@@ -145,6 +146,10 @@ class Supervisor:
         self._print(f"loading [bold]{escape(self._options.scene)}[/bold]")
         for note in self._options.notes:
             self._console.print(note, style="dim", markup=False)
+        problem = ros_problem() if self._options.ros else ""
+        if problem:
+            self._fail(problem)
+            return
         self._progress.start()
         text = self._options.to_text()
         self._children["physics"] = Child(
