@@ -90,8 +90,8 @@ CACHES: dict[str, str] = {
     ),
     **dict.fromkeys(
         (
-            "World.client",
-            "World._end",
+            "Engine.client",
+            "Engine._end",
             "Placement.client",
             "Motions._client",
             "TreeControl._client",

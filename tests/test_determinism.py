@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from ligature import Simulation
 from ligature.model.scene import Scene
 from ligature.model.subsystem import Subsystem
-from ligature.physics import control, world
+from ligature.physics import control, impulses
 from ligature.sensing import rays
 from ligature.simulation import Snapshot
 from ligature.suture import colliders, rod
@@ -194,7 +194,7 @@ def test_a_restore_puts_back_every_attribute_that_steps_change(name: str) -> Non
         ("suturing_small", rod, "NODES_KEPT", "w"),
         ("suturing_small", rod, "_KEPT", "tension"),
         ("suturing_small", colliders, "_KEPT", "_watched"),
-        ("suturing_small", world, "_KEPT", "_impulses"),
+        ("suturing_small", impulses, "_KEPT", "_total"),
         (next((n for n in QUICK if "gripper2/" in n), ""), rays, "STICK_KEPT", "_on_sensed"),
     ],
 )

@@ -112,7 +112,7 @@ class Guard:
         if gap > OPEN:
             name = scene.joints[loop].identity.key
             return f"joint '{name}' closes a loop that gapes by {1e3 * gap:.3g} mm", "let its pivots meet"
-        depth, other = self._world.overlap(members)
+        depth, other = self._world.queries.overlap(members)
         if depth > DEEP:
             name = scene.bodies[other].identity.identifier
             return f"it overlaps '{name}' by {1e3 * depth:.3g} mm", "move them apart, or let them not collide"
