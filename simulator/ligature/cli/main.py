@@ -25,7 +25,7 @@ app = typer.Typer(
 
 
 def _launch_files(paths: list[Path]) -> list[Path]:
-    return [launch_file(path) for path in paths]
+    return [launch_file(path) for path in paths or ()]
 
 
 Launch = Annotated[

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ligature.adf.schema.keys import POSE_ZERO, Fault, Key, Status, Type, each, ignored, spellings
+from ligature.adf.schema.keys import LARGEST_SCALE, POSE_ZERO, Fault, Key, Status, Type, each, ignored, spellings
 
 N, U, F, T, P, C = Type.NUMBER, Type.UNSIGNED, Type.FLAG, Type.TEXT, Type.PATH, Type.CHOICE
 V, POSE, MAP, MAPS = Type.VECTOR, Type.POSE, Type.MAP, Type.MAPS
@@ -122,7 +122,7 @@ COLLISION = (
     ),
     Key("collision margin", N, 0.001, "m", "collision margin", least=0.0),
     Key("collision groups", Type.INTEGERS, (), doc="two bodies in groups collide only if they share one"),
-    Key("scale", N, 1.0, doc="factor on meshes and joint pivots"),
+    Key("scale", N, 1.0, doc="factor on meshes and joint pivots", most=LARGEST_SCALE),
 )
 
 

@@ -121,6 +121,9 @@ FARTHEST = 1e4
 LONGEST_ARM = 100.0
 """Largest distance in metres of a centre of mass from its body's frame: the lever multiplies errors of rotation."""
 
+LARGEST_SCALE = 1e3
+"""Largest factor on a mesh: one in millimetres where metres are meant, the other way round."""
+
 HEAVIEST, STRONGEST = 1e6, 1e3
 """Largest mass in kg and gravity in m/s² that can be simulated."""
 
