@@ -13,7 +13,7 @@ KILLS ?= 200
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
-.PHONY: run demo film test test-slow setup developers lint types check-imports unit fuzz bench contact-sheet soak docs wheel addon test-blender blender-module clean
+.PHONY: run demo film test test-slow setup developers lint types check-imports unit fuzz bench contact-sheet soak docs site wheel addon test-blender blender-module clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -116,6 +116,10 @@ film: setup
 wheel: developers
 	@rm -rf dist/ligature_sim-*
 	@$(STEP) "building the source distribution and the wheel, about 15 s" $(PYTHON) -m build --no-isolation --outdir dist
+
+# the pages of docs and the reference made from the code, in build/site; no network, every warning is an error
+site: developers
+	@$(STEP) "building the site in build/site, about a minute" $(PYTHON) docs/site/build.py build/site
 
 docs: setup
 	$(PYTHON) -c 'from ligature.adf.support import support_table; print(support_table(), end="")' > docs/adf.md

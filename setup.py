@@ -61,6 +61,5 @@ setup(
     package_dir={"": "simulator"},
     packages=find_packages("simulator"),
     package_data={"ligature": ["py.typed", "**/*.glsl", "**/*.vert", "**/*.frag", "client/names/*/*.py"]},
-    include_package_data=False,
     cmdclass={"build_py": BuildWithBundle, "sdist": SourceWithMessages},
 )

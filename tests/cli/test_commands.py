@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 BIN = Path(sys.executable).parent
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -36,6 +37,17 @@ def test_check_names_file_line_and_column(tmp_path: Path) -> None:
 def test_check_of_a_missing_file_reports_it(tmp_path: Path) -> None:
     done = ligature("check", tmp_path / "none.yaml")
     assert done.returncode == 1 and "does not exist" in done.stdout
+
+
+def test_compile_takes_no_file_or_the_name_of_a_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    from ligature.cli import compile as module
+    from ligature.cli.main import app
+
+    asked: list[list[Path]] = []
+    monkeypatch.setattr(module, "compile_ahead", lambda scenes, console: asked.append(list(scenes)) or 0)
+    assert CliRunner().invoke(app, ["compile"]).exit_code == 0
+    assert CliRunner().invoke(app, ["compile", "suturing_small"]).exit_code == 0
+    assert asked == [[], [SMALL]]
 
 
 def test_bench_prints_its_figures_as_json() -> None:

@@ -24,8 +24,8 @@ app = typer.Typer(
 )
 
 
-def _launch_files(paths: list[Path]) -> list[Path]:
-    return [launch_file(path) for path in paths or ()]
+def _launch_files(paths: list[Path] | None) -> list[Path]:
+    return [launch_file(path) for path in paths or []]
 
 
 Launch = Annotated[
