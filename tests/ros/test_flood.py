@@ -19,7 +19,7 @@ import ligature
 import numpy as np
 import pytest
 from ligature.bus import Block
-from ligature.bus.block import FOLDER
+from ligature.bus.leftovers import FOLDER
 from ligature.model.state import new_state
 
 from tests.fuzz.commands import _floats

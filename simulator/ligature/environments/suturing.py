@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from ligature.bundle import SCENES
 from ligature.camera_simulation import Simulation
 from ligature.environments.goals import GOALS, Goal, tip_position
 from ligature.model.frames import axis_rotation, pose7_matrix
@@ -28,9 +29,6 @@ CONTROL = 0.02
 
 STEP_LENGTH, STEP_ANGLE, STEP_JAW = 0.001, 0.05, 0.1
 """Metres, radians and radians of jaw that an action of 1 means."""
-
-SCENES = Path(__file__).resolve().parents[3] / "scenes"
-"""Our scenes, in the repository that this package is installed from."""
 
 STEP_JOINTS = np.array([0.01, 0.01, 0.001, 0.08, 0.06, 0.06])
 SUCCESS_REWARD = 1.0

@@ -77,7 +77,7 @@ class DecompositionError(ValueError):
 class Decomposition:
     """Convex pieces, each (n, 3), and how well they fill the mesh.
 
-    ``volume_error`` is |sum of hulls − mesh| / mesh by volume, None for a mesh that is not closed;
+    ``volume_error`` is ``|sum of hulls − mesh| / mesh`` by volume, None for a mesh that is not closed;
     ``distance`` the Hausdorff distance in metres (see `hausdorff_distance`).
     """
 

@@ -50,7 +50,7 @@ def load(
     Parameters
     ----------
     path
-        A launch file, or one model file.
+        A launch file, one model file, or the name of a scene that comes with Ligature, such as ``suturing``.
     models
         Indices into the launch file's ``multibody configs``, in the order of loading; repeats are
         allowed. None loads all of them.

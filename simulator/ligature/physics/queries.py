@@ -141,10 +141,10 @@ class BulletQueries:
         rows = sorted((row[8], row[5], row[7]) for row in found)
         return Gaps(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
 
-    def overlap(self, bodies: set[int]) -> tuple[float, int]:
-        """How deep in metres one of ``bodies`` overlaps another body, and which; (0, -1) when none does."""
-        deepest = (0.0, -1)
+    def overlap(self, bodies: set[int]) -> tuple[float, int, int]:
+        """How deep in metres one of ``bodies`` overlaps another body, and both; (0, -1, -1) when none does."""
+        deepest = (0.0, -1, -1)
         for body in sorted(bodies & self._engine.place_of.keys()):
             for contact in self.contacts(body, 0.0):
-                deepest = max(deepest, (-contact.distance, contact.body))
+                deepest = max(deepest, (-contact.distance, body, contact.body))
         return deepest

@@ -118,6 +118,8 @@ class World(Subsystem):
         self.welds = Welds(self.engine)
         self.masses = Masses(self.engine, self.commands, self.welds)
         self.collisions = Collisions(self.engine)
+        for found in self.collisions.overlaps:
+            self.report(found.finding(scene))
         self.queries = BulletQueries(self.engine)
         self.wrenches = ContactWrenches(self.engine, self.welds, self.impulses)
         self._set_up()
@@ -227,6 +229,7 @@ class World(Subsystem):
         self._closures.pace()
         pybullet.stepSimulation(physicsClientId=self.engine.client)
         self._parting.step()
+        self.collisions.step(tick)
         motions.expire()
         if not motions.sound(MAX_SPEED):
             self._heal()
@@ -240,6 +243,8 @@ class World(Subsystem):
             self.report(Diagnostic(Severity.ERROR, message, code="diverged"))
         for k in sorted(joined(self.engine, found)):
             self.engine.restart(k)
+        if found:
+            self.collisions.begin()
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists, joints and wrenches into a state record."""

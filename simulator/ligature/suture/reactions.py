@@ -54,7 +54,10 @@ def add_reactions(n: int, joints: Joints, touches: Touches, work: Work, impulse:
 
 @inlined
 def find_tension(first: int, n: int, joints: Joints, work: Work, tension: Array, dt: float) -> None:
-    """Tension of each element in newtons: the mean pull of its joints along it, positive when taut."""
+    """Tension of each element in newtons: the mean pull of its joints along it, positive when taut.
+
+    0 for an element whose joints are in one place, which has no direction.
+    """
     for e in range(tension.shape[0]):
         i = first + e
         near = work.lever[i - 1, 1] if i > 0 else work.lever[i, 0]
@@ -70,4 +73,5 @@ def find_tension(first: int, n: int, joints: Joints, work: Work, tension: Array,
                 joined += 1
                 f = joints.load[j]
                 pull += f[0] * ux + f[1] * uy + f[2] * uz
-        tension[e] = pull / (joined * math.sqrt(ux * ux + uy * uy + uz * uz) * dt * dt)
+        length = math.sqrt(ux * ux + uy * uy + uz * uz)
+        tension[e] = pull / (joined * length * dt * dt) if length > 0.0 else 0.0
