@@ -24,6 +24,8 @@ from ligature.model.frames import pose7_matrix
 from ligature.model.state import new_state
 from ligature.process import end_with_parent
 
+from tests import waiting
+
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
 TIMEOUT = 100.0
@@ -38,14 +40,8 @@ FLAGS = (
 
 
 def until(condition: Callable[[], Any], what: str, seconds: float = TIMEOUT) -> Any:
-    """Wait for ``condition``; returns what it returned."""
-    deadline = time.monotonic() + seconds
-    while True:
-        found = condition()
-        if found:
-            return found
-        assert time.monotonic() < deadline, f"not within {seconds:g} s: {what}"
-        time.sleep(0.05)
+    """Wait for ``condition``, as long as a busy browser takes; returns what it returned."""
+    return waiting.until(condition, what, seconds, every=0.05)
 
 
 class Served:

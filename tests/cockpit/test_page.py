@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,7 +11,8 @@ import pytest
 from ligature.bus.record import Record
 from ligature.cli.replay import resimulate
 
-from tests.cockpit.conftest import Person, Served, projected, tip, until
+from tests.cockpit.conftest import TIMEOUT, Person, Served, projected, tip, until
+from tests.waiting import stays, steady
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -24,15 +25,18 @@ def operator(served: Served, person: Person) -> Person:
     return person
 
 
+def soon(condition: Callable[[], bool], seconds: float = 2.0) -> bool:
+    """Whether ``condition`` holds within some seconds."""
+    with suppress(AssertionError):
+        return bool(until(condition, "it holds", seconds))
+    return False
+
+
 def rest(served: Served) -> None:
     """Wait until PSM1 is where its last goal is."""
 
-    def stands() -> bool:
-        before = served.arm("PSM1")["setpoint_js"][0].copy()
-        time.sleep(0.3)
-        return bool(np.abs(served.arm("PSM1")["measured_js"][0] - before).max() < 1e-4)
-
-    until(stands, "the arm stands")
+    goal = steady(lambda: served.arm("PSM1")["setpoint_js"][0].copy(), 0.3, 1e-6, "the goal stands", TIMEOUT)
+    until(lambda: np.abs(served.arm("PSM1")["measured_js"][0] - goal).max() < 1e-4, "the arm stands", TIMEOUT)
 
 
 def test_the_page_shows_scene_figures_and_cameras(served: Served, person: Person) -> None:
@@ -109,8 +113,7 @@ def test_a_slider_moves_the_joint(served: Served, operator: Person) -> None:
     def moved() -> bool:
         # a browser that draws in software on a busy machine may answer too late: the arm holds, and one drags again
         operator.drags(operator.slider("yaw °"), 25)
-        time.sleep(1.0)
-        return bool(served.arm("PSM1")["measured_js"][0, 0] - before[0] > np.deg2rad(5.0))
+        return soon(lambda: served.arm("PSM1")["measured_js"][0, 0] - before[0] > np.deg2rad(5.0))
 
     until(moved, "the joint has moved")
 
@@ -126,8 +129,7 @@ def test_a_slider_moves_the_joint(served: Served, operator: Person) -> None:
 def test_the_jaw_opens(served: Served, operator: Person) -> None:
     def opened() -> bool:
         operator.drags(operator.slider("jaw °"), 30)
-        time.sleep(1.0)
-        return bool(served.arm("PSM1")["jaw_measured_js"][0] > np.deg2rad(5.0))
+        return soon(lambda: served.arm("PSM1")["jaw_measured_js"][0] > np.deg2rad(5.0))
 
     until(opened, "the jaw has opened")
 
@@ -135,10 +137,10 @@ def test_the_jaw_opens(served: Served, operator: Person) -> None:
 def test_pause_step_and_run(served: Served, operator: Person) -> None:
     operator.clicks("Paused")
     operator.sees("paused")
-    until(lambda: served.state["tick"] == served.state["tick"], "time stands")
-    before = int(served.state["update"])
+    before = int(steady(lambda: served.state["update"], what="time stands"))
     operator.clicks("Step 10")
     until(lambda: int(served.state["update"]) == before + 10, "ten updates were run")
+    stays(lambda: int(served.state["update"]) == before + 10, "ten updates and no more")
     operator.clicks("Paused")
     until(lambda: int(served.state["update"]) > before + 20, "time goes on")
 

@@ -1,4 +1,4 @@
-"""A browser that is gone in the middle of a drag: the arm holds, states why, and nothing else stops.
+"""A browser that is gone in the middle of a drag: the arm holds and reports the reason, and nothing else stops.
 
 How soon is measured by `tests.bench.cockpit` and, on a quiet machine, by the slow test.
 """
@@ -94,7 +94,7 @@ def vanish(running: Served, operator: Person, happens: Callable[[list[int]], Non
     drag = Drag(running, operator, happens)
     ticks = int(running.state["tick"])
     drag.perform()
-    until(lambda: any(f"{ARM} holds: {why}" in line for line in running.lines), "the terminal states why")
+    until(lambda: any(f"{ARM} holds: {why}" in line for line in running.lines), "the reason is printed")
     before = drag.goal()
     assert abs(before) < REACH - 0.2, "it did not go on to where the slider was dragged"
     time.sleep(0.3)

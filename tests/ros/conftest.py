@@ -18,6 +18,8 @@ from typing import Any
 import pytest
 from ligature.process import end_with_parent
 
+from tests.waiting import until
+
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
 BIN = Path(sys.executable).parent
@@ -161,10 +163,10 @@ class Listener:
 
     def wait(self, condition: Callable[[Any], bool] = lambda _: True, seconds: float = 20.0) -> Any:
         """The newest message once it satisfies ``condition``."""
-        deadline = time.monotonic() + seconds
-        while not (self.messages and condition(self.messages[-1])):
-            assert time.monotonic() < deadline, f"last message: {self.messages[-1:]}"
-            time.sleep(0.005)
+        try:
+            until(lambda: self.messages and condition(self.messages[-1]), seconds=seconds, every=0.005)
+        except AssertionError as error:
+            raise AssertionError(f"last message: {self.messages[-1:]}") from error
         return self.messages[-1]
 
     def rate(self, seconds: float) -> float:
@@ -226,10 +228,7 @@ def publish(node: Any) -> Iterator[Callable[..., Any]]:
     def make(topic: str, type_: Any) -> Any:
         publisher = node.Publisher(topic, type_, queue_size=1000, tcp_nodelay=True)
         publishers.append(publisher)
-        deadline = time.monotonic() + 10
-        while publisher.get_num_connections() == 0:
-            assert time.monotonic() < deadline, f"nobody subscribes to {topic}"
-            time.sleep(0.01)
+        until(publisher.get_num_connections, f"somebody subscribes to {topic}", 10.0)
         return publisher
 
     yield make

@@ -54,7 +54,7 @@ float64 w
 
 
 def until(condition: Callable[[], Any], what: Any = "", seconds: float = TIMEOUT) -> Any:
-    """Wait for a condition; ``what`` states what was awaited, or is asked when it did not come. Returns its value."""
+    """Wait for a condition; ``what`` names it, or is asked when it did not come. Returns its value."""
     deadline = time.monotonic() + seconds
     while not (value := condition()):
         assert time.monotonic() < deadline, what() if callable(what) else what
@@ -80,7 +80,7 @@ def wait_for_listener(publisher: Any, count: int = 1) -> Any:
 
 
 class Driver:
-    """States where the handle ``T`` (4, 4) is every `PERIOD`; ``grip`` is how far its grip is pressed, 0 to 1.
+    """Publishes the pose ``T`` (4, 4) of the handle every `PERIOD`; ``grip`` is how far its grip is pressed, 0 to 1.
 
     ``muted`` silences it, ``states`` (7,) replaces the pose.
     """

@@ -13,6 +13,7 @@ import pytest
 
 from tests.ros.conftest import BIN
 from tests.ros.test_client_scripts import on_all
+from tests.waiting import stays, steady, until
 
 pytestmark = pytest.mark.ros
 
@@ -198,10 +199,12 @@ def test_tf_has_a_frame_for_every_arm(arms, listen):
     from tf2_msgs.msg import TFMessage
 
     listener = listen("/tf", TFMessage)
-    time.sleep(1.0)
-    pairs = {(t.header.frame_id, t.child_frame_id) for message in listener.messages for t in message.transforms}
     wanted = {("HRSV" if name.startswith("MTM") else f"{name}_base", name) for name in ARMS}
-    assert wanted <= pairs
+
+    def pairs() -> set[tuple[str, str]]:
+        return {(t.header.frame_id, t.child_frame_id) for message in listener.messages for t in message.transforms}
+
+    until(lambda: wanted <= pairs(), "every arm has a frame")
 
 
 @on_every_arm
@@ -242,12 +245,10 @@ def test_enable_and_home_of_a_homed_arm_change_nothing(arm):
     from tests.ros.crtk import shifted
 
     assert arm.move_cp(shifted(arm.setpoint_cp(), [0.005, 0.0, 0.0])).wait()
-    time.sleep(0.1)
-    before = arm.measured_jp()
+    before = steady(arm.measured_jp, within=1e-4)
     assert arm.enable(0.0)
     assert arm.home(0.0)
-    time.sleep(0.3)
-    np.testing.assert_allclose(arm.measured_jp(), before, atol=1e-4)
+    stays(lambda: np.abs(arm.measured_jp() - before).max() < 1e-4, "the arm stands", 0.3)
     assert arm.state.now.state == "ENABLED"
 
 
@@ -255,8 +256,8 @@ def test_enable_and_home_of_a_homed_arm_change_nothing(arm):
 def test_states_follow_the_reference_sequence(arm):
     assert arm.disable(2.0)
     arm.state.command("unhome")
-    time.sleep(0.2)
-    before = len(arm.state.events)
+    assert arm.state.wait_for(lambda s: not s.is_homed, 2.0)
+    before = int(steady(lambda: len(arm.state.events)))
     assert arm.enable(1.0)
     assert arm.home(5.0)
     reported = [(e.state, e.is_homed, e.is_busy) for e in arm.state.events[before:]]
@@ -280,8 +281,7 @@ def test_pause_stops_motion_and_resume_allows_it(arm):
     assert arm.state.wait_for(lambda s: s.state == "PAUSED", 1.0)
     assert not arm.move_jp(start + step).wait(timeout=0.5)
     arm.servo_jp(start + step)
-    time.sleep(0.2)
-    np.testing.assert_allclose(arm.measured_jp(), start, atol=1e-3)
+    stays(lambda: np.abs(arm.measured_jp() - start).max() < 1e-3, "the paused arm stands")
     assert arm.hear("measured_js"), "feedback stays fresh while paused"
     arm.state.command("resume")
     assert arm.state.wait_for(lambda s: s.state == "ENABLED", 1.0)
@@ -294,9 +294,12 @@ def test_an_unknown_state_command_is_a_warning_without_effect(arm, listen):
     from std_msgs.msg import String
 
     warnings = listen(arm.topic("warning"), String)
-    time.sleep(0.3)
-    arm.state.command("dance")
-    warnings.wait(lambda message: "dance" in message.data)
+
+    def warned() -> bool:  # who subscribes too late misses the first
+        arm.state.command("dance")
+        return any("dance" in message.data for message in warnings.messages)
+
+    until(warned, "the warning", every=0.1)
     assert arm.state.now.state == "ENABLED"
 
 
@@ -317,8 +320,7 @@ def test_a_servo_stream_is_followed(arm, rate):
         errors.append(np.abs(arm.measured_jp() - arm.setpoint_jp()).max())
 
     stream(send, 1.0, rate)
-    time.sleep(0.3)
-    np.testing.assert_allclose(arm.measured_jp(), start, atol=2e-3)
+    until(lambda: np.abs(arm.measured_jp() - start).max() < 2e-3, "the arm is back")
     # 0.31 rad/s: what a measured and a set value of two messages 10 ms apart differ by
     assert np.percentile(errors, 95) < 0.01
 
@@ -341,11 +343,10 @@ def test_a_newer_move_takes_over_and_only_its_goal_is_reached(arm, listen):
     step[0] = 0.3
     first = arm.move_jp(start + step)
     assert first.wait(is_busy=True, timeout=2.0)
-    time.sleep(0.1)
+    until(lambda: np.abs(arm.setpoint_jp() - start).max() > 1e-3, "the first move goes on")
     assert arm.move_jp(start).wait()
-    time.sleep(0.1)
-    np.testing.assert_allclose(arm.setpoint_jp(), start, atol=1e-6)
-    assert [message.data for message in goals.messages][-2:] == [False, True]
+    until(lambda: np.abs(arm.setpoint_jp() - start).max() < 1e-6, "the newer goal is reached")
+    until(lambda: [message.data for message in goals.messages][-2:] == [False, True], "both moves are reported")
 
 
 @on_every_arm
@@ -355,12 +356,12 @@ def test_a_servo_command_ends_a_move(arm):
     step[0] = 0.3
     motion = arm.move_jp(start + step)
     assert motion.wait(is_busy=True, timeout=2.0)
-    time.sleep(0.1)
+    until(lambda: np.abs(arm.setpoint_jp() - start).max() > 1e-3, "the move goes on")
     here = arm.setpoint_jp()
     arm.servo_jp(here)
     assert motion.wait(timeout=1.0), "busy did not end"
-    time.sleep(0.2)
-    np.testing.assert_allclose(arm.setpoint_jp(), here, atol=1e-6)
+    until(lambda: np.abs(arm.setpoint_jp() - here).max() < 1e-6, "the setpoint is taken")
+    stays(lambda: np.abs(arm.setpoint_jp() - here).max() < 1e-6, "the setpoint stands")
     assert arm.move_jp(start).wait()
 
 
@@ -440,8 +441,7 @@ def test_ratios_are_echoed_and_slow_moves_down(arm, listen):
         top_speed[ratio] = max(abs(message.velocity[0]) for message in setpoints.messages)
     assert top_speed[0.25] < 0.6 * top_speed[1.0]  # half of it where the move is too short for full speed
     arm.say("trajectory_j/set_ratio", Float64(1.5))
-    time.sleep(0.2)
-    assert ratios.messages[-1].data == 1.0
+    stays(lambda: ratios.messages[-1].data == 1.0, "the ratio of 1")
 
 
 @on_every_arm
@@ -455,10 +455,7 @@ def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     local, reference = arm.hear("local/measured_cp"), arm.hear("measured_cp").header.frame_id
     before = arm.measured_cp()
     arm.publish("set_base_frame", base)
-    deadline = time.monotonic() + 5.0
-    while any(arm.hear(reading).header.frame_id != "table" for reading in ("measured_cp", "setpoint_cp")):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: {arm.hear(reading).header.frame_id for reading in ("measured_cp", "setpoint_cp")} == {"table"})
     there = arm.setpoint_cp()
     np.testing.assert_allclose(there[:3], pose7(arm.hear("local/setpoint_cp").pose)[:3] + [0.1, 0.2, 0.3], atol=1e-6)
     assert arm.hear("local/measured_cp").header.frame_id == local.header.frame_id
@@ -468,7 +465,7 @@ def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     back = PoseStamped(pose=pose_message(between(before, pose7(local.pose))))
     back.header.frame_id = reference
     arm.publish("set_base_frame", back)
-    time.sleep(0.3)
+    until(lambda: arm.hear("measured_cp").header.frame_id == reference, "the base frame is back")
 
 
 def between(pose: np.ndarray, local: np.ndarray) -> np.ndarray:
@@ -486,5 +483,4 @@ def test_a_jaw_opens_and_closes(arms, name):
     assert psm.jaw.close_jaw().wait(timeout=5.0)
     assert psm.jaw.setpoint_jp() == pytest.approx(np.deg2rad(-20.0), abs=1e-3)
     psm.jaw.servo_jp(0.3)
-    time.sleep(0.5)
-    assert psm.jaw.measured_jp() == pytest.approx(0.3, abs=0.02)
+    until(lambda: abs(psm.jaw.measured_jp() - 0.3) < 0.02, "the jaw is where it was sent")

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from tests.ros.conftest import BIN, ROOT, SMALL, Listener, Program, free_port
+from tests.waiting import steady, until
 
 pytestmark = pytest.mark.ros
 NEEDLE = "/ambf/env/phantom/Needle"
@@ -41,11 +42,7 @@ def client(simulator: Program, node: Any) -> Iterator[Any]:
 
 
 def wait_for(condition: Callable[[], Any], seconds: float = 5.0) -> Any:
-    deadline = time.monotonic() + seconds
-    while not (result := condition()):
-        assert time.monotonic() < deadline, "not within the time"
-        time.sleep(0.01)
-    return result
+    return until(condition, seconds=seconds)
 
 
 def test_all_objects_are_found_under_their_topics(client: Any) -> None:
@@ -134,7 +131,7 @@ def test_commands_go_out_at_the_rate_given_to_connect_for_active_objects_only(
     assert active.rate(2.0) == pytest.approx(50, abs=3)
     assert idle.messages == []
     slow.clean_up()
-    time.sleep(0.1)
+    wait_for(lambda: active.rate(0.2) == 0)
     assert active.rate(0.5) == 0
 
 
@@ -177,9 +174,12 @@ def test_reset_bodies_puts_bodies_back_and_reset_cameras_too(client: Any) -> Non
     wait_for(lambda: abs(needle.get_pos().x - 0.005) < 1e-3 and needle.get_pos().z < 0.7165)
     assert camera.get_pos().x == pytest.approx(home + 0.1)
     camera._cmd.enable_position_controller = False
-    time.sleep(0.1)
-    world.reset()
-    wait_for(lambda: abs(camera.get_pos().x - home) < 1e-6)
+
+    def back() -> bool:  # a command that was on its way moves the camera once more
+        world.reset()
+        return abs(camera.get_pos().x - home) < 1e-6
+
+    until(back, "the camera is home", 5.0, every=0.1)
     assert world._state.sim_time > time_before
 
 
@@ -188,12 +188,11 @@ def test_every_update_of_a_throttled_world_advances_the_given_steps(client: Any)
     world.enable_throttling(True)
     world.set_num_step_skips(5)
     world.update()
-    steps = []
-    time.sleep(0.2)
+    steps = [int(steady(world.get_sim_step, 0.1))]
     for _ in range(5):
         world.update()
-        time.sleep(0.15)
-        steps.append(world.get_sim_step())
+        wait_for(lambda: world.get_sim_step() == steps[-1] + 5)
+        steps.append(int(steady(world.get_sim_step, 0.05)))
     assert {b - a for a, b in zip(steps[:-1], steps[1:], strict=True)} == {5}
     wait_for(lambda: world.get_sim_step() > steps[-1] + 50)  # nobody updates: it runs freely again
     world.enable_throttling(False)
@@ -209,10 +208,7 @@ def test_an_active_world_is_kept_throttled_for_two_seconds_after_the_last_update
     world.set_num_step_skips(1)
     world.enable_throttling(True)
     world.update()
-    time.sleep(1.0)
-    held = world.get_sim_step()
-    time.sleep(0.5)
-    assert world.get_sim_step() == held
+    held = int(steady(world.get_sim_step, 1.2))
     wait_for(lambda: world.get_sim_step() > held + 50, 4.0)
     own.clean_up()
 
@@ -338,8 +334,7 @@ def test_a_script_goes_on_when_simulator_and_master_were_started_again(
     follower = start("/usr/bin/python3", "-c", FOLLOWER, env=own)
     follower.wait_for("step", 20)
     assert first.end() == 0
-    time.sleep(0.5)
-    seen = len(follower.lines)
+    seen = int(steady(lambda: len(follower.lines), 0.3))
     second = run()
     wait_for(lambda: len([line for line in follower.lines[seen:] if "step" in line]) > 5, 20)
     follower.process.kill()

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from tests.ros.conftest import BIN
+from tests.waiting import steady, until
 
 pytestmark = pytest.mark.ros
 
@@ -122,7 +123,7 @@ def run_servo_jp_example(arm: Any) -> None:
     amplitude[:2] = np.deg2rad(5.0)
     stream(lambda t: arm.servo_jp(start + amplitude * np.sin(2.0 * np.pi * t) ** 2), 1.0, 200.0)
     arm.servo_jp(start)
-    time.sleep(0.3)
+    steady(arm.measured_jp, within=1e-4)
     at_rest(arm, start)
 
 
@@ -139,12 +140,7 @@ def run_servo_cv_example(arm: Any) -> None:
 
     stream(send, 1.0, 100.0)
     assert 0.1 < max(seen) / (0.02 / np.pi) < 1.2  # less where simulated time lags behind the clock
-    for _ in range(10):  # simulated time may lag behind the clock
-        stopped = arm.setpoint_cp()
-        time.sleep(0.3)
-        if pose_distance(arm.setpoint_cp(), stopped)[0] < 1e-7:
-            return
-    raise AssertionError("it moves on without commands")
+    steady(lambda: arm.setpoint_cp()[:3], 0.3, 1e-7, "it stands without commands", 3.0)
 
 
 @pytest.mark.parametrize("run", [run_move_cp_example, run_servo_cp_example, run_servo_jp_example, run_servo_cv_example])
@@ -165,8 +161,7 @@ def test_crtk_teleop_example_lets_a_puppet_follow_a_controller(arms):
         puppet.servo_cp(shifted(from_puppet, 0.5 * (master.measured_cp() - from_master)[:3]))
         puppet.jaw.servo_jp(0.2 + 0.5 * master.gripper())
         time.sleep(0.005)
-    time.sleep(0.2)
-    followed = puppet.measured_cp()[:3] - from_puppet[:3]
+    followed = steady(puppet.measured_cp, within=1e-4)[:3] - from_puppet[:3]
     np.testing.assert_allclose(followed, [0.015, 0.0, 0.0], atol=2e-3)
 
 
@@ -268,10 +263,7 @@ def test_dvrk_reset_teleoperation_brings_master_and_roll_to_zero(arms, node):
     assert psm.move_jp(goal).wait()
     at_rest(psm, goal)
     console.say("teleop/enable", Bool(True))
-    deadline = time.monotonic() + 5.0
-    while enabled[-1:] != [True] and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert enabled[-1:] == [True]
+    until(lambda: enabled[-1:] == [True], "teleoperation is enabled", 5.0)
     listener.unregister()
     console.close()
 

@@ -57,7 +57,7 @@ def remote(node: Any, teleop: Any) -> Iterator[Any]:
 
 def test_a_pair_is_chosen_from_afar(remote: Any) -> None:
     until(lambda: remote.pairs["pen_PSM1"].selected, "the first pair is the one that is selected")
-    until(lambda: remote.pairs["pen_PSM1"].status, "it states what it does")
+    until(lambda: remote.pairs["pen_PSM1"].status, "its status is shown")
 
     def chosen() -> bool:
         remote.select("pen_PSM2")  # again and again: a topic that is new reaches its listeners a moment later

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tests.ros.conftest import BIN, SMALL, Program
+from tests.waiting import steady, until
 
 pytestmark = pytest.mark.ros
 BASE = "/ambf/env/psm1/baselink"
@@ -105,9 +106,7 @@ def test_sim_steps_and_times_advance(listen: Callable[..., Any]) -> None:
 
     world = listen(f"{WORLD}/State", WorldState)
     first = world.wait()
-    time.sleep(1.0)
-    last = world.messages[-1]
-    assert last.sim_step > first.sim_step
+    last = world.wait(lambda message: message.sim_step > first.sim_step + 100)
     assert last.sim_time - first.sim_time == pytest.approx((last.sim_step - first.sim_step) * 0.002, rel=1e-2)
 
 
@@ -177,10 +176,12 @@ def test_a_flood_of_commands_is_coalesced(listen: Callable[..., Any], publish: C
         time.sleep(0.005)
     world = listen(f"{WORLD}/State", WorldState)
     world.wait()
-    time.sleep(1.5)
-    after = diagnostics(listen)
-    assert int(after["commands received"]) > int(before["commands received"])
-    assert int(after["commands coalesced"]) > int(before["commands coalesced"])
+
+    def counted() -> bool:
+        after = diagnostics(listen)
+        return all(int(after[name]) > int(before[name]) for name in ("commands received", "commands coalesced"))
+
+    until(counted, "the flood is counted")
     assert world.rate(0.5) > 50
 
 
@@ -215,15 +216,15 @@ def test_a_client_steps_the_world_by_the_edges_of_its_clock(
     clock = True
     publisher.publish(WorldCmd(enable_step_throttling=True, step_clock=clock, n_skip_steps=5))
     time.sleep(0.2)
-    steps = []
+    world.wait()
+    steps = [int(steady(lambda: world.messages[-1].sim_step, 0.1))]
     for _ in range(8):
         clock = not clock
         publisher.publish(WorldCmd(enable_step_throttling=True, step_clock=clock, n_skip_steps=5))
-        time.sleep(0.15)
-        steps.append(world.messages[-1].sim_step)
+        world.wait(lambda message: message.sim_step == steps[-1] + 5, 5.0)
+        steps.append(int(steady(lambda: world.messages[-1].sim_step, 0.05)))
     assert {b - a for a, b in zip(steps[:-1], steps[1:], strict=True)} == {5}
-    time.sleep(1.0)
-    assert world.messages[-1].sim_step > steps[-1] + 50
+    world.wait(lambda message: message.sim_step > steps[-1] + 50, 5.0)
 
 
 def test_ghosts_and_actuators_have_their_topics(listen: Callable[..., Any], publish: Callable[..., Any]) -> None:

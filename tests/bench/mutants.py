@@ -1,0 +1,221 @@
+"""Changes small things in modules, one at a time, and lists the changes that no test notices.
+
+    python -m tests.bench.mutants [MODULE=TESTS ...] [--most N] [--seed S]
+
+A mutant is a module with one operator, comparison, constant or condition changed, or one statement left out. The tests of
+the module run against it in a process of their own, forked after the packages that do not change were imported, so that a
+mutant takes as long as its tests. ``TESTS`` are paths below `tests`, divided by commas; without arguments `PARTS` are done.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import copy
+import importlib.util
+import io
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from importlib.abc import MetaPathFinder, SourceLoader
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PARTS = {
+    "adf.values": "adf",
+    "adf.scalars": "adf",
+    "adf.frames": "adf,model/test_frames.py",
+    "adf.patch": "adf",
+    "adf.update": "adf",
+    "model.messages": "model/test_commands.py,bus/test_codec.py",
+    "model.commands": "model/test_commands.py,bus/test_codec.py,bus/test_mailbox.py",
+    "model.lookup": "model/test_lookup.py",
+    "model.naming": "model/test_naming.py,model/test_load.py",
+    "bus.codec": "bus/test_codec.py,bus/test_mailbox.py",
+    "bus.newest": "bus/test_mailbox.py,bus/test_codec.py,bus/test_outbox.py",
+    "bus.mailbox": "bus/test_mailbox.py",
+    "bus.pacing": "bus/test_pacing.py",
+    "bus.ring": "bus/test_outbox.py,bus/test_mailbox.py,bus/test_block.py",
+    "robots.operating_state": "robots/test_operating_state.py",
+    "robots.trajectory": "robots/test_arm.py,robots/test_operating_state.py",
+    "robots.device": "robots/test_operating_state.py,robots/test_arm.py",
+    "robots.axes": "robots/test_arm.py,robots/test_psm.py",
+    "robots.poses": "robots",
+}
+"""Modules and the tests that are theirs."""
+
+SECONDS = 60
+"""Time after which a mutant counts as noticed: it hangs."""
+
+COMPARED = {
+    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
+}  # fmt: skip
+OPERATED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.FloorDiv: ast.Mult}
+
+
+def variants(node: ast.AST) -> Iterator[ast.AST]:
+    """What may stand in the place of an expression."""
+    new = copy.deepcopy(node)
+    if isinstance(new, ast.Compare) and type(new.ops[0]) in COMPARED:
+        new.ops[0] = COMPARED[type(new.ops[0])]()
+        yield new
+    elif isinstance(new, ast.BinOp) and type(new.op) in OPERATED:
+        new.op = OPERATED[type(new.op)]()
+        yield new
+    elif isinstance(new, ast.BoolOp):
+        new.op = ast.Or() if isinstance(new.op, ast.And) else ast.And()
+        yield new
+    elif isinstance(new, ast.UnaryOp) and isinstance(new.op, ast.Not):
+        yield new.operand
+    elif isinstance(new, ast.Constant) and isinstance(new.value, bool):
+        new.value = not new.value
+        yield new
+    elif isinstance(new, ast.Constant) and isinstance(new.value, int | float):
+        new.value = new.value + 1
+        yield new
+
+
+def mutants(source: str) -> list[tuple[int, str, Callable[[], str]]]:
+    """Line, description and text of every mutant of a module."""
+    tree, found = ast.parse(source), []
+    for parent in ast.walk(tree):
+        if isinstance(parent, ast.FunctionDef):  # neither defaults nor annotations
+            places = [(parent, "body")]
+        elif isinstance(parent, ast.arguments | ast.AnnAssign | ast.ImportFrom):
+            continue
+        else:
+            places = [(parent, name) for name, _ in ast.iter_fields(parent)]
+        for owner, name in places:
+            value = getattr(owner, name)
+            for i, node in enumerate(value if isinstance(value, list) else [value]):
+                if not isinstance(node, ast.AST):
+                    continue
+                options = list(variants(node)) if isinstance(node, ast.expr) else []
+                if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+                    options.append(ast.copy_location(ast.Pass(), node))
+                for new in options:
+                    at = i if isinstance(value, list) else None
+                    before, after = ast.unparse(node), ast.unparse(new)
+                    found.append((node.lineno, f"{before}  ->  {after}", _text(tree, owner, name, at, new)))
+    return found
+
+
+def _text(tree: ast.Module, owner: ast.AST, name: str, at: int | None, new: ast.AST) -> Callable[[], str]:
+    def text() -> str:
+        old = getattr(owner, name) if at is None else getattr(owner, name)[at]
+        _put(owner, name, at, new)
+        try:
+            return ast.unparse(ast.fix_missing_locations(tree))
+        finally:
+            _put(owner, name, at, old)
+
+    return text
+
+
+def _put(owner: ast.AST, name: str, at: int | None, node: object) -> None:
+    if at is None:
+        setattr(owner, name, node)
+    else:
+        getattr(owner, name)[at] = node
+
+
+class Changed(MetaPathFinder, SourceLoader):
+    """Imports one module from another text than its file's."""
+
+    def __init__(self, module: str, path: Path, text: str) -> None:
+        self._module, self._path, self._text = module, path, text
+
+    def find_spec(self, fullname: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        if fullname != self._module:
+            return None
+        return importlib.util.spec_from_file_location(fullname, self._path, loader=self)
+
+    def get_filename(self, fullname: str) -> str:
+        return str(self._path)
+
+    def get_data(self, path: str) -> bytes:
+        return self._text.encode()
+
+    def path_stats(self, path: str) -> dict[str, int]:
+        raise OSError("no bytecode")
+
+
+def survives(module: str, path: Path, text: str, tests: list[str]) -> bool:
+    """Whether the tests pass with a module of this text."""
+    child = os.fork()
+    if child == 0:
+        os.setpgid(0, 0)
+        sys.meta_path.insert(0, Changed(module, path, text))
+        code = 1
+        try:
+            import pytest
+
+            with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+                code = pytest.main(["-x", "-q", "-m", "not slow and not ros and not corpus", "--no-header", *tests])
+        finally:
+            os._exit(0 if code == 0 else 1)
+    deadline = time.monotonic() + SECONDS
+    while time.monotonic() < deadline:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status) == 0
+        time.sleep(0.02)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return False
+
+
+def report(line: str) -> None:
+    """Write a line at once."""
+    sys.stdout.write(line + "\n" if line else "")
+    sys.stdout.flush()
+
+
+def main() -> int:
+    """Print survivors module by module."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", metavar="MODULE=TESTS")
+    parser.add_argument("--most", type=int, default=25, help="mutants of a module that are tried, drawn at random")
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    os.chdir(ROOT)
+    sys.path[:0] = [str(ROOT / "simulator"), str(ROOT)]
+    import hypothesis  # noqa: F401
+    import numba  # noqa: F401
+    import numpy  # noqa: F401
+    import yaml  # noqa: F401
+
+    parts = dict(part.split("=") for part in given.parts) or PARTS
+    lived = tried = 0
+    for name, tests in parts.items():
+        module = f"ligature.{name}"
+        path = ROOT / "simulator" / Path(*module.split(".")).with_suffix(".py")
+        if not path.exists():
+            report(f"{name}: no such module")
+            continue
+        folders = [f"tests/{test}" for test in tests.split(",")]
+        if not survives(module, path, path.read_text(), folders):
+            report(f"{name}: its tests fail, or take longer than {SECONDS} s, without a change")
+            continue
+        found = mutants(path.read_text())
+        chosen = random.Random(given.seed).sample(found, min(given.most, len(found)))
+        begin, left = time.monotonic(), []
+        for line, what, text in sorted(chosen, key=lambda m: m[0]):
+            if survives(module, path, text(), folders):
+                left.append(f"    {path.name}:{line}: {what}")
+        lived, tried = lived + len(left), tried + len(chosen)
+        took = time.monotonic() - begin
+        report(f"{name}: {len(left)} of {len(chosen)} survive ({len(found)} mutants in all, {took:.0f} s)")
+        report("\n".join(left))
+    report(f"{lived} of {tried} survive")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+"""The waits that other tests rely on: each fails on what it is there to find."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from tests.waiting import stays, steady, until
+
+
+def later(seconds: float) -> threading.Event:
+    """An event that is set after some seconds."""
+    event = threading.Event()
+    threading.Timer(seconds, event.set).start()
+    return event
+
+
+def test_a_wait_ends_with_its_condition_and_names_it_when_time_is_up() -> None:
+    begin, event = time.monotonic(), later(0.1)
+    assert until(event.is_set)
+    assert 0.09 < time.monotonic() - begin < 5.0
+    with pytest.raises(AssertionError, match=r"not within 0.05 s: pigs fly"):
+        until(lambda: False, "pigs fly", 0.05)
+
+
+def test_what_still_moves_is_not_steady() -> None:
+    begin, event = time.monotonic(), later(0.1)
+    assert steady(lambda: 1.0 if event.is_set() else time.monotonic(), 0.1) == 1.0
+    assert time.monotonic() - begin >= 0.19
+    with pytest.raises(AssertionError, match="not at rest within"):
+        steady(time.monotonic, 0.1, seconds=0.3)
+    assert steady(lambda: [0.0, 1e-9 * time.monotonic()], 0.05)[0] == 0.0
+
+
+def test_what_must_stay_may_not_end() -> None:
+    stays(lambda: True, seconds=0.05)
+    event = later(0.05)
+    with pytest.raises(AssertionError, match="no longer: quiet"):
+        stays(lambda: not event.is_set(), "quiet", 5.0)
