@@ -122,12 +122,12 @@ class ADF_OT_fix(bpy.types.Operator):
     bl_label = "Fix"
     bl_options = {"REGISTER", "UNDO"}
 
-    everything: bpy.props.BoolProperty(name="All", description="Mend everything that has a fix")
+    everything: bpy.props.BoolProperty(name="All", description="Fix everything that can be fixed automatically")
 
     @classmethod
     def poll(cls, context):
         if not any(item.fixable for item in context.scene.adf.findings):
-            cls.poll_message_set("No finding can be mended by itself")
+            cls.poll_message_set("No finding can be fixed automatically")
             return False
         return True
 

@@ -39,7 +39,7 @@ class Part:
     values: dict
     placed: Placed
     same: set[str]
-    """Groups of placed keys that state what the file states."""
+    """Groups of placed keys that have not changed since the import."""
 
 
 @dataclass(frozen=True, eq=False)

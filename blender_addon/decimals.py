@@ -1,4 +1,4 @@
-"""Numbers as files state them: the shortest decimals that are the same in single precision, in which Blender counts."""
+"""Numbers as files have them: the shortest decimals that are the same in single precision, which Blender uses."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ class ADF_OT_make(bpy.types.Operator):
     def execute(self, context):
         for obj in context.selected_objects:
             if obj.adf.role in ("SHAPE", "HULL", "INERTIAL"):
-                self.report({"WARNING"}, f"'{obj.name}' is part of a body and stays so")
+                self.report({"WARNING"}, f"'{obj.name}' is part of a body and keeps its role")
                 continue
             making.give_role(obj, self.role, making.file_of(obj) or target_file(context, self.role))
             if self.role in SHAPED and obj.type not in ("MESH", "EMPTY"):
@@ -255,7 +255,7 @@ def solid_of(body, source, density=1.0):
     """Mass properties of a body in its own frame; raises ValueError with the reason."""
     if source == "MESH":
         if body.type != "MESH":
-            raise ValueError("it has no visual mesh; weigh its primitives instead")
+            raise ValueError("it has no visual mesh; use its primitives instead")
         return mass_properties(*points_of(own_solid(body)), density)
     if source == "SHAPES":
         shapes = [(shape_of(child), relative_pose(body, child)) for child in shapes_of(body, "COLLISION")]

@@ -96,7 +96,7 @@ def _flat(matrix: np.ndarray) -> list[float]:
 
 
 def unchanged_groups(imported: dict[str, list] | None, state: dict[str, list]) -> set[str]:
-    """The groups of keys that state what they stated when the object was imported; none for one made anew."""
+    """The groups of keys that have not changed since the object was imported; none for an object made in Blender."""
     if imported is None:
         return set()
     return {group for group in (*_GROUPS, *state) if _same(imported.get(group), state.get(group))}
@@ -224,7 +224,7 @@ def _camera(placed: Placed, same: set[str], file_values: Keys) -> Keys:
 
 
 def _distance(file_values: Keys) -> float:
-    """How far the file's camera looks; one metre when it states nothing."""
+    """How far the file's camera looks; one metre when the file does not say."""
     a, b = (np.array(file_values.get(name, (0.0, 0.0, 0.0))) for name in ("location", "look at"))
     return float(np.linalg.norm(a - b)) or 1.0
 

@@ -41,7 +41,7 @@ def rest_pose(obj: bpy.types.Object) -> np.ndarray:
     matrix = rest_matrix(obj)
     if not (np.abs(matrix) < FAR).all():
         raise ValueError(
-            f"'{obj.name}' has a transform that is not a number or beyond all measure; clear location, rotation, scale"
+            f"'{obj.name}' has a transform that is not finite or far too large; clear location, rotation, scale"
         )
     if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
         raise ValueError(f"'{obj.name}' has a scale of zero; give it a size")

@@ -126,7 +126,7 @@ class ADF_PG_variant(bpy.types.PropertyGroup):
 class ADF_PG_launch_entry(bpy.types.PropertyGroup):
     """One model of the launch file, by its index."""
 
-    path: bpy.props.StringProperty(name="Path", description="Path as the launch file states it")
+    path: bpy.props.StringProperty(name="Path", description="Path as written in the launch file")
     collection: bpy.props.PointerProperty(type=bpy.types.Collection, name="Model")
 
 

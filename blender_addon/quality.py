@@ -163,7 +163,7 @@ def solids_of(body: bpy.types.Object) -> list[Solid]:
 
 def _primitive(shape, T: np.ndarray) -> Solid:
     if shape.kind == "PLANE":
-        raise ValueError("a plane has no end, so that no figure measures how well it fits")
+        raise ValueError("a plane is infinite, so its fit cannot be measured")
     vertices, polygons = shape_mesh(shape)
     faces = np.array([(face[0], b, c) for face in polygons for b, c in zip(face[1:], face[2:])])  # noqa: B905
     solid = _solid(vertices @ T[:3, :3].T + T[:3, 3], faces, True)

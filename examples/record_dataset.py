@@ -53,7 +53,7 @@ def record(writer: DatasetWriter, simulation: ligature.Simulation, throws: int) 
 
 
 def main() -> int:
-    """Write the dataset and state how many episodes succeeded."""
+    """Write the dataset and print how many episodes succeeded."""
     arguments = argparse.ArgumentParser(description="Write sutures as a dataset.")
     arguments.add_argument("out", type=Path, help="HDF5 file")
     arguments.add_argument("--throws", type=int, default=1, help="in each episode")

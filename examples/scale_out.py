@@ -17,7 +17,7 @@ import ray
 from ligature.environments import SuturingEnv
 
 TIP, TARGET = slice(27, 30), slice(30, 33)
-"""Where an observation states these (`ligature.environments.SuturingEnv`)."""
+"""Where an observation has these (`ligature.environments.SuturingEnv`)."""
 
 
 @ray.remote(num_cpus=1)
@@ -40,7 +40,7 @@ class Worker:
 
 
 def search(workers: list[ray.actor.ActorHandle], generations: int, population: int, seed: int) -> np.ndarray:
-    """The middle (3, 3) of the best policies of the last generation; states how each generation did."""
+    """The middle (3, 3) of the best policies of the last generation; prints how each generation did."""
     rng = np.random.default_rng(seed)
     mean, spread = np.zeros((3, 3)), np.full((3, 3), 300.0)
     for generation in range(generations):

@@ -51,7 +51,7 @@ Array = np.ndarray
 
 
 class Failure(RuntimeError):
-    """The suture cannot go on; the text states what went wrong."""
+    """The suture cannot go on; its text is what went wrong."""
 
 
 class Surgeon:

@@ -61,7 +61,7 @@ def test_an_alias_bomb_is_refused() -> None:
 
 
 def test_an_alias_inside_its_own_anchor_is_refused() -> None:
-    with pytest.raises(AdfError, match=r"scene.yaml:1:9: error: alias '\*a' stands inside what it names"):
+    with pytest.raises(AdfError, match=r"scene.yaml:1:9: error: alias '\*a' is inside the block that it names"):
         parse("a: &a [1, *a]".replace("1, ", " "), FILE)
 
 

@@ -134,7 +134,7 @@ def test_an_anchor_may_go_when_its_aliases_are_spelled_out() -> None:
 def test_a_key_is_renamed_in_place() -> None:
     root = parse(TEXT, Path("m.yaml"))
     assert apply(TEXT, [rename_key(root, "BODY b", "BODY c")]) == TEXT.replace("BODY b:", "BODY c:")
-    with pytest.raises(PatchError, match="'BODY a' is there already, at m.yaml:2:1"):
+    with pytest.raises(PatchError, match="'BODY a' already exists, at m.yaml:2:1"):
         rename_key(root, "BODY b", "BODY a")
 
 
@@ -147,7 +147,7 @@ def test_changes_that_meet_are_refused() -> None:
 def test_what_cannot_be_is_reported() -> None:
     with pytest.raises(PatchError, match="'mass' at m.yaml:4:9 is no block"):
         set_value(TEXT, block(TEXT, "BODY a"), "mass.x", 1)
-    with pytest.raises(PatchError, match="is there already"):
+    with pytest.raises(PatchError, match="already exists"):
         add_key(TEXT, block(TEXT, "BODY a"), "mass", 1)
 
 

@@ -1,4 +1,4 @@
-"""Findings that take more than one key: each rule states what is wrong, where, and what would be right."""
+"""Findings that take more than one key: each rule reports what is wrong, where, and what would be right."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A file is made to state what is wanted by changing only what differs."""
+"""A file gets new values by changing only what differs."""
 
 from __future__ import annotations
 

@@ -329,7 +329,7 @@ def test_contact_masks_become_collision_groups_where_they_can() -> None:
     assert groups == {1: (0,), 2: (1,), 3: (0, 1)} and not result.notes
     result = converted(f'<body name="a"><freejoint/>{geom.format(1)}{geom.format(2)}</body>')
     assert result.notes == [
-        "contype and conaffinity differ in a way that collision groups cannot state; everything collides"
+        "contype and conaffinity differ in a way that collision groups cannot express; everything collides"
     ]
 
 

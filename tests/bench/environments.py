@@ -1,7 +1,7 @@
 """How fast the learning environments are: ``python -m tests.bench.environments [SECONDS]``.
 
 Steps a second for state observations and random actions, resets included, in one process and in two, and how many
-times real time that is; a step is 20 ms of simulated time. Steps for each second of processor time state the same of a
+times real time that is; a step is 20 ms of simulated time. Steps for each second of processor time measure the same of a
 machine that has other work.
 """
 

@@ -1,4 +1,4 @@
-"""Whether a ROS master answers, and what is stated where none can be started."""
+"""Whether a ROS master answers, and what is printed where none can be started."""
 
 from __future__ import annotations
 

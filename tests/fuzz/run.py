@@ -178,7 +178,7 @@ def run(
 ) -> Outcome:
     """Run ``cases`` cases of a campaign from number ``first`` on in ``jobs`` processes.
 
-    ``attempt`` states what a mutant goes through; it must be importable; None stands for
+    ``attempt`` is what a mutant goes through; it must be importable; None stands for
     `tests.fuzz.attempt.attempt`, which only the workers import. ``log`` gets each failure as it happens, and
     progress every `REPORT_EVERY` seconds.
     """

@@ -47,7 +47,7 @@ def test_colours_are_kept_within_0_and_1(read) -> None:
 def test_unreadable_values_are_warnings_and_other_keywords_are_noted_once(read) -> None:
     mesh = read("Kd 1 1 1\nnewmtl a\nKd red\nNs nan\nillum 2\nillum 3\nNi 1\n")
     assert warnings(mesh) == [
-        "m.mtl:1:1: warning: 'Kd' stands before the first newmtl and has no effect",
+        "m.mtl:1:1: warning: 'Kd' comes before the first newmtl and has no effect",
         "m.mtl:3:1: warning: 'Kd red' has no effect; 3 finite numbers were expected",
         "m.mtl:4:1: warning: 'Ns nan' has no effect; 1 finite numbers were expected",
     ]

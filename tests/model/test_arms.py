@@ -64,8 +64,9 @@ def test_half_an_arm_states_what_is_missing(tmp_path: Path) -> None:
     assert "PSM1" not in names(scene)
     assert "PSM2" in names(scene)
     (found,) = [d for d in scene.diagnostics if d.code == "arm"]
-    assert "'PSM1' is no arm: no revolute joint 'wrist pitch' hangs on '/ambf/env/psm1/BODY tool roll link'" in str(
-        found
+    assert (
+        "'PSM1' is no arm: no revolute joint 'wrist pitch' is attached to '/ambf/env/psm1/BODY tool roll link'"
+        in str(found)
     )
 
 
@@ -89,9 +90,9 @@ def test_a_launch_file_may_declare_that_there_are_none(tmp_path: Path) -> None:
     ("entry", "why"),
     [
         ("{name: A, kind: robot}", "A: kind 'robot' must be one of psm, ecm, mtm"),
-        ("{name: '1 2', kind: mtm}", "'1 2' is no name; write letters, digits and '_'"),
+        ("{name: '1 2', kind: mtm}", "'1 2' is not a valid name; write letters, digits and '_'"),
         ("{name: A, kind: psm, base: nowhere}", "A: base 'nowhere' names no body, or several"),
-        ("{name: A, kind: psm, base: BODY CameraFrame}", "A: no revolute joint 'yaw' hangs on"),
+        ("{name: A, kind: psm, base: BODY CameraFrame}", "A: no revolute joint 'yaw' is attached to"),
         ("{name: A, kind: mtm, colour: red}", "there is no key 'colour'"),
         ("just words", "'just words' is no map"),
     ],

@@ -121,7 +121,7 @@ def test_tissue_is_fixed_to_the_body_that_carries_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("    material: silicone pad\n", "", "tissue of no material"),
+        ("    material: silicone pad\n", "", "no tissue material"),
         ("silicone pad", "jelly", "'ligature tissue.material'"),
         (LINE, LINE + "    poisson ratio: 0.5\n", "'ligature tissue.poisson ratio'"),
         (LINE, LINE + "    youngs modulus: 0\n", "'ligature tissue.youngs modulus'"),

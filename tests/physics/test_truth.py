@@ -1,4 +1,4 @@
-"""Rigid-body truth against closed forms; each tolerance states where the error of 1 ms ticks comes from."""
+"""Rigid-body truth against closed forms; each tolerance names where the error of 1 ms ticks comes from."""
 
 from __future__ import annotations
 

@@ -86,5 +86,5 @@ def test_a_sensor_that_is_invalid_is_refused(wrong: dict[str, Any], words: str) 
 def test_a_lens_that_cannot_be_undone_is_refused(simulate: Make) -> None:
     sensor = ImageSensor(distortion=(-5.0, 0.0, 0.0, 0.0, 0.0))
     wide = LENS.replace("angle: 0.9", "angle: 2.0")
-    with pytest.raises(ValueError, match="cannot be undone over this picture"):
+    with pytest.raises(ValueError, match="cannot be inverted over the whole picture"):
         simulate(C=camera("C", lens=wide)).cameras["C"].capture(sensor=sensor)

@@ -30,7 +30,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One finding. ``hint`` states what would be right; ``code`` names the kind of finding."""
+    """One finding. ``hint`` is what would be right; ``code`` names the kind of finding."""
 
     severity: Severity
     message: str
@@ -45,7 +45,7 @@ class Diagnostic:
 
 
 class AdfError(Exception):
-    """A file that cannot be used; ``diagnostics`` state why."""
+    """A file that cannot be used; ``diagnostics`` are the reasons."""
 
     def __init__(self, *diagnostics: Diagnostic) -> None:
         super().__init__("\n".join(map(str, diagnostics)))

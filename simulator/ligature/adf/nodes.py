@@ -212,7 +212,7 @@ class _Composer:
 
     def _alias(self, anchor: str, mark: Mark) -> Node:
         if anchor in self._open:
-            raise self._error(mark, f"alias '*{anchor}' stands inside what it names")
+            raise self._error(mark, f"alias '*{anchor}' is inside the block that it names")
         if anchor not in self._anchors:
             raise self._error(mark, f"alias '*{anchor}' names no anchor", f"define '&{anchor}' before it")
         return self._anchors[anchor]

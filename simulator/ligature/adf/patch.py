@@ -16,7 +16,7 @@ from ligature.adf.writer import Literal, entry_lines, flow_text, scalar_text, te
 
 
 class PatchError(ValueError):
-    """A change that cannot be made in place; the message states why."""
+    """A change that cannot be made in place; the message is the reason."""
 
 
 @dataclass(frozen=True, order=True)
@@ -71,7 +71,7 @@ def set_value(text: str, owner: Mapping, path: str, value: Any) -> Edit:
 def add_key(text: str, owner: Mapping, name: str, value: Any) -> Edit:
     """Add ``name: value`` at the end of the block ``owner``; raises `PatchError` when it is there already."""
     if name in owner.entries:
-        raise PatchError(f"'{name}' is there already, at {owner.entries[name][0].mark}")
+        raise PatchError(f"'{name}' already exists, at {owner.entries[name][0].mark}")
     if owner.flow:
         at = len(text[: owner.span[1] - 1].rstrip())
         separator = "" if not owner.entries else " " if text[at - 1] == "," else ", "
@@ -126,7 +126,7 @@ def remove_item(text: str, items: Sequence, index: int) -> Edit:
 def rename_key(owner: Mapping, name: str, new: str) -> Edit:
     """Another key for the same value; raises `PatchError` when the new one is taken."""
     if new in owner.entries:
-        raise PatchError(f"'{new}' is there already, at {owner.entries[new][0].mark}")
+        raise PatchError(f"'{new}' already exists, at {owner.entries[new][0].mark}")
     return Edit(owner.entries[name][0].span, text_scalar(new))
 
 

@@ -31,7 +31,7 @@ MAX_LAUNCH_FILES, MAX_LAUNCH_BYTES = 200, 1024 * 1024
 
 
 class ResolutionError(AdfError):
-    """A path that may not be opened or does not exist; ``diagnostic`` states why."""
+    """A path that may not be opened or does not exist; ``diagnostic`` is the reason."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(diagnostic)

@@ -55,7 +55,7 @@ def frequencies(element: Element) -> Iterator[Diagnostic]:
     low, high = element.integer("publish frequency.low"), element.integer("publish frequency.high")
     if low > high:
         message = f"publishes at {low} Hz without commands and at {high} Hz with them"
-        yield _finding(element, Severity.WARNING, "publish frequency", message, "low is to be the smaller one")
+        yield _finding(element, Severity.WARNING, "publish frequency", message, "write low, then high")
 
 
 def plugins(element: Element) -> Iterator[Diagnostic]:

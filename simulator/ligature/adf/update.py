@@ -1,4 +1,4 @@
-"""Makes a file state what is wanted by changing only what differs, and writes new files in canonical order.
+"""Gives a file new values by changing only what differs, and writes new files in canonical order.
 
 An `Item` is one object as it is to stand in the file. Values are typed as the schema types them;
 numbers count as equal when they are equal in single precision, which is what editors store.
@@ -290,7 +290,7 @@ def _removals(text: str, owner: nodes.Mapping, element: Element, paths: list[str
             continue
         if inner and _aliased(owner, ".".join(inner)):
             raise PatchError(
-                f"'{path}' of {element.kind} '{element.key}' stands behind an alias and cannot be removed alone; "
+                f"'{path}' of {element.kind} '{element.key}' comes from an alias and cannot be removed alone; "
                 f"remove '{inner[0]}' or give it a value"
             )
         yield remove_key(text, parent, name)

@@ -1,4 +1,4 @@
-"""Turns nodes into values of the types that the schema names; every refusal states where and what was expected."""
+"""Turns nodes into values of the types that the schema names; every error names the place and what was expected."""
 
 from __future__ import annotations
 

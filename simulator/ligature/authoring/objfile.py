@@ -21,7 +21,7 @@ FULL_SHININESS = 128.0
 
 
 class MeshWriteError(ValueError):
-    """A mesh that cannot be written; the message states why."""
+    """A mesh that cannot be written; the message is the reason."""
 
 
 @dataclass(frozen=True)

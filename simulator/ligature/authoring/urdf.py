@@ -52,7 +52,7 @@ def _zero_poses(robot: Any, notes: list[str]) -> dict[str, Array]:
     while waiting:
         ready = [joint for joint in waiting if joint.parent in poses]
         if not ready:
-            notes.append(f"joint '{waiting[0].name}' hangs on no root; it and what follows are left out")
+            notes.append(f"joint '{waiting[0].name}' is connected to no root; it and all below it are left out")
             break
         for joint in ready:
             poses[joint.child] = poses[joint.parent] @ _matrix(joint.origin)

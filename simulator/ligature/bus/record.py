@@ -2,7 +2,7 @@
 
 The same scene and commands give the same bits, so that a record is all that a run was. A file has one line of JSON,
 then frames: update (u8), length (u4), a command as `ligature.bus.codec` packs it; the last has the length `END` and
-states the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too,
+holds the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too,
 and a frame of the length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
 """
 

@@ -1,6 +1,6 @@
 """Convex decomposition of concave meshes with CoACD: for ADF collision meshes, and for moving triangle meshes.
 
-The ADF form is one OBJ file with one material per convex piece, which is how the format states that
+The ADF form is one OBJ file with one material per convex piece, which is how the format marks that
 a collision mesh is made of hulls (ADF specification §12.5). Metres. Method: Wei et al.,
 "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and Tree Search", 2022.
 """
@@ -57,13 +57,13 @@ PROGRESS_SECONDS = 4.0
 
 _FROM_OUTSIDE = tuple(-s for s in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP))
 _MACHINE_ERRORS = ("ImportError", "ModuleNotFoundError", "MemoryError", "OSError")
-"""Ends of CoACD that state nothing about the mesh: another try may do better."""
+"""Ends of CoACD that do not depend on the mesh: another try may do better."""
 
 _log = logging.getLogger(__name__)
 
 
 class DecompositionError(ValueError):
-    """A mesh that cannot be decomposed; the message states why.
+    """A mesh that cannot be decomposed; the message is the reason.
 
     ``lasting`` is true when another try would end the same.
     """

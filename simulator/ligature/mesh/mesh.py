@@ -27,7 +27,7 @@ MAX_FINDINGS = 50
 
 
 class MeshError(AdfError):
-    """A mesh file that cannot be used; ``diagnostics`` state where and why."""
+    """A mesh file that cannot be used; ``diagnostics`` give places and reasons."""
 
 
 @dataclass(frozen=True)

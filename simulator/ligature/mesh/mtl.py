@@ -83,7 +83,7 @@ def read_mtl(text: str, path: Path, folder: Path, resolver: Resolver, findings: 
             if len(drafts) > MAX_PARTS:
                 raise failure(path, f"the library has more than {MAX_PARTS} materials", number)
         elif not drafts:
-            findings.add(path, f"'{word[:40]}' stands before the first newmtl and has no effect", number)
+            findings.add(path, f"'{word[:40]}' comes before the first newmtl and has no effect", number)
         elif word in _TEXTURES:
             name = _without_options(rest)
             found = texture_file(name, path, number, folder, resolver, findings) if name else None

@@ -63,7 +63,7 @@ class Chains:
         chain = self.longest(base, types)
         if len(chain) < len(types):
             last = self._bodies[chain[-1].child if chain else base].identity.identifier
-            return f"no {types[len(chain)].value} joint '{PSM_JOINTS[len(chain)]}' hangs on '{last}'"
+            return f"no {types[len(chain)].value} joint '{PSM_JOINTS[len(chain)]}' is attached to '{last}'"
         tip = chain[-1].child
         jaw = self.jaw(tip) if kind is ArmKind.PSM else ()
         return ArmDescription(name, kind, base, tuple(joint.index for joint in chain), jaw, tip, tool)
@@ -139,7 +139,7 @@ def _declared(
 
 
 def _entry(bodies: Sequence[Body], chains: Chains, entry: Any) -> ArmDescription:
-    """One declared arm; raises ValueError, stating what is wrong with it."""
+    """One declared arm; raises ValueError with what is wrong with it."""
     if not isinstance(entry, Mapping):
         raise ValueError(f"'{entry}' is no map")
     unknown = [str(key) for key in entry if key not in KEYS]
@@ -147,7 +147,7 @@ def _entry(bodies: Sequence[Body], chains: Chains, entry: Any) -> ArmDescription
         raise ValueError(f"there is no key '{unknown[0]}'")
     name, word = str(entry.get("name", "")), str(entry.get("kind", "")).lower()
     if not re.fullmatch(r"[A-Za-z]\w*", name):
-        raise ValueError(f"'{name}' is no name; write letters, digits and '_'")
+        raise ValueError(f"'{name}' is not a valid name; write letters, digits and '_'")
     if word not in {kind.value for kind in ArmKind}:
         raise ValueError(f"{name}: kind '{word}' must be one of {', '.join(kind.value for kind in ArmKind)}")
     kind, tool = ArmKind(word), str(entry.get("tool", ""))

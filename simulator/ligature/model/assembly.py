@@ -23,9 +23,9 @@ from ligature.model.trees import MOST_LINKS, links_of
 Array = NDArray[np.float64]
 
 PLACED_M, PLACED_RAD = 0.01, 0.05
-"""How far a location may be off its joint to still state where the joint starts.
+"""How far a location may be off its joint to still count as the start of the joint.
 
-Files with three digits are off by up to 2 mm and 0.003 rad; those whose locations state nothing by decimetres.
+Files with three digits are off by up to 2 mm and 0.003 rad; those whose locations mean nothing by decimetres.
 """
 
 ROUNDING = 1e-3

@@ -51,7 +51,7 @@ HULL_MARGIN_OF_ESTIMATE = 0.04
 
 
 class GeometryError(Exception):
-    """An object that cannot be built; ``diagnostic`` states why."""
+    """An object that cannot be built; ``diagnostic`` is the reason."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(str(diagnostic))

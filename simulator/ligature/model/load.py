@@ -33,7 +33,7 @@ SKYBOX_FACES = ("right", "left", "top", "bottom", "front", "back")
 
 
 class SceneError(AdfError):
-    """A scene that cannot run at all; ``diagnostics`` state why."""
+    """A scene that cannot run at all; ``diagnostics`` are the reasons."""
 
 
 def load(

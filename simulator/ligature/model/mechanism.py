@@ -29,7 +29,7 @@ LEAST_SIZE = 1e-3
 class Chain:
     """A joint seen from body ``inner``: its frames in both bodies' inertial frames, and axes in that order.
 
-    ``point`` states that it holds a point only.
+    ``point`` is whether it holds a point only.
     """
 
     joint: int

@@ -99,7 +99,7 @@ class Choice(Field):
 
     def check(self, what: str, value: Any) -> None:  # noqa: D102
         if value not in self.options:
-            raise CodecError(f"'{str(value)[:40]}' is none of {', '.join(map(str, self.options))}")
+            raise CodecError(f"'{str(value)[:40]}' is not one of {', '.join(map(str, self.options))}")
 
 
 @dataclass(frozen=True)

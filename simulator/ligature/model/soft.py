@@ -35,7 +35,7 @@ class TissueForm:
     support
         Text that names the body that carries this one; empty for none.
     own_density
-        Whether the file states the density, or a material that has one.
+        Whether the file gives the density, or a material that has one.
     cut
         Whether slits cut the visual mesh, so that the grid's own surface is to be drawn.
     """
@@ -59,7 +59,7 @@ class TissueForm:
         return self.grid.faces[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
     def with_mass(self, mass: float) -> TissueForm:
-        """The form with densities that make up ``mass`` kilograms; itself where the file states them, or it is held."""
+        """The form with densities that make up ``mass`` kilograms; itself where the file gives them, or it is held."""
         if self.own_density or self.fixed.any() or not mass > 0.0:
             return self
         scale = mass / float(self.cell_masses.sum())

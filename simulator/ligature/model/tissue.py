@@ -98,7 +98,7 @@ def _material(element: Element, prefix: str, below: TissueMaterial | None) -> Ti
     given = {field: value for field, value in given.items() if value is not None}
     if start is None and "youngs" not in given:
         hint = f"give 'youngs modulus' in Pa, or material: {', '.join(MATERIALS)}"
-        raise _error(element, f"{prefix}material", "is tissue of no material", hint)
+        raise _error(element, f"{prefix}material", "has no tissue material", hint)
     values = {field.name: getattr(start, field.name) for field in fields(TissueMaterial)} if start else {}
     try:
         return TissueMaterial(**{**values, **given})
@@ -162,7 +162,7 @@ def _surface(
         raise _error(element, "ligature tissue", f"is tissue but {what}", "give a closed 'mesh' or one 'shape'")
     surface = surface_of(shapes[0])
     if surface is None:
-        raise _error(element, "ligature tissue", "is tissue but a plane", "give a shape with a volume")
+        raise _error(element, "ligature tissue", "is tissue, but its shape is a plane", "give a shape with a volume")
     return surface
 
 

@@ -301,7 +301,7 @@ def _inertia_on(body: Body, steps: Sequence[Axis], dt: float) -> Array:
     """`inertia_of` a body on the axes of its joint.
 
     Where the file leaves the inertia open it is large enough for the springs and dampers to act in full in
-    ticks of ``dt``; else they are capped (§15.4), and a tissue hole swings where its file states it is stiff.
+    ticks of ``dt``; else they are capped (§15.4), and a tissue hole swings where its file makes it stiff.
     """
     turning = [axis for axis in steps if not axis.prismatic]
     if not body.inertia_estimated or body.mass == 0.0 or not turning:

@@ -117,7 +117,7 @@ class Guard:
         if depth > DEEP:
             name = scene.bodies[other].identity.identifier
             who = "it" if one == body.index else f"'{scene.bodies[one].identity.identifier}'"
-            return f"{who} overlaps '{name}' by {1e3 * depth:.3g} mm", "move them apart, or let them not collide"
+            return f"{who} overlaps '{name}' by {1e3 * depth:.3g} mm", "move them apart, or disable their collision"
         masses = [scene.bodies[i].mass for i in members if scene.bodies[i].mass > 0.0]
         if max(masses) > UNEQUAL * min(masses):
             return f"joined bodies of {min(masses):g} kg and {max(masses):g} kg", "give them masses that are closer"

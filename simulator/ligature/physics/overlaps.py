@@ -33,7 +33,7 @@ class Overlap:
             f"'{one.identifier}' starts {1e3 * self.depth:.3g} mm inside '{other.identifier}', where joints hold it; "
             "they do not collide until they have parted"
         )
-        return Diagnostic(Severity.WARNING, message, one.mark, "move them apart, or let them not collide", "overlap")
+        return Diagnostic(Severity.WARNING, message, one.mark, "move them apart, or disable their collision", "overlap")
 
 
 def held_overlaps(engine: Engine) -> list[Overlap]:

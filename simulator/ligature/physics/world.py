@@ -278,7 +278,7 @@ class World(Subsystem):
         place = self.engine.place_of[body]
         if place.link >= 0:
             name = self.scene.bodies[body].identity.identifier
-            raise ValueError(f"body '{name}' hangs on joints; set its joints, or the pose of its root")
+            raise ValueError(f"body '{name}' is held by joints; set its joints, or the pose of its root")
         place.put(pose)
         self._parting.begin()
 

@@ -6,7 +6,7 @@ import moderngl
 
 
 class RenderUnavailable(RuntimeError):
-    """No OpenGL is available on this machine; the message states what to install."""
+    """No OpenGL is available on this machine; the message names what to install."""
 
 
 def create_context() -> moderngl.Context:

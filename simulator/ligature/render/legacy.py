@@ -48,7 +48,7 @@ DIFFUSE_UNIT, _FIRST_FREE_UNIT = _UNITS["diffuseMap"], 11
 
 
 class ShaderError(AdfError):
-    """Shaders of a scene file that cannot be used; ``diagnostics`` state where and why."""
+    """Shaders of a scene file that cannot be used; ``diagnostics`` give places and reasons."""
 
 
 @dataclass(frozen=True)

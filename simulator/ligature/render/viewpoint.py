@@ -34,7 +34,7 @@ class Viewpoint:
         back = T[:3, 0]
         x, y, z = T[:3, 3] - distance * back
         elevation = float(np.clip(np.arcsin(np.clip(back[2], -1, 1)), -STEEPEST, STEEPEST))
-        # seen from straight above or below, image up states where the camera stands
+        # seen from straight above or below, image up gives where the camera stands
         flat = back[:2] if np.hypot(*back[:2]) > 1e-3 else -np.sign(back[2]) * T[:2, 2]
         return cls((x, y, z), distance, float(np.arctan2(flat[1], flat[0])), elevation)
 

@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 class Piece:
     """Triangles of one surface on one owner.
 
-    ``geometry`` equals that of pieces with the same triangles; ``closed`` states that no back face can
+    ``geometry`` equals that of pieces with the same triangles; ``closed`` is whether no back face can
     be seen; ``coarse`` are the triangles of the owner's low-resolution mesh, to be drawn when it is far away.
     """
 

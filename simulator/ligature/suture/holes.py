@@ -30,7 +30,7 @@ from ligature.tables import table_of
 Array = NDArray[np.float64]
 
 LEAST_FRICTION, LEAST_STRENGTH, LEAST_STIFFNESS = 0.3, 3.0, 4000.0
-"""Friction (N), sideways strength (N) and stiffness (N/m) of tissue whose file states nothing.
+"""Friction (N), sideways strength (N) and stiffness (N/m) of tissue whose file gives none.
 
 Masses in scenes of AMBF are often a thousand times those of real needles and threads; such a needle would
 fall out of real tissue. Its tissue therefore scales with its weight by the factors below. A thread of a kilogram that

@@ -283,7 +283,7 @@ class Teleop:
             if follows
             else f"both of {hands} must send poses"
             if hands
-            else "a hand leapt; press the pedal again"
+            else "a hand jumped; press the pedal again"
         )
         self._camera_topics.publish("following", follows)
         self._camera_topics.publish("status", why)

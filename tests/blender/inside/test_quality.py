@@ -100,6 +100,6 @@ def test_a_body_that_cannot_be_measured_is_reported_why():
     with pytest.raises(RuntimeError, match="'bare': it has no collision shape; add or fit a primitive"):
         bpy.ops.adf.measure_collision()
     making.add_shape(part, Shape("PLANE"))
-    with pytest.raises(RuntimeError, match="'bare': a plane has no end"):
+    with pytest.raises(RuntimeError, match="'bare': a plane is infinite"):
         bpy.ops.adf.measure_collision()
     assert not part.adf.quality.measured

@@ -85,7 +85,7 @@ def _limit_pairs(joint: Element) -> list[tuple[str, str]]:
 
 @rule("spring-without-stiffness")
 def spring_without_stiffness(subject: Subject) -> Iterator[Finding]:
-    """A spring joint states how stiff it is."""
+    """A spring joint has a stiffness."""
     for joint in subject.joints:
         if joint.value("type") in ("six dof spring", *_SPRINGS) and not joint.has("stiffness"):
             hint = "add 'stiffness', or take the joint without spring"

@@ -135,7 +135,7 @@ def _need_groups(model: Any, notes: list[str]) -> bool:
         return False
     one_per_body = {(int(model.geom_bodyid[g]), int(model.geom_contype[g])) for g in touched}
     if any(a != b for a, b in masks) or len(one_per_body) > len({body for body, _ in one_per_body}):
-        note = "contype and conaffinity differ in a way that collision groups cannot state; everything collides"
+        note = "contype and conaffinity differ in a way that collision groups cannot express; everything collides"
         if note not in notes:
             notes.append(note)
         return False

@@ -1,6 +1,6 @@
 """What every input device gives: readings of a hand and of buttons, and perhaps a force in return.
 
-Devices speak in their own axes, metres and radians; `ligature.teleop.calibration` states what they mean.
+Devices speak in their own axes, metres and radians; `ligature.teleop.calibration` defines them.
 """
 
 from __future__ import annotations

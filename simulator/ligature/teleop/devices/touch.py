@@ -58,7 +58,7 @@ class Adapter(Device):
         try:
             type_ = message_class(types.get(self._force_topic, self._force_type), f"force on {self._force_topic}")
         except MissingPackage as error:
-            rospy.logerr(f"{error}; the pen will not press back")
+            rospy.logerr(f"{error}; the pen gives no force feedback")
             return False
         self._force = rospy.Publisher(self._force_topic, type_, queue_size=1, tcp_nodelay=True)
         return type_()
