@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ligature.adf import Diagnostic, Severity
 from ligature.cli.check import findings
-from ligature.model.axes import Axis
+from ligature.model.axis import Axis
 from ligature.physics.response import moved_inertia
 
 ZERO, UP = "{x: 0, y: 0, z: 0}", "{x: 0, y: 0, z: 1}"

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
-from ligature.model.axes import Axis, axes_of
+from ligature.model.axes import axes_of
+from ligature.model.axis import Axis
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_quaternion, matrix_rpy
 from ligature.model.mechanism import Chain, Mechanism, chain_of, rotation
 from ligature.model.scene import Articulation, Body, Closure, Joint, JointType, Start

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.axes import Axis, axes_of
+from ligature.model.axes import axes_of
+from ligature.model.axis import Axis
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_quaternion
 from ligature.model.scene import Articulation, Body, Joint, JointType
 

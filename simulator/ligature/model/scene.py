@@ -13,17 +13,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Mark
+from ligature.model.axis import Axis
 from ligature.model.piercing import Hole, Needle, Tissue
 from ligature.model.soft import TissueBody, TissueForm
-
-if TYPE_CHECKING:
-    from ligature.model.axes import Axis
 
 Array = NDArray[np.float64]
 """A float64 array; the docstring beside each use gives its shape and frame."""

@@ -16,7 +16,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from ligature.mesh import CollisionCache
-from ligature.model.axes import Axis
+from ligature.model.axis import Axis
 from ligature.model.frames import inverse, matrix_quaternion
 from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Articulation, Body, Closure, JointType, Scene

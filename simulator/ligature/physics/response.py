@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf.frames import axis_rotation
-from ligature.model.axes import Axis
+from ligature.model.axis import Axis
 
 Array = NDArray[np.float64]
 
