@@ -36,8 +36,9 @@ Such a body pushes with its own momentum: one of 0.1 g with 3 mN at 30 mm/s, whi
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Pairs of nearest points of one body with another, nearest first: ``distance`` (n,), ``point`` (n, 3) on the
-    one, and ``normal`` (n, 3) from the other to the one.
+    """Pairs of nearest points of one body with another, nearest first.
+
+    ``distance`` (n,), ``point`` (n, 3) on the one, and ``normal`` (n, 3) from the other to the one.
     """
 
     distance: Array

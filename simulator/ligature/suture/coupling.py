@@ -130,8 +130,10 @@ def _friction(touches, c, wx, wy, wz, scale, dt):
 
 @inlined
 def rigid(touches, c):
-    """Whether ``c`` is a point constraint; a bilateral contact with friction is a grasp, whose `Touches.press` is
-    given."""
+    """Whether ``c`` is a point constraint.
+
+    A bilateral contact with friction is a grasp, whose `Touches.press` is given.
+    """
     return touches.bilateral[c] and touches.friction[c] == 0.0
 
 
