@@ -215,10 +215,11 @@ class Simulation:
         self._clock = Clock()
         self._watched = 0
         self._world = World(scene, dt)
+        queries = self._world.queries
         self._suture = Suture(scene, self._world, dt)
         self._mounts = Mounts(scene)
-        self._rays = Rays(scene, self._world, self._suture.rods)
-        self._touches = Touches(self._world)
+        self._rays = Rays(scene, queries, self._world, self._suture.rods)
+        self._touches = Touches(queries)
         self.arms = ArmSet(scene, self._world, dt)
         actuator_grasps, rods = ActuatorGrasps(scene, self._world), self._suture.rods
         self._actuators = Actuators(scene, ActuatorAttachments(scene, self._world, rods, actuator_grasps), self._rays)
@@ -227,7 +228,7 @@ class Simulation:
             "control": (self.arms, self._actuators, self._rays, Controllers(self._world)),
             "suture": (self._suture, self.grasps),
             "bodies": (self._world,),
-            "sensing": (self._touches, self._mounts, Ghosts(scene, self._world), Contacts(scene, self._world)),
+            "sensing": (self._touches, self._mounts, Ghosts(scene, queries), Contacts(scene, queries)),
         }
         """What a tick does, phase by phase: all subsystems in the order of their steps."""
         self._subsystems = [subsystem for phase in self._tick.values() for subsystem in phase]

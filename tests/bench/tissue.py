@@ -11,10 +11,10 @@ import sys
 import time
 
 import numpy as np
+from ligature.mesh.grid import Cut, build_grid
+from ligature.model.material import TissueMaterial
 from ligature.tissue.block import TissueBlock
 from ligature.tissue.elastic import ElasticGrid
-from ligature.tissue.grid import Cut, build_grid
-from ligature.tissue.material import TissueMaterial
 
 from tests.bench.scenes import chain_step_us
 from tests.tissue.conftest import SprungNeedle

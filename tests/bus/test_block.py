@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ligature.bus import Block, BusError
-from ligature.bus.block import FOLDER, RETRIES, remove_leftovers
+from ligature.bus.block import RETRIES
+from ligature.bus.leftovers import FOLDER, remove_leftovers
 
 DTYPE = np.dtype([("tick", "u8"), ("values", "f8", (5000,))])
 NAME = f"ligature-{os.getpid()}-0a0b0c0d"

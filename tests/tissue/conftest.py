@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ligature.mesh.grid import build_grid
+from ligature.model.material import TissueMaterial
 from ligature.tissue.block import TissueBlock
-from ligature.tissue.grid import build_grid
-from ligature.tissue.material import TissueMaterial
 from scipy.spatial.transform import Rotation
 
 DT = 1e-3

@@ -8,11 +8,11 @@ import sys
 
 import numpy as np
 import pytest
+from ligature.mesh.grid import build_grid
+from ligature.model.material import TissueMaterial
 from ligature.tissue.elastic import ElasticGrid
 from ligature.tissue.elements import lame
-from ligature.tissue.grid import build_grid
 from ligature.tissue.lips import Lips
-from ligature.tissue.material import TissueMaterial
 from scipy.spatial.transform import Rotation
 
 YOUNGS = 1e5

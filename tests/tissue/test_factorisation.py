@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ligature.mesh.grid import build_grid
 from ligature.tissue.factorisation import Factor
-from ligature.tissue.grid import build_grid
 
 
 def _matrix(grid, rng):

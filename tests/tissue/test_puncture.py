@@ -9,8 +9,8 @@ import sys
 
 import numpy as np
 import pytest
+from ligature.model.material import TissueMaterial
 from ligature.tissue import needle as states
-from ligature.tissue.material import TissueMaterial
 
 MATERIAL = TissueMaterial(1e5, puncture_force=0.5, exit_force=0.13, cutting_force=0.1, friction=16.0)
 
@@ -204,8 +204,8 @@ def test_two_needles_puncture_at_once(kit):
 
 
 def test_each_layer_has_its_own_cutting_force(kit):
+    from ligature.mesh.grid import build_grid
     from ligature.tissue.block import TissueBlock
-    from ligature.tissue.grid import build_grid
 
     cells = (10, 8, 4)
     layer = np.zeros(cells, dtype=np.int64)
@@ -226,8 +226,8 @@ def test_each_layer_has_its_own_cutting_force(kit):
 
 def test_impulses_of_needle_and_tissue_balance(kit):
     """A free block, which a needle pushes through the air: what it gains the needle has lost."""
+    from ligature.mesh.grid import build_grid
     from ligature.tissue.block import TissueBlock
-    from ligature.tissue.grid import build_grid
 
     grid = build_grid([np.linspace(0.0, s, n + 1) for s, n in zip(kit.SIZE, (6, 5, 3), strict=True)])
     block = TissueBlock(grid, [MATERIAL], np.zeros(len(grid.nodes), dtype=bool))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ligature.mesh.grid import build_grid
+from ligature.model.material import TissueMaterial
 from ligature.tissue.block import TissueBlock
-from ligature.tissue.grid import build_grid
-from ligature.tissue.material import TissueMaterial
 
 DT = 1e-3
 

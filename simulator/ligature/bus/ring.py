@@ -36,6 +36,9 @@ class Ring:
         at = _HEADER + (head % SLOTS) * SLOT_BYTES
         self._memory[at : at + 4 + len(data)] = struct.pack("<I", len(data)) + data
         self._counters[0] = head + 1
+        if self._beat[0]:
+            # who sends is alive, though its own loop may be kept waiting on a busy machine
+            self.beat()
         return True
 
     def drain(self) -> Iterator[bytes]:

@@ -12,11 +12,8 @@ import typer
 from rich.console import Console
 
 from ligature.bundle import launch_file, scene_names
-from ligature.cli.bench import bench as run_bench
-from ligature.cli.check import check as run_check
 from ligature.cli.missing import remedy
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
-from ligature.cli.poses import poses as run_poses
 from ligature.cli.supervisor import supervise
 
 app = typer.Typer(
@@ -176,6 +173,8 @@ def check(
     models: Models = None,
 ) -> None:
     """Report every problem of a scene as file:line:column; exit status 1 on errors."""
+    from ligature.cli.check import check as run_check
+
     console = Console(highlight=False, soft_wrap=True)
     raise typer.Exit(run_check(files, root or [], strict, verbose, console, indices(models)))
 
@@ -190,6 +189,8 @@ def bench(
     root: Roots = None,
 ) -> None:
     """Measure the physics of a scene: ticks per second, real-time factor, times by phase, memory."""
+    from ligature.cli.bench import bench as run_bench
+
     raise typer.Exit(run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False)))
 
 
@@ -326,6 +327,8 @@ def poses(
     root: Roots = None,
 ) -> None:
     """Simulate a scene and write the poses of all bodies over time, for editors that play them back."""
+    from ligature.cli.poses import poses as run_poses
+
     raise typer.Exit(run_poses(file, indices(models), root or [], seconds, rate, out, Console(highlight=False)))
 
 

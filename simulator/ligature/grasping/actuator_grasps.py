@@ -36,14 +36,14 @@ class ActuatorGrasps:
         grasp.normal_force = slip.normal_force
         self._added += 1
         self._grasps[self._added] = BodyGrasp(child, parent, grasp, ride), slip.reach
-        self._world.set_held(child, True, grasped=True)
+        self._world.masses.set_held(child, True, grasped=True)
         return self._added
 
     def remove(self, number: int) -> None:
         """Release the body; does nothing when it has slipped out already."""
         if number in self._grasps:
             grasp, _ = self._grasps.pop(number)
-            self._world.set_held(grasp.body, False, grasped=True)
+            self._world.masses.set_held(grasp.body, False, grasped=True)
 
     def holds(self, number: int) -> bool:
         """Whether the grasp still holds its body."""

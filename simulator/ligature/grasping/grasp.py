@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ligature.grasping.friction import grasp_arrays, motions, predict_free, scratch, solve
 from ligature.grasping.motion import Motion
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
-from ligature.suture.tables import table_of
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from ligature.model import proxies, trees
 from ligature.model.arms import find_arms
 from ligature.model.assembly import assemble
 from ligature.model.conversion import ModelParts, Mounts, Part, converted, mounts
-from ligature.model.frames import Array
+from ligature.model.frames import Array, inverse
 from ligature.model.geometry import GeometryError
 from ligature.model.holes import find_holes
 from ligature.model.jaws import find_jaws
@@ -41,6 +41,7 @@ from ligature.model.scene import (
     Identity,
     InputDevice,
     Joint,
+    JointType,
     Light,
     Model,
     Scene,
@@ -100,6 +101,7 @@ class SceneBuilder:
         self._add_sensors(parts, model, local)
         self._add_actuators(document, model, local)
         self._add_joints(document, model, local)
+        self._carry_tissues(document, model, local)
         self._add_mounts(parts.mounts, model)
         if top.flag("ignore inter-collision"):
             self._silent_files.append(local)
@@ -210,6 +212,12 @@ class SceneBuilder:
             self.report(
                 Diagnostic(Severity.INFO, message, identity.mark, "opt out with 'ligature needle: false'", "needle")
             )
+        for body in self.bodies:
+            if body.tissue is not None:
+                grid = body.tissue.grid
+                edges = " x ".join(f"{1e3 * edge:.2g}" for edge in np.median(grid.sizes, axis=0))
+                message = f"'{body.identity.identifier}' is soft tissue: {len(grid.nodes)} nodes, cells of {edges} mm"
+                self.report(Diagnostic(Severity.INFO, message, body.identity.mark, "docs/tissue.md", "tissue"))
         for hole in holes:
             message = f"'{hole.name}' is a tissue hole: it holds what passes through it"
             mark = self.ghosts[hole.ghost].identity.mark
@@ -359,6 +367,34 @@ class SceneBuilder:
             if not element.flag("ligature rod"):
                 self._no_rod.update((parent, child))
 
+    def _carry_tissues(self, document: Document, model: Model, local: list[int]) -> None:
+        """Fix bodies of tissue to the bodies that carry them."""
+        key = "ligature tissue.carried by"
+        made = {self.bodies[i].identity.key: i for i in local if self.bodies[i].tissue is not None}
+        for element in document.elements("bodies"):
+            child = made.pop(element.key, None)
+            if child is None or not element.text(key):
+                continue
+            parent = self._body(element, key, local, merged(model.namespace, element.text("namespace")))
+            if parent is None:
+                continue
+            carrier, tissue = self.bodies[parent], self.bodies[child]
+            if parent == child or (tissue.static and not carrier.static):
+                what = (
+                    "is carried by itself"
+                    if parent == child
+                    else f"has no mass but is carried by '{carrier.identity.name}'"
+                )
+                hint = "name another body" if parent == child else "remove its 'mass', or give one above 0"
+                self.report(
+                    Diagnostic(Severity.ERROR, f"body '{element.key}' {what}", element.mark_of(key), hint, "tissue")
+                )
+            elif not tissue.static:
+                identity = replace(tissue.identity, key=f"{element.key} carrier", passive=True)
+                self.joints.append(_fixed_joint(len(self.joints), identity, carrier, tissue))
+                self._names["joint"].identifiers.append(identity.identifier)
+                self._linked.append((parent, child))
+
     def _body(self, element: Element, key: str, local: list[int], namespace: str) -> int | None:
         """The body that ``element`` names under ``key``, by the search order of §4.5."""
         text = element.text(key)
@@ -408,3 +444,13 @@ class SceneBuilder:
             parent = self._arrivals.parents.get((kind, item.index))
             settled.append(replace(item, attachment=Attachment(parent, item.attachment.T_parent_object)))
         return tuple(settled)
+
+
+def _fixed_joint(index: int, identity: Identity, parent: Body, child: Body) -> Joint:
+    """A joint that holds ``child`` to ``parent`` as both stand."""
+    T_parent_child = inverse(parent.T_world_body) @ child.T_world_body
+    T_a = inverse(parent.T_body_inertial) @ T_parent_child @ child.T_body_inertial
+    return Joint(
+        index, identity, JointType.FIXED, parent.index, child.index, axis=T_a[:3, 2], T_parent_a=T_a,
+        T_child_b=np.eye(4), T_parent_child_zero=T_parent_child, passive=True,
+    )  # fmt: skip

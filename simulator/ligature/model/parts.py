@@ -29,6 +29,7 @@ from ligature.model.scene import (
     ShaderFiles,
     SixDof,
 )
+from ligature.model.tissue import inertial_of, surface_friction, tissue_of
 
 _INERTIAL_KEYS = ("inertia", "inertial offset", "gravity")
 SIX = tuple(f"{half}.{axis}" for half in ("linear", "angular") for axis in "xyz")
@@ -40,18 +41,28 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
     ``gravity`` (3,) holds unless the body has its own. Raises `GeometryError`.
     """
     inertial_block = element.has("mass")
-    if not inertial_block:
-        _warn_no_mass(element, context)
     offset = pose_matrix(*element.pose("inertial offset")) if element.has("inertial offset") else None
     shapes = colliders(element, context, np.eye(4) if offset is None else offset)
-    T_body_inertial = offset if offset is not None and inertial_block else _estimated_offset(shapes)
-    mass = element.number("mass")
+    looks = visual(element, context, shaders)
+    tissue = tissue_of(element, context, looks, shapes)
     margin = element.number("collision margin")
-    if inertial_block and element.has("inertia"):
-        inertia = np.array([element.number(f"inertia.{k}") for k in ("ix", "iy", "iz")])
+    own = np.array([element.number(f"inertia.{k}") for k in ("ix", "iy", "iz")]) if element.has("inertia") else None
+    if tissue is not None:
+        mass = element.number("mass") if inertial_block else float(tissue.cell_masses.sum())
+        tissue = tissue.with_mass(mass)
+        T_body_inertial, inertia = inertial_of(tissue, mass, offset if inertial_block else None)
+        inertia = own if inertial_block and own is not None else inertia
+        shapes = ()
     else:
-        size = estimate_size(shapes, T_body_inertial, margin)
-        inertia = np.zeros(3) if size is None else box_inertia(mass, size)
+        if not inertial_block:
+            _warn_no_mass(element, context)
+        T_body_inertial = offset if offset is not None and inertial_block else _estimated_offset(shapes)
+        mass = element.number("mass")
+        if inertial_block and own is not None:
+            inertia = own
+        else:
+            size = estimate_size(shapes, T_body_inertial, margin)
+            inertia = np.zeros(3) if size is None else box_inertia(mass, size)
     own_gravity = inertial_block and element.has("gravity")
     return partial(
         Body,
@@ -61,9 +72,9 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
         T_world_body=pose_matrix(*element.pose("location")),
         gravity=np.array(element.vector("gravity")) if own_gravity else gravity,
         colliders=shapes,
-        visual=visual(element, context, shaders),
+        visual=looks,
         collision_margin=margin,
-        friction=element.number("friction.static"),
+        friction=surface_friction(element),
         rolling_friction=element.number("friction.rolling"),
         restitution=element.number("restitution"),
         linear_damping=min(max(element.number("damping.linear"), 0.0), 1.0),
@@ -73,7 +84,8 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
         publish_joint_names=element.flag("publish joint names"),
         publish_joint_positions=element.flag("publish joint positions"),
         needle=element.value("ligature needle"),
-        inertia_estimated=not (inertial_block and element.has("inertia")),
+        inertia_estimated=not (inertial_block and own is not None),
+        tissue=tissue,
     )
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Mark
 from ligature.model.piercing import Hole, Needle, Tissue
+from ligature.model.soft import TissueBody, TissueForm
 
 if TYPE_CHECKING:
     from ligature.model.axes import Axis
@@ -203,6 +204,7 @@ class Body:
     specification §11), ``children`` the matching child bodies. ``no_collision_with`` holds the
     bodies whose contacts with this one are switched off by joints, files or groups. ``needle`` is what
     the file states of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
+    ``tissue`` is what a body of soft tissue consists of; its shapes and visual are then those of the body at rest.
     """
 
     index: int
@@ -229,6 +231,7 @@ class Body:
     no_collision_with: frozenset[int] = frozenset()
     needle: bool | None = None
     inertia_estimated: bool = False
+    tissue: TissueForm | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -649,6 +652,15 @@ class Scene:
         """Identifier by the number that pictures show: bodies from 1 on, then ghosts; 0 is the background."""
         things = [body.identity for body in self.bodies] + [ghost.identity for ghost in self.ghosts]
         return {number: identity.identifier for number, identity in enumerate(things, 1)}
+
+    @cached_property
+    def tissues(self) -> tuple[TissueBody, ...]:
+        """The bodies of soft tissue, in order of their bodies."""
+        soft = [(body.index, body.tissue) for body in self.bodies if body.tissue is not None]
+        ends = np.cumsum([0] + [len(form.grid.nodes) for _, form in soft]).tolist()
+        return tuple(
+            TissueBody(index, body, slice(*ends[index : index + 2]), form) for index, (body, form) in enumerate(soft)
+        )
 
     @cached_property
     def rod_bodies(self) -> frozenset[int]:

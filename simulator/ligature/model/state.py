@@ -57,6 +57,9 @@ the instrument's model number. Local poses are in the arm's base frame. Twists a
 MAX_INSERTIONS = 64
 """Most passages of needles and threads through tissue holes in one state."""
 
+MAX_PUNCTURES = 32
+"""Most places at which needles have punctured the surface of one body of tissue."""
+
 StateDtype = np.dtype[np.void]
 StateRecord = NDArray[np.void]
 """One-element record array of `state_dtype`; index fields by name, then ``[0]``."""
@@ -72,8 +75,13 @@ def state_dtype(scene: Scene) -> StateDtype:
     are in the parent's frame, as the messages want them; ``*_world`` beside them in world axes.
     Of ``touch_*`` the first ``touch_count`` rows count, while contacts are watched (`WatchContacts`): where bodies
     touch, and the force on one of the two.
-    Of ``insertion_*`` the first ``insertion_count`` rows count: hole of the scene, needle or element in
-    it, metres of it beyond the hole, where it passes and the force on it there, in world axes.
+    Of ``insertion_*`` the first ``insertion_count`` rows count: hole of the scene, needle or element in it, metres of
+    it beyond the hole, where it passes and the force on it there, in world axes. In the body of tissue k the hole is
+    -1 - k, the depth is the length inside, and the place is where it went in. ``tissue_node`` are the nodes of all
+    bodies of tissue, in rows `TissueBody.rows`. ``tissue_wrench`` is all that needles, threads and bodies do to a
+    body of tissue, about the origin of its frame B; ``tissue_peak`` the largest force at one point of it. Of
+    ``puncture_*`` the first ``puncture_count`` rows of a body count: places on its surface where needles went in or
+    out, and the outward normals there.
     ``jaw_body`` is what each jaw holds by friction or -1; ``jaw_force`` presses its fingers together, ``jaw_wrench``
     acts on the body about the patch, ``jaw_slip`` are metres and radians slipped since it was grasped.
     """
@@ -123,6 +131,12 @@ def state_dtype(scene: Scene) -> StateDtype:
             ("insertion_depth", "f8", (MAX_INSERTIONS,)),
             ("insertion_point", "f8", (MAX_INSERTIONS, 3)),
             ("insertion_force", "f8", (MAX_INSERTIONS, 3)),
+            ("tissue_node", "f8", (scene.tissues[-1].rows.stop if scene.tissues else 0, 3)),
+            ("tissue_wrench", "f8", (len(scene.tissues), 6)),
+            ("tissue_peak", "f8", (len(scene.tissues),)),
+            ("puncture_count", "i4", (len(scene.tissues),)),
+            ("puncture_point", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),
+            ("puncture_normal", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),
             ("jaw_body", "i4", (len(scene.jaws),)),
             ("jaw_force", "f8", (len(scene.jaws),)),
             ("jaw_wrench", "f8", (len(scene.jaws), 6)),
@@ -133,7 +147,7 @@ def state_dtype(scene: Scene) -> StateDtype:
 
 
 def new_state(scene: Scene) -> StateRecord:
-    """A zeroed state record of ``scene`` with identity poses, shape (1,)."""
+    """A zeroed state record of ``scene`` with identity poses and tissue at rest, shape (1,)."""
     state = np.zeros(1, dtype=state_dtype(scene))
     for field_name in (
         "body_pose",
@@ -144,6 +158,9 @@ def new_state(scene: Scene) -> StateRecord:
         "light_world",
     ):
         state[field_name][..., 6] = 1.0
+    for tissue in scene.tissues:
+        T = scene.bodies[tissue.body].T_world_body
+        state["tissue_node"][0, tissue.rows] = tissue.form.grid.nodes @ T[:3, :3].T + T[:3, 3]
     state["ray_body"] = -1
     state["actuator_body"] = -1
     state["jaw_body"] = -1

@@ -50,7 +50,10 @@ def add_reactions(n, joints, touches, work, impulse, dt):
 
 @inlined
 def find_tension(first, n, joints, work, tension, dt):
-    """Tension of each element in newtons: the mean pull of its joints along it, positive when taut."""
+    """Tension of each element in newtons: the mean pull of its joints along it, positive when taut.
+
+    0 for an element whose joints are in one place, which has no direction.
+    """
     for e in range(tension.shape[0]):
         i = first + e
         near = work.lever[i - 1, 1] if i > 0 else work.lever[i, 0]
@@ -66,4 +69,5 @@ def find_tension(first, n, joints, work, tension, dt):
                 joined += 1
                 f = joints.load[j]
                 pull += f[0] * ux + f[1] * uy + f[2] * uz
-        tension[e] = pull / (joined * math.sqrt(ux * ux + uy * uy + uz * uz) * dt * dt)
+        length = math.sqrt(ux * ux + uy * uy + uz * uz)
+        tension[e] = pull / (joined * length * dt * dt) if length > 0.0 else 0.0

@@ -16,14 +16,15 @@ from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
-from ligature.suture.tables import opener
 from ligature.suture.tracking import open_passages
+from ligature.tables import opener
 
-open_nodes = opener(layout.nodes(1))
-open_joints = opener(layout.joints(1))
-open_shapes = opener(layout.no_shapes(1))
 open_touches = opener(layout.touches(1))
-open_work = opener(layout.work(2, 2, 1, 1))
+open_rod = opener(
+    layout.rod_arrays(
+        layout.nodes(1), layout.joints(1), layout.no_shapes(1), layout.work(2, 2, 1, 1), 0, 0, 0.0, 0.0, 0.0
+    )
+)
 
 REFINEMENT, MAX_PARTS = 4, 16
 """How many steps take the place of one that did not settle, and the most in a tick."""
@@ -92,34 +93,35 @@ def _scale_loads(joints, factor):
 
 
 @inlined
-def _one_step(
-    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, constraints, points, tension, counts,
-    self_skip, stiffness, h, begins, elapsed,
-):  # fmt: skip
+def _one_step(rod, old, new, passages, owner, constraints, points, h, begins, elapsed):
+    """A step of ``h`` seconds that ends ``elapsed`` seconds after the tick began; see `advance` for what it returns."""
+    nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
+    n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
     new.count[0] = 0
     add_point_constraints(nodes, work, old, new, constraints, points)
-    detect(first, work.segment.shape[0], nodes, shapes, old, new, work, tension, counts, self_skip, h)
-    return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, begins, elapsed)
+    detect(
+        constants.first[0], elements, nodes, rod.shapes, old, new, work, rod.tension, rod.counts,
+        constants.self_skip[0], h,
+    )  # fmt: skip
+    return advance(n, total, nodes, joints, new, work, passages, owner, constants.stiffness[0], h, begins, elapsed)
 
 
 @kernel
-def run_tick(
-    first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, scratch, work_table,
-    passage_table, owner, constraints, points, motion, met, counts, self_skip, stiffness, impulse, tension, max_speed,
-    dt,
-):  # fmt: skip
+def run_tick(rod_table, last, next_, scratch, passage_table, owner, constraints, points, motion, met):
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``scratch``.
 
-    Groups of arrays come as the tables of `ligature.suture.tables`. ``counts`` returns: contacts found,
+    Groups of arrays come as the tables of `ligature.tables`. `RodArrays.counts` returns: contacts found,
     contacts for which there was no room, Newton steps, whether the contacts lie in ``scratch``, and whether all
-    elements are finite and slower than ``max_speed``.
+    elements are finite and slower than the maximum speed.
     """
-    nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
-    a, b, c, work = open_touches(last), open_touches(next_), open_touches(scratch), open_work(work_table)
-    passages = open_passages(passage_table)
+    rod, passages = open_rod(rod_table), open_passages(passage_table)
+    a, b, c = open_touches(last), open_touches(next_), open_touches(scratch)
+    nodes, joints, shapes, work, impulse, counts = rod.nodes, rod.joints, rod.shapes, rod.work, rod.impulse, rod.counts
+    n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
+    first, dt = rod.constants.first[0], rod.constants.dt[0]
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
-    _copy2(shapes.pose, shape_poses)
+    _copy2(shapes.pose, rod.shape_poses)
     begin_passages(passages, owner)
     for i in range(total):
         for k in range(6):
@@ -133,9 +135,8 @@ def run_tick(
         _scale_loads(joints, (size / scale) ** 2)
         scale = size
         more, settled = _one_step(
-            first, n, total, nodes, joints, shapes, old, new, work, passages, owner, constraints, points, tension,
-            counts, self_skip, stiffness, h, done == 0, dt * (done + size) / MAX_PARTS,
-        )  # fmt: skip
+            rod, old, new, passages, owner, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
+        )
         steps += more
         if not settled and size > 1 and steps < MAX_STEPS:
             _take_back(nodes, joints, work)
@@ -154,9 +155,8 @@ def run_tick(
         new = c if in_c else b
         while done % (REFINEMENT * size) == 0:
             size *= REFINEMENT
-    _copy2(shape_poses, shapes.pose)
+    _copy2(rod.shape_poses, shapes.pose)
     _scale_loads(joints, (MAX_PARTS / scale) ** 2)
-    find_tension(first, n, joints, work, tension, dt)
+    find_tension(first, n, joints, work, rod.tension, dt)
     counts[2], counts[3] = steps, 1 if in_c else 0
-    elements = work.segment.shape[0]
-    counts[4] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, max_speed) else 0
+    counts[4] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, rod.constants.max_speed[0]) else 0

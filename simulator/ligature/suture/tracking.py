@@ -12,7 +12,7 @@ from ligature.suture import layout
 from ligature.suture import passages as arrays
 from ligature.suture.layout import SLIPS, STICKS
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
-from ligature.suture.tables import opener
+from ligature.tables import opener
 
 open_nodes = opener(layout.nodes(1))
 open_passages = opener(arrays.passages(1))

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.mesh.grid import Grid
+from ligature.model.material import TissueMaterial
 from ligature.tissue.elastic import STEP, ElasticGrid
-from ligature.tissue.grid import Grid
 from ligature.tissue.interface import Interface
 from ligature.tissue.lips import Lips
 from ligature.tissue.location import locate
-from ligature.tissue.material import TissueMaterial
 from ligature.tissue.paths import begin_path, extend_path, paths
 from ligature.tissue.puncture import NeedleInTissue
 from ligature.tissue.thread import ThreadInTissue

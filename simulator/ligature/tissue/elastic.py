@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 
+from ligature.mesh.grid import Grid
+from ligature.model.material import TissueMaterial
 from ligature.tissue import elements
 from ligature.tissue.corotation import add_elastic_forces
 from ligature.tissue.factorisation import Factor
-from ligature.tissue.grid import Grid
-from ligature.tissue.material import TissueMaterial
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

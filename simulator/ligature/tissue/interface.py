@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import kernel
+from ligature.model.material import TissueMaterial
 from ligature.tissue.elastic import ElasticGrid
-from ligature.tissue.material import TissueMaterial
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

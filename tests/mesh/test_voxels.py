@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ligature.mesh.grid import Cut
+from ligature.mesh.voxels import embed, voxelise
+from ligature.model.material import TissueMaterial
 from ligature.tissue.elastic import ElasticGrid
-from ligature.tissue.grid import Cut
-from ligature.tissue.material import TissueMaterial
-from ligature.tissue.voxels import embed, voxelise
 
 
 def _volume(grid):

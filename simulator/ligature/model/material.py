@@ -1,8 +1,8 @@
-"""What tissue is made of: elasticity, and how it resists needles and threads."""
+"""What tissue is made of: elasticity, and how it resists needles and threads; materials by name."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -62,3 +62,33 @@ class TissueMaterial:
     def shear(self) -> float:
         """Shear modulus, Pa."""
         return self.youngs / (2.0 * (1.0 + self.poisson))
+
+
+MATERIALS = {
+    "silicone pad": TissueMaterial(69e3, density=1070.0),
+    "skin": TissueMaterial(101e3, density=1100.0, puncture_force=0.8, cutting_force=0.2, exit_force=0.3),
+    "fat": TissueMaterial(3.25e3, density=950.0, puncture_force=0.1, cutting_force=0.03, exit_force=0.05, friction=3.0,
+                          strength=200.0),
+    "stomach": TissueMaterial(1.91e3, density=1058.0, puncture_force=0.3, cutting_force=0.08, exit_force=0.1,
+                              friction=5.0, strength=600.0),
+    "liver": TissueMaterial(5.94e3, density=1060.0, puncture_force=0.15, cutting_force=0.065, exit_force=0.05,
+                            friction=5.0, strength=300.0),
+}  # fmt: skip
+"""Materials by name; Poisson's ratio is 0.45 in all of them: at 0.49 cells tremble under loads on few nodes.
+
+Young's moduli: silicone pad, the stress at 100 % strain of Ecoflex 00-30 (Smooth-On, technical bulletin); skin, Liang
+and Boppart 2010; fat, Samani and others 2007; stomach and liver, Lim and others 2009. Densities of stomach and liver:
+Duck 2013; of the others, ICRP 110. The cutting force of liver is its toughness of 164 J/m² (Gokgol and others 2012)
+times a needle of 0.4 mm. All other forces are chosen: within the 0.2 to 0.6 N at which a suture needle punctures
+hydrogel for silicone, and lower or higher in the order of the materials' toughness. They are starting points, no
+measurements.
+"""
+
+KEYS = {
+    "youngs": "youngs modulus", "poisson": "poisson ratio", "density": "density", "damping": "damping time",
+    "puncture_force": "puncture force", "exit_force": "exit force", "cutting_force": "cutting force",
+    "friction": "friction", "strength": "strength", "least_angle": "least angle",
+}  # fmt: skip
+"""Key of the format by the field of `TissueMaterial`."""
+
+assert list(KEYS) == [field.name for field in fields(TissueMaterial)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ligature.tissue.grid import Cut, build_grid
+from ligature.mesh.grid import Cut, build_grid
 
 
 def _lattice(shape):

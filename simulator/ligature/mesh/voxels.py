@@ -10,16 +10,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
-from ligature.tissue.grid import Cut, Grid, build_grid
+from ligature.mesh.grid import Cut, Grid, build_grid
+from ligature.mesh.surface import open_edges, weld
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 FULL = 0.5
 """Share of a cell that the mesh fills from which it is tissue."""
+
+CHUNK = 256
+"""Points that are bound at a time."""
 
 SAMPLES = 4
 """Points along each edge of a cell at which its filling is counted."""
@@ -46,7 +49,12 @@ class Embedding:
 
 
 def voxelise(
-    vertices: Array, triangles: Integers, cell: float | Sequence[float], cuts: Sequence[Cut] = ()
+    vertices: Array,
+    triangles: NDArray[np.integer],
+    cell: float | Sequence[float],
+    cuts: Sequence[Cut] = (),
+    slits: Sequence[Array] = (),
+    planes: Sequence[Sequence[float]] = ((), (), ()),
 ) -> tuple[Grid, Embedding]:
     """Make a grid that fills a closed mesh, and bind the mesh's vertices to it.
 
@@ -58,29 +66,58 @@ def voxelise(
         Edge of a cell, m; one number or one for each axis. It is made smaller to fit the mesh's box.
     cuts
         Slits in the planes of the lattice.
+    slits
+        Boxes (2, 3) from corner to corner, m. One that is flat along an axis is a slit; cells in any other are
+        missing. The lattice has planes at their faces.
+    planes
+        Further coordinates along x, y, z at which the lattice has planes, such as those between layers, m.
 
     Raises
     ------
     ValueError
-        When the mesh is not closed, or the cells are so large that none is filled.
+        When the mesh is not closed, the cells are so large that none is filled, or a slit lies outside.
     """
-    mesh = trimesh.Trimesh(vertices, triangles, process=False)
-    mesh.merge_vertices()
-    if not mesh.is_watertight:
+    points = np.asarray(vertices, dtype=np.float64)
+    welded, faces = weld(points, np.asarray(triangles, dtype=np.int32))
+    if not len(faces) or open_edges(faces):
         raise ValueError("the mesh has open edges, so it encloses no tissue; close it or give it a thickness")
-    low, high = mesh.bounds
-    count = np.maximum(np.ceil((high - low) / np.asarray(cell, dtype=np.float64) - 1e-6).astype(np.int64), 1)
-    axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, count, strict=True)]
-    share = _filling(mesh, axes)
-    filled = share >= FULL
+    low, high = welded.min(axis=0), welded.max(axis=0)
+    edge = np.broadcast_to(np.asarray(cell, dtype=np.float64), 3)
+    wanted = [[*planes[a], *(float(x) for box in slits for x in box[:, a])] for a in range(3)]
+    axes = [_lattice(low[a], high[a], edge[a], wanted[a]) for a in range(3)]
+    filled = _filling(welded[faces], axes) >= FULL
+    cuts = list(cuts)
+    for box in slits:
+        flat = np.flatnonzero(box[0] == box[1])
+        inside = [(a[:-1] + np.diff(a) / 2 > lo) & (a[:-1] + np.diff(a) / 2 < hi)
+                  for a, lo, hi in zip(axes, box.min(axis=0), box.max(axis=0), strict=True)]  # fmt: skip
+        if len(flat) > 1 or (len(flat) and not low[flat[0]] < box[0, flat[0]] < high[flat[0]]):
+            raise ValueError(f"the slit from {box[0]} to {box[1]} m is no rectangle or box inside the mesh")
+        if len(flat):
+            axis = int(flat[0])
+            index = int(np.argmin(np.abs(axes[axis] - box[0, axis])))
+            cuts.append(Cut(axis, index, np.multiply.outer(*(inside[a] for a in range(3) if a != axis))))
+        else:
+            filled &= ~(inside[0][:, None, None] & inside[1][:, None] & inside[2])
     if not filled.any():
         raise ValueError(f"no cell of {cell} m is filled by the mesh of {high - low} m; use smaller cells")
-    grid = build_grid(axes, filled, cuts=cuts)
-    return grid, embed(grid, np.asarray(vertices, dtype=np.float64))
+    grid = build_grid(axes, filled, cuts=cuts, closing=(0, 1, 2) if slits else (0, 1))
+    return grid, embed(grid, points)
 
 
-def _filling(mesh: trimesh.Trimesh, axes: Sequence[Array]) -> Array:
-    """Share of each cell that lies inside the mesh, (nx, ny, nz), by rays along z through a lattice of points.
+def _lattice(low: float, high: float, cell: float, planes: Sequence[float]) -> Array:
+    """Lattice planes from ``low`` to ``high``, at most ``cell`` apart, with those of ``planes`` among them."""
+    room = 1e-3 * min(cell, high - low)
+    inner = sorted(x for x in set(planes) if low + room < x < high - room)
+    ends = [low, *(x for x, before in zip(inner, [low, *inner], strict=False) if x - before > room), high]
+    parts = [
+        np.linspace(a, b, max(int(np.ceil((b - a) / cell - 1e-6)), 1) + 1) for a, b in zip(ends, ends[1:], strict=False)
+    ]
+    return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+
+
+def _filling(triangles: Array, axes: Sequence[Array]) -> Array:
+    """Share of each cell that lies inside triangles (t, 3, 3), (nx, ny, nz), by rays along z through a lattice.
 
     A ray adds the mesh's crossings up with their directions, so parts that overlap count once.
     """
@@ -89,9 +126,9 @@ def _filling(mesh: trimesh.Trimesh, axes: Sequence[Array]) -> Array:
     across = [(a[:-1, None] + inner * np.diff(a)[:, None]).reshape(-1) for a in axes]
     x, y = np.meshgrid(across[0], across[1], indexing="ij")
     # Off the vertices' own lattice, so that no ray meets an edge of an axis-aligned mesh.
-    shift = 1e-7 * np.array([np.sqrt(2.0), np.sqrt(3.0)]) * np.ptp(mesh.vertices, axis=0)[:2]
+    shift = 1e-7 * np.array([np.sqrt(2.0), np.sqrt(3.0)]) * np.ptp(triangles.reshape(-1, 3), axis=0)[:2]
     winding = np.zeros((x.shape[0], x.shape[1], len(across[2])))
-    for a, b, c in mesh.triangles:
+    for a, b, c in triangles:
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         if area == 0.0:
             continue
@@ -113,13 +150,11 @@ def _filling(mesh: trimesh.Trimesh, axes: Sequence[Array]) -> Array:
 def embed(grid: Grid, points: Array) -> Embedding:
     """Bind points (v, 3) to the cells that contain them, or to the nearest ones."""
     low, high = grid.nodes[grid.cells[:, 0]], grid.nodes[grid.cells[:, 7]]
-    nodes = np.zeros((len(points), 8), dtype=np.int64)
-    weights = np.zeros((len(points), 8))
     corner = np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)], dtype=bool)
-    for i, point in enumerate(points):
-        outside = np.maximum(np.maximum(low - point, point - high), 0.0)
-        c = int(np.argmin((outside**2).sum(axis=1)))
-        at = (point - low[c]) / (high[c] - low[c])
-        nodes[i] = grid.cells[c]
-        weights[i] = np.where(corner, at, 1.0 - at).prod(axis=1)
-    return Embedding(nodes, weights)
+    nearest = np.zeros(len(points), dtype=np.int64)
+    for begin in range(0, len(points), CHUNK):
+        part = points[begin : begin + CHUNK, None]
+        outside = np.maximum(np.maximum(low - part, part - high), 0.0)
+        nearest[begin : begin + CHUNK] = np.argmin((outside**2).sum(axis=2), axis=1)
+    at = ((points - low[nearest]) / (high - low)[nearest])[:, None]
+    return Embedding(grid.cells[nearest], np.where(corner, at, 1.0 - at).prod(axis=2))

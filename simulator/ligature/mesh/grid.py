@@ -1,4 +1,7 @@
-"""Structured grids of hexahedra: cells on a lattice, with cuts, holes, layers and matching lips; metres."""
+"""Structured grids of hexahedra: cells on a lattice, with cuts, holes, layers and matching lips; metres.
+
+SciPy is imported where it is used: Blender, which lacks it, can import this module.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -42,7 +43,7 @@ class Grid:
     site
         Lattice indices of the nodes, (n, 3); both lips of a cut share them.
     cells
-        Nodes of the cells in the order of `ligature.tissue.elements`, (m, 8).
+        Nodes of the cells, (m, 8); bits 0, 1, 2 of a corner's number count along x, y, z.
     cell_site
         Lattice indices of the cells, (m, 3).
     layer
@@ -66,6 +67,16 @@ class Grid:
     face_cell: Integers
     lips: Integers
     lip_axis: Integers
+
+    def pieces(self) -> Integers:
+        """Number of the connected piece that each node belongs to, from 0 on, (n,)."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        row, column = np.repeat(self.cells[:, :1], 7, axis=1).reshape(-1), self.cells[:, 1:].reshape(-1)
+        n = len(self.nodes)
+        graph = coo_matrix((np.ones(len(row)), (row, column)), shape=(n, n))
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
     @property
     def sizes(self) -> Array:
@@ -150,6 +161,9 @@ def _joined(number: Integers, cuts: Sequence[Cut], shape: tuple[int, ...]) -> li
 
 def _nodes(number: Integers, joined: list[NDArray[np.bool_]], cell_site: Integers) -> tuple[Integers, Integers]:
     """Node of every corner of every cell (m, 8), and the nodes' lattice indices (n, 3)."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     m = len(cell_site)
     links = []
     for axis in range(3):

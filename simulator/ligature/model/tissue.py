@@ -1,0 +1,171 @@
+"""Reads bodies of soft tissue from their elements: a grid that fills the body's shape, and its materials.
+
+SI units, frames as in `ligature.model.scene`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.adf import Diagnostic, Element, Severity
+from ligature.mesh import load_mesh
+from ligature.mesh.surface import joined
+from ligature.mesh.voxels import voxelise
+from ligature.model.frames import Array, frame
+from ligature.model.geometry import FileContext, GeometryError
+from ligature.model.material import KEYS, MATERIALS, TissueMaterial
+from ligature.model.soft import TissueForm
+from ligature.model.solids import surface_of
+
+if TYPE_CHECKING:
+    from ligature.mesh.grid import Grid
+    from ligature.model.scene import Collider, Visual
+
+FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
+USUAL_CELLS = 600
+"""Cells of a body whose cell size the file does not state, about."""
+
+MOST_NODES = 6000
+"""Most nodes of a body: with more, a step takes longer than the four ticks that it stands for."""
+
+
+def tissue_of(
+    element: Element, context: FileContext, visual: Visual, colliders: Sequence[Collider]
+) -> TissueForm | None:
+    """The tissue of a body's element, None for a rigid one; raises `GeometryError`.
+
+    Its shape is that of the visual mesh, else of the visual primitives, else of the collision shapes.
+    """
+    if not element.has("ligature tissue"):
+        return None
+    base = _material(element, "ligature tissue.", None)
+    vertices, faces = _surface(element, context, visual, colliders)
+    cell = element.value("ligature tissue.cell size")
+    if cell is None:
+        cell = float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / USUAL_CELLS)) or 1e-3
+    if not cell > 0.0:
+        raise _error(element, "ligature tissue.cell size", f"has cells of {cell:g} m", "give metres above 0")
+    cells = np.prod(np.ceil(np.ptp(vertices, axis=0) / cell) + 1.0)
+    if cells > 20 * MOST_NODES:
+        raise _error(element, "ligature tissue.cell size", f"would have {cells:.0f} cells of {cell:g} m",
+                     f"at most {MOST_NODES} nodes are simulated; use larger cells")  # fmt: skip
+    slits = [np.array([item.vector("from"), item.vector("to")]) for item in element.children("ligature tissue.slits")]
+    materials, heights = _layers(element, base, float(vertices[:, 2].max()))
+    try:
+        grid, _ = voxelise(vertices, faces, cell, slits=slits, planes=((), (), heights))
+    except ValueError as error:
+        raise _error(
+            element, "ligature tissue", f"is no tissue: {error}", "give a closed mesh and fitting cells"
+        ) from None
+    middle = grid.nodes[grid.cells].mean(axis=1)[:, 2]
+    layer = np.searchsorted(-np.array(heights), -middle).astype(np.int64)
+    grid = replace(grid, layer=layer)
+    if len(grid.nodes) > MOST_NODES:
+        raise _error(element, "ligature tissue.cell size", f"has {len(grid.nodes)} nodes",
+                     f"at most {MOST_NODES} are simulated; use larger cells than {cell:g} m")  # fmt: skip
+    fixed = _fixed(element, grid)
+    stated = element.has("ligature tissue.density") or element.has("ligature tissue.material")
+    return TissueForm(grid, materials, fixed, element.text("ligature tissue.carried by"), stated, bool(slits))
+
+
+def inertial_of(form: TissueForm, mass: float, T_body_inertial: Array | None) -> tuple[Array, Array]:
+    """Inertial frame (4, 4) in B, the given one if any, and moments (3,) of ``mass`` kilograms of tissue at rest."""
+    shares = form.cell_masses / form.cell_masses.sum()
+    centres, sizes = form.grid.nodes[form.grid.cells].mean(axis=1), form.grid.sizes
+    if T_body_inertial is None:
+        T_body_inertial = frame(np.eye(3), shares @ centres)
+    at = (centres - T_body_inertial[:3, 3]) @ T_body_inertial[:3, :3]
+    square = shares @ (at**2 + sizes**2 / 12.0)
+    return T_body_inertial, mass * (square.sum() - square)
+
+
+def surface_friction(element: Element) -> float:
+    """Friction coefficient of a body's surface."""
+    own = element.value("ligature tissue.surface friction")
+    return element.number("friction.static") if own is None else float(own)
+
+
+def _material(element: Element, prefix: str, below: TissueMaterial | None) -> TissueMaterial:
+    """The material of a block or layer: that of its name, else of the block, with the numbers that it states."""
+    name = element.text(f"{prefix}material")
+    start = MATERIALS[name] if name else below
+    given = {field: element.value(prefix + key) for field, key in KEYS.items()}
+    given = {field: value for field, value in given.items() if value is not None}
+    if start is None and "youngs" not in given:
+        hint = f"give 'youngs modulus' in Pa, or material: {', '.join(MATERIALS)}"
+        raise _error(element, f"{prefix}material", "is tissue of no material", hint)
+    values = {field.name: getattr(start, field.name) for field in fields(TissueMaterial)} if start else {}
+    try:
+        return TissueMaterial(**{**values, **given})
+    except ValueError as error:
+        first = next((key for field, key in KEYS.items() if str(error).startswith(field)), "poisson ratio")
+        raise _error(element, prefix + first, f"is no tissue: {error}", "see docs/tissue.md") from None
+
+
+def _layers(element: Element, base: TissueMaterial, top: float) -> tuple[tuple[TissueMaterial, ...], list[float]]:
+    """Materials from the top down, and the heights in B between them."""
+    layers = element.children("ligature tissue.layers")
+    if not layers:
+        return (base,), []
+    materials, heights = [], []
+    for number, item in enumerate(layers):
+        materials.append(_material(item, "", base))
+        thickness = item.value("thickness")
+        if number == len(layers) - 1:
+            break
+        if thickness is None or not thickness > 0.0:
+            raise _error(item, "thickness", "is a layer without thickness", "give metres; the lowest may have none")
+        top -= thickness
+        heights.append(top)
+    return tuple(materials), heights
+
+
+def _fixed(element: Element, grid: Grid) -> NDArray[np.bool_]:
+    """The nodes of the faces that the file holds, those at the ends of the grid along the axes of B."""
+    fixed = np.zeros(len(grid.nodes), dtype=bool)
+    for face in element.texts("ligature tissue.fixed"):
+        if face not in FACES:
+            raise _error(element, "ligature tissue.fixed", f"has no face '{face}'", f"give faces of {', '.join(FACES)}")
+        along = grid.site[:, "xyz".index(face[1])]
+        fixed |= along == (along.max() if face[0] == "+" else along.min())
+    pieces = grid.pieces()
+    if fixed.any():
+        loose = sorted(set(pieces.tolist()) - set(pieces[fixed].tolist()))
+        if loose:
+            raise _error(element, "ligature tissue.fixed", f"has {len(loose)} pieces that nothing holds",
+                         "hold them by a further face, shorten the slits, or use smaller cells")  # fmt: skip
+    elif pieces.max() > 0:
+        raise _error(element, "ligature tissue", f"falls into {pieces.max() + 1} pieces",
+                     "use smaller cells, shorten the slits, or hold the pieces by 'fixed'")  # fmt: skip
+    if fixed.all():
+        raise _error(
+            element, "ligature tissue.fixed", "has no node that can move", "hold fewer faces or use smaller cells"
+        )
+    return fixed
+
+
+def _surface(
+    element: Element, context: FileContext, visual: Visual, colliders: Sequence[Collider]
+) -> tuple[Array, NDArray[np.int32]]:
+    """The closed surface of a body, in its frame B: vertices (n, 3) and faces (m, 3)."""
+    if visual.mesh is not None:
+        vertices, faces = joined(load_mesh(visual.mesh, context.resolver).parts)
+        return vertices * visual.scale, faces
+    shapes = visual.shapes or tuple(colliders)
+    if len(shapes) != 1:
+        what = "has no shape" if not shapes else f"has {len(shapes)} shapes"
+        raise _error(element, "ligature tissue", f"is tissue but {what}", "give a closed 'mesh' or one 'shape'")
+    surface = surface_of(shapes[0])
+    if surface is None:
+        raise _error(element, "ligature tissue", "is tissue but a plane", "give a shape with a volume")
+    return surface
+
+
+def _error(element: Element, key: str, message: str, hint: str) -> GeometryError:
+    text = f"body '{element.key}' {message}"
+    return GeometryError(Diagnostic(Severity.ERROR, text, element.mark_of(key), hint, "tissue"))
