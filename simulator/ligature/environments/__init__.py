@@ -1,4 +1,4 @@
-"""Gymnasium environments; importing this room registers ``ligature/Reach-v0``, ``Pick-v0``, ``Insert-v0``."""
+"""Gymnasium environments; importing it registers ``ligature/Reach-v0``, ``Pick-v0``, ``Insert-v0``."""
 
 import gymnasium
 

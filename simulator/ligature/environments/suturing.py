@@ -74,6 +74,14 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         A launch file with a PSM and a needle, and holes for ``insert``; the task's scene of ours by default.
     arm
         Name of the arm; by default the one that does the task.
+    action, observation, reward
+        As above.
+    camera, size
+        Name of the camera, and width and height of its pictures in pixels.
+    max_steps
+        Actions until an episode is cut.
+    render_mode
+        ``rgb_array`` to draw with `render`, or None.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012 (as the base class)
@@ -141,7 +149,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self._arm.local_setpoint_cp()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; ``options`` has no keys."""
+        """Begin an episode; ``seed`` begins another series of random starts, ``options`` has no keys."""
         super().reset(seed=seed)
         self._simulation.restore(self._settled)
         self._goal.begin(self._simulation, self._scenery, self._arm, self.np_random)

@@ -101,8 +101,9 @@ open_axes = opener(_no_axes())
 
 @compiled
 def outputs(table: Integers, dt: float) -> None:
-    """Motor velocities and efforts of one tick for the axes of a table of `Axes`; what it keeps, and the last three
-    arrays change.
+    """Motor velocities and efforts of one tick for the axes of a table of `Axes`.
+
+    What it keeps, and the last three arrays change.
     """
     axes = open_axes(table)
     for k in range(axes.mode.shape[0]):
