@@ -37,8 +37,9 @@ NEAR = 0.002
 
 
 def common_gravity(scene: Scene) -> Array:
-    """The gravity (3,) that most moving bodies share."""
-    moving = [b for b in scene.bodies if not b.static and b.index not in scene.rod_bodies]
+    """The gravity (3,) that most moving bodies of trees share."""
+    members = [scene.bodies[link.body] for articulation in scene.articulations for link in articulation.links]
+    moving = [body for body in members if not body.static]
     counts = Counter(tuple(b.gravity.tolist()) for b in moving)
     if not counts:
         return np.array(scene.world.gravity)
