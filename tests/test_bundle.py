@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ligature
 import pytest
 from ligature import bundle
 
@@ -17,6 +18,10 @@ def test_a_checkout_has_its_scenes_beside_the_package() -> None:
 def test_a_name_of_a_scene_is_its_launch_file() -> None:
     for name in bundle.scene_names():
         assert bundle.launch_file(Path(name)) == ROOT / "scenes" / name / "launch.yaml"
+
+
+def test_a_scene_is_loaded_by_its_name() -> None:
+    assert ligature.load("needle_pick").bodies
 
 
 def test_a_file_or_an_unknown_name_stays_what_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,3 +53,8 @@ def test_words_for_false(text: str) -> None:
 def test_one_and_zero_are_not_truth_values(text: str) -> None:
     with pytest.raises(ValueError, match="true or false"):
         scalars.flag(text)
+
+
+def test_zero_is_unsigned_and_octal_has_all_eight_digits() -> None:
+    assert scalars.unsigned("0") == 0
+    assert scalars.integer("001234567") == 0o1234567

@@ -22,6 +22,7 @@ class TipWrench:
         self._world, self._base, self._bodies, self._arm = world, description.base, tuple(bodies), arm
 
     def __call__(self) -> Array:
+        """Force (N) and moment (N m), (6,)."""
         if not self._world.wrenches.any(self._bodies):
             return np.zeros(6)
         T_world_base = pose7_matrix(self._world.pose7(self._base))

@@ -25,8 +25,10 @@ class ActuatorGrasps:
         return [grasp for grasp, _ in self._grasps.values()]
 
     def add(self, slip: Slip, parent: int, child: int, T_parent_frame: np.ndarray) -> int:
-        """Grasp ``child`` where it is, between pads in a frame (4, 4) of body ``parent``; returns the grasp's
-        number."""
+        """Grasp ``child`` where it is, between pads in a frame (4, 4) of body ``parent``.
+
+        Returns the grasp's number.
+        """
         bodies = self._scene.bodies
         T_palm_patch = inverse(bodies[parent].T_body_inertial) @ T_parent_frame
         patch = Patch(T_palm_patch, slip.half_width, slip.friction * bodies[child].friction)
@@ -48,8 +50,10 @@ class ActuatorGrasps:
         return number in self._grasps
 
     def release(self, body: int | None = None, slipped: bool = False) -> bool:
-        """Release ``body``, all bodies for None, or only those that have ``slipped`` out; returns whether there was
-        any."""
+        """Release ``body``, all bodies for None, or only those that have ``slipped`` out.
+
+        Returns whether there was any.
+        """
         released = [
             number
             for number, (grasp, reach) in self._grasps.items()

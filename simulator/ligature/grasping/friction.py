@@ -232,8 +232,10 @@ def _slide(row: Array, Y: Array, force: float, moment: float, room: Scratch) -> 
 
 @inlined
 def _bound(row: Array, Y: Array, limits: Array, room: Scratch, dt: float) -> tuple[bool, bool]:
-    """Clip an impulse (6,) to the limits of the pads; returns whether the body slips and whether it pulls them
-    apart."""
+    """Clip an impulse (6,) to the limits of the pads.
+
+    Returns whether the body slips and whether it pulls them apart.
+    """
     force, moment, press = dt * limits[0], dt * limits[1], dt * limits[2]
     slides = (row[0] / force) ** 2 + (row[1] / force) ** 2 + (row[5] / moment) ** 2 > 1.0
     if slides:

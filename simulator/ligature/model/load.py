@@ -24,6 +24,7 @@ from ligature.adf import (
     read_model,
     read_world,
 )
+from ligature.bundle import launch_file
 from ligature.model.builder import SceneBuilder
 from ligature.model.geometry import shader_files
 from ligature.model.naming import prefixed, topic_name
@@ -71,7 +72,7 @@ def load(
     SceneError
         When there is nothing to run: the file is not readable, or no body could be created.
     """
-    start = Path(path)
+    start = launch_file(Path(path))
     resolver = Resolver.for_file(start, [Path(root) for root in (*roots, *(Path(f).parent for f in files))])
     try:
         document = read_any(start, resolver)

@@ -23,8 +23,9 @@ _FAR = [0.0, 0.0, -1000.0]
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Pairs of nearest points of one body with another, nearest first: ``distance`` (n,), ``point`` (n, 3) on the
-    one, and ``normal`` (n, 3) from the other to the one.
+    """Pairs of nearest points of one body with another, nearest first.
+
+    ``distance`` (n,), ``point`` (n, 3) on the one, and ``normal`` (n, 3) from the other to the one.
     """
 
     distance: Array

@@ -54,8 +54,7 @@ class Touchable(Protocol):
     """Bodies whose contacts are watched."""
 
     def touches(self, most: int) -> tuple[Array, Array]:
-        """Contact points of the last step, (n, 3), and the forces on one of the two bodies, (n, 3); at most
-        ``most``."""
+        """Contact points of the last step (n, 3), and the forces (n, 3) on one of the two bodies; at most ``most``."""
 
 
 class Attachable(Protocol):

@@ -142,8 +142,10 @@ def _friction(
 
 @inlined
 def rigid(touches: Touches, c: int) -> bool:
-    """Whether ``c`` is a point constraint; a bilateral contact with friction is a grasp, whose `Touches.press` is
-    given."""
+    """Whether ``c`` is a point constraint.
+
+    A bilateral contact with friction is a grasp, whose `Touches.press` is given.
+    """
     return touches.bilateral[c] and touches.friction[c] == 0.0
 
 

@@ -24,8 +24,10 @@ FIRST_GRASP_KEY = -2
 
 @inlined
 def _constrain(nodes: Nodes, work: Work, touches: Touches, i: int, k: int, points: Array) -> None:
-    """Add point constraints that hold ``points`` (m, 2, 3), given in the frames of nodes i and k, together this
-    tick."""
+    """Add point constraints that hold ``points`` (m, 2, 3) together this tick.
+
+    The points are given in the frames of nodes i and k.
+    """
     for node in (i, k):
         matrix_of(nodes.q[node, 0], nodes.q[node, 1], nodes.q[node, 2], nodes.q[node, 3], work.R[node])
     for m in range(points.shape[0]):

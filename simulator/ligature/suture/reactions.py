@@ -29,8 +29,10 @@ def _joint_load(n: int, work: Work, joints: Joints, i: int, out: Array) -> None:
 
 @inlined
 def add_reactions(n: int, joints: Joints, touches: Touches, work: Work, impulse: Array, dt: float) -> None:
-    """Add the impulses of joints and contacts on every node to ``impulse``, in N s, with the moment about its
-    centre."""
+    """Add the impulses of joints and contacts on every node to ``impulse``.
+
+    In N s, with the moment about the node's centre.
+    """
     for i in range(n):
         _joint_load(n, work, joints, i, work.sum6)
         for a in range(6):
