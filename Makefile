@@ -86,7 +86,7 @@ fuzz: developers
 	$(PYTHON) -m tests.fuzz.release --trials $(RELEASES)
 	$(PYTHON) -m tests.fuzz.commands --commands $(COMMANDS)
 	$(PYTHON) -m tests.fuzz.kills --kills $(KILLS)
-	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q $(shell grep -rl "from hypothesis" tests --include="test_*.py")
+	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q tests/cockpit/test_intake.py $(shell grep -rl "from hypothesis" tests --include="test_*.py")
 
 bench: developers
 	$(PYTHON) -m tests.bench.run

@@ -101,6 +101,8 @@ CACHES: dict[str, str] = {
         ),
         "Bullet's own numbers",
     ),  # fmt: skip
+    "Motions._begun": "true from a restore to the next tick, in which nobody has an effort",
+    "ContactWrenches._owned": "saves asking again",
     # what sensors make of the state
     **dict.fromkeys(
         (

@@ -125,6 +125,44 @@ def test_a_reset_scene_stands_as_a_fresh_one_whatever_was_commanded(name: str) -
         assert simulation.state[field].tobytes() == fresh[field].tobytes(), field
 
 
+def test_a_restore_keeps_bullets_world_and_forgets_its_contacts() -> None:
+    simulation = Simulation(scene_of("suturing_small"))
+    engine, needle = simulation._world.engine, simulation.bodies["BODY Needle"].body.index
+    simulation.step(300)
+    taken, client = simulation.snapshot(), engine.client
+    simulation.step(1)
+    assert simulation._world.queries.contacts(needle, 0.0), "the needle lies on the pad"
+    simulation.restore(taken)
+    assert engine.client == client
+    assert not simulation._world.queries.contacts(needle, 0.0)
+
+
+def test_what_diverged_gets_another_bullet_world_and_goes_on_as_a_fresh_one() -> None:
+    scene = scene_of("needle_pick")
+    simulation, fresh = Simulation(scene), Simulation(scene)
+    trees, needle = simulation._world.engine.trees, simulation.bodies["BODY Needle"].body.index
+    simulation._world.apply_force(needle, np.array([np.nan, 0.0, 0.0]), np.zeros(3))
+    simulation.step(1)
+    assert any(problem.code == "diverged" for problem in simulation.problems)
+    simulation.reset()
+    assert simulation._world.engine.trees is not trees
+    for one in (simulation, fresh):
+        one.step(100)
+    assert simulation.state_hash(clock=False) == fresh.state_hash(clock=False)
+
+
+def test_a_joint_that_nothing_drives_any_more_reports_no_effort() -> None:
+    simulation = Simulation(scene_of("suturing_small"))
+    base = simulation.bodies["psm1/baselink"]
+    rows = simulation._world.joints.control_of(base.body.joints[0])
+    base.command_joints([0.3, 0.2, 0.1, 0.3, 0.2, -0.2, 0.4, 0.4])
+    simulation.step(3)
+    assert np.abs(rows.read(np.arange(8))[2]).max() > 1e-3
+    base.release()
+    simulation.step(3)
+    assert (rows.read(np.arange(8))[2] == 0.0).all()
+
+
 def test_commands_that_hold_over_a_reset_act_as_if_they_were_sent_again() -> None:
     scene = scene_of("suturing_small")
     hashes = []

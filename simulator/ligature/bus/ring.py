@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-SLOT_BYTES = 1280
+SLOT_BYTES = 2560
 MOST_BYTES = SLOT_BYTES - 4
 SLOTS = 1024
 _HEADER = 64

@@ -5,6 +5,7 @@ Metres, radians, world axes.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from ligature.camera_simulation import Simulation
 from ligature.environments.goals import GOALS, Goal, tip_position
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.load import load
+from ligature.model.scene import Scene
 from ligature.robots.operating_state import Rejected
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks.scenery import Scenery
@@ -71,9 +73,10 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     task
         ``reach``, ``pick`` or ``insert`` (`ligature.environments.goals`).
     scene
-        A launch file with a PSM and a needle, and holes for ``insert``; the task's scene of ours by default.
+        A launch file with a PSM and a needle, and holes for ``insert``; by default what the task needs of a scene of
+        ours, without the other arms, and for ``reach`` without the thread.
     arm
-        Name of the arm; by default the one that does the task.
+        Name of the arm; by default the one that does the task. Another one brings the whole scene.
     action, observation, reward
         As above.
     camera, size
@@ -106,8 +109,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             if value not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
         self._goal: Goal = GOALS[task]()
-        self._simulation = Simulation(load(scene or SCENES / self._goal.scene / "launch.yaml"))
         arm = arm or self._goal.arm
+        self._simulation = Simulation(_scene(self._goal, arm) if scene is None else load(scene))
         found = self._simulation.arms[arm]
         if not isinstance(found, PsmArm):
             raise ValueError(f"'{arm}' is not a PSM")
@@ -216,6 +219,16 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         if not self._closed:
             self._closed = True
             self._simulation.close()
+
+
+def _scene(goal: Goal, arm: str) -> Scene:
+    """What a task needs of its scene; all of it when another arm than the task's own is asked for."""
+    path = SCENES / goal.scene / "launch.yaml"
+    if arm != goal.arm:
+        return load(path)
+    scene = load(path, goal.models)
+    arms = tuple(found for found in scene.arms if found.name == arm)
+    return replace(scene, arms=arms, rods=scene.rods if goal.thread else ())
 
 
 def _stepped(arm: PsmArm, action: Array) -> Array:

@@ -70,7 +70,7 @@ class BodyCommands:
         return any(control is not None and control.acts for control in controls)
 
     def restart(self) -> None:
-        """Take all commands as if they came now, in an engine that was rebuilt; no finger is stopped."""
+        """Take all commands as if they came now; no finger is stopped."""
         before, self._controls, self._stopped = self._controls, {}, set()
         for body, command in before.items():
             self.take(body, command.type, command.target.copy())
@@ -81,7 +81,7 @@ class BodyCommands:
         return {"controls": controls, "stopped": self._stopped}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Continue from `snapshot` in an engine that was rebuilt."""
+        """Continue from `snapshot`."""
         self._controls, self._stopped = {}, snapshot["stopped"]
         for body, state in snapshot["controls"].items():
             control = self._controls[body] = BodyControl(self._engine.place_of[body], self._engine.dt)

@@ -24,6 +24,7 @@ class Collisions:
         self._engine = engine
         self._disabled_pairs: set[tuple[int, int]] = set()
         self._overlapped: set[tuple[int, int]] = set()
+        self.rebuild()
         self.overlaps = held_overlaps(engine)
         self.restart()
 
@@ -32,39 +33,46 @@ class Collisions:
         if not self._overlapped or tick % LOOK:
             return
         parted = {pair for pair in self._overlapped if overlap(self._engine, *pair) == 0.0}
-        self._overlapped -= parted
-        for body, other in sorted(parted - self._disabled_pairs):
-            self._set(body, other, True)
+        self._change(self._disabled_pairs, self._overlapped - parted)
 
     def disable(self, body: int, other: int, disabled: bool) -> None:
         """Disable collision between two bodies, or enable it again unless they are disabled for another reason."""
-        (self._disabled_pairs.add if disabled else self._disabled_pairs.discard)((body, other))
-        overlapped = not self._overlapped.isdisjoint(((body, other), (other, body)))
-        silent = other in self._engine.scene.bodies[body].no_collision_with
-        self._set(body, other, not (disabled or overlapped or silent))
+        pair = {(body, other)}
+        self._change(self._disabled_pairs | pair if disabled else self._disabled_pairs - pair, self._overlapped)
+
+    def _change(self, disabled: set[tuple[int, int]], overlapped: set[tuple[int, int]]) -> None:
+        """Take other pairs, and set those that are no longer, or newly, among them."""
+        before = self._disabled_pairs | self._overlapped
+        self._disabled_pairs, self._overlapped = disabled, overlapped
+        now = disabled | overlapped
+        for body, other in sorted(before ^ now):
+            apart = other in self._engine.scene.bodies[body].no_collision_with
+            self._set(body, other, not apart and (body, other) not in now and (other, body) not in now)
 
     def _set(self, body: int, other: int, collide: bool) -> None:
         a, b = self._engine.place_of[body], self._engine.place_of[other]
         pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(collide), physicsClientId=self._engine.client)
 
+    def rebuild(self) -> None:
+        """Begin anew in an engine that was rebuilt: only pairs of the scene do not collide."""
+        self._disabled_pairs, self._overlapped = set(), set()
+        for body in self._engine.place_of:
+            for other in self._engine.scene.bodies[body].no_collision_with:
+                if other > body and other in self._engine.place_of:
+                    self._set(body, other, False)
+
     def restart(self) -> None:
-        """Begin anew in an engine that was rebuilt."""
-        self.restore((set(), {(found.body, found.other) for found in self.overlaps}))
+        """Begin anew where the scene starts."""
+        self._change(set(), {(found.body, found.other) for found in self.overlaps})
 
     def begin(self) -> None:
         """Bodies were put back to where the scene starts: those that overlap there do so again."""
-        self.restore((self._disabled_pairs, {(found.body, found.other) for found in self.overlaps}))
+        self._change(self._disabled_pairs, {(found.body, found.other) for found in self.overlaps})
 
     def snapshot(self) -> tuple[set[tuple[int, int]], set[tuple[int, int]]]:
         """What lasts from tick to tick."""
         return self._disabled_pairs, self._overlapped
 
     def restore(self, snapshot: tuple[set[tuple[int, int]], set[tuple[int, int]]]) -> None:
-        """Continue from `snapshot` in an engine that was rebuilt."""
-        self._disabled_pairs, self._overlapped = snapshot
-        for body in self._engine.place_of:
-            for other in self._engine.scene.bodies[body].no_collision_with:
-                if other > body and other in self._engine.place_of:
-                    self._set(body, other, False)
-        for body, other in sorted(self._disabled_pairs | self._overlapped):
-            self._set(body, other, False)
+        """Continue from `snapshot`."""
+        self._change(*snapshot)

@@ -24,19 +24,32 @@ class ContactWrenches:
 
     def __init__(self, engine: Engine, welds: Welds, impulses: Impulses) -> None:
         self._engine, self._welds, self._impulses = engine, welds, impulses
+        self._owned: dict[tuple[int, ...], frozenset[tuple[int, int]]] = {}
 
     def any(self, bodies: Sequence[int]) -> bool:
         """Whether `on` may find anything: a quick look."""
-        if any(body in self._impulses.bodies for body in bodies):
+        if not self._impulses.bodies.isdisjoint(bodies):
             return True
         if any(weld.parent in bodies or weld.child in bodies for weld in self._welds):
             return True
-        own = {(place.uid, place.link) for place in map(self._engine.place_of.get, bodies) if place is not None}
+        own = self._own(bodies)
         return any(
             (found[1], found[3]) in own and (found[2], found[4]) not in own
             for uid in {uid for uid, _ in own}
             for found in pybullet.getContactPoints(bodyA=uid, physicsClientId=self._engine.client)
         )
+
+    def rebuild(self) -> None:
+        """Forget where bodies were in an engine that was rebuilt."""
+        self._owned = {}
+
+    def _own(self, bodies: Sequence[int]) -> frozenset[tuple[int, int]]:
+        """Multibody and link of each of ``bodies``."""
+        key = tuple(bodies)
+        if key not in self._owned:
+            places = (self._engine.place_of[body] for body in bodies if body in self._engine.place_of)
+            self._owned[key] = frozenset((place.uid, place.link) for place in places)
+        return self._owned[key]
 
     def on(self, bodies: Sequence[int], point: Array) -> Array:
         """Force and moment (6,) about ``point`` (3,) that the rest of the world exerted on ``bodies`` in the last tick.
@@ -45,7 +58,7 @@ class ContactWrenches:
         Gravity, inertia and what the bodies do to each other are not.
         """
         place_of = self._engine.place_of
-        own = {(place_of[body].uid, place_of[body].link) for body in bodies if body in place_of}
+        own = self._own(bodies)
         wrench = np.zeros(6)
         for uid in dict.fromkeys(place_of[body].uid for body in bodies if body in place_of):
             links = {link for owner, link in own if owner == uid}

@@ -448,6 +448,8 @@ class TreeControl:
             pybullet.setJointMotorControlArray(
                 self.tree.uid, idle, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(idle), physicsClientId=self._client
             )
+        if self.links:
+            self._motions.drive(self._index, np.flatnonzero(by_motor).tolist())
         self._driven, self._pushed = np.flatnonzero(by_motor).tolist(), np.flatnonzero(by_effort).tolist()
         self._driven_links = [self.links[row] for row in self._driven]
         self._driven_strength = self._strength[self._driven].tolist()
@@ -459,20 +461,31 @@ class TreeControl:
         return kept(self, _KEPT)
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Continue from `snapshot` in a new Bullet world."""
+        """Continue from `snapshot`."""
         put_back(self, snapshot)
         self._sort()
 
-    def follow(self, before: TreeControl) -> None:
-        """Take the commands of ``before``, the same axes in an earlier world, as if they came now."""
-        for name in ("target", "_pace", "_max_velocity", "_max_deceleration", "_yield_stiffness", "owned"):
-            getattr(self, name)[:] = getattr(before, name)
-        aimed = before.mode == POSITION
-        self.mode[~aimed] = before.mode[~aimed]
+    def held(self) -> dict[str, Any]:
+        """The commands now, for `follow`."""
+        return {name: getattr(self, name).copy() for name in ("mode", *_COMMANDED)}
+
+    def follow(self, held: dict[str, Any]) -> None:
+        """Begin anew with commands that `held` gave, as if they came now."""
+        self.mode[:] = FREE
+        for array in (self._integral, self._kick, self._kick_ticks, self._asked):
+            array[:] = 0
+        self._stops, self._slowed = {}, {}
+        for name in _COMMANDED:
+            getattr(self, name)[:] = held[name]
+        aimed = held["mode"] == POSITION
+        self.mode[~aimed] = held["mode"][~aimed]
         for row in np.flatnonzero(aimed).tolist():
-            self._aim(row, float(before.target[row]))
+            self._aim(row, float(held["target"][row]))
         self._sort()
 
+
+_COMMANDED = ("target", "_pace", "_max_velocity", "_max_deceleration", "_yield_stiffness", "owned")
+"""Attributes of a `TreeControl`, beside the modes, that commands set."""
 
 _KEPT = (
     "mode", "target", "_integral", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",

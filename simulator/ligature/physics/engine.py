@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ligature.mesh import CollisionCache
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Scene
-from ligature.physics.articulation import build
+from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
 from ligature.physics.closures import CLOSING
 from ligature.physics.motions import Motions
@@ -29,13 +29,17 @@ SOLVER_ITERATIONS = 50
 LOOP_ITERATIONS = 200
 """The same where loops close: with 50, links of grams beside ones of kilograms part by 2 mm, with 200 by 0.1 mm."""
 
+MOVES, STANDS = (1, -1), (2, -3)
+"""Bullet's collision group and mask of what moves, and of what stands and meets only what moves: its own defaults."""
+
 NEAR = 0.002
 """Gap in metres up to which Bullet prepares contacts; its 20 mm takes half of the time of a needle on a phantom."""
 
 
 def common_gravity(scene: Scene) -> Array:
-    """The gravity (3,) that most moving bodies share."""
-    moving = [b for b in scene.bodies if not b.static and b.index not in scene.rod_bodies]
+    """The gravity (3,) that most moving bodies of trees share."""
+    members = [scene.bodies[link.body] for articulation in scene.articulations for link in articulation.links]
+    moving = [body for body in members if not body.static]
     counts = Counter(tuple(b.gravity.tolist()) for b in moving)
     if not counts:
         return np.array(scene.world.gravity)
@@ -43,9 +47,11 @@ def common_gravity(scene: Scene) -> Array:
 
 
 class Engine:
-    """The trees of ``scene`` in a Bullet client, which `rebuild` replaces: Bullet's contacts cannot be read or set.
+    """The trees of ``scene`` in a Bullet client.
 
-    Whoever keeps one of these attributes over a `rebuild` has those of the client that is gone.
+    Bullet's contacts cannot be read or set, so whatever begins anew begins without: `forget_contacts`. A client that
+    met numbers which are not finite is replaced by `rebuild`; whoever keeps one of these attributes over that has those
+    of the client that is gone.
 
     Attributes
     ----------
@@ -87,11 +93,24 @@ class Engine:
             for body in tree.link_of
         }
         self.body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
+        self._colliders = [collider for tree in self.trees for collider in _colliders(tree)]
+        self.start = self.snapshot()
+        self.restore(self.start)  # as every later start: Bullet turns what it makes by a last bit
 
     def rebuild(self) -> None:
         """Begin anew with another client: all bodies are where the scene starts, and nothing is known of contacts."""
         self.close()
         self._build()
+
+    def forget_contacts(self) -> None:
+        """Take all shapes out of Bullet's world and put them back in their first order, where they are now.
+
+        Their contacts, pairs and boxes go, with what solvers know from the last tick. What follows is a function of
+        where bodies are and how they move.
+        """
+        for uid, link, group, mask in self._colliders:
+            pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)
+        self.motions.begin()
 
     def restart(self, tree: int) -> None:
         """Put one tree back to where the scene starts, at rest."""
@@ -112,14 +131,23 @@ class Engine:
         return {"trees": trees, "sent": dict(self.motions.sent)}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Set the motion of all trees, after a `rebuild`: Bullet's own saved states are not exact."""
+        """Set the motion of all trees; `forget_contacts` is to follow. Bullet's own saved states are not exact."""
         for tree, (pose, velocity, joints) in zip(self.trees, snapshot["trees"], strict=True):
             self.place_of[tree.root].put_inertial(*pose)
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
+        self.motions.sent.clear()
         self.motions.sent.update(snapshot["sent"])
+        self.motions.forget_all()
 
     def close(self) -> None:
         """Give the Bullet client back; an engine that is forgotten does so by itself."""
         self._end()
+
+
+def _colliders(tree: Tree) -> list[tuple[int, int, int, int]]:
+    """Multibody, link, group and mask of the shapes of a tree, in the order in which they were made."""
+    stand = [(tree.stand, -1, *STANDS)] if tree.stand != tree.uid else []
+    base = (tree.uid, -1, *(STANDS if tree.static else MOVES))
+    return [*stand, base, *((tree.uid, link, *MOVES) for link in range(len(tree.frames)))]

@@ -36,10 +36,14 @@ class Joints:
         self._control_of = {joint: control for control in self.controls for joint in control.row}
         self.jointed = [control for control in self.controls if control.links]
 
-    def follow(self, before: Sequence[TreeControl]) -> None:
-        """Take the commands of the ``controls`` from before a rebuild, as if they came now."""
-        for control, earlier in zip(self.controls, before, strict=True):
-            control.follow(earlier)
+    def held(self) -> list[dict[str, Any]]:
+        """The commands of all joints now, for `follow`."""
+        return [control.held() for control in self.controls]
+
+    def follow(self, held: Sequence[dict[str, Any]]) -> None:
+        """Begin anew with commands that `held` gave, as if they came now."""
+        for control, commands in zip(self.controls, held, strict=True):
+            control.follow(commands)
 
     def control_of(self, joint: int) -> TreeControl:
         """The controllers of the tree that a joint belongs to; others after a snapshot."""
@@ -117,6 +121,6 @@ class Joints:
         return [control.snapshot() for control in self.controls]
 
     def restore(self, snapshot: list[dict[str, Any]]) -> None:
-        """Continue from `snapshot`, after a `rebuild`."""
+        """Continue from `snapshot`."""
         for control, state in zip(self.controls, snapshot, strict=True):
             control.restore(state)

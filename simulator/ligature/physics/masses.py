@@ -124,7 +124,7 @@ class Masses:
         return scale * described.mass, scale * inertia_of(described)
 
     def restart(self) -> None:
-        """Begin anew in an engine that was rebuilt: only welds hold bodies."""
+        """Begin anew: only welds hold bodies."""
         self._hold_counts, self._grasp_counts = dict(Counter(self._welds.children)), {}
         self._set_all()
 
@@ -133,15 +133,15 @@ class Masses:
         return kept(self, _KEPT)
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Continue from `snapshot` in an engine that was rebuilt, after commands were restored."""
+        """Continue from `snapshot`, after commands were restored."""
         put_back(self, snapshot)
         self._set_all()
 
     def _set_all(self) -> None:
-        """Set the masses of grasped and commanded bodies in a new Bullet world."""
-        self._attached_loads = {}
+        """Set the masses of grasped and commanded bodies, and of those that no longer are."""
         for body in sorted(self._free_bodies):
-            if body in self._grasp_counts or (body in self._light_bodies and self._commands.driven(body)):
+            loaded = body in self._attached_loads or body in self._grasp_counts
+            if loaded or (body in self._light_bodies and self._commands.driven(body)):
                 self._update(body)
 
 

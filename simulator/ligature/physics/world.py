@@ -127,19 +127,27 @@ class World(Subsystem):
     def _set_up(self) -> None:
         """Make what acts on bodies within a tick, for the engine's present client."""
         engine = self.engine
+        self._broken = False
         self._lifts = gravity_lifts(engine, self.joints.controls)
         self._damped = self._damping_factors()
         self._closures = Closures(engine.client, self.scene, engine.trees, engine.place_of, engine.motions, self.dt)
         self._readout = Readout(engine.client, self.scene, engine.trees, engine.motions, engine.place_of)
         self._parting = Parting(engine.client, self.dt)
-        engine.motions.forget_all()
+        engine.forget_contacts()
 
-    def _rebuild(self) -> None:
-        """Begin anew in another Bullet client: without commands, contacts, welds."""
+    def _begin(self) -> None:
+        """Make ready to begin anew; in another Bullet client after bodies diverged or a step failed."""
+        if not self._broken:
+            self.welds.loosen()
+            self._closures.begin()
+            self._parting.begin()
+            return
         self.engine.rebuild()
         self.joints.rebuild()
+        self.collisions.rebuild()
         self._set_up()
         self.queries.rebuild()
+        self.wrenches.rebuild()
 
     def _damping_factors(self) -> list[tuple[Placement, float, float]]:
         """Lone bodies with the factors of a tick on their linear and angular velocity (§12.1)."""
@@ -236,6 +244,7 @@ class World(Subsystem):
 
     def _heal(self) -> None:
         """Put trees that diverged back to where the scene starts, with all that loops join to them."""
+        self._broken = True
         found = diverged(self.engine)
         for k in found:
             name = self.scene.bodies[self.engine.trees[k].root].identity.identifier
@@ -322,20 +331,23 @@ class World(Subsystem):
     def reset(self) -> None:
         """Put every body back to its initial pose, at rest.
 
-        The engine is built anew, for Bullet's own caches would go on. Commands hold, as if they were sent again; so do
-        the constraints of actuators.
+        Bullet's contacts are forgotten, for they would go on. Commands hold, as if they were sent again; so do the
+        constraints of actuators.
         """
-        before = self.joints.controls
-        self._rebuild()
-        self.joints.follow(before)
+        held = self.joints.held()
+        self._begin()
+        self.engine.restore(self.engine.start)
+        self.joints.follow(held)
         self.impulses.clear()
         self.commands.restart()
         self.collisions.restart()
         self.masses.restart()
         self.welds.repeat()
+        self.engine.forget_contacts()
 
     def recover(self) -> None:
         """Put every body back, and clear all commands."""
+        self._broken = True
         self.clear_commands()
         self.reset()
 
@@ -347,12 +359,12 @@ class World(Subsystem):
         }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Build the engine anew and continue from `snapshot`."""
-        self._rebuild()
+        """Forget Bullet's contacts and continue from `snapshot`."""
+        self._begin()
         for name, part in self._parts().items():
             part.restore(snapshot[name])
         self._owned_reported = snapshot["owned_reported"]
-        self.engine.motions.forget_all()
+        self.engine.forget_contacts()
 
     def _parts(self) -> dict[str, Any]:
         """The parts that keep something from tick to tick, in the order in which they are restored."""

@@ -7,10 +7,14 @@ axes, SI units.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture.contacts import detect
 from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
+from ligature.suture.passages import Passages
 from ligature.suture.placing import sound
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
@@ -18,6 +22,10 @@ from ligature.suture.rotations import cross, turn
 from ligature.suture.step import advance
 from ligature.suture.tracking import open_passages
 from ligature.tables import opener
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
 
 open_touches = opener(layout.touches(1))
 open_rod = opener(
@@ -34,14 +42,14 @@ MAX_STEPS = 16
 
 
 @inlined
-def _copy2(a, b):
+def _copy2(a: Array, b: Array) -> None:
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
             b[i, k] = a[i, k]
 
 
 @inlined
-def _place(nodes, motion, met):
+def _place(nodes: layout.Nodes, motion: Array, met: Integers) -> None:
     """Set the nodes ``met[:, 1]`` to the motion of their bodies, rows ``met[:, 0]`` of ``motion`` (b, 13)."""
     for m in range(met.shape[0]):
         row, i = motion[met[m, 0]], met[m, 1]
@@ -52,7 +60,7 @@ def _place(nodes, motion, met):
 
 
 @inlined
-def _keep(nodes, joints, work):
+def _keep(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
     _copy2(nodes.x, work.kept_x)
     _copy2(nodes.q, work.kept_q)
     _copy2(nodes.v, work.kept_v)
@@ -62,7 +70,7 @@ def _keep(nodes, joints, work):
 
 
 @inlined
-def _take_back(nodes, joints, work):
+def _take_back(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
     _copy2(work.kept_x, nodes.x)
     _copy2(work.kept_q, nodes.q)
     _copy2(work.kept_v, nodes.v)
@@ -72,7 +80,7 @@ def _take_back(nodes, joints, work):
 
 
 @inlined
-def _move_shapes(nodes, shapes, h):
+def _move_shapes(nodes: layout.Nodes, shapes: layout.Shapes, h: float) -> None:
     """Advance the parts of bodies by ``h`` seconds with their nodes."""
     for c in range(shapes.node.shape[0]):
         k = shapes.node[c]
@@ -85,7 +93,7 @@ def _move_shapes(nodes, shapes, h):
 
 
 @inlined
-def _scale_loads(joints, factor):
+def _scale_loads(joints: layout.Joints, factor: float) -> None:
     """Scale the loads, which are times the square of the step, to another step."""
     for j in range(joints.load.shape[0]):
         for a in range(6):
@@ -93,7 +101,10 @@ def _scale_loads(joints, factor):
 
 
 @inlined
-def _one_step(rod, old, new, passages, owner, constraints, points, h, begins, elapsed):
+def _one_step(
+    rod: layout.RodArrays, old: layout.Touches, new: layout.Touches, passages: Passages, owner: int,
+    constraints: Integers, points: Array, h: float, begins: bool, elapsed: float,
+) -> tuple[int, bool]:  # fmt: skip
     """A step of ``h`` seconds that ends ``elapsed`` seconds after the tick began; see `advance` for what it returns."""
     nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
     n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
@@ -107,7 +118,10 @@ def _one_step(rod, old, new, passages, owner, constraints, points, h, begins, el
 
 
 @kernel
-def run_tick(rod_table, last, next_, scratch, passage_table, owner, constraints, points, motion, met):
+def run_tick(
+    rod_table: Integers, last: Integers, next_: Integers, scratch: Integers, passage_table: Integers, owner: int,
+    constraints: Integers, points: Array, motion: Array, met: Integers,
+) -> None:  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``scratch``.
 
     Groups of arrays come as the tables of `ligature.tables`. `RodArrays.counts` returns: contacts found,
