@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
+import types
 from typing import Any
 
 import ligature
-import numpy as np
 
 project = "Ligature"
 author = "The Ligature developers"
@@ -28,6 +28,7 @@ autodoc_preserve_defaults = True
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 napoleon_preprocess_types = False
+napoleon_attr_annotations = False
 
 html_theme = "furo"
 html_title = f"Ligature {release}"
@@ -59,12 +60,16 @@ def _tables(lines: list[str]) -> list[str]:
 
 
 def _docstring(app: Any, what: str, name: str, object: Any, options: Any, lines: list[str]) -> None:
-    # the documentation of numpy's own types, aliased here, is not ours
-    if isinstance(object, np.ufunc) or getattr(object, "__module__", "").startswith("numpy"):
-        lines[:] = []
     lines[:] = _tables(lines)
+
+
+def _skip(app: Any, what: str, name: str, object: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out names for types of others: their documentation is numpy's."""
+    ours = getattr(object, "__module__", "").startswith("ligature")
+    return True if isinstance(object, types.GenericAlias) and not ours else None
 
 
 def setup(app: Any) -> None:
     """Connect what Sphinx calls."""
     app.connect("autodoc-process-docstring", _docstring)
+    app.connect("autodoc-skip-member", _skip)

@@ -59,7 +59,7 @@ def unexplained(thing: Any) -> list[str]:
     return [
         name
         for name in parameters(thing)
-        if not re.search(rf"``[^`]*\b{name}\b[^`]*``|^{name}(, \w+)*$", text, re.MULTILINE)
+        if not re.search(rf"``[^`]*\b{name}\b[^`]*``|^(\w+, )*{name}(, \w+)*$", text, re.MULTILINE)
     ]
 
 
