@@ -262,14 +262,11 @@ class Motions:
             if links:
                 states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
                 self.position[rows], self.velocity[rows], reaction, self.effort[rows] = zip(*states, strict=True)
-                if self._begun:
-                    self.effort[rows], reaction = 0.0, np.zeros(6)
-                elif len(self._limp[tree]):
-                    self.effort[self._limp[tree]] = 0.0
+                self.effort[rows if self._begun else self._limp[tree]] = 0.0
                 for axis, effort in self.sent.items():
                     self.effort[axis] = effort
                 if self._measured[tree]:
-                    self.reaction[rows] = reaction
+                    self.reaction[rows] = np.zeros(6) if self._begun else reaction
         return self._joints[:, self.slices[tree]]
 
     def links(self, tree: int) -> None:
