@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from ligature.environments import SuturingEnv
+from ligature.environments import SuturingEnv, make_vec
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.robots.poses import rotation_vector
 
@@ -151,3 +151,29 @@ def test_environments_run_side_by_side_in_processes() -> None:
     observations, *_ = envs.step(np.zeros((2, 7), dtype=np.float32))
     envs.close()
     assert np.isfinite(observations).all()
+
+
+def test_environments_of_a_vector_are_single_ones_to_the_bit() -> None:
+    envs, actions = make_vec("reach", 2), np.random.default_rng(4).uniform(-1, 1, (2, 7)).astype(np.float32)
+    first, _ = envs.reset(seed=[1, 2])
+    then, *_ = envs.step(actions)
+    envs.close()
+    single = SuturingEnv("reach")
+    for k, seed in enumerate((1, 2)):
+        assert (single.reset(seed=seed)[0] == first[k]).all()
+        assert (single.step(actions[k])[0] == then[k]).all()
+    single.close()
+
+
+def test_a_vector_has_at_least_one_environment() -> None:
+    with pytest.raises(ValueError, match="n is a number of environments, at least 1, not 0"):
+        make_vec("reach", 0)
+
+
+def test_an_environment_simulates_the_arm_of_its_task_alone() -> None:
+    env = SuturingEnv("pick")
+    scene = env._simulation.scene
+    env.close()
+    assert [arm.name for arm in scene.arms] == ["PSM1"]
+    assert not any("psm2" in body.identity.identifier for body in scene.bodies)
+    assert scene.rods, "the needle has its thread"

@@ -43,7 +43,8 @@ class ArmRecord:
     def write(self, record: Any) -> None:
         """Fill ``record``, of `ligature.model.state.ARM_DTYPE`, the same each time, with the arm's state now."""
         arm, axes = self._arm, self._arm.joints
-        (measured, setpoint), wrench = axes.readings(), arm.spatial_measured_cf()
+        measured, setpoint = axes.readings()
+        wrench = arm.spatial_measured_cf() if arm.senses_wrench else None
         tool = arm.kinematics.instrument.id if isinstance(arm, PsmArm) else 0
         present = isinstance(arm, PsmArm) and arm.tool_present
         status = (arm.operating_state, axes.ratio_v, axes.ratio_a, arm.reference, tool, present)
@@ -58,9 +59,12 @@ class ArmRecord:
             self._fingers[0], self._fingers[1] = (reading[:, 0] for reading in fingers.readings())
             opening = self._fingers.tobytes()
         placed = arm.base_frame.tobytes(), tool, arm.cf_orientation_absolute
-        described = (measured.tobytes(), setpoint.tobytes(), wrench.tobytes(), opening, *placed)
+        pushed = b"" if wrench is None else wrench.tobytes()
+        described = (measured.tobytes(), setpoint.tobytes(), pushed, opening, *placed)
         if described != self._described:
             self._described = described
+            if wrench is None:  # it follows from the joints
+                wrench = arm.spatial_measured_cf()
             arm.kinematics.describe(
                 arm.base_frame, arm.cf_orientation_absolute, measured, setpoint, wrench,
                 self._js, self._poses, self._vectors, self._jacobians,
