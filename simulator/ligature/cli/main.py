@@ -15,6 +15,7 @@ from ligature.cli.check import check as run_check
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
 from ligature.cli.poses import poses as run_poses
 from ligature.cli.supervisor import supervise
+from ligature.model.softening import Softening
 
 app = typer.Typer(
     add_completion=False,
@@ -97,6 +98,10 @@ def run(
     cockpit: Annotated[bool, typer.Option("--cockpit", help="Serve the web page (cockpit) on this machine.")] = False,
     cockpit_at: CockpitAddress = None,
     devices: Devices = None,
+    soft: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(help="A rigid body that is to be soft tissue, BODY or BODY=MATERIAL; repeatable."),
+    ] = None,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -105,6 +110,7 @@ def run(
     try:
         for text in arms:
             arm_entry(text)
+        Softening(soft or ())
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     options = RunOptions(
@@ -112,7 +118,7 @@ def run(
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
         task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
-        devices=indices(devices) or (),
+        devices=indices(devices) or (), soft=tuple(soft or ()),
     )  # fmt: skip
     supervise(options)
 

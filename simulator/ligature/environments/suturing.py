@@ -71,9 +71,10 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     Parameters
     ----------
     task
-        ``reach``, ``pick`` or ``insert`` (`ligature.environments.goals`).
+        ``reach``, ``pick``, ``insert`` or ``puncture`` (`ligature.environments.goals`).
     scene
-        A launch file with a PSM and a needle, and holes for ``insert``; the task's scene of ours by default.
+        A launch file with a PSM and a needle, holes for ``insert`` and soft tissue for ``puncture``; by default that
+        of ours for the task.
     arm
         Name of the arm; by default the one that does the task.
     """

@@ -15,6 +15,7 @@ from ligature.suture.placing import sound
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
+from ligature.suture.springs import add_spring_impulses, begin_springs, open_springs
 from ligature.suture.step import advance
 from ligature.suture.tables import opener
 from ligature.suture.tracking import open_passages
@@ -93,20 +94,20 @@ def _scale_loads(joints, factor):
 
 @inlined
 def _one_step(
-    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, constraints, points, tension, counts,
-    self_skip, stiffness, h, begins, elapsed,
+    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, springs, constraints, points, tension,
+    counts, self_skip, stiffness, h, begins, elapsed,
 ):  # fmt: skip
     new.count[0] = 0
     add_point_constraints(nodes, work, old, new, constraints, points)
     detect(first, work.segment.shape[0], nodes, shapes, old, new, work, tension, counts, self_skip, h)
-    return advance(n, total, nodes, joints, new, work, passages, owner, stiffness, h, begins, elapsed)
+    return advance(n, total, nodes, joints, new, work, passages, owner, springs, stiffness, h, begins, elapsed)
 
 
 @kernel
 def run_tick(
     first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, scratch, work_table,
-    passage_table, owner, constraints, points, motion, met, counts, self_skip, stiffness, impulse, tension, max_speed,
-    dt,
+    passage_table, owner, spring_table, constraints, points, motion, met, counts, self_skip, stiffness, impulse,
+    tension, max_speed, dt,
 ):  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``scratch``.
 
@@ -116,11 +117,12 @@ def run_tick(
     """
     nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
     a, b, c, work = open_touches(last), open_touches(next_), open_touches(scratch), open_work(work_table)
-    passages = open_passages(passage_table)
+    passages, springs = open_passages(passage_table), open_springs(spring_table)
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
     _copy2(shapes.pose, shape_poses)
     begin_passages(passages, owner)
+    begin_springs(springs, nodes)
     for i in range(total):
         for k in range(6):
             impulse[i, k] = 0.0
@@ -133,8 +135,8 @@ def run_tick(
         _scale_loads(joints, (size / scale) ** 2)
         scale = size
         more, settled = _one_step(
-            first, n, total, nodes, joints, shapes, old, new, work, passages, owner, constraints, points, tension,
-            counts, self_skip, stiffness, h, done == 0, dt * (done + size) / MAX_PARTS,
+            first, n, total, nodes, joints, shapes, old, new, work, passages, owner, springs, constraints, points,
+            tension, counts, self_skip, stiffness, h, done == 0, dt * (done + size) / MAX_PARTS,
         )  # fmt: skip
         steps += more
         if not settled and size > 1 and steps < MAX_STEPS:
@@ -144,6 +146,7 @@ def run_tick(
             continue
         add_reactions(n, joints, new, work, impulse, h)
         add_passage_impulses(passages, owner, impulse, h)
+        add_spring_impulses(springs, impulse, h)
         done += size
         if done == MAX_PARTS:
             break
