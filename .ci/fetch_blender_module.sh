@@ -15,11 +15,11 @@ mkdir -p "$(dirname "$folder")"
 if [ -z "$python" ]; then
     why="bpy $version needs Python 3.11, and this machine has $(/usr/bin/python3 -V 2>&1)"
 else
-    echo "fetching bpy $version (some 350 MB) into $folder, for at most $seconds s"
     rm -rf "$folder"
     "$python" -m venv "$folder" &&
-        timeout -k 10 "$seconds" "$folder/bin/pip" install --quiet --disable-pip-version-check --timeout 15 --retries 1 \
-            "bpy==$version" -r requirements-bpy.txt
+        sh "$(dirname "$0")/step.sh" "fetching bpy $version (some 350 MB) into $folder, for at most $seconds s" \
+            timeout -k 10 "$seconds" "$folder/bin/pip" install --disable-pip-version-check --progress-bar off \
+            --timeout 15 --retries 1 "bpy==$version" -r requirements-bpy.txt
     case $? in
     0) rm -f "$folder.why" && exit 0 ;;
     124) why="bpy $version was not fetched within $seconds s" ;;

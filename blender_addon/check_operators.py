@@ -13,7 +13,7 @@ from .ligature.authoring.lint import Finding, lint
 from .placing import SHAPED, rest_pose
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier, store, unset
-from .write_file import NO_MESH, ExportError, has_mesh, members, text_of
+from .write_file import NO_MESH, ExportError, current_text, has_mesh, members
 
 OWN = {"identifier": "its own"}
 """The fix of a copy that has the identifier of its original."""
@@ -31,7 +31,7 @@ def check_file(collection):
     if broken:
         return [(finding, objects.get(finding.key)) for finding in broken]
     try:
-        text = text_of(collection)
+        text = current_text(collection)
     except ExportError as error:
         return [(Finding("export", Severity.ERROR, error.obj.adf.key if error.obj else "", str(error)), error.obj)]
     except ValueError as error:

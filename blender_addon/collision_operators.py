@@ -10,7 +10,7 @@ from .ligature.authoring.rings import capsules_along, edge_loops
 from .ligature.authoring.shapes import Shape, fitted, oriented
 from .mesh_data import points_of, surfaces_of
 from .object_operators import NeedsBody, active_body
-from .placing import scaling
+from .placing import own_solid, scaling
 from .properties import SHAPE_KINDS, USES
 
 
@@ -126,7 +126,7 @@ def _by_material(body):
     """Points of the body's mesh in its frame, by the material of their faces; raises ValueError without a mesh."""
     if body.type != "MESH":
         raise ValueError("it has no mesh to put pieces around")
-    found = [surface.vertices[np.unique(surface.triangles)] for surface in surfaces_of(body, corners=False)]
+    found = [surface.vertices[np.unique(surface.triangles)] for surface in surfaces_of(own_solid(body), corners=False)]
     if not found:
         raise ValueError("it has no face to put pieces around")
     return found
@@ -192,7 +192,7 @@ def _chosen_points(context, body):
         chosen = [v.co for face in work.faces if face.select for v in face.verts]
         if chosen:
             return np.array(chosen, dtype=float)
-    return points_of(body)[0] if body.type == "MESH" else np.zeros((0, 3))
+    return points_of(own_solid(body))[0] if body.type == "MESH" else np.zeros((0, 3))
 
 
 CLASSES = (ADF_OT_add_shape, ADF_OT_redraw_shape, ADF_OT_fit, ADF_OT_add_hull, ADF_OT_add_ring)

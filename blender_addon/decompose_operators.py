@@ -19,7 +19,7 @@ from . import compat, making
 from .ligature.mesh.cache import write_atomically
 from .mesh_data import points_of
 from .object_operators import NeedsBody, active_body
-from .placing import children_with
+from .placing import children_with, own_solid
 from .quality import measure
 
 WORKER = Path(__file__).with_name("decompose_worker.py")
@@ -162,7 +162,7 @@ class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
             self.report({"ERROR"}, f"'{body.name}' has no mesh to decompose")
             return False
         self._body = body.name
-        self._vertices, self._faces = points_of(body)
+        self._vertices, self._faces = points_of(own_solid(body))
         if not len(self._faces):
             self.report({"ERROR"}, f"'{body.name}' has no face")
             return False

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from . import making
+from .decimals import decimal
 from .ligature.authoring.generate import (
     Anchor,
     Needle,
@@ -21,7 +22,6 @@ from .ligature.authoring.generate import (
 from .object_operators import active_body, target_file
 from .placing import hang, inertial_frame, place, rest_pose
 from .read_file import add_parts, find_open
-from .schema_properties import decimal
 
 THREADS = [
     ("NONE", "None", "No thread"),

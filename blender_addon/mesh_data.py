@@ -9,6 +9,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -17,7 +19,18 @@ import numpy as np
 from . import compat
 from .ligature.authoring.objfile import Paint, Surface
 from .ligature.mesh.mesh import Material, Mesh, MeshPart
-from .placing import children_with, relative_pose, scaling
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """An object as a shape of an owner: what its transform leaves beside a rigid pose, (4, 4), and that pose.
+
+    ``T_owner`` (4, 4) is None for the owner itself, whose pose is left out.
+    """
+
+    obj: bpy.types.Object
+    scale: np.ndarray
+    T_owner: np.ndarray | None = None
 
 
 class MeshMaker:
@@ -272,14 +285,9 @@ class _Evaluated:
             bpy.data.meshes.remove(self.edited)
 
 
-def surfaces_of(
-    obj: bpy.types.Object,
-    frame_of: bpy.types.Object | None = None,
-    textures: Textures | None = None,
-    corners: bool = True,
-) -> list[Surface]:
-    """The triangles of an object by material, in the frame of ``frame_of`` (itself: scale taken in, pose left out)."""
-    place = scaling(obj) if frame_of in (None, obj) else relative_pose(frame_of, obj) @ scaling(obj)
+def surfaces_of(solid: Solid, textures: Textures | None = None, corners: bool = True) -> list[Surface]:
+    """The triangles of a solid by material, in its owner's frame; ``corners`` adds normals and texture coordinates."""
+    obj, place = solid.obj, solid.scale if solid.T_owner is None else solid.T_owner @ solid.scale
     with _Evaluated(obj) as mesh:
         mesh.calc_loop_triangles()
         vertices = _floats(mesh.vertices, "co", 3)
@@ -305,16 +313,17 @@ def surfaces_of(
     return [surface for surface in found if len(surface.triangles)]
 
 
-def points_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) in the object's pose, scale taken in, and triangles (m, 3), modifiers applied."""
-    surfaces = surfaces_of(obj, corners=False)
+def points_of(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) in the owner's frame and triangles (m, 3), modifiers applied."""
+    surfaces = surfaces_of(solid, corners=False)
     if not surfaces:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
     return surfaces[0].vertices, np.vstack([s.triangles for s in surfaces])
 
 
-def fingerprint(obj: bpy.types.Object) -> str:
+def fingerprint(solid: Solid) -> str:
     """A text that changes when the mesh that would be written changes."""
+    obj = solid.obj
     if obj.type != "MESH":
         return obj.type
     digest = hashlib.blake2b(digest_size=16)
@@ -327,15 +336,16 @@ def fingerprint(obj: bpy.types.Object) -> str:
         digest.update(smooth.tobytes())
         if mesh.uv_layers.active:
             digest.update(_floats(mesh.uv_layers.active.data, "uv", 2).tobytes())
-    digest.update(np.round(scaling(obj)[:3, :3], 6).tobytes())
+    digest.update(np.round(solid.scale[:3, :3], 6).tobytes())
     for slot in obj.material_slots:
         digest.update(repr(_look(slot.material)).encode())
     return digest.hexdigest()
 
 
-def mesh_print(obj: bpy.types.Object) -> str:
-    """A text that changes when the object's mesh files have to be written again."""
-    return json.dumps([fingerprint(obj), *sorted(fingerprint(child) for child in children_with(obj, "HULL"))])
+def mesh_print(solids: Sequence[Solid]) -> str:
+    """A text that changes when the files of an object and its convex parts have to be written again."""
+    own, *hulls = (fingerprint(solid) for solid in solids)
+    return json.dumps([own, *sorted(hulls)])
 
 
 def _look(material: bpy.types.Material | None) -> tuple:

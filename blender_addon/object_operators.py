@@ -12,7 +12,7 @@ from .ligature.authoring.generate import mass_keys
 from .ligature.authoring.shapes import Shape, shapes_properties
 from .ligature.mesh.inertia import combined, mass_properties
 from .mesh_data import points_of
-from .placing import SHAPED, children_with, relative_pose, rest_pose, shape_of, shapes_of
+from .placing import SHAPED, children_with, own_solid, relative_pose, rest_pose, shape_of, shapes_of
 from .properties import ROLES
 from .write_file import NO_MESH
 
@@ -256,7 +256,7 @@ def solid_of(body, source, density=1.0):
     if source == "MESH":
         if body.type != "MESH":
             raise ValueError("it has no visual mesh; weigh its primitives instead")
-        return mass_properties(*points_of(body), density)
+        return mass_properties(*points_of(own_solid(body)), density)
     if source == "SHAPES":
         shapes = [(shape_of(child), relative_pose(body, child)) for child in shapes_of(body, "COLLISION")]
         if not shapes:
@@ -265,7 +265,9 @@ def solid_of(body, source, density=1.0):
     hulls = children_with(body, "HULL")
     if not hulls:
         raise ValueError("it has no convex piece; add a hull or decompose its mesh")
-    return combined([mass_properties(*points_of(hull), density).placed(relative_pose(body, hull)) for hull in hulls])
+    return combined(
+        [mass_properties(*points_of(own_solid(hull)), density).placed(relative_pose(body, hull)) for hull in hulls]
+    )
 
 
 def target_file(context, role):

@@ -19,7 +19,7 @@ from .ligature.authoring.shapes import shape_mesh, shape_properties
 from .ligature.mesh.inertia import mass_properties
 from .mesh_data import points_of
 from .object_operators import NeedsBody, active_body
-from .placing import children_with, relative_pose, rest_matrix, shape_of, shapes_of
+from .placing import children_with, own_solid, relative_pose, rest_matrix, shape_of, shapes_of
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier
 
@@ -68,7 +68,7 @@ def measure(body: bpy.types.Object) -> Figures:
     """Compare a body's collision shapes with its mesh, and keep figures and deviations; raises ValueError."""
     if body.type != "MESH":
         raise ValueError("it has no mesh to compare its collision shapes with")
-    vertices, faces = points_of(body)
+    vertices, faces = points_of(own_solid(body))
     if not len(faces):
         raise ValueError("it has no face to compare its collision shapes with")
     solids = solids_of(body)
@@ -150,7 +150,7 @@ def solids_of(body: bpy.types.Object) -> list[Solid]:
     convex = _mesh_type(body).startswith("CONVEX")
     found = []
     for child in children_with(body, "HULL"):
-        vertices, faces = points_of(child)
+        vertices, faces = points_of(own_solid(child))
         if convex:
             vertices, polygons = making.hull_of(vertices)
             faces = np.array(polygons)

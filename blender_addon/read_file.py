@@ -24,7 +24,7 @@ from .ligature.authoring.placement import matrix_of
 from .ligature.authoring.shapes import Shape, shape_mesh
 from .ligature.mesh import Mesh, MeshError, load_mesh
 from .mesh_data import MeshMaker, mesh_print, shape_data
-from .placing import SHAPED, hang, place, place_joint, place_light, place_view, rest_pose, state_of
+from .placing import SHAPED, hang, place, place_joint, place_light, place_view, placed, rest_pose, solids_of
 from .properties import ROLE_OF_KIND
 from .references import qualified
 from .schema_properties import fetch, identifier, state_text, store
@@ -122,9 +122,9 @@ class _Importer:
         """Make everything, and remember how it stood."""
         made = self.make()
         for obj in made:
-            obj.adf.imported = state_text(state_of(obj))
+            obj.adf.imported = state_text(placed(obj).state())
             if obj.adf.role in SHAPED:
-                obj.adf.mesh_print = mesh_print(obj)
+                obj.adf.mesh_print = mesh_print(solids_of(obj))
         self.collection.adf.imported_keys = json.dumps([obj.adf.key for obj in made])
 
     def make(self) -> list[bpy.types.Object]:

@@ -11,8 +11,8 @@ import re
 from functools import cache
 
 import bpy
-import numpy as np
 
+from .decimals import decimal, decimals
 from .ligature.adf.schema import SCHEMA, Key, Status, Type
 
 _SHAPES = (
@@ -180,19 +180,21 @@ def fetch(group: bpy.types.PropertyGroup, kind: str, prefix: str = "") -> dict:
     return values
 
 
+@cache
+def unheld_paths(kind: str) -> list[str]:
+    """Keys that neither properties nor placing hold: they stay as the file has them."""
+    held = {key.path for key in keys_of(kind)}
+    placed = PLACED.get(kind, ())
+    return [
+        key.path
+        for key in SCHEMA[kind]
+        if key.path not in held and not any(key.path == p or key.path.startswith(f"{p}.") for p in placed)
+    ]
+
+
 def unset(group: bpy.types.PropertyGroup, name: str) -> None:
     """Take a key out of the file: its property shows the default again."""
     group.property_unset(name)
-
-
-def decimals(values) -> tuple[float, ...]:
-    """The shortest decimals that are these numbers in single precision."""
-    return tuple(decimal(value) for value in values)
-
-
-def decimal(value: float) -> float:
-    """The shortest decimal that is this number in single precision."""
-    return float(np.format_float_scientific(np.float32(value), unique=True)) + 0.0
 
 
 @cache

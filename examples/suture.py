@@ -16,6 +16,7 @@ from pathlib import Path
 import ligature
 import numpy as np
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7
+from ligature.render.context import RenderUnavailable
 from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
@@ -263,15 +264,24 @@ class Film:
         self._camera = simulation.cameras[camera]
         self._frames: list[Image.Image] = []
         self._next = 0.0
+        self.unavailable = ""
 
     def watch(self) -> None:
-        """Take a picture when it is time for one."""
-        if self._simulation.time >= self._next:
+        """Take a picture when it is time for one; where nothing can be drawn, `unavailable` gets the reason."""
+        if self._simulation.time >= self._next and not self.unavailable:
             self._next += FILM_PERIOD
-            self._frames.append(Image.fromarray(self._camera.capture(FILM_SIZE, passes=("rgb",)).rgb))
+            try:
+                self._frames.append(Image.fromarray(self._camera.capture(FILM_SIZE, passes=("rgb",)).rgb))
+            except RenderUnavailable as error:
+                self.unavailable = str(error)
 
-    def save(self) -> None:
-        """Write ``suture.webp`` and eight pictures along the way; nothing half-written stays under these names."""
+    def save(self) -> str:
+        """Write ``suture.webp`` and eight pictures along the way; nothing half-written stays under these names.
+
+        Returns what was done, for the user.
+        """
+        if not self._frames:
+            return f"no pictures: {self.unavailable}"
         self._folder.mkdir(parents=True, exist_ok=True)
         for number, index in enumerate(np.linspace(0, len(self._frames) - 1, 8).round().astype(int), 1):
             self._frames[index].save(self._folder / f"suture_{number}.png")
@@ -279,6 +289,7 @@ class Film:
         first, *rest = self._frames
         first.save(part, format="WEBP", save_all=True, append_images=rest, duration=FILM_SHOWN, quality=FILM_QUALITY)
         part.replace(self._folder / "suture.webp")
+        return f"pictures in {self._folder}"
 
 
 def operate(
@@ -320,8 +331,7 @@ def main() -> int:
     ]
     print("\n".join([f"stopped: {stopped}", *lines] if stopped else lines))
     if film is not None:
-        film.save()
-        print(f"pictures in {given.out}")
+        print(film.save())
     return 0 if score.success and not stopped else 1
 
 

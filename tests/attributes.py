@@ -15,10 +15,9 @@ from ligature.robots.psm import Psm
 
 CACHES: dict[str, str] = {
     # what a rod or hole works with within one tick; every row is written before it is read
-    "Rod._work": "scratch of a tick",
-    "Rod._counts": "written by every tick",
-    "Rod._shape_poses": "written by every tick",
-    "Rod._tables": "addresses of arrays",
+    "Rod._table": "addresses of arrays",
+    "Rod._arrays": "what of it lasts are attributes of the rod, too",
+    "TreeControl._table": "addresses of arrays",
     "Rod._touch_tables": "addresses of arrays",
     "Rod._passage_table": "addresses of arrays",
     "Rod._scratch": "scratch",
@@ -130,8 +129,8 @@ CACHES: dict[str, str] = {
     ),
     **dict.fromkeys(
         (
-            "World.client",
-            "World._end",
+            "Engine.client",
+            "Engine._end",
             "Placement.client",
             "Motions._client",
             "TreeControl._client",
@@ -142,6 +141,8 @@ CACHES: dict[str, str] = {
         ),
         "Bullet's own numbers",
     ),  # fmt: skip
+    "Motions._begun": "true from a restore to the next tick, in which nobody has an effort",
+    "ContactWrenches._owned": "saves asking again",
     # what sensors make of the state
     **dict.fromkeys(
         (

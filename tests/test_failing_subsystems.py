@@ -55,6 +55,8 @@ def finite(simulation: Simulation) -> bool:
 def test_what_a_subsystem_raises_is_reported_once_and_the_run_goes_on(
     simulation: Simulation, monkeypatch: pytest.MonkeyPatch, name: str, method: str
 ) -> None:
+    if method != "step" and getattr(type(subsystem(simulation, name)), method) is getattr(Subsystem, method, None):
+        pytest.skip("it does nothing then, and is not called")
     others = [one for one in simulation._subsystems if type(one).__name__ != name]
     counts = dict.fromkeys(map(id, others), 0)
 

@@ -54,8 +54,7 @@ def test_what_the_simulator_imports_is_in_the_lists_for_running() -> None:
     lists = listed("requirements.txt") | listed("debian-packages.txt")
     modules = (imported("simulator") | imported("scenes")) - OPTIONAL
     lacking = {module for module in modules if not suppliers(module) & lists}
-    # numba's own part, and the server that viser is made of
-    assert lacking <= {"llvmlite", "websockets"}, lacking
+    assert lacking <= {"llvmlite"}, lacking  # numba's own part
 
 
 def test_running_needs_nothing_of_the_developers() -> None:
@@ -94,4 +93,4 @@ def test_make_run_stays_off_the_lists_of_developers() -> None:
 
 def test_the_scripts_of_the_set_up_are_plain_shell() -> None:
     for script in Path(ROOT, ".ci").glob("*.sh"):
-        assert script.read_text().startswith(("#!/bin/sh\n", "#!/usr/bin/env bash\n")), script
+        assert script.read_text().startswith(("#!/bin/sh\n", "#!/usr/bin/env bash\n", "# Sourced by ")), script

@@ -1,6 +1,6 @@
 """Compiles kernels and keeps their machine code: the decorators that all rooms share.
 
-The code lies below `ligature.mesh.cache.cache_folder`, in a folder named by the digest of all sources that kernels
+The code lies below `ligature.cache.cache_folder`, in a folder named by the digest of all sources that kernels
 are made of: Numba itself looks at one source file each, and would keep a kernel whose callee has changed. So only the
 first start after an installation compiles, which is logged every few seconds while it lasts.
 """
@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core import event
 
-from ligature.mesh.cache import CacheError, cache_folder
+from ligature.cache import CacheError, cache_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -6,7 +6,6 @@ same scene, commands and calls give the same bits.
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -36,7 +35,7 @@ from ligature.model.lookup import find_by_text
 from ligature.model.messages import Message, handle
 from ligature.model.scene import Actuator, Body, Camera, Joint, Light, Scene
 from ligature.model.state import StateRecord, new_state
-from ligature.model.subsystem import Subsystem
+from ligature.model.subsystem import Subsystem, copied
 from ligature.physics import Controllers, World, failed, failure
 from ligature.physics.guard import Guard
 from ligature.robots.commands import ArmCommand
@@ -216,10 +215,11 @@ class Simulation:
         self._clock = Clock()
         self._watched = 0
         self._world = World(scene, dt)
+        queries = self._world.queries
         self._suture = Suture(scene, self._world, dt)
         self._mounts = Mounts(scene)
-        self._rays = Rays(scene, self._world, self._suture.rods)
-        self._touches = Touches(self._world)
+        self._rays = Rays(scene, queries, self._world, self._suture.rods)
+        self._touches = Touches(queries)
         self.arms = ArmSet(scene, self._world, dt)
         actuator_grasps, rods = ActuatorGrasps(scene, self._world), self._suture.rods
         self._actuators = Actuators(scene, ActuatorAttachments(scene, self._world, rods, actuator_grasps), self._rays)
@@ -230,10 +230,14 @@ class Simulation:
             "control": (self.arms, self._actuators, self._rays, Controllers(self._world)),
             "suture": (*before, self._suture, *after, self.grasps),
             "bodies": (self._world,),
-            "sensing": (self._touches, self._mounts, Ghosts(scene, self._world), Contacts(scene, self._world)),
+            "sensing": (self._touches, self._mounts, Ghosts(scene, queries), Contacts(scene, queries)),
         }
         """What a tick does, phase by phase: all subsystems in the order of their steps."""
         self._subsystems = [subsystem for phase in self._tick.values() for subsystem in phase]
+        self._writers, self._senses, self._reporters = (
+            [s for s in self._subsystems if getattr(type(s), name) is not getattr(Subsystem, name)]
+            for name in ("write_state", "sense", "take_problems")
+        )
         self._resting: dict[int, int] = {}
         """Subsystems that are left out, by their number, and the tick from which each goes on."""
         self._reported: dict[tuple[str, str], int] = {}
@@ -332,12 +336,13 @@ class Simulation:
     def _write_state(self) -> None:
         """Fill the state record: what is, then what sensors make of it. Looking changes nothing."""
         with self.phases["state"]:
-            for subsystem in self._subsystems:
+            for subsystem in self._writers:
                 self._guarded(subsystem, "write_state", self.state)
+            for subsystem in self._reporters:
                 self.problems += subsystem.take_problems()
             self._clock.write_state(self.state, self.dt, self.ticks_per_update)
         with self.phases["sensing"]:
-            for subsystem in self._subsystems:
+            for subsystem in self._senses:
                 self._guarded(subsystem, "sense", self.state)
 
     @property
@@ -430,13 +435,13 @@ class Simulation:
             "resting": self._resting,
             **{f"{n}": s.snapshot() for n, s in enumerate(self._subsystems)},
         }
-        taken = Snapshot(copy.deepcopy(parts), self.state.copy())
+        taken = Snapshot(copied(parts), self.state.copy())
         self.restore(taken)
         return taken
 
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot of this scene, taken here or elsewhere."""
-        parts = copy.deepcopy(dict(snapshot.parts))
+        parts = copied(dict(snapshot.parts))
         self._clock, self._resting = parts["clock"], parts["resting"]
         for n, subsystem in reversed(list(enumerate(self._subsystems))):
             subsystem.restore(parts[f"{n}"])

@@ -16,6 +16,9 @@ import ligature.environments
 import numpy as np
 from ligature.environments.suturing import CONTROL
 
+from tests.bench import ledger
+from tests.bench.scenes import chain_step_us
+
 SECONDS = 10.0
 MAX_STEPS = 100
 
@@ -58,15 +61,22 @@ def rate_alone(name: str, seconds: float) -> tuple[float, float]:
 
 def main() -> int:
     """Entry point."""
+    found = {}
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     load = os.getloadavg()[0]
     for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
+        reference = chain_step_us()
         (one, spent), two = rate_alone(name, seconds), rate(name, 2, seconds)
+        found[name] = {
+            "steps_per_second": one, "times_real_time": one * CONTROL, "times_real_time_of_processor": spent * CONTROL,
+            "two_processes": two * CONTROL, "ratio": 1e6 / one / reference,
+        }  # fmt: skip
         sys.stdout.write(
             f"{name}: {one:.0f} steps/s in one process, {one * CONTROL:.2f} times real time, "
             f"{spent:.0f} for a second of processor time; {two:.0f} in two, {two * CONTROL:.2f} times\n"
         )
         sys.stdout.flush()
+    ledger.note("environments", found)
     sys.stdout.write(f"load of the machine at the start: {load:.1f}\n")
     return 0
 

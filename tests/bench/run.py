@@ -1,4 +1,4 @@
-"""Runs every benchmark one after the other: ``python -m tests.bench.run``."""
+"""Runs every benchmark one after the other, then states what got slower: ``python -m tests.bench.run``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import subprocess
 import sys
 
 BENCHMARKS = (
-    "scenes", "on_ros", "latency", "arm_latency", "teleop_latency", "teleop_suture", "kinematics", "cameras", "render",
-    "environments", "suturing_on_ros",
+    "scenes", "resets", "growth", "environments", "on_ros", "latency", "arm_latency", "teleop_latency",
+    "teleop_suture", "kinematics", "cameras", "render", "suturing_on_ros", "ledger",
 )  # fmt: skip
 
 

@@ -1,20 +1,26 @@
 """How fast scenes run, beside a reference of the same run: a 40-body chain of point joints in Bullet.
 
-``python -m tests.bench.scenes``
+``python -m tests.bench.scenes``; writes ``build/bench.json`` and ``docs/pictures/bench_phases.png``, where the last
+release's figures of ``docs/benchmarks.json`` stand beside them.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import statistics
 import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import ligature  # imports Bullet without its banner
 from ligature.cli.bench import measure
 from ligature.model.scene import Scene
+from ligature.simulation import PHASES
+
+from tests.bench import ledger
 
 ROOT = Path(__file__).resolve().parents[2]
 ROUNDS = 3
@@ -60,21 +66,60 @@ def scenes() -> list[tuple[str, Scene]]:
     return found
 
 
+def draw(series: dict[str, dict[str, Any]], path: Path) -> None:
+    """A picture of where ticks spend their time, in steps of the reference: one bar for each scene, rate and version."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    bars = [
+        (f"{name}\n{version}", run)
+        for name in series["now"]
+        for version in series
+        if (run := series[version].get(name))
+    ]
+    figure, axis = pyplot.subplots(figsize=(10, 0.45 * len(bars) + 1), constrained_layout=True)
+    left = [0.0] * len(bars)
+    for phase in PHASES:
+        parts = [run["phases_us"][phase] / run["reference_us"] for _, run in bars]
+        axis.barh(range(len(bars)), parts, left=left, label=phase)
+        left = [a + b for a, b in zip(left, parts, strict=True)]
+    axis.set_yticks(range(len(bars)), [label for label, _ in bars], fontsize=7)
+    axis.set_xlabel("tick, in steps of the reference")
+    axis.legend(fontsize=7)
+    axis.invert_yaxis()
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
+
+
 def main() -> int:
     """Entry point."""
-    reference = statistics.median(chain_step_us() for _ in range(ROUNDS))
-    sys.stdout.write(f"reference, 40 Bullet bodies with point joints: {reference:.0f} us a step\n")
+    found = {}
     for name, scene in scenes():
         for rate in (200.0, 1000.0):
-            runs = [measure(scene, SECONDS, rate) for _ in range(ROUNDS)]
+            references, runs = [], []
+            for _ in range(ROUNDS):
+                references.append(chain_step_us())
+                runs.append(measure(scene, SECONDS, rate))
+            reference = statistics.median(references)
+            ratios = sorted(1e6 / r["ticks_per_second"] / step for r, step in zip(runs, references, strict=True))
             figures = sorted(runs, key=lambda r: r["ticks_per_second"])[ROUNDS // 2]
-            tick = 1e6 / figures["ticks_per_second"]
+            ratio = ratios[ROUNDS // 2]
+            found[f"{name}, {rate:.0f} updates/s"] = {
+                **{key: figures[key] for key in ("real_time_factor", "tick_p99_us", "phases_us", "memory_mb")},
+                "reference_us": reference, "ratio": ratio,
+            }  # fmt: skip
             phases = ", ".join(f"{k} {v:.0f}" for k, v in figures["phases_us"].items())
             sys.stdout.write(
                 f"{name}, {rate:.0f} updates/s: {figures['ticks_per_second']:.0f} ticks/s, real-time factor "
-                f"{figures['real_time_factor']:.2f}, p99 {figures['tick_p99_us']:.0f} us, {tick / reference:.2f} of the "
-                f"reference; us: {phases}\n"
+                f"{figures['real_time_factor']:.2f}, p99 {figures['tick_p99_us']:.0f} us, {ratio:.2f} of the "
+                f"reference of {reference:.0f} us; us: {phases}\n"
             )
+            sys.stdout.flush()
+    ledger.note("scenes", found)
+    release = json.loads(ledger.RELEASE.read_text()).get("scenes", {}) if ledger.RELEASE.exists() else {}
+    draw({"release": release, "now": found}, ROOT / "docs" / "pictures" / "bench_phases.png")
     return 0
 
 

@@ -99,6 +99,17 @@ def test_a_silent_front_end_has_its_commands_released(scene: Scene, ring: Ring) 
     assert box.take() == []
 
 
+def test_the_newest_command_of_a_front_end_whose_loop_is_late_is_carried_out(scene: Scene, ring: Ring) -> None:
+    box = Mailbox(scene, {"ros": ring})
+    ring.beat()
+    push(ring, force(3, 1.0))
+    box.take()
+    ring._beat[0] -= 1.0
+    push(ring, force(3, 2.0))
+    assert box.take() == [force(3, 2.0)]
+    assert box.take() == []
+
+
 def test_a_silent_front_end_that_commands_nothing_any_more_changes_nothing(scene: Scene, ring: Ring) -> None:
     box = Mailbox(scene, {"ros": ring})
     ring.beat()

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 BIN = Path(sys.executable).parent
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -36,6 +37,17 @@ def test_check_names_file_line_and_column(tmp_path: Path) -> None:
 def test_check_of_a_missing_file_reports_it(tmp_path: Path) -> None:
     done = ligature("check", tmp_path / "none.yaml")
     assert done.returncode == 1 and "does not exist" in done.stdout
+
+
+def test_compile_takes_no_file_or_the_name_of_a_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    from ligature.cli import compile as module
+    from ligature.cli.main import app
+
+    asked: list[list[Path]] = []
+    monkeypatch.setattr(module, "compile_ahead", lambda scenes, console: asked.append(list(scenes)) or 0)
+    assert CliRunner().invoke(app, ["compile"]).exit_code == 0
+    assert CliRunner().invoke(app, ["compile", "suturing_small"]).exit_code == 0
+    assert asked == [[], [SMALL]]
 
 
 def test_bench_prints_its_figures_as_json() -> None:
@@ -128,7 +140,7 @@ def test_render_refuses_what_it_cannot_write(tmp_path: Path) -> None:
     assert "finite" in ligature("render", SMALL, "--camera", "cameraL", "--seconds", "nan").stderr
 
 
-def test_demo_needs_the_repository(
+def test_demo_names_the_example_that_is_missing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from ligature.cli import demo
@@ -136,7 +148,7 @@ def test_demo_needs_the_repository(
 
     monkeypatch.setattr(demo, "EXAMPLE", tmp_path / "suture.py")
     assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 2
-    assert "comes with the repository" in capsys.readouterr().out
+    assert f"the demonstration '{tmp_path / 'suture.py'}' is missing" in capsys.readouterr().out
     (tmp_path / "suture.py").write_text(
         "import sys; sys.exit(0 if sys.argv[1:4] == ['--throws', '2', '--seed'] else 3)"
     )

@@ -8,6 +8,8 @@ import subprocess
 import time
 from pathlib import Path
 
+import pytest
+
 from tests.conftest import ROOT
 
 STEP = ROOT / ".ci" / "step.sh"
@@ -45,14 +47,15 @@ def test_ctrl_c_ends_a_step_and_its_program(tmp_path: Path) -> None:
     assert not Path("/proc", (tmp_path / "pid").read_text().strip()).exists()
 
 
-def test_the_smoke_of_a_bare_machine_states_why_it_cannot_be_tried(tmp_path: Path) -> None:
+@pytest.mark.parametrize("script", ["bare_machine.sh", "bare_wheel.sh", "bare_image.sh"])
+def test_the_try_of_a_bare_machine_states_why_it_is_left_out(script: str, tmp_path: Path) -> None:
     """Without its tools on the path, or without root."""
     (tmp_path / "bin").mkdir()
     for name in ("bash", "dirname", "id"):
         (tmp_path / "bin" / name).symlink_to(f"/usr/bin/{name}")
     done = subprocess.run(
-        ["/usr/bin/bash", ROOT / ".ci" / "bare_machine.sh"],
+        ["/usr/bin/bash", ROOT / ".ci" / script],
         env={"PATH": str(tmp_path / "bin")}, capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     assert done.returncode == 0
-    assert done.stdout.startswith("bare machine: not tried: it needs ")
+    assert done.stdout.startswith(f"{script.removesuffix('.sh').replace('_', ' ')}: not tried: it needs ")

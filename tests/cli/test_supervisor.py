@@ -11,7 +11,7 @@ from pathlib import Path
 from queue import Queue
 
 import pytest
-from ligature.bus.block import FOLDER
+from ligature.bus.leftovers import FOLDER
 from ligature.cli.options import RunOptions
 from ligature.cli.supervisor import Child, Event, Supervisor
 from rich.console import Console

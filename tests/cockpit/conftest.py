@@ -18,7 +18,7 @@ import ligature
 import numpy as np
 import pytest
 from ligature.bus import Block
-from ligature.bus.block import FOLDER
+from ligature.bus.leftovers import FOLDER
 from ligature.cockpit.stage import VIEW_ANGLE, first_view
 from ligature.model.frames import pose7_matrix
 from ligature.model.state import new_state

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import yaml
 from ligature.adf import Severity
+from ligature.bus.codec import decode, encode
+from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import matrix_quaternion, pose7_matrix
-from ligature.model.reach import reaches
+from ligature.model.reach import findings, reaches
 from ligature.model.scene import Joint, JointType, OutputType, Scene
 
 from tests.physics.test_loops import gaps
@@ -281,3 +283,23 @@ def test_files_that_the_reference_refuses_are_refused_in_strict_mode(corpus: Pat
 
 REFUSED = ["compound_example.yaml"]
 """The only file here that is no YAML for the reference either; all others it accepts."""
+
+
+@pytest.mark.parametrize(
+    "name", ["multibodies/descriptions/launch.yaml", *(f"multibodies/descriptions/multi-bodies/{n}" for n in LOOPS)]
+)
+def test_all_joints_of_a_tree_of_others_can_be_commanded_at_once(name: str, corpus: Path) -> None:
+    scene = ligature.load(corpus / name, roots=[corpus])
+    body = max(scene.bodies, key=lambda one: len(one.joints))
+    count = len(body.joints)
+    command = BodyCommand(body.index, CommandType.FORCE, (0.0,) * 6, (CommandType.POSITION,) * count, (0.01,) * count)
+    command.check()
+    assert decode(encode(command)) == command
+    assert len(encode(command)) <= MOST_BYTES
+
+
+def test_a_mechanism_too_large_for_its_reaches_is_reported(corpus: Path) -> None:
+    scene = ligature.load(
+        corpus / "multibodies/descriptions/multi-bodies/environments/KnotEnv/env.yaml", roots=[corpus]
+    )
+    assert any("more than the 64 of which reaches are computed" in found.message for found in findings(scene))

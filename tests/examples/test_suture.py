@@ -8,6 +8,7 @@ from pathlib import Path
 import ligature
 import numpy as np
 import pytest
+from ligature.render.context import RenderUnavailable
 from ligature.tasks import throws
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -41,6 +42,18 @@ def test_the_thread_followed_the_needle_out_of_the_exit(operated: tuple) -> None
     simulation, *_ = operated
     holes = {simulation.scene.holes[i.hole].name.rpartition("ghost")[2] for i in simulation.insertions}
     assert {"Entry1", "Exit1"} <= holes
+
+
+def test_without_opengl_a_film_has_no_pictures_and_states_why(tmp_path: Path) -> None:
+    class Blind:
+        def capture(self, *_: object, **__: object) -> None:
+            raise RenderUnavailable("no OpenGL")
+
+    simulation = type("S", (), {"cameras": {"cameraL": Blind()}, "time": 1.0})()
+    film = suture.Film(simulation, tmp_path)
+    film.watch()
+    film.watch()
+    assert film.save() == "no pictures: no OpenGL"
 
 
 def test_holes_too_far_apart_for_the_needle_are_reported() -> None:

@@ -104,8 +104,10 @@ def _wait_for(program: subprocess.Popen[bytes], stage: str) -> None:
                 reached.set()
 
     threading.Thread(target=take, daemon=True).start()
-    if stage and not reached.wait(START):
-        raise TimeoutError(f"the run did not state '{stage}' within {START:g} s")
+    deadline = time.monotonic() + START
+    while stage and not reached.wait(0.01):
+        if program.poll() is not None or time.monotonic() > deadline:
+            raise RuntimeError(f"the run did not state '{stage}' within {START:g} s, or ended before")
 
 
 @contextmanager

@@ -177,7 +177,7 @@ class Trial:
         other = self.scene.bodies[int(rng.choice(self._fingers if in_jaw else self._solid))]
         part = other.colliders[int(rng.integers(len(other.colliders)))]
         T_part = pose7_matrix(self.sim._world.pose7(other.index)) @ part.T_body_shape
-        low, high = self.sim._world.surroundings([other.index])[1]
+        low, high = self.sim._world.queries.surroundings([other.index])[1]
         at = rng.uniform(low - 0.005, high + 0.005)
         if rng.uniform() < 0.5:
             at = T_part[:3, 3] + rng.normal(size=3) * 0.003
@@ -296,7 +296,7 @@ class Trial:
 
     def _statics(self) -> tuple[np.ndarray, np.ndarray]:
         static = [b.index for b in self.scene.bodies if b.static and b.colliders]
-        boxes = [self.sim._world.surroundings([body])[1] for body in static]
+        boxes = [self.sim._world.queries.surroundings([body])[1] for body in static]
         return np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
 
     def _floor(self) -> float:

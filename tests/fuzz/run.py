@@ -36,6 +36,9 @@ START_LIMIT = 120.0
 SCENE_LIMIT = 60.0
 """Seconds for one scene; the slowest takes 6, and the first of a worker loads compiled code."""
 
+REPORT_EVERY = 30.0
+"""Seconds between two lines of progress."""
+
 CHUNK, SCENE_CHUNK = 1000, 25
 """Mutants, and scenes, that a worker is given at a time."""
 
@@ -171,19 +174,29 @@ def run(
     limit: float = LIMIT,
     campaign: Campaign = MUTANTS,
     chunk: int = CHUNK,
+    log: Callable[[str], object] = lambda line: None,
 ) -> Outcome:
     """Run ``cases`` cases of a campaign from number ``first`` on in ``jobs`` processes.
 
     ``attempt`` states what a mutant goes through; it must be importable; None stands for
-    `tests.fuzz.attempt.attempt`, which only the workers import.
+    `tests.fuzz.attempt.attempt`, which only the workers import. ``log`` gets each failure as it happens, and
+    progress every `REPORT_EVERY` seconds.
     """
     outcome = Outcome()
+    begin = reported = time.monotonic()
+    known = 0
     todo = [(a, min(a + chunk, first + cases)) for a in range(first, first + cases, chunk)][::-1]
     with tempfile.TemporaryDirectory(prefix="ligature-fuzz-") as folder:
         count = min(jobs, len(todo))
         workers = {slot: _Worker(Path(folder, str(slot)), campaign.trial, attempt) for slot in range(count)}
         while workers:
             wait([worker.connection for worker in workers.values()], timeout=0.2)
+            for failure in outcome.failures[known:]:
+                log(f"{failure}\n")
+            known = len(outcome.failures)
+            if time.monotonic() - reported > REPORT_EVERY:
+                reported = time.monotonic()
+                log(f"{reported - begin:5.0f} s  {sum(outcome.ended.values())} of {cases} {campaign.noun}s\n")
             for slot, worker in list(workers.items()):
                 reason = _listen(worker, todo, outcome, limit, campaign)
                 if reason == "idle":
@@ -252,12 +265,18 @@ def main() -> int:
     given = flags.parse_args()
     begin = time.monotonic()
     if given.scenes is None:
-        cases, outcome = given.mutants, run(given.mutants, given.first, given.jobs)
+        cases, outcome = given.mutants, run(given.mutants, given.first, given.jobs, log=sys.stderr.write)
     else:
         cases = given.scenes
-        outcome = run(cases, given.first, given.jobs, limit=SCENE_LIMIT, campaign=SCENES, chunk=SCENE_CHUNK)
-    for failure in outcome.failures[:50]:
-        sys.stdout.write(f"{failure}\n")
+        outcome = run(
+            cases,
+            given.first,
+            given.jobs,
+            limit=SCENE_LIMIT,
+            campaign=SCENES,
+            chunk=SCENE_CHUNK,
+            log=sys.stderr.write,
+        )
     ended = ", ".join(f"{key} {count}" for key, count in sorted(outcome.ended.items()))
     seconds = time.monotonic() - begin
     noun = "mutants" if given.scenes is None else "scenes"

@@ -14,7 +14,7 @@ from tests.fuzz.run import SCENE_LIMIT, SCENES, mutant, run
 from tests.fuzz.seeds import Seed, seeds, write_scene
 
 KNOWN = 30
-"""The one scene of these that still passes 50 m/s: overlapping bodies on chains of light links (`docs/physics.md`)."""
+"""The one scene of these that still passes 50 m/s: a doubled joint about three axes on a body of 3 g (`docs/physics.md`)."""
 
 
 def test_no_mutant_crashes_hangs_or_surprises() -> None:

@@ -87,7 +87,7 @@ def test_a_needle_goes_ten_times_from_arm_to_arm_without_a_jolt(held: Theatre, m
         for _ in range(ticks):
             sim._advance()
             for name in strongest:
-                force = np.linalg.norm(sim._world.contact_wrench(held.tools(name), np.zeros(3))[:3])
+                force = np.linalg.norm(sim._world.wrenches.on(held.tools(name), np.zeros(3))[:3])
                 strongest[name] = max(strongest[name], float(force))
         step(1)
 
@@ -113,7 +113,7 @@ def test_an_open_jaw_lets_the_needle_fall(held: Theatre) -> None:
     sim.step(200)
     assert sim.grasps["PSM1"] is None
     assert held.needle.pose[2] < height - 0.01
-    assert sim._world.mass_of(held.needle.body.index)[0] == held.needle.body.mass
+    assert sim._world.masses.mass_of(held.needle.body.index)[0] == held.needle.body.mass
     assert not any(held.needle.body.index in passing for passing in sim.grasps.snapshot()["_disabled"])
 
 
@@ -123,7 +123,7 @@ def test_an_arm_feels_the_needle_it_holds(held: Theatre) -> None:
     sim.step(1500)
     thread = sum(sim.scene.bodies[b].mass for b in sim.scene.rods[0].bodies)
     weight = 9.8 * (held.needle.body.mass + thread)
-    wrench = sim._world.contact_wrench(held.tools("PSM1"), held.palm("PSM1")[:3, 3])
+    wrench = sim._world.wrenches.on(held.tools("PSM1"), held.palm("PSM1")[:3, 3])
     assert wrench[:3] == pytest.approx([0, 0, -weight], abs=0.1 * weight)
 
 
@@ -156,7 +156,7 @@ def test_nothing_bursts_when_what_is_held_is_put_elsewhere(held: Theatre, what: 
         held.needle.set_pose(np.array([0.0, 0.2, 0.78, 0, 0, 0, 1]))
     else:
         for joint, by in zip(sim.scene.arms[0].joints[:2], (0.2, 0.1), strict=True):
-            sim._world.set_joint_position(joint, sim._world.joint_position(joint) + by)
+            sim._world.set_joint_position(joint, sim._world.joints.position(joint) + by)
     top_speed = 0.0
     for _ in range(100):
         sim.step(2)

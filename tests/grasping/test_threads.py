@@ -82,7 +82,7 @@ def test_a_thread_pulled_beyond_the_limit_slides_against_it(thread: Stretched) -
     assert held.share == pytest.approx(1.0, rel=1e-3)
     stretch = 1.5e-3 - held.slip[0]
     assert 0.1e-3 < stretch < 0.6e-3
-    pulled = thread.sim._world.contact_wrench(thread.tools("PSM1"), np.zeros(3))[:3]
+    pulled = thread.sim._world.wrenches.on(thread.tools("PSM1"), np.zeros(3))[:3]
     assert pulled == pytest.approx(limit * thread.back, abs=0.05)
     thread.pull(1.5e-3, speed=0.03)
     assert thread.rod.tension[5] == pytest.approx(limit, rel=0.02)

@@ -43,7 +43,7 @@ def test_a_body_that_is_thrown_is_reported_once_with_its_name(tmp_path: Path) ->
 def test_energy_from_nowhere_is_reported_below_fifty_metres_a_second(tmp_path: Path) -> None:
     simulation = scene(tmp_path, {"BODY ball": BALL})
     simulation.step(20)
-    place = simulation._world.place_of[0]
+    place = simulation._world.engine.place_of[0]
     place.set_twist(np.array([15.0, 0.0, 0.0]), np.zeros(3))
     simulation.step(10)
     (alarm,) = alarms(simulation)
@@ -98,14 +98,14 @@ def _masses(folder: Path) -> tuple[ligature.Simulation, str]:
     )
     bodies = {"BODY a": "{name: a, mass: 1000}", "BODY b": "{name: b, mass: 0.001}"}
     simulation = scene(folder, bodies, {"hinge": joint})
-    simulation._world.place_of[0].set_twist(np.array([70.0, 0.0, 0.0]), np.zeros(3))
+    simulation._world.engine.place_of[0].set_twist(np.array([70.0, 0.0, 0.0]), np.zeros(3))
     return simulation, "joined bodies of 0.001 kg and 1000 kg"
 
 
 def _overlap(folder: Path) -> tuple[ligature.Simulation, str]:
     box = "{name: %s, mass: 1, collision shape: BOX, collision geometry: {x: 1, y: 1, z: 1}}"
     simulation = scene(folder, {"BODY a": box % "a", "BODY b": box % "b"})
-    simulation._world.place_of[0].set_twist(np.array([60.0, 0.0, 0.0]), np.zeros(3))
+    simulation._world.engine.place_of[0].set_twist(np.array([60.0, 0.0, 0.0]), np.zeros(3))
     return simulation, "it overlaps"
 
 

@@ -12,6 +12,7 @@ from ligature.adf import Severity
 from ligature.model.assembly import joint_coordinates
 from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import inverse, pose7_matrix
+from ligature.physics.divergence import joined
 from numpy.typing import NDArray
 
 from tests.physics.linkages import CLOSING, KINDS, linkage
@@ -226,10 +227,11 @@ def test_a_loop_that_diverges_restarts_as_a_whole(tmp_path: Path) -> None:
     sim = Simulation(ligature.load(tmp_path / "model.yaml"))
     start = sim.state["body_pose"].copy()
     sim.step(100)
-    sim._world._motions.everything()
-    moving = next(k for k, tree in enumerate(sim._world.trees) if tree.axes)
-    for k in sim._world._joined([moving]):
-        sim._world._restart(k, sim._world.trees[k])
+    sim._world.engine.motions.everything()
+    engine = sim._world.engine
+    moving = next(k for k, tree in enumerate(engine.trees) if tree.axes)
+    for k in joined(engine, [moving]):
+        engine.restart(k)
     sim._world.write_state(sim.state)
     np.testing.assert_allclose(sim.state["body_pose"], start, atol=1e-9)
     assert gaps(sim).max() < 1e-6

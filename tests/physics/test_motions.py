@@ -43,9 +43,9 @@ def test_links_of_a_moving_arm_are_where_the_engine_has_them(simulate: Callable[
         world.set_joint_position(joint.joint.index, rng.uniform(-0.8, 0.8), rng.uniform(-2.0, 2.0))
     simulation.step(7)
     checked = 0
-    for body, place in world.place_of.items():
+    for body, place in world.engine.place_of.items():
         if place.link >= 0:
-            found = pybullet.getLinkState(place.uid, place.link, 1, 1, physicsClientId=world.client)
+            found = pybullet.getLinkState(place.uid, place.link, 1, 1, physicsClientId=world.engine.client)
             pose, twist = world.motion(body)
             q = np.array(found[1]) * np.sign(np.dot(found[1], pose[3:]))
             np.testing.assert_allclose(pose, [*found[0], *q], atol=1e-12)
@@ -58,7 +58,7 @@ def test_links_of_a_moving_arm_are_where_the_engine_has_them(simulate: Callable[
 
 def test_forces_on_links_reach_the_joints_by_virtual_work(simulate: Callable[[str], Simulation]) -> None:
     simulation = simulate(ARM)
-    world, motions = simulation._world, simulation._world._motions
+    world, motions = simulation._world, simulation._world.engine.motions
     rng = np.random.default_rng(5)
     joints = [joint.joint.index for joint in simulation.joints.values()]
     q = rng.uniform(-0.8, 0.8, size=3)

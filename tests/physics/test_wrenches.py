@@ -22,7 +22,7 @@ def _box(name: str, x: float, z: float) -> str:
 
 
 def _wrench(sim: Simulation, names: list[str], point: np.ndarray) -> np.ndarray:
-    return sim._world.contact_wrench([sim.bodies[name].body.index for name in names], point)
+    return sim._world.wrenches.on([sim.bodies[name].body.index for name in names], point)
 
 
 @pytest.mark.parametrize("order", ["[Floor, A]", "[A, Floor]"])

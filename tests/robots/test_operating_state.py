@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ligature.model.frames import matrix_pose7
 from ligature.robots import psm_arm
 from ligature.robots.axes import Axes
@@ -158,6 +160,37 @@ def test_a_state_command_drives_where_the_table_states(state, command):
     arm.state_command(command)
     settle(arm)
     assert (arm.operating_state.state, arm.operating_state.is_homed) == expected
+
+
+@pytest.mark.parametrize("interval", [1, 37, 199, 200, 300])
+@pytest.mark.parametrize("command", ["enable", "home", "disable", "pause"])
+def test_a_command_that_is_repeated_until_it_has_its_effect_has_it_as_soon(command, interval):
+    once, repeated = make_arm(), make_arm()
+    once.state_command(command)
+    settled_at = settle(once).time
+    for tick in range(round(settled_at / TICK)):
+        if tick % interval == 0:
+            repeated.state_command(command)
+        repeated.tick(TICK)
+    assert settle(repeated).operating_state.state == once.operating_state.state
+    assert repeated.operating_state.is_homed == once.operating_state.is_homed
+    assert repeated.time <= settled_at + 0.05
+
+
+OUTCOMES = {"enable": ENABLED, "home": ENABLED, "resume": ENABLED, "disable": DISABLED, "pause": PAUSED}
+
+
+@given(st.lists(st.tuples(st.sampled_from([*OUTCOMES, "unhome"]), st.integers(0, 400)), min_size=1, max_size=8))
+def test_the_last_accepted_command_decides_whatever_came_before_and_when(commands):
+    arm, expected = make_arm(), DISABLED
+    for command, ticks in commands:
+        try:
+            arm.state_command(command)
+            expected = OUTCOMES.get(command, expected)
+        except Rejected:
+            pass
+        run(arm, ticks * TICK)
+    assert settle(arm).operating_state.state == expected
 
 
 @pytest.mark.parametrize("state", MADE)

@@ -15,6 +15,9 @@ from ligature.adf.values import BadValue, Vector, convert
 class Element:
     """One object of a document: a body, a joint, … or the document's own top level.
 
+    ``kind`` is its table of the schema, ``key`` its name in the file, ``node`` its block, and ``prefix`` stands before
+    the paths of a block within a list.
+
     Paths are dotted keys of the schema; a missing value is the schema's default. Values of an
     element that a document lists are checked: reading them raises nothing.
     """

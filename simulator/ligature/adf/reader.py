@@ -57,27 +57,42 @@ class LaunchDocument(Document):
 
 
 def read_launch(path: Path, resolver: Resolver, strict: bool = False) -> LaunchDocument:
-    """Read a launch file; raises `AdfError` when it is not readable at all."""
+    """Read a launch file; parameters and errors are those of `read_any`: ``path``, ``resolver``, ``strict``."""
     return _launch(_opened(path, resolver), resolver, strict)
 
 
 def read_world(path: Path, resolver: Resolver, strict: bool = False) -> Document:
-    """Read a world file; raises `AdfError` when it is not readable at all."""
+    """Read a world file; parameters and errors are those of `read_any`: ``path``, ``resolver``, ``strict``."""
     return _document(_opened(path, resolver), "world", strict)
 
 
 def read_model(path: Path, resolver: Resolver, strict: bool = False) -> Document:
-    """Read a model file; raises `AdfError` when it is not readable at all."""
+    """Read a model file; parameters and errors are those of `read_any`: ``path``, ``resolver``, ``strict``."""
     return _document(_opened(path, resolver), "model", strict)
 
 
 def read_devices(path: Path, resolver: Resolver, strict: bool = False) -> Document:
-    """Read an input-devices file; raises `AdfError` when it is not readable at all."""
+    """Read an input-devices file; parameters and errors are those of `read_any`: ``path``, ``resolver``, ``strict``."""
     return _document(_opened(path, resolver), "input devices", strict)
 
 
 def read_any(path: Path, resolver: Resolver, strict: bool = False) -> Document:
-    """Read a file of any kind, distinguished by its keys; raises `AdfError` when it is not readable at all."""
+    """Read a file of any kind, distinguished by its keys.
+
+    Parameters
+    ----------
+    path
+        The file.
+    resolver
+        Opens it and the files that it names, below its roots alone.
+    strict
+        Reject what AMBF rejects, instead of the sane reading with a warning.
+
+    Raises
+    ------
+    AdfError
+        When the file is not readable at all.
+    """
     source = _opened(path, resolver)
     kind = kind_of(source.root)
     if kind == "launch":

@@ -61,7 +61,10 @@ class Resolver:
         return cls([scene_root(Path(path)), *extra_roots, *more])
 
     def resolve(self, reference: str, base: Path, mark: Mark | None = None) -> Path:
-        """The path that ``reference`` means in a file of the folder ``base``; raises `ResolutionError`."""
+        """The path that ``reference`` means in a file of the folder ``base``.
+
+        Raises `ResolutionError`, which names ``mark``, the place in the file that refers to it.
+        """
         if "\0" in reference:
             raise self._refusal("the path holds a zero byte", mark)
         if _URL.match(reference):
@@ -69,7 +72,7 @@ class Resolver:
         return self.allow(Path(os.path.join(base, reference)), mark)
 
     def allow(self, path: Path, mark: Mark | None = None) -> Path:
-        """``path`` with links resolved, if it lies below a root; raises `ResolutionError`."""
+        """``path`` with links resolved, if it lies below a root; raises `ResolutionError` at ``mark``."""
         if len(str(path)) > MAX_PATH or any(len(part.encode("utf-8", "replace")) > MAX_NAME for part in path.parts):
             raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark)
         try:
@@ -93,7 +96,7 @@ class Resolver:
             return False
 
     def read_bytes(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> bytes:
-        """The content of ``path``, at most ``limit`` bytes; raises `ResolutionError`."""
+        """The content of ``path``, at most ``limit`` bytes; raises `ResolutionError` at ``mark``."""
         real = self.allow(path, mark)
         try:
             if not real.is_file():
@@ -106,7 +109,10 @@ class Resolver:
             raise self._refusal(f"'{real}' cannot be read: {error.strerror}", mark) from error
 
     def read_text(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> str:
-        """The content of ``path`` as UTF-8 text; raises `ResolutionError`, which names the byte's own place."""
+        """The content of ``path`` as UTF-8 text, at most ``limit`` bytes.
+
+        Raises `ResolutionError` at ``mark``, or at the byte that is no UTF-8.
+        """
         data = self.read_bytes(path, limit, mark)
         try:
             return data.decode("utf-8-sig")

@@ -22,10 +22,11 @@ class TipWrench:
         self._world, self._base, self._bodies, self._arm = world, description.base, tuple(bodies), arm
 
     def __call__(self) -> Array:
-        if not self._world.touched(self._bodies):
+        """Force (N) and moment (N m), (6,)."""
+        if not self._world.wrenches.any(self._bodies):
             return np.zeros(6)
         T_world_base = pose7_matrix(self._world.pose7(self._base))
         tip = T_world_base @ self._arm.kinematics.forward(self._arm.joints.measured()[0])
-        wrench = self._world.contact_wrench(self._bodies, tip[:3, 3])
+        wrench = self._world.wrenches.on(self._bodies, tip[:3, 3])
         R = T_world_base[:3, :3].T
         return np.concatenate([R @ wrench[:3], R @ wrench[3:]])

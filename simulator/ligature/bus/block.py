@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import mmap
 import os
-import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,14 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.bus.events import LOG_BYTES, EventLog
+from ligature.bus.leftovers import FOLDER
 from ligature.bus.ring import RING_BYTES, Ring
 from ligature.deprecation import warn_deprecated
 from ligature.model.state import StateDtype, StateRecord
 
-FOLDER = Path("/dev/shm")
 PRODUCERS = ("ros", "cockpit", "teleop", "window", "spare")
 MAGIC = 0x4C494741
-_NAME = re.compile(r"ligature-(\d+)-[0-9a-f]+\Z")
 
 FIGURES = np.dtype(
     [
@@ -126,8 +124,9 @@ class Block:
         timeout: float = TIMEOUT,
         cancelled: Callable[[], bool] = lambda: False,
         patience: float | None = None,
+        empty: bool = False,
     ) -> Block:
-        """Map the block ``name`` once it holds a state.
+        """Map the block ``name`` once it holds a state; with ``empty``, once it exists.
 
         Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True meanwhile, or
         when the block has another layout. ``patience`` is the former name of ``timeout``.
@@ -139,12 +138,17 @@ class Block:
         while True:
             with suppress(FileNotFoundError):
                 block = cls(FOLDER / name, dtype, False)
-                if int(block.figures["sequence"][0]) >= 2:
+                if empty or block.filled:
                     return block
                 block.close()
             if cancelled() or time.monotonic() > deadline:
                 raise BusError(f"no simulator writes to shared memory '{name}'")
             time.sleep(0.01)
+
+    @property
+    def filled(self) -> bool:
+        """Whether the first state has been written."""
+        return int(self.figures["sequence"][0]) >= 2
 
     def write(self, state: StateRecord) -> None:
         """Publish ``state`` (1,) as the newest."""
@@ -211,20 +215,3 @@ def _reserve(descriptor: int, path: Path, size: int) -> None:
         raise BusError(
             f"cannot allocate {size / 1e6:.0f} MB of shared memory for '{path}': {error.strerror}"
         ) from error
-
-
-def remove(name: str) -> None:
-    """Remove the block ``name``, should its owner have died without doing so."""
-    (FOLDER / name).unlink(missing_ok=True)
-
-
-def remove_leftovers() -> list[str]:
-    """Remove blocks of this user whose supervisor no longer lives; returns their names."""
-    removed = []
-    for path in FOLDER.glob("ligature-*"):
-        match = _NAME.match(path.name)
-        if match and not Path(f"/proc/{match.group(1)}").exists():
-            with suppress(PermissionError, FileNotFoundError):
-                path.unlink()
-                removed.append(path.name)
-    return removed

@@ -29,8 +29,10 @@ LOG_BYTES = _HEADER + SLOTS * SLOT_BYTES
 
 @dataclass(frozen=True)
 class BusEvent:
-    """Something that happened to the arm with number ``arm``, or to the `RUN`; ``name`` is the topic that reports
-    it."""
+    """Something that happened to the arm with number ``arm``, or to the `RUN`.
+
+    ``name`` is the topic that reports it.
+    """
 
     arm: int
     name: str

@@ -22,8 +22,10 @@ class Recording(Message, code=11):
 
 
 def file_name(text: str) -> str:
-    """The file that a person means by ``text``, a name without folders; raises ValueError with the allowed
-    names."""
+    """The file that a person means by ``text``, a name without folders.
+
+    Raises ValueError with the allowed names.
+    """
     name = text.strip()
     if "/" in name or name.startswith(".") or not name.isprintable():
         raise ValueError(f"'{text[:40]}' is not a valid name of a recording; use letters and digits, without folders")

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-SLOT_BYTES = 1280
+SLOT_BYTES = 2560
 MOST_BYTES = SLOT_BYTES - 4
 SLOTS = 1024
 _HEADER = 64
@@ -36,6 +36,9 @@ class Ring:
         at = _HEADER + (head % SLOTS) * SLOT_BYTES
         self._memory[at : at + 4 + len(data)] = struct.pack("<I", len(data)) + data
         self._counters[0] = head + 1
+        if self._beat[0]:
+            # who sends is alive, though its own loop may be kept waiting on a busy machine
+            self.beat()
         return True
 
     def drain(self) -> Iterator[bytes]:

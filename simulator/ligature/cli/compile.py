@@ -12,11 +12,11 @@ from pathlib import Path
 from rich.console import Console
 
 import ligature
-from ligature.cli.demo import EXAMPLE
+from ligature.bundle import SCENES
 from ligature.process import end_with_parent
 
-SCENES = tuple(EXAMPLE.parents[1] / "scenes" / name / "launch.yaml" for name in ("suturing", "peg_transfer"))
-"""Scenes of the repository that between them need nearly all kernels."""
+COMPILED_SCENES = tuple(SCENES / name / "launch.yaml" for name in ("suturing", "peg_transfer"))
+"""Bundled scenes that between them need nearly all kernels."""
 
 TICKS = 300
 """Ticks that each scene runs, of which arms find their home for the last part."""
@@ -24,10 +24,7 @@ TICKS = 300
 
 def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
     """Compile what ``scenes`` need, or what most need; returns 1 when one of them cannot run."""
-    scenes = scenes or [scene for scene in SCENES if scene.is_file()]
-    if not scenes:
-        console.print("name a launch file: the default scenes come with the repository, not with the package")
-        return 2
+    scenes = scenes or COMPILED_SCENES
     begin = time.monotonic()
     console.print(f"compiling the kernels of {len(scenes)} scenes in parallel; this takes 1 to 2 minutes, once")
     running = {scene: _start(scene, console) for scene in scenes}

@@ -70,7 +70,7 @@ def _mjcf(source: Path) -> Converted:
         import mujoco
     except ImportError as error:
         raise MissingReaderError(
-            f"{source}: reading MJCF needs MuJoCo, which is not installed; run 'pip install mujoco==3.3.7'"
+            f"{source}: reading MJCF needs MuJoCo, which is not installed; run: pip install 'ligature-sim[convert]'"
         ) from error
     return from_mjcf(mujoco.MjModel.from_xml_path(str(source)))
 

@@ -1,4 +1,4 @@
-"""``ligature demo``: runs the example that sutures by itself, which lies beside the package in the repository."""
+"""``ligature demo``: runs the bundled example that sutures by itself."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from pathlib import Path
 
 from rich.console import Console
 
+from ligature.bundle import EXAMPLES
 from ligature.process import end_with_parent
 
-EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "suture.py"
+EXAMPLE = EXAMPLES / "suture.py"
 
 
 def demo(throws: int, seed: int, out: Path, dataset: Path | None, console: Console) -> int:
     """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status."""
     if not EXAMPLE.is_file():
-        console.print(f"'{EXAMPLE}' is missing: the demonstration comes with the repository, not with the package")
+        console.print(f"the demonstration '{EXAMPLE}' is missing; install Ligature again")
         return 2
     if dataset is None:
         command = [sys.executable, str(EXAMPLE), "--throws", str(throws), "--seed", str(seed), "--out", str(out)]

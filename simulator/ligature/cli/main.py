@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import os
 from pathlib import Path
@@ -10,10 +11,9 @@ from typing import Annotated, Optional
 import typer
 from rich.console import Console
 
-from ligature.cli.bench import bench as run_bench
-from ligature.cli.check import check as run_check
+from ligature.bundle import launch_file, scene_names
+from ligature.cli.missing import remedy
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
-from ligature.cli.poses import poses as run_poses
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import Softening
 
@@ -24,7 +24,18 @@ app = typer.Typer(
     help="Simulator for robot-assisted suturing.",
 )
 
-Launch = Annotated[Path, typer.Argument(help="Launch file, or one model file.")]
+
+def _launch_files(paths: list[Path] | None) -> list[Path]:
+    return [launch_file(path) for path in paths or []]
+
+
+Launch = Annotated[
+    Path,
+    typer.Argument(
+        help=f"Launch file, one model file, or the name of a bundled scene: {', '.join(scene_names())}.",
+        callback=launch_file,
+    ),
+]
 Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
 Roots = Annotated[
     list[Path] | None, typer.Option("--root", help="Additional folder that scene files may be read from.")
@@ -125,6 +136,8 @@ def run(
 
 def _served_at(text: str | None) -> str:
     """The address of the page, after a look at whether it may be served there."""
+    if importlib.util.find_spec("viser") is None:
+        raise typer.BadParameter(remedy("viser"))
     from ligature.cockpit.address import DEFAULT, TOKEN_VARIABLE, AddressError, check_token, read_address
 
     try:
@@ -154,13 +167,20 @@ def cockpit(
 
 @app.command()
 def check(
-    files: Annotated[list[Path], typer.Argument(help="Launch, world, model or input-device files.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Launch, world, model or input-device files, or names of bundled scenes.", callback=_launch_files
+        ),
+    ],
     strict: Annotated[bool, typer.Option(help="Reject files that AMBF rejects.")] = False,
     root: Roots = None,
     verbose: Annotated[bool, typer.Option("-v", help="Also list keys without effect.")] = False,
     models: Models = None,
 ) -> None:
     """Report every problem of a scene as file:line:column; exit status 1 on errors."""
+    from ligature.cli.check import check as run_check
+
     console = Console(highlight=False, soft_wrap=True)
     raise typer.Exit(run_check(files, root or [], strict, verbose, console, indices(models)))
 
@@ -175,6 +195,8 @@ def bench(
     root: Roots = None,
 ) -> None:
     """Measure the physics of a scene: ticks per second, real-time factor, times by phase, memory."""
+    from ligature.cli.bench import bench as run_bench
+
     raise typer.Exit(run_bench(launch, indices(models), root or [], seconds, rate, json, Console(highlight=False)))
 
 
@@ -182,7 +204,7 @@ def bench(
 def compile_kernels(
     scenes: Annotated[
         Optional[list[Path]],  # noqa: UP045
-        typer.Argument(help="Launch files; by default the scenes of the repository."),
+        typer.Argument(help="Launch files; by default two bundled scenes.", callback=_launch_files),
     ] = None,
 ) -> None:
     """Compile the kernels of scenes ahead of their first start, several at a time."""
@@ -244,7 +266,7 @@ def _five_numbers(text: str) -> tuple[float, float, float, float, float]:
 
 @app.command()
 def decompose(
-    mesh: Launch,
+    mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, STL or 3DS.")],
     out: Annotated[Optional[Path], typer.Option("-o", help="OBJ file to write.")] = None,  # noqa: UP045
     threshold: Annotated[
         float, typer.Option(help="Allowed concavity; smaller values fit more closely.", min=0.01, max=1)
@@ -311,6 +333,8 @@ def poses(
     root: Roots = None,
 ) -> None:
     """Simulate a scene and write the poses of all bodies over time, for editors that play them back."""
+    from ligature.cli.poses import poses as run_poses
+
     raise typer.Exit(run_poses(file, indices(models), root or [], seconds, rate, out, Console(highlight=False)))
 
 
@@ -405,7 +429,14 @@ def teleop(
 
 def main() -> None:
     """Entry point of the command."""
-    app()
+    try:
+        app()
+    except ModuleNotFoundError as error:
+        text = remedy(error.name or "")
+        if not text:
+            raise
+        Console(stderr=True, highlight=False, soft_wrap=True).print(text, style="red", markup=False)
+        raise SystemExit(2) from None
 
 
 if __name__ == "__main__":

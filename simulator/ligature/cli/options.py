@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 import ligature
-from ligature.model.scene import Camera, Scene
+
+if TYPE_CHECKING:
+    from ligature.model.scene import Camera, Scene
 
 
 @dataclass(frozen=True)

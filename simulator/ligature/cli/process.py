@@ -5,6 +5,7 @@ Each has one argument, the run's options as text, and reports to the supervisor 
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +18,9 @@ from ligature.cli.options import RunOptions
 from ligature.model.scene import Scene
 from ligature.model.state import state_dtype
 from ligature.process import end_with_parent, report
+
+STATE_NAP = 0.005
+"""Seconds between two looks for the first state."""
 
 END_TIMEOUT = 10.0
 """Seconds that a process which cannot go on waits for the end of the run, before it is started again."""
@@ -36,6 +40,12 @@ class Run:
         """Whether no signal has asked for the end, and the physics process lives."""
         return not self.stop.is_set() and self.block.active
 
+    def await_state(self) -> None:
+        """Wait until the physics process has written the first state; a process that is asked to end does so."""
+        while not self.block.filled:
+            if self.stop.wait(STATE_NAP):
+                sys.exit(0)
+
     def fail(self, error: Exception) -> NoReturn:
         """End the run for a reason that its user has to put right."""
         report("fatal", str(error))
@@ -48,14 +58,16 @@ class Run:
         sys.exit(0)
 
 
-def run_process(work: Callable[[Run], None], owner: bool = False) -> None:
+def run_process(work: Callable[[Run], None], owner: bool = False, early: bool = False) -> None:
     """Be a process of a run: end with the parent, stop on signals, load the scene, map the shared memory, do ``work``.
 
     The ``owner``, which simulates, creates the shared memory and reports what is wrong with the scene; all others wait
-    until it has written the first state. A process that cannot join ends with a status other than 0.
+    until it has written the first state, unless they are ``early`` and call `Run.await_state` themselves. A process
+    that cannot join ends with a status other than 0.
     """
     end_with_parent()
     stop = stop_on_signal()
+    gc.disable()  # nothing that a start makes is garbage: looking for it takes a fifth of the time
     options = RunOptions.from_text(sys.argv[1])
     try:
         scene = options.load()
@@ -66,9 +78,12 @@ def run_process(work: Callable[[Run], None], owner: bool = False) -> None:
         if owner:
             block = Block.create(options.bus, dtype)
         else:
-            block = Block.attach(options.bus, dtype, cancelled=stop.is_set)
+            block = Block.attach(options.bus, dtype, cancelled=stop.is_set, empty=early)
     except BusError as error:
         _leave(stop, owner, [str(error)], 1)
+    gc.freeze()
+    if not owner:
+        gc.enable()
     work(Run(options, scene, stop, block))
 
 

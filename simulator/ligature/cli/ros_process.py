@@ -1,25 +1,38 @@
-"""The ROS process: hands the run's scene and shared memory to `ligature.ros`."""
+"""The ROS process: hands the run's scene and shared memory to `ligature.ros`.
+
+It imports ROS and advertises all topics while the physics process still builds its world, and a master still starts.
+"""
 
 from __future__ import annotations
 
+import os
+import sys
+
+from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.cli.process import Run, run_process
 from ligature.process import report
+from ligature.ros.master import NameTaken
+from ligature.ros.node import Node
+
+MASTER_NAP = 0.02
+"""Seconds between two questions to a master that does not answer yet."""
 
 
 def main() -> None:
     """Entry point: one argument, the run's options as text."""
-    run_process(_serve)
+    run_process(_serve, early=True)
 
 
 def _serve(run: Run) -> None:
-    from ligature.ros.master import NameTaken
-    from ligature.ros.node import Node
-
-    options = run.options
+    options, uri = run.options, os.environ.get("ROS_MASTER_URI") or DEFAULT_MASTER
+    while not master_answers(uri):  # the supervisor ends the run when none ever does
+        if run.stop.wait(MASTER_NAP):
+            sys.exit(0)
     try:
         node = Node(run.scene, run.block, options.min_hz, options.max_hz, options.names, options.src_crtk)
     except NameTaken as error:
         run.fail(error)
+    run.await_state()
     report("ready", node.summary)
     node.run(run.stop, lambda: report("first-state"))
 

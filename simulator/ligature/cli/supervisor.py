@@ -17,10 +17,11 @@ from typing import NoReturn
 from rich.console import Console
 from rich.markup import escape
 
-from ligature.bus.block import remove, remove_leftovers
+from ligature.bus.leftovers import remove, remove_leftovers
 from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
 from ligature.cli import master
 from ligature.cli.options import RunOptions
+from ligature.cli.ros_packages import ros_problem
 from ligature.process import end_with_parent, lower_priority
 
 MASTER_TIMEOUT = 15.0
@@ -145,16 +146,20 @@ class Supervisor:
         self._print(f"loading [bold]{escape(self._options.scene)}[/bold]")
         for note in self._options.notes:
             self._console.print(note, style="dim", markup=False)
+        problem = ros_problem() if self._options.ros else ""
+        if problem:
+            self._fail(problem)
+            return
         self._progress.start()
         text = self._options.to_text()
         self._children["physics"] = Child(
             "physics", [sys.executable, "-m", "ligature.cli.physics", text], self._events, self._env
         )
-        if self._options.ros and self._master_ready():
+        if self._options.ros and self._master_begun():
             self._children["ros"] = Child(
                 "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
             )
-            if self._options.task:
+            if self._master_answers() and self._options.task:
                 self._children["tasks"] = Child(
                     "tasks", [sys.executable, "-m", "ligature.cli.tasks_process", text], self._events, self._env
                 )
@@ -165,8 +170,8 @@ class Supervisor:
             command = [sys.executable, "-m", module, self._options.to_text()]
             self._children[name] = Child(name, command, self._events, self._env, nice)
 
-    def _master_ready(self) -> bool:
-        """Whether a ROS master answers, after one was started where there was none."""
+    def _master_begun(self) -> bool:
+        """Whether there is a ROS master, after one was started where none answered: it may still take a second."""
         uri = self._env["ROS_MASTER_URI"] = self._env.get("ROS_MASTER_URI") or master.DEFAULT_MASTER
         if master.master_answers(uri):
             self._print(f"using the ROS master at {uri}")
@@ -176,7 +181,14 @@ class Supervisor:
             self._fail(problem)
             return False
         self._print(f"no ROS master answers at {uri}: starting one")
-        child = self._children["master"] = Child("master", master.command(uri), self._events, self._env)
+        self._children["master"] = Child("master", master.command(uri), self._events, self._env)
+        return True
+
+    def _master_answers(self) -> bool:
+        """Wait until a master that was started answers; the run is over when it does not."""
+        child, uri = self._children.get("master"), self._env["ROS_MASTER_URI"]
+        if child is None:
+            return True
         deadline = time.monotonic() + MASTER_TIMEOUT
         while time.monotonic() < deadline and not self._stopping and child.process.poll() is None:
             if master.master_answers(uri):

@@ -26,8 +26,8 @@ class BaseObject:
     Setters change a stored command, which the client's thread publishes as long as the object is active: a target
     holds until the next one. Before the first message the state is an empty message: zero everywhere.
 
-    ``time_out`` (seconds) is taken as AMBF takes it and clears nothing here: a client that lives repeats its
-    command, and of one that died the simulator releases it.
+    ``ral`` is the layer to ROS, ``a_name`` the object's name. ``time_out`` (seconds) is taken as AMBF takes it and
+    clears nothing here: a client that lives repeats its command, and of one that died the simulator releases it.
     """
 
     State: ClassVar[type]
@@ -129,11 +129,17 @@ class BaseObject:
         return self._wanted_pose().orientation
 
     def set_pos(self, px: float, py: float, pz: float) -> None:
-        """Command a position; the orientation stays the commanded one, or the measured one before any."""
+        """Command a position ``px``, ``py``, ``pz`` (m).
+
+        The orientation stays the commanded one, or the measured one before any.
+        """
         self._move(Point(float(px), float(py), float(pz)), self.get_rot_command())
 
     def set_rpy(self, roll: float, pitch: float, yaw: float) -> None:
-        """Command an orientation; the position stays the commanded one, or the measured one before any."""
+        """Command an orientation by ``roll``, ``pitch``, ``yaw`` (rad).
+
+        The position stays the commanded one, or the measured one before any.
+        """
         self._move(self.get_pos_command(), Quaternion(*quaternion_from_euler(roll, pitch, yaw)))
 
     def set_rot(self, quat: Sequence[float]) -> None:

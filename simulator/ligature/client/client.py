@@ -44,6 +44,8 @@ class Client:
     ``get_obj_handle`` makes an object *active*: one daemon thread publishes the commands of all active objects at the
     rate given to `connect`, so that targets hold until they are changed. Objects that appear after `connect` are
     found by `refresh`. Names that match no object or several give None, with a message that lists what there is.
+
+    ``client_name`` is the name of the ROS node; `connect` looks for objects ``max_discovery_attempts`` times.
     """
 
     def __init__(self, client_name: str = "ambf_client", max_discovery_attempts: int = 5) -> None:
@@ -128,7 +130,7 @@ class Client:
         return None if handle is None else handle.get_pose()
 
     def set_obj_cmd(self, name: str, fx: float, fy: float, fz: float, nx: float, ny: float, nz: float) -> None:
-        """Command force and torque on the body of that name."""
+        """Command force ``fx``, ``fy``, ``fz`` (N) and torque ``nx``, ``ny``, ``nz`` (N m) on the body ``name``."""
         handle = self.get_obj_handle(name)
         if handle is not None:
             handle.wrench_command(fx, fy, fz, nx, ny, nz)

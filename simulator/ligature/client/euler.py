@@ -25,7 +25,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: str = "sxyz") -
 
 
 def euler_from_quaternion(quaternion: Sequence[float], axes: str = "sxyz") -> tuple[float, float, float]:
-    """Angles about the three ``axes`` of a quaternion x, y, z, w of any length.
+    """Angles about the three ``axes`` of a ``quaternion`` x, y, z, w of any length.
 
     The first and third are in -π..π; where both are about one axis, one of them is zero. A quaternion of zero length,
     as in a message that was never filled, is no rotation. Bernardes and Viollet, PLOS ONE 17(11), 2022, algorithm 1.

@@ -123,7 +123,10 @@ class ral:  # noqa: N801 - the name that clients import
         return bool(rospy.is_shutdown())
 
     def publisher(self, topic: str, type_: type, queue_size: int = 10, latch: bool = False) -> rospy.Publisher:
-        """A publisher on ``topic`` below the namespace."""
+        """A publisher of messages ``type_`` on ``topic`` below the namespace.
+
+        ``queue_size`` and ``latch`` as in rospy.
+        """
         publisher = rospy.Publisher(self._resolved(topic), type_, queue_size=queue_size, latch=latch, tcp_nodelay=True)
         self._publishers.append(publisher)
         return publisher
@@ -131,13 +134,16 @@ class ral:  # noqa: N801 - the name that clients import
     def subscriber(
         self, topic: str, type_: type, callback: Callable[[Any], Any], queue_size: int = 10, latch: bool = False
     ) -> rospy.Subscriber:
-        """A subscriber on ``topic`` below the namespace; ``latch`` has no meaning in ROS 1."""
+        """A subscriber that calls ``callback`` with messages ``type_`` on ``topic`` below the namespace.
+
+        ``queue_size`` as in rospy; ``latch`` has no meaning in ROS 1.
+        """
         subscriber = rospy.Subscriber(self._resolved(topic), type_, callback, queue_size=queue_size, tcp_nodelay=True)
         self._subscribers.append(subscriber)
         return subscriber
 
     def service_client(self, name: str, type_: type) -> rospy.ServiceProxy:
-        """A callable for the service ``name`` below the namespace."""
+        """A callable for the service ``name`` of ``type_`` below the namespace."""
         service = rospy.ServiceProxy(self._resolved(name), type_)
         self._services.append(service)
         return service
@@ -161,7 +167,9 @@ class ral:  # noqa: N801 - the name that clients import
         end.unregister()
 
     def check_connections(self, timeout_seconds: float = 5.0, check_children: bool = True) -> None:
-        """Wait until every publisher is listened to and every subscriber is served, here and in children.
+        """Wait until every publisher is listened to and every subscriber is served.
+
+        With ``check_children`` also in children.
 
         TimeoutError names what is missing after ``timeout_seconds``; zero looks once. Services are not checked.
         """

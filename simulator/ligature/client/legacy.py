@@ -18,7 +18,10 @@ class Object(JointedObject):
     def pose_command(
         self, px: float, py: float, pz: float, roll: float, pitch: float, yaw: float, *joints: float
     ) -> None:
-        """Command a pose, turned as in `RigidBody.pose_command`, and the positions of the first joints."""
+        """Command a pose, and the positions of the first ``joints`` (rad, m).
+
+        At ``px``, ``py``, ``pz`` (m), turned by ``roll``, ``pitch``, ``yaw`` (rad) as in `RigidBody.pose_command`.
+        """
         rotation = Quaternion(*quaternion_from_euler(roll, pitch, yaw, "szyx"))
         self.set_pose(Pose(Point(float(px), float(py), float(pz)), rotation))
         with self._lock:
@@ -26,11 +29,11 @@ class Object(JointedObject):
             self._cmd.position_controller_mask = [True] * len(joints)
 
     def set_joint_pos(self, joint_name_or_idx: str | int, pos: float) -> None:
-        """Command the position of a joint."""
+        """Command the position ``pos`` (rad, m) of the joint ``joint_name_or_idx``."""
         self._command_joint(joint_name_or_idx, pos, True)
 
     def set_joint_effort(self, joint_name_or_idx: str | int, effort: float) -> None:
-        """Command the torque or force of a joint."""
+        """Command the ``effort`` (N m, N) of the joint ``joint_name_or_idx``."""
         self._command_joint(joint_name_or_idx, effort, False)
 
     def _pose_commanded(self) -> None:

@@ -32,11 +32,11 @@ class RigidBody(JointedObject):
         return self._state.twist.angular
 
     def set_linear_vel(self, vx: float, vy: float, vz: float) -> None:
-        """Command a velocity; the angular one stays the commanded one."""
+        """Command a velocity ``vx``, ``vy``, ``vz`` (m/s); the angular one stays the commanded one."""
         self.set_twist(Twist(vector(vx, vy, vz), self._cmd.twist.angular))
 
     def set_angular_vel(self, ax: float, ay: float, az: float) -> None:
-        """Command an angular velocity; the linear one stays the commanded one."""
+        """Command an angular velocity ``ax``, ``ay``, ``az`` (rad/s); the linear one stays the commanded one."""
         self.set_twist(Twist(self._cmd.twist.linear, vector(ax, ay, az)))
 
     def set_twist(self, twist: Twist) -> None:
@@ -50,13 +50,15 @@ class RigidBody(JointedObject):
     def velocity_command(
         self, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, *_joints: float
     ) -> None:
-        """Command linear and angular velocity by their components."""
+        """Command linear ``vx``, ``vy``, ``vz`` (m/s) and angular velocity ``ax``, ``ay``, ``az`` (rad/s)."""
         self.set_twist(Twist(vector(vx, vy, vz), vector(ax, ay, az)))
 
     def pose_command(
         self, px: float, py: float, pz: float, roll: float, pitch: float, yaw: float, *_joints: float
     ) -> None:
-        """Command a pose whose turns are about fixed z by ``roll``, y by ``pitch``, x by ``yaw``, in that order.
+        """Command a pose at ``px``, ``py``, ``pz`` (m).
+
+        Its turns (rad) are about fixed z by ``roll``, y by ``pitch``, x by ``yaw``, in that order.
 
         AMBF's clients turn so in this call alone; `set_rpy` turns about x, y, z.
         """
@@ -80,30 +82,36 @@ class RigidBody(JointedObject):
         return list(self._listed.joint_efforts)
 
     def set_joint_pos(self, joint_name_or_idx: str | int, pos: float) -> None:
-        """Command the position of a joint.
+        """Command the position ``pos`` (rad, m) of the joint ``joint_name_or_idx``.
 
         Joints before it that were never commanded are commanded a force of zero: they go limp.
         """
         self._command_joint(joint_name_or_idx, pos, POSITION)
 
     def set_joint_vel(self, joint_name_or_idx: str | int, vel: float) -> None:
-        """Command the velocity of a joint; other joints as in `set_joint_pos`."""
+        """Command the velocity ``vel`` (rad/s, m/s) of the joint ``joint_name_or_idx``.
+
+        Other joints as in `set_joint_pos`.
+        """
         self._command_joint(joint_name_or_idx, vel, VELOCITY)
 
     def set_joint_effort(self, joint_name_or_idx: str | int, effort: float) -> None:
-        """Command the torque or force of a joint; other joints as in `set_joint_pos`."""
+        """Command the ``effort`` (N m, N) of the joint ``joint_name_or_idx``; other joints as in `set_joint_pos`."""
         self._command_joint(joint_name_or_idx, effort, FORCE)
 
     def set_multiple_joint_pos(self, joints_pos: Sequence[float], joints_idx: Sequence[int]) -> None:
-        """Command positions: one for each of ``joints_idx``, or of all joints, of which ``joints_idx`` are meant."""
+        """Command ``joints_pos`` (rad, m).
+
+        One for each of ``joints_idx``, or of all joints, of which ``joints_idx`` are meant.
+        """
         self._command_joints(joints_pos, joints_idx, POSITION)
 
     def set_multiple_joint_vel(self, joints_vel: Sequence[float], joints_idx: Sequence[int]) -> None:
-        """Command velocities, given as in `set_multiple_joint_pos`."""
+        """Command ``joints_vel`` (rad/s, m/s) of ``joints_idx``, given as in `set_multiple_joint_pos`."""
         self._command_joints(joints_vel, joints_idx, VELOCITY)
 
     def set_multiple_joint_effort(self, joints_effort: Sequence[float], joints_idx: Sequence[int]) -> None:
-        """Command torques and forces, given as in `set_multiple_joint_pos`."""
+        """Command ``joints_effort`` (N m, N) of ``joints_idx``, given as in `set_multiple_joint_pos`."""
         self._command_joints(joints_effort, joints_idx, FORCE)
 
     def _pose_commanded(self) -> None:

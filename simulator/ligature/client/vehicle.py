@@ -13,7 +13,10 @@ from ligature.client.joints import grown
 
 
 class Vehicle(BaseObject):
-    """A chassis with wheels, of which all are powered and steered unless set otherwise."""
+    """A chassis with wheels, of which all are powered and steered unless set otherwise.
+
+    ``arguments`` and ``named`` are those of `BaseObject`.
+    """
 
     State = VehicleState
     Command = VehicleCmd
@@ -56,15 +59,15 @@ class Vehicle(BaseObject):
         self._set_all("wheel_steering", self._steered, lambda wheel: self._ackermann(wheel, value))
 
     def set_wheel_power(self, idx: int, value: float) -> None:
-        """Power of one wheel."""
+        """Power ``value`` of the wheel ``idx``."""
         self._set("wheel_power", idx, value)
 
     def set_wheel_steering(self, idx: int, value: float) -> None:
-        """Angle of one wheel."""
+        """Angle ``value`` (rad) of the wheel ``idx``."""
         self._set("wheel_steering", idx, value)
 
     def set_wheel_brake(self, idx: int, value: float) -> None:
-        """Brake of one wheel."""
+        """Brake ``value`` of the wheel ``idx``."""
         self._set("wheel_brake", idx, value)
 
     def _ackermann(self, wheel: int, angle: float) -> float:

@@ -20,7 +20,10 @@ _POLL = 0.01
 
 
 class World(BaseObject):
-    """The world. It is published by `update`, and periodically only after `set_active`."""
+    """The world. It is published by `update`, and periodically only after `set_active`.
+
+    ``ral``, ``a_name`` and ``time_out`` are those of `BaseObject`.
+    """
 
     State = WorldState
     Command = WorldCmd

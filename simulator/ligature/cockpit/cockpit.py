@@ -38,6 +38,9 @@ PERIOD = 0.01
 STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD = 0.05, 0.2, 0.4
 """Seconds between turns of the loop, poses, words and controls, and curves."""
 
+AFTER_FAILURE = 1.0
+"""Seconds after which a part of the page that failed is tried again."""
+
 REPORTED = ("warning", "error")
 """Events of an arm that are shown beside it."""
 
@@ -68,7 +71,7 @@ class Cockpit:
         self._inbox: deque[tuple[str, int, Any]] = deque()
         self._clockwork = Clockwork(self._outbox.push)
         self._speed = "1"
-        self._record_as, self._recorded = "", ""
+        self._record_as, self._recorded, self._reported = "", "", ""
         facts = [ArmFacts.of(scene, index) for index in range(len(scene.arms))]
         self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
         self._curves = Curves(scene, task)
@@ -125,16 +128,29 @@ class Cockpit:
         self._block.read(self._state)
         while self._inbox:
             word, client, value = self._inbox.popleft()
-            if not self._audience.hear(word, client, value, now):
-                self._obey(word, value)
+            try:
+                if not self._audience.hear(word, client, value, now):
+                    self._obey(word, value)
+            except Exception as error:  # nothing that one browser does ends the page for the others
+                self._report(f"'{word}' of a browser failed", error)
         self._follow(now, now - self._last)
         self._last = now
         self._curves.observe(self._state[0])
         for show, due in self._due.items():
             if now >= due:
-                self._due[show] = now + show(now)
+                try:
+                    self._due[show] = now + show(now)
+                except Exception as error:
+                    self._due[show] = now + AFTER_FAILURE
+                    self._report(f"'{show.__name__}' of the page failed", error)
         self._outbox.flush()
         time.sleep(max(PERIOD - (time.monotonic() - now), 0.0))
+
+    def _report(self, what: str, error: Exception) -> None:
+        words = f"{what}: {type(error).__name__}: {error}"
+        if words != self._reported:
+            self._reported = words
+            self._warn(words)
 
     def close(self) -> None:
         """End the page."""

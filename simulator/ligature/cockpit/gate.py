@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import http
+import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from html import escape
@@ -22,9 +23,22 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ligature.cockpit.address import Address
+from ligature.cockpit.intake import MOST_BYTES, careful
 
 COOKIE = "ligature_cockpit"
 PARAMETER = "token"
+
+HEADERS = {
+    "Content-Security-Policy": "frame-ancestors 'none'",
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+"""Of every answer: no other page shows this one in a frame, and the token in the address goes to nobody else."""
+
+MOST_PATH = 2000
+"""Most characters of the path of a request."""
 
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Ligature cockpit</title>
 <body style="font-family: sans-serif; background: #1a1b1e; color: #c1c2c5; text-align: center; padding-top: 20vh">
@@ -49,15 +63,18 @@ class Gate:
         return found
 
     def _answer(self, request: Request) -> Response | None:
-        host = request.headers.get("Host", "")
+        hosts = request.headers.get_all("Host")
+        if len(hosts) != 1 or len(request.path) > MOST_PATH:
+            return _refusal(http.HTTPStatus.BAD_REQUEST, "A request has one host and a short address.")
+        (host,) = hosts
         if self._local and not _names_this_machine(host):
             return _refusal(http.HTTPStatus.FORBIDDEN, f"'{host}' is not a name of this machine.")
         origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and _authority(origin) != host:
             return _refusal(http.HTTPStatus.FORBIDDEN, "Requests from other sites are rejected.")
         if not self._token or self._has_pass(request.headers):
             return None
-        shown = parse_qs(urlsplit(request.path).query).get(PARAMETER, [""])[0]
+        shown = parse_qs(request.path.partition("?")[2]).get(PARAMETER, [""])[0]
         if not shown:
             return _refusal(http.HTTPStatus.UNAUTHORIZED, "This page needs the token of the cockpit.")
         if not hmac.compare_digest(shown.encode(), self._token.encode()):
@@ -74,8 +91,18 @@ class Gate:
 
 
 def _names_this_machine(host: str) -> bool:
-    name = urlsplit(f"//{host}").hostname or ""
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+    except ValueError:  # as "[::1", which never closes
+        return False
     return Address(name, 0).loopback
+
+
+def _authority(origin: str) -> str | None:
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return None
 
 
 def _refusal(status: http.HTTPStatus, why: str) -> Response:
@@ -91,14 +118,25 @@ def guarded(gate: Gate) -> Iterator[None]:
     """Have ``gate`` stand before a websocket server that is started within: viser has no hook for that of its own."""
     serve = websockets.asyncio.server.serve
 
-    def guarded_serve(*arguments: Any, process_request: Callable[..., Any] | None = None, **options: Any) -> Any:
-        def process(connection: ServerConnection, request: Request) -> Any:
-            refusal = gate.answer(request)
-            if refusal is not None or process_request is None:
-                return refusal
-            return process_request(connection, request)
+    def guarded_serve(
+        handler: Callable[..., Any],
+        *arguments: Any,
+        process_request: Callable[..., Any] | None = None,
+        **options: Any,
+    ) -> Any:
+        async def process(connection: ServerConnection, request: Request) -> Any:
+            response = gate.answer(request)
+            if response is None and process_request is not None:
+                response = process_request(connection, request)
+                if inspect.isawaitable(response):
+                    response = await response
+            if isinstance(response, Response):
+                for name, value in HEADERS.items():
+                    response.headers[name] = value
+            return response
 
-        return serve(*arguments, process_request=process, **options)
+        options["max_size"] = MOST_BYTES
+        return serve(careful(handler), *arguments, process_request=process, **options)
 
     websockets.asyncio.server.serve = guarded_serve  # type: ignore[assignment,misc]
     try:

@@ -13,6 +13,7 @@ from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 
 from ligature.cockpit.address import Address, AddressError, check_free
 from ligature.cockpit.gate import Gate, guarded
+from ligature.cockpit.intake import check_input
 from ligature.cockpit.stage import VIEW_ANGLE
 
 BRAND = (28, 126, 214)
@@ -24,6 +25,7 @@ def serve(address: Address, gate: Gate) -> ViserServer:
     """A page at ``address`` behind ``gate``; raises `AddressError` when the address is unavailable."""
     if address.port:
         check_free(address)
+    check_input()
     with guarded(gate), contextlib.redirect_stdout(io.StringIO()):
         server = ViserServer(address.host, address.port, "Ligature", verbose=False)
     if address.port and server.get_port() != address.port:

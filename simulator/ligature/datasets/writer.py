@@ -137,7 +137,10 @@ class DatasetWriter:
         return True
 
     def end_episode(self, success: bool, **remarks: float | int | str) -> None:
-        """End the episode, with ``remarks`` as its attributes; without a sample there is none to end."""
+        """End the episode, with ``success`` and ``remarks`` as its attributes.
+
+        Without a sample there is none to end.
+        """
         if self._episode is None:
             return
         with self._writing():

@@ -33,6 +33,12 @@ class Goal(Protocol):
     scene: str
     """Folder of the scene of ours that the task is made for."""
 
+    models: tuple[int, ...]
+    """Models of its launch file that the task needs: one arm, where all of them are simulated for nothing."""
+
+    thread: bool
+    """Whether the task needs the needle's thread."""
+
     arm: str
     """Name of the arm that does it."""
 
@@ -70,7 +76,7 @@ class Reach:
     """Bring the tool's control point to within 2 mm of a random place above the work."""
 
     holes = 0
-    scene, arm = "suturing_small", "PSM1"
+    scene, arm, models, thread = "suturing_small", "PSM1", (0, 1, 2), False
     WITHIN = 0.002
     REACH = np.array([0.025, 0.025, 0.012])
 
@@ -95,7 +101,7 @@ class Pick:
     """Grasp the needle, which lies somewhere on the pad, and lift it by 20 mm."""
 
     holes = 0
-    scene, arm = "suturing_small", "PSM1"
+    scene, arm, models, thread = "suturing_small", "PSM1", (0, 1, 2), True
     HEIGHT = 0.02
     SPREAD = 0.012
 
@@ -138,7 +144,7 @@ class Insert:
     """
 
     holes = 1
-    scene, arm = "suturing", "PSM2"
+    scene, arm, models, thread = "suturing", "PSM2", (0, 1, 4, 5), True
     DEPTHS = (0.020, 0.0205, 0.021)
     BEFORE, MORE, LOOK = 0.4, 0.1, 0.15
     SHIFT, TURN = 0.002, 0.08
@@ -232,6 +238,7 @@ class Puncture(Insert):
 
     holes = 0
     scene, arm = "needle_insertion", "PSM2"
+    models, thread = (0, 1, 2), True
     CHORD = 0.014
 
     def _ends(self) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ Metres, radians, world axes.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from ligature.bundle import SCENES
 from ligature.camera_simulation import Simulation
 from ligature.environments.goals import GOALS, Goal, tip_position
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.load import load
+from ligature.model.scene import Scene
 from ligature.robots.operating_state import Rejected
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks.scenery import Scenery
@@ -28,9 +31,6 @@ CONTROL = 0.02
 
 STEP_LENGTH, STEP_ANGLE, STEP_JAW = 0.001, 0.05, 0.1
 """Metres, radians and radians of jaw that an action of 1 means."""
-
-SCENES = Path(__file__).resolve().parents[3] / "scenes"
-"""Our scenes, in the repository that this package is installed from."""
 
 STEP_JOINTS = np.array([0.01, 0.01, 0.001, 0.08, 0.06, 0.06])
 SUCCESS_REWARD = 1.0
@@ -73,10 +73,18 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     task
         ``reach``, ``pick``, ``insert`` or ``puncture`` (`ligature.environments.goals`).
     scene
-        A launch file with a PSM and a needle, holes for ``insert`` and soft tissue for ``puncture``; by default that
-        of ours for the task.
+        A launch file with a PSM and a needle, holes for ``insert`` and soft tissue for ``puncture``; by default what
+        the task needs of a scene of ours, without the other arms, and for ``reach`` without the thread.
     arm
-        Name of the arm; by default the one that does the task.
+        Name of the arm; by default the one that does the task. Another one brings the whole scene.
+    action, observation, reward
+        As above.
+    camera, size
+        Name of the camera, and width and height of its pictures in pixels.
+    max_steps
+        Actions until an episode is cut.
+    render_mode
+        ``rgb_array`` to draw with `render`, or None.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012 (as the base class)
@@ -101,8 +109,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             if value not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
         self._goal: Goal = GOALS[task]()
-        self._simulation = Simulation(load(scene or SCENES / self._goal.scene / "launch.yaml"))
         arm = arm or self._goal.arm
+        self._simulation = Simulation(_scene(self._goal, arm) if scene is None else load(scene))
         found = self._simulation.arms[arm]
         if not isinstance(found, PsmArm):
             raise ValueError(f"'{arm}' is not a PSM")
@@ -144,7 +152,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self._arm.local_setpoint_cp()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; ``options`` has no keys."""
+        """Begin an episode; ``seed`` begins another series of random starts, ``options`` has no keys."""
         super().reset(seed=seed)
         self._simulation.restore(self._settled)
         self._goal.begin(self._simulation, self._scenery, self._arm, self.np_random)
@@ -211,6 +219,16 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         if not self._closed:
             self._closed = True
             self._simulation.close()
+
+
+def _scene(goal: Goal, arm: str) -> Scene:
+    """What a task needs of its scene; all of it when another arm than the task's own is asked for."""
+    path = SCENES / goal.scene / "launch.yaml"
+    if arm != goal.arm:
+        return load(path)
+    scene = load(path, goal.models)
+    arms = tuple(found for found in scene.arms if found.name == arm)
+    return replace(scene, arms=arms, rods=scene.rods if goal.thread else ())
 
 
 def _stepped(arm: PsmArm, action: Array) -> Array:

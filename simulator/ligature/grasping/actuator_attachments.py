@@ -29,7 +29,7 @@ class ActuatorAttachments:
         if child in self._rod_bodies:
             self._rods.attach(parent, child, T_parent_frame, T_child_frame)
             return ("element", parent, child)
-        handle = self._world.add_weld(parent, child, T_parent_frame, T_child_frame)
+        handle = self._world.welds.add(parent, child, T_parent_frame, T_child_frame)
         self._set_held(child, True)
         return ("weld", handle, child)
 
@@ -38,7 +38,7 @@ class ActuatorAttachments:
         if child in self._rod_bodies:
             return self.attach(parent, child, T_parent_frame, T_child_frame)
         number = self._grasps.add(slip, parent, child, T_parent_frame)
-        self._rods.update_masses(self._world)
+        self._rods.update_masses(self._world.masses)
         return ("grasp", number, child)
 
     def holds(self, handle: Any) -> bool:
@@ -51,13 +51,13 @@ class ActuatorAttachments:
         """Release the body of a handle from `attach` or `grasp`."""
         if handle[0] == "grasp":
             self._grasps.remove(handle[1])
-            self._rods.update_masses(self._world)
+            self._rods.update_masses(self._world.masses)
         elif handle[0] == "element":
             self._rods.detach(handle[1], handle[2])
         else:
-            self._world.remove_weld(handle[1])
+            self._world.welds.remove(handle[1])
             self._set_held(handle[2], False)
 
     def _set_held(self, body: int, held: bool) -> None:
-        self._world.set_held(body, held)
-        self._rods.update_masses(self._world)
+        self._world.masses.set_held(body, held)
+        self._rods.update_masses(self._world.masses)

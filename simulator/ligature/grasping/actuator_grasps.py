@@ -25,8 +25,10 @@ class ActuatorGrasps:
         return [grasp for grasp, _ in self._grasps.values()]
 
     def add(self, slip: Slip, parent: int, child: int, T_parent_frame: np.ndarray) -> int:
-        """Grasp ``child`` where it is, between pads in a frame (4, 4) of body ``parent``; returns the grasp's
-        number."""
+        """Grasp ``child`` where it is, between pads in a frame (4, 4) of body ``parent``.
+
+        Returns the grasp's number.
+        """
         bodies = self._scene.bodies
         T_palm_patch = inverse(bodies[parent].T_body_inertial) @ T_parent_frame
         patch = Patch(T_palm_patch, slip.half_width, slip.friction * bodies[child].friction)
@@ -34,22 +36,24 @@ class ActuatorGrasps:
         grasp.normal_force = slip.normal_force
         self._added += 1
         self._grasps[self._added] = BodyGrasp(child, parent, grasp, ride), slip.reach
-        self._world.set_held(child, True, grasped=True)
+        self._world.masses.set_held(child, True, grasped=True)
         return self._added
 
     def remove(self, number: int) -> None:
         """Release the body; does nothing when it has slipped out already."""
         if number in self._grasps:
             grasp, _ = self._grasps.pop(number)
-            self._world.set_held(grasp.body, False, grasped=True)
+            self._world.masses.set_held(grasp.body, False, grasped=True)
 
     def holds(self, number: int) -> bool:
         """Whether the grasp still holds its body."""
         return number in self._grasps
 
     def release(self, body: int | None = None, slipped: bool = False) -> bool:
-        """Release ``body``, all bodies for None, or only those that have ``slipped`` out; returns whether there was
-        any."""
+        """Release ``body``, all bodies for None, or only those that have ``slipped`` out.
+
+        Returns whether there was any.
+        """
         released = [
             number
             for number, (grasp, reach) in self._grasps.items()

@@ -75,7 +75,7 @@ class Fingers:
         axis, pivot = self.axis()
         found = []
         for finger, own in enumerate(self.jaw.fingers):
-            gaps = self._world.gaps(own, body, within)
+            gaps = self._world.queries.gaps(own, body, within)
             if gaps is None:
                 return None
             for gap, point, normal in zip(gaps.distance, gaps.point, gaps.normal, strict=True):
@@ -90,16 +90,16 @@ class Fingers:
 
     def near(self, body: int) -> bool:
         """Whether a body touches a finger."""
-        return any(self._world.gaps(own, body, 0.0) is not None for own in self.jaw.fingers)
+        return any(self._world.queries.gaps(own, body, 0.0) is not None for own in self.jaw.fingers)
 
     def driven(self) -> bool:
         """Whether a command drives a finger; undriven fingers grasp nothing."""
-        return any(self._world.joint_driven(joint) for joint in self.jaw.joints)
+        return any(self._world.joints.driven(joint) for joint in self.jaw.joints)
 
     def efforts(self) -> tuple[float, float]:
         """Efforts (N m) with which the commands of both fingers would close them; negative ones open."""
         one, two = (
-            -opening * self._world.requested_effort(joint, STIFFNESS)
+            -opening * self._world.joints.requested_effort(joint, STIFFNESS)
             for joint, opening in zip(self.jaw.joints, self.jaw.opening, strict=True)
         )
         return min(one, EFFORT), min(two, EFFORT)
@@ -112,7 +112,7 @@ class Fingers:
             speed = (PUSH_SPEED + max(face.gap, 0.0) / (APPROACH * self._world.dt)) / lever
             strength = PUSH * lever if face.gap < 10 * TOUCH else np.inf
             low, high = (-speed, np.inf) if opening > 0.0 else (-np.inf, speed)
-            self._world.slow_joint(joint, low, high, strength)
+            self._world.joints.slow(joint, low, high, strength)
 
     def approach_thread(self, box: Array) -> None:
         """Slow the fingers as they close on a thread within their box (2, 3)."""
@@ -123,7 +123,7 @@ class Fingers:
         """Stop both fingers at ``positions``; they press with ``effort``."""
         self._slowed = True
         for joint, opening, at, tau in zip(self.jaw.joints, self.jaw.opening, positions, effort, strict=True):
-            self._world.stop_joint(joint, at, -opening * tau)
+            self._world.joints.stop(joint, at, -opening * tau)
 
     def moved(
         self, positions: tuple[float, float], distances: tuple[float, float], levers: tuple[float, float]
@@ -140,7 +140,7 @@ class Fingers:
         if self._slowed:
             self._slowed = False
             for joint in self.jaw.joints:
-                self._world.release_joint(joint)
+                self._world.joints.let(joint)
 
     def reset(self) -> None:
         """Follow commands, after the world was reset."""
@@ -156,5 +156,5 @@ class Fingers:
 
     def positions(self) -> tuple[float, float]:
         """Positions of both joints in radians."""
-        one, two = (self._world.joint_position(joint) for joint in self.jaw.joints)
+        one, two = (self._world.joints.position(joint) for joint in self.jaw.joints)
         return one, two

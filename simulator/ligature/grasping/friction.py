@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6
 from ligature.suture.rotations import cross, matrix_of, multiply, rotate, rotate_back, rotation_vector
-from ligature.suture.tables import opener
+from ligature.tables import opener
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 SWEEPS = 20
 """Gauss-Seidel sweeps over the grasps of one body and the rows that slip."""
@@ -37,7 +38,7 @@ degree."""
 
 
 @inlined
-def _spring(row, dt):
+def _spring(row: int, dt: float) -> tuple[float, float]:
     """Bias per metre or radian and softness of an implicit spring and damper (Catto, Soft Constraints, 2011)."""
     k, c = (STIFFNESS, DAMPING) if row < 3 else (TURN_STIFFNESS, TURN_DAMPING)
     return k / (c + dt * k), 1.0 / (dt * (c + dt * k))
@@ -114,7 +115,7 @@ open_motions, open_grasps, open_scratch = opener(motions(1)), opener(grasp_array
 
 
 @inlined
-def _place(g, body_pose, palm_pose, grasps, room):
+def _place(g: int, body_pose: Array, palm_pose: Array, grasps: GraspArrays, room: Scratch) -> None:
     """Pose of patch ``g`` in the world, and the error of the body's pose against its held pose."""
     h, p, b, held, R, S, at = palm_pose[g], grasps.patch[g], body_pose, grasps.held[g], room.R[g], room.S, room.at[g]
     matrix_of(h[3], h[4], h[5], h[6], S)
@@ -133,7 +134,7 @@ def _place(g, body_pose, palm_pose, grasps, room):
 
 
 @inlined
-def _inverse_inertia(q, moments, S, W):
+def _inverse_inertia(q: Array, moments: Array, S: Array, W: Array) -> None:
     """W (3, 3): inverse inertia in world axes of a body with principal inverse ``moments``."""
     matrix_of(q[3], q[4], q[5], q[6], S)
     for i in range(3):
@@ -142,7 +143,7 @@ def _inverse_inertia(q, moments, S, W):
 
 
 @inlined
-def _velocity(R, twist, rx, ry, rz, out):
+def _velocity(R: Array, twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     """Velocity (6,) in patch axes of a body's material at the lever r."""
     vx, vy, vz = cross(twist[3], twist[4], twist[5], rx, ry, rz)
     out[0], out[1], out[2] = rotate_back(R, twist[0] + vx, twist[1] + vy, twist[2] + vz)
@@ -150,7 +151,9 @@ def _velocity(R, twist, rx, ry, rz, out):
 
 
 @inlined
-def _push(twist, inverse_mass, W, R, rx, ry, rz, impulse):
+def _push(
+    twist: Array, inverse_mass: float, W: Array, R: Array, rx: float, ry: float, rz: float, impulse: Array
+) -> None:
     """Change a body's twist (6,) by an ``impulse`` (6,) in patch axes at the lever r."""
     fx, fy, fz = rotate(R, impulse[0], impulse[1], impulse[2])
     mx, my, mz = rotate(R, impulse[3], impulse[4], impulse[5])
@@ -165,7 +168,7 @@ def _push(twist, inverse_mass, W, R, rx, ry, rz, impulse):
 
 
 @inlined
-def _fill_impedance(g, inverse_mass, rx, ry, rz, room, dt):
+def _fill_impedance(g: int, inverse_mass: float, rx: float, ry: float, rz: float, room: Scratch, dt: float) -> None:
     """Impulse of patch ``g`` for a unit of velocity, the compliance of its pads included."""
     ask, step, K = room.ask, room.step, room.K
     for row in range(6):
@@ -183,7 +186,7 @@ def _fill_impedance(g, inverse_mass, rx, ry, rz, room, dt):
 
 
 @inlined
-def _solve3(B, more, u, out):
+def _solve3(B: Array, more: float, u: Array, out: Array) -> None:
     """out = (1 + more B)⁻¹ u for a symmetric B (3, 3), by Cramer's rule."""
     a, b, c = 1.0 + more * B[0, 0], more * B[0, 1], more * B[0, 2]
     d, e, f = 1.0 + more * B[1, 1], more * B[1, 2], 1.0 + more * B[2, 2]
@@ -195,7 +198,7 @@ def _solve3(B, more, u, out):
 
 
 @inlined
-def _slide(row, Y, force, moment, room):
+def _slide(row: Array, Y: Array, force: float, moment: float, room: Scratch) -> None:
     """Project the impulse ``row`` (6,) onto the ellipsoid of friction, so that the body slips against it.
 
     Of all impulses within, the one of largest dissipation: the slip is normal to the ellipsoid (Goyal, Ruina
@@ -228,9 +231,11 @@ def _slide(row, Y, force, moment, room):
 
 
 @inlined
-def _bound(row, Y, limits, room, dt):
-    """Clip an impulse (6,) to the limits of the pads; returns whether the body slips and whether it pulls them
-    apart."""
+def _bound(row: Array, Y: Array, limits: Array, room: Scratch, dt: float) -> tuple[bool, bool]:
+    """Clip an impulse (6,) to the limits of the pads.
+
+    Returns whether the body slips and whether it pulls them apart.
+    """
     force, moment, press = dt * limits[0], dt * limits[1], dt * limits[2]
     slides = (row[0] / force) ** 2 + (row[1] / force) ** 2 + (row[5] / moment) ** 2 > 1.0
     if slides:
@@ -241,7 +246,10 @@ def _bound(row, Y, limits, room, dt):
 
 
 @inlined
-def _follow(g, error, velocity, load, held, slid, slides, pulls_apart, dt):
+def _follow(
+    g: int, error: Array, velocity: Array, load: Array, held: Array, slid: Array, slides: bool, pulls_apart: bool,
+    dt: float,
+) -> None:  # fmt: skip
     """Move the held pose of a patch that slips, so that its springs carry the limits of the pads."""
     sx, sy, sz, turned = 0.0, 0.0, 0.0, 0.0
     if slides:
@@ -258,7 +266,7 @@ def _follow(g, error, velocity, load, held, slid, slides, pulls_apart, dt):
 
 
 @inlined
-def _sweep(g, body_pose, inverse_mass, grasps, room, dt):
+def _sweep(g: int, body_pose: Array, inverse_mass: float, grasps: GraspArrays, room: Scratch, dt: float) -> bool:
     """Update the impulse of one patch, kept in its load, by the law of its springs; returns whether it was clipped."""
     at, load, ask, step = room.at[g], grasps.load[g], room.ask, room.step
     rx, ry, rz = at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2]
@@ -282,7 +290,7 @@ def _sweep(g, body_pose, inverse_mass, grasps, room, dt):
 
 
 @kernel
-def predict_free(motion_table, room_table, own_mass, gravity, dt):
+def predict_free(motion_table: Integers, room_table: Integers, own_mass: float, gravity: Array, dt: float) -> None:
     """Advance `Motions.body_twist` from the start of a tick to its end, as if all grasps released the body.
 
     The mass and inertia added to its ``own_mass`` move with the palms, by the mean change of `Motions.ride`, which is
@@ -319,7 +327,7 @@ def predict_free(motion_table, room_table, own_mass, gravity, dt):
 
 
 @kernel
-def solve(motion_table, grasp_table, room_table, dt):
+def solve(motion_table: Integers, grasp_table: Integers, room_table: Integers, dt: float) -> None:
     """Fill `Motions.impulse` for one tick: row 0 acts on the body, row 1 + g on the holder of grasp g.
 
     All are about the centres of mass, in world axes. Holders keep their velocity within the tick; their acceleration

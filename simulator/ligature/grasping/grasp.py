@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ligature.grasping.friction import grasp_arrays, motions, predict_free, scratch, solve
 from ligature.grasping.motion import Motion
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
-from ligature.suture.tables import table_of
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 
@@ -31,8 +31,10 @@ LEAST_FORCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """The contact patch of two pads: ``T_palm_patch`` (4, 4) in the holder's inertial frame, its z axis normal
-    to the pads; ``half_width`` of the pads in metres; Coulomb ``friction`` of one pad.
+    """The contact patch of two pads.
+
+    ``T_palm_patch`` (4, 4) is in the holder's inertial frame, its z axis normal to the pads; ``half_width`` of the pads
+    in metres; Coulomb ``friction`` of one pad.
     """
 
     T_palm_patch: Array

@@ -162,7 +162,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def _search(self, index: int) -> None:
         """Close gently on the nearest body between the fingers; grasp it when both pads touch it."""
         fingers, disabled = self._fingers[index], self._disabled[index]
-        around, box = self._world.surroundings(fingers.jaw.fingers)
+        around, box = self._world.queries.surroundings(fingers.jaw.fingers)
         between: list[tuple[int, tuple[Facing, Facing]]] = []
         for body in around:
             if self._scene.bodies[body].static or body in self._own[index]:
@@ -196,8 +196,8 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         held = JawGrasp(body, jaw.palm, grasp, ride, levers, fingers.positions(), palm[:3])
         self._jaw_grasps[index] = held
         self._replace_contacts(index, held)
-        self._world.set_held(body, True, grasped=True)
-        self._rods.update_masses(self._world)
+        self._world.masses.set_held(body, True, grasped=True)
+        self._rods.update_masses(self._world.masses)
         self._keep(index, held)
 
     def _grasp_thread(self, index: int) -> bool:
@@ -208,7 +208,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             thread = thread_grasps.begin(number, self._rods, self._world, fingers, friction)
             if thread is not None:
                 self._thread_grasps[index] = thread
-                self._world.set_stopped(jaw.fingers, True)
+                self._world.commands.set_stopped(jaw.fingers, True)
                 self._keep_thread(index, thread)
                 return True
         return False
@@ -225,7 +225,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def _release_thread(self, index: int, thread: thread_grasps.ThreadGrasp) -> None:
         """Release a thread."""
         self._thread_grasps[index] = self._pads[index] = None
-        self._world.set_stopped(self._scene.jaws[index].fingers, False)
+        self._world.commands.set_stopped(self._scene.jaws[index].fingers, False)
         self._rods.exclude(thread.rod, self._scene.jaws[index].fingers, None)
         self._fingers[index].release()
         self._update_rod(thread.rod)
@@ -250,7 +250,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
 
     def _disable_collision(self, index: int, body: int, disabled: bool) -> None:
         for finger in self._scene.jaws[index].fingers:
-            self._world.disable_collision(finger, body, disabled)
+            self._world.collisions.disable(finger, body, disabled)
         self._disabled[index] = sorted(
             {*self._disabled[index], body} if disabled else {*self._disabled[index]} - {body}
         )
@@ -289,15 +289,15 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             return
         self._jaw_grasps[index] = None
         self._fingers[index].release()
-        self._world.set_held(held.body, False, grasped=True)
-        self._rods.update_masses(self._world)
+        self._world.masses.set_held(held.body, False, grasped=True)
+        self._rods.update_masses(self._world.masses)
         self._near[index] = True
 
     def _exchange_impulses(self) -> None:
         """Apply the impulses of all grasps, body by body."""
         by_body: dict[int, list[BodyGrasp]] = {}
         if self._actuator_grasps.release(slipped=True):
-            self._rods.update_masses(self._world)
+            self._rods.update_masses(self._world.masses)
         for grasp in self._actuator_grasps.grasps:
             by_body.setdefault(grasp.body, []).append(grasp)
         for index, held in enumerate(self._jaw_grasps):
@@ -319,7 +319,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             if thread is not None and body is None:
                 self._release_thread(index, thread)
         if self._actuator_grasps.release(body):
-            self._rods.update_masses(self._world)
+            self._rods.update_masses(self._world.masses)
 
     def write_state(self, state: StateRecord) -> None:
         """Write the body in every jaw to a state record."""

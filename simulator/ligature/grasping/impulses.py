@@ -56,13 +56,13 @@ class ImpulseExchange:
         for g, grasp in enumerate(grasps):
             world.read_motion(grasp.palm, at.palm_pose[g], at.palm_twist[g])
             at.ride[g] = grasp.ride
-        mass, inertia = world.mass_of(body)
-        at.inverse[0], at.inverse[1:], at.pending[:] = 1.0 / mass, 1.0 / inertia, world.pending_impulse(body)
+        mass, inertia = world.masses.mass_of(body)
+        at.inverse[0], at.inverse[1:], at.pending[:] = 1.0 / mass, 1.0 / inertia, world.impulses.pending(body)
         described = world.scene.bodies[body]
-        world.carry(body, solver.predict_free(described.mass, described.gravity, world.dt))
+        world.masses.carry(body, solver.predict_free(described.mass, described.gravity, world.dt))
         for g, grasp in enumerate(grasps):
             grasp.ride[:] = at.ride[g]
         impulses = solver.solve([grasp.grasp for grasp in grasps], world.dt)
-        world.apply_impulse(body, impulses[0, :3], impulses[0, 3:])
+        world.impulses.apply(body, impulses[0, :3], impulses[0, 3:])
         for grasp, impulse in zip(grasps, impulses[1:], strict=True):
-            world.apply_impulse(grasp.palm, impulse[:3], impulse[3:])
+            world.impulses.apply(grasp.palm, impulse[:3], impulse[3:])

@@ -1,6 +1,7 @@
 """Mesh tools free of Blender and of the physics engine: load, split, decompose, inertia, cache."""
 
-from ligature.mesh.cache import CacheError, CollisionCache, cache_folder
+from ligature.cache import CacheError, cache_folder
+from ligature.mesh.cache import CollisionCache
 from ligature.mesh.collision import ConvexPart, TrianglePart, collision_parts
 from ligature.mesh.inertia import MassProperties, box_inertia, combined, hull_properties, mass_properties
 from ligature.mesh.load import load_mesh

@@ -6,95 +6,21 @@ their text and written atomically, so that processes may share the folder. Metre
 
 from __future__ import annotations
 
-import atexit
-import contextlib
-import errno
 import hashlib
 import logging
-import os
-import shutil
-import stat
 import tempfile
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.cache import VARIABLE, CacheError, cache_folder, temporary_folder, write_atomically
 from ligature.mesh.surface import convex_surface
 
 Array = NDArray[np.float64]
 
-VARIABLE = "LIGATURE_CACHE"
-
 _log = logging.getLogger(__name__)
-
-
-class CacheError(OSError):
-    """Nothing can be kept, neither in the cache nor in the system's temporary folder."""
-
-
-def cache_folder() -> Path:
-    """Where everything is kept that is computed once: ``LIGATURE_CACHE``, else ``ligature`` in the user's cache folder.
-
-    Where that cannot be written, a temporary folder that belongs to the user alone takes its place; a warning is
-    logged once, and ``LIGATURE_CACHE`` hands the folder on to the processes of a run. Raises `CacheError` where
-    there is none either.
-    """
-    if os.environ.get(VARIABLE):
-        return _writable(Path(os.environ[VARIABLE]))
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return _writable(Path(base) / "ligature")
-
-
-@lru_cache
-def _writable(wanted: Path) -> Path:
-    try:
-        if not wanted.is_absolute() and str(wanted).startswith("~"):
-            raise FileNotFoundError(errno.ENOENT, "the user has no home")
-        wanted.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=wanted).close()
-        return wanted
-    except OSError as error:
-        try:
-            folder = _private_folder()
-        except OSError as second:
-            raise CacheError(f"neither {wanted} nor a temporary folder can be written: {second}") from second
-        _log.warning(
-            "%s cannot be written (%s): %s is used; set %s to choose another", wanted, error.strerror, folder, VARIABLE
-        )
-        os.environ[VARIABLE] = str(folder)
-        return folder
-
-
-def _private_folder() -> Path:
-    """The user's own folder among the temporary ones, kept for the next start.
-
-    What lies in it is run as code: where somebody else made it, this process gets one for itself.
-    """
-    if hasattr(os, "getuid"):
-        folder = Path(tempfile.gettempdir()) / f"ligature-{os.getuid()}"
-        with contextlib.suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        status = folder.lstat()
-        if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077:
-            return folder
-    return _temporary_folder()
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Make ``path`` hold ``data``; other processes see the old file or the whole new one. Raises OSError."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError:
-        os.unlink(name)
-        raise
 
 
 class CollisionCache:
@@ -136,7 +62,7 @@ class CollisionCache:
         except OSError as error:
             failed = self.folder
             try:
-                self.folder = _temporary_folder()
+                self.folder = temporary_folder()
                 path = _kept(self.folder / name, data)
             except OSError as second:
                 raise CacheError(
@@ -156,18 +82,6 @@ def _kept(path: Path, data: bytes) -> Path:
         pass
     write_atomically(path, data)
     return path
-
-
-@lru_cache(maxsize=1)
-def _temporary_folder() -> Path:
-    folder, owner = tempfile.mkdtemp(prefix="ligature-"), os.getpid()
-
-    def remove() -> None:
-        if os.getpid() == owner:
-            shutil.rmtree(folder, ignore_errors=True)
-
-    atexit.register(remove)
-    return Path(folder)
 
 
 def _finite(points: Array) -> Array:

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.mesh.cache import cache_folder, write_atomically
+from ligature.cache import cache_folder, write_atomically
 from ligature.mesh.inertia import hull_properties, mass_properties
 from ligature.mesh.mesh import Array, Mesh
 from ligature.mesh.surface import convex_surface, hull_vertices, joined
@@ -77,7 +77,7 @@ class DecompositionError(ValueError):
 class Decomposition:
     """Convex pieces, each (n, 3), and how well they fill the mesh.
 
-    ``volume_error`` is |sum of hulls − mesh| / mesh by volume, None for a mesh that is not closed;
+    ``volume_error`` is ``|sum of hulls − mesh| / mesh`` by volume, None for a mesh that is not closed;
     ``distance`` the Hausdorff distance in metres (see `hausdorff_distance`).
     """
 

@@ -50,6 +50,15 @@ def mass_properties(vertices: Array, faces: NDArray[np.int32], density: float = 
     d = a·(b × c), volume d/6, first moment d s/24, second moment d (s sᵀ + a aᵀ + b bᵀ + c cᵀ)/120
     (Blow and Binstock, "How to find the inertia tensor (or other mass properties) of a 3D solid
     body represented by a triangle mesh", 2004). Raises ValueError when the surface is open or flat.
+
+    Parameters
+    ----------
+    vertices
+        Corners (n, 3) in metres.
+    faces
+        Indices (m, 3) of the corners of each triangle.
+    density
+        In kg/m³.
     """
     vertices, faces = weld(np.asarray(vertices, dtype=float), np.asarray(faces))
     if not len(faces):
@@ -73,7 +82,10 @@ def mass_properties(vertices: Array, faces: NDArray[np.int32], density: float = 
 
 
 def hull_properties(points: Array, density: float = 1.0) -> MassProperties:
-    """Mass properties of the convex hull of ``points`` (n, 3); raises ValueError when it is flat."""
+    """Mass properties of the convex hull of ``points`` (n, 3), metres, with ``density`` in kg/m³.
+
+    Raises ValueError when it is flat.
+    """
     return mass_properties(*convex_surface(np.asarray(points, dtype=float)), density)
 
 
@@ -132,7 +144,7 @@ def _primitive(volume: float, density: float, z: float, gyration: Array) -> Mass
 
 
 def box_inertia(mass: float, size: Array) -> Array:
-    """Principal moments (3,) of a solid box with edge lengths ``size`` (3,).
+    """Principal moments (3,), kg m², of a solid box of ``mass`` (kg) with edge lengths ``size`` (3,), metres.
 
     Bullet estimates the inertia of a compound so, from its bounding box (ADF specification §12.6).
     """

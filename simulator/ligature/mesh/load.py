@@ -14,7 +14,10 @@ EXTENSIONS = (".obj", ".stl", ".3ds")
 
 
 def load_mesh(path: Path, resolver: Resolver) -> Mesh:
-    """The mesh of ``path``; raises `MeshError`, or `ResolutionError` when it may not be opened."""
+    """The mesh of ``path``, opened by ``resolver``.
+
+    Raises `MeshError`, or `ResolutionError` when it may not be opened.
+    """
     extension = path.suffix.lower()
     if extension not in EXTENSIONS:
         raise failure(path, f"'{path.name}' is not a mesh format that is read", hint=f"use {', '.join(EXTENSIONS)}")

@@ -21,7 +21,7 @@ _NUDGE = 1e-6
 
 
 def volume_error(vertices: Array, faces: Faces, hulls: Sequence[Array]) -> float | None:
-    """|sum of hulls − mesh| / mesh by volume; None when the mesh is not closed and has no volume."""
+    """``|sum of hulls − mesh| / mesh`` by volume; None when the mesh is not closed and has no volume."""
     try:
         volume = mass_properties(vertices, faces).volume
     except ValueError:

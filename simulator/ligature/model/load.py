@@ -24,6 +24,7 @@ from ligature.adf import (
     read_model,
     read_world,
 )
+from ligature.bundle import launch_file
 from ligature.model.builder import SceneBuilder
 from ligature.model.geometry import shader_files
 from ligature.model.naming import prefixed, topic_name
@@ -52,7 +53,7 @@ def load(
     Parameters
     ----------
     path
-        A launch file, or one model file.
+        A launch file, one model file, or the name of a scene that comes with Ligature, such as ``suturing``.
     models
         Indices into the launch file's ``multibody configs``, in the order of loading; repeats are
         allowed. None loads all of them.
@@ -77,7 +78,7 @@ def load(
     ValueError
         For a material of ``soft`` that does not exist.
     """
-    start, softening = Path(path), Softening(soft)
+    start, softening = launch_file(Path(path)), Softening(soft)
     resolver = Resolver.for_file(start, [Path(root) for root in (*roots, *(Path(f).parent for f in files))])
     try:
         document = read_any(start, resolver)

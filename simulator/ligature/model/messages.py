@@ -18,8 +18,8 @@ from typing import Any, ClassVar, TypeVar
 Vector = tuple[float, ...]
 Result = TypeVar("Result")
 
-MAX_NUMBERS = 64
-"""Most numbers of one field."""
+MAX_NUMBERS = 250
+"""Most numbers of one field: trees of others have up to 94 joints, and a length takes one byte."""
 
 MAX_TEXT = 200
 """Most bytes of a text."""

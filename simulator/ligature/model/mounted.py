@@ -13,6 +13,7 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
+from ligature.adf.schema.keys import FARTHEST
 from ligature.mesh import load_mesh
 from ligature.model.frames import Array, axis_rotation, pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
@@ -131,6 +132,11 @@ def sensor_rays(element: Element, folder: Path, resolver: Resolver) -> Array:
         rays = []
         for item in element.children("array"):
             start, direction = np.array(item.vector("offset")), np.array(item.vector("direction"))
+            length = reach * float(np.linalg.norm(direction))
+            if length > FARTHEST:
+                message = f"a ray of sensor '{element.key}' is {length:g} m long; at most {FARTHEST:g} m"
+                hint = "give a direction of length 1; its length multiplies the range"
+                raise GeometryError(Diagnostic(Severity.ERROR, message, item.mark_of("direction"), hint, "sensor"))
             rays.append((start, start + reach * direction))
         return np.array(rays).reshape(-1, 2, 3)
     if element.text("mesh"):

@@ -25,7 +25,7 @@ def topic_name(namespace: str, name: str) -> str:
 
 
 class Names:
-    """Hands out identities of one kind of object; repeated identifiers get the suffixes 1, 2, …"""
+    """Hands out identities of one kind of object; repeated identifiers get the suffixes 1, 2 and so on."""
 
     def __init__(self) -> None:
         self.identifiers: list[str] = []

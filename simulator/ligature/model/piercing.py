@@ -15,8 +15,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """Centre line of a needle in its inertial frame: ``centre`` (3,), unit axes ``x`` and ``y`` (3,) of its
-    plane, ``radius``, and angles ``begin`` < ``end`` from x towards y; the tip is at ``end``.
+    """Centre line of a needle in its inertial frame.
+
+    ``centre`` (3,), unit axes ``x`` and ``y`` (3,) of its plane, ``radius``, and angles ``begin`` < ``end`` from x
+    towards y; the tip is at ``end``.
     """
 
     centre: Array

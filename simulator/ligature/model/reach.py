@@ -6,6 +6,7 @@ Kinematic: a joint is moved along its range while the other joints of its mechan
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
 from ligature.model.assembly import CLOSED, OPEN, REDUNDANT, STEPS, coupled
-from ligature.model.mechanism import Mechanism, chain_of
+from ligature.model.mechanism import Chain, Mechanism, chain_of
 from ligature.model.scene import Joint, JointType, Scene
 
 Array = NDArray[np.float64]
@@ -48,13 +49,12 @@ class Reach:
 
 def reaches(scene: Scene) -> list[Reach]:
     """How far each joint of a loop goes that has limits and can be commanded; large mechanisms are left out."""
-    chains = [chain_of(scene.joints[c.joint], scene.joints[c.joint].child == c.outer) for c in scene.closures]
+    chains = _chains(scene)
     slack = {c.joint: c.slack for c in scene.closures}
     commanded = {joint for body in scene.bodies for joint in body.joints}
     coordinates = {j: np.array(q) for j, q in scene.start.coordinates.items()}
     found = []
-    for trees, members in coupled(scene.bodies, scene.joints, scene.articulations, chains):
-        mechanism = Mechanism(scene.bodies, scene.joints, [scene.articulations[k] for k in trees], members)
+    for mechanism, members in _mechanisms(scene, chains):
         x = mechanism.gather(coordinates, scene.start.roots)
         if len(x) > LARGEST:
             continue
@@ -67,9 +67,28 @@ def reaches(scene: Scene) -> list[Reach]:
     return found
 
 
+def _chains(scene: Scene) -> list[Chain]:
+    return [chain_of(scene.joints[c.joint], scene.joints[c.joint].child == c.outer) for c in scene.closures]
+
+
+def _mechanisms(scene: Scene, chains: list[Chain]) -> Iterator[tuple[Mechanism, list[Chain]]]:
+    for trees, members in coupled(scene.bodies, scene.joints, scene.articulations, chains):
+        yield Mechanism(scene.bodies, scene.joints, [scene.articulations[k] for k in trees], members), members
+
+
 def findings(scene: Scene) -> list[Diagnostic]:
-    """A finding for each joint that its loop stops short of a limit."""
+    """A finding for each joint that its loop stops short of a limit, and for mechanisms that are left out."""
+    coordinates = {j: np.array(q) for j, q in scene.start.coordinates.items()}
     found = []
+    for mechanism, members in _mechanisms(scene, _chains(scene)):
+        size = len(mechanism.gather(coordinates, scene.start.roots))
+        if size > LARGEST:
+            joint = scene.joints[members[0].joint]
+            message = (
+                f"the loop of joint '{joint.identity.key}' has {size} coordinates, more than the {LARGEST} of which "
+                "reaches are computed: its joints may stop short of their limits"
+            )
+            found.append(Diagnostic(Severity.INFO, message, joint.identity.mark, "", "reach"))
     for reach in reaches(scene):
         joint = scene.joints[reach.joint]
         assert joint.low is not None and joint.high is not None

@@ -378,8 +378,10 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Slip:
-    """Two pads of an actuator that hold by friction: ``normal_force`` (N) between them, ``friction`` of a pad, to be
-    multiplied by the body's, ``half_width`` (m), and the way (m) that a body may slip until it is let go.
+    """Two pads of an actuator that hold by friction.
+
+    ``normal_force`` (N) between them, ``friction`` of a pad, to be multiplied by the body's, ``half_width`` (m), and
+    the way (m) that a body may slip until it is released.
     """
 
     normal_force: float

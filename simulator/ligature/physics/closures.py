@@ -82,13 +82,20 @@ class Closures:
         )
         gaps = np.sqrt(((one - other) ** 2).sum(axis=1))
         widest = float(gaps.max())
-        share = CLOSING if CLOSING * widest <= PACE * self._dt else PACE * self._dt / widest
-        if share != self._share:
-            self._share = share
-            pybullet.setPhysicsEngineParameter(erp=share, physicsClientId=self._client)
+        self._close(CLOSING if CLOSING * widest <= PACE * self._dt else PACE * self._dt / widest)
         torn = {tree for k in np.flatnonzero(gaps > TORN) for tree in self._joined[k]} if widest > TORN else set()
         if torn != self._torn:
             self._damp(torn)
+
+    def begin(self) -> None:
+        """Close gaps as fast, and damp as little, as a new client does."""
+        self._damp(set())
+        self._close(CLOSING)
+
+    def _close(self, share: float) -> None:
+        if share != self._share:
+            self._share = share
+            pybullet.setPhysicsEngineParameter(erp=share, physicsClientId=self._client)
 
     def _damp(self, torn: set[int]) -> None:
         """Damp the trees ``torn`` and no others more than their files state."""

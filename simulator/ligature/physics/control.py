@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet
@@ -26,6 +26,7 @@ from ligature.model.scene import Joint, JointType, OutputType
 from ligature.model.subsystem import kept, put_back
 from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
 from ligature.physics.motions import Motions
+from ligature.tables import opener, table_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -59,45 +60,81 @@ MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 
 
-@compiled
-def outputs(
-    mode: Integers, force_output: Flags, turns: Flags, sprung: Flags, p: Array, i: Array, d: Array,
-    stiffness: Array, damping: Array, rest: Array, target: Array, pace: Array, max_velocity: Array,
-    max_deceleration: Array,
-    position: Array, velocity: Array, dt: float,
-    integral: Array, kick: Array, kick_ticks: Integers, motor: Array, asked: Array, effort: Array,
-) -> None:  # fmt: skip
-    """Motor velocities and efforts of one tick for n axes, all arrays (n,); the last six change.
+class Axes(NamedTuple):
+    """The single axes of one tree for compiled code, all arrays (n,)."""
 
-    ``asked`` is what a motor with force output exerts at most, ``effort`` what acts beside motors.
+    mode: Integers
+    force_output: Flags
+    turns: Flags
+    sprung: Flags
+    p: Array
+    i: Array
+    d: Array
+    stiffness: Array
+    damping: Array
+    rest: Array
+    target: Array
+    pace: Array  # of the target
+    max_velocity: Array
+    max_deceleration: Array
+    position: Array
+    velocity: Array
+    integral: Array
+    kick: Array
+    kick_ticks: Integers
+    motor: Array  # velocities of motors
+    asked: Array  # what a motor with force output exerts at most
+    effort: Array  # what acts beside motors
+
+
+def _no_axes() -> Axes:
+    z, whole, flag = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.bool_)
+    return Axes(
+        mode=whole, force_output=flag, turns=flag, sprung=flag, p=z, i=z, d=z, stiffness=z, damping=z, rest=z,
+        target=z, pace=z, max_velocity=z, max_deceleration=z, position=z, velocity=z, integral=z, kick=z,
+        kick_ticks=whole, motor=z, asked=z, effort=z,
+    )  # fmt: skip
+
+
+open_axes = opener(_no_axes())
+
+
+@compiled
+def outputs(table: Integers, dt: float) -> None:
+    """Motor velocities and efforts of one tick for the axes of a table of `Axes`.
+
+    What it keeps, and the last three arrays change.
     """
-    for k in range(mode.shape[0]):
-        motor[k] = asked[k] = effort[k] = 0.0
-        if mode[k] == POSITION:
-            error = target[k] - position[k]
-            if turns[k]:
+    axes = open_axes(table)
+    for k in range(axes.mode.shape[0]):
+        axes.motor[k] = axes.asked[k] = axes.effort[k] = 0.0
+        if axes.mode[k] == POSITION:
+            error = axes.target[k] - axes.position[k]
+            if axes.turns[k]:
                 error = (error + np.pi) % (2 * np.pi) - np.pi
-            integral[k] += error * dt
-            pull = p[k] * error + i[k] * integral[k]
+            axes.integral[k] += error * dt
+            pull = axes.p[k] * error + axes.i[k] * axes.integral[k]
             jump = 0.0
-            if kick_ticks[k] > 0:
-                jump = kick[k]
-                kick_ticks[k] -= 1
-            if force_output[k]:
-                asked[k] = pull + d[k] * (jump - velocity[k])
-                motor[k] = jump + _vanishing(pull, d[k], STOP_GAIN / dt * abs(error))
+            if axes.kick_ticks[k] > 0:
+                jump = axes.kick[k]
+                axes.kick_ticks[k] -= 1
+            if axes.force_output[k]:
+                axes.asked[k] = pull + axes.d[k] * (jump - axes.velocity[k])
+                axes.motor[k] = jump + _vanishing(pull, axes.d[k], STOP_GAIN / dt * abs(error))
             else:
-                motor[k] = (pull + d[k] * jump) / (1.0 + d[k])
-        elif mode[k] == SERVO:
-            error = target[k] - position[k]
-            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * max_deceleration[k] * abs(error)))
-            motor[k] = min(max(pace[k] + np.copysign(closing, error), -max_velocity[k]), max_velocity[k])
-        elif mode[k] == VELOCITY:
-            motor[k] = target[k]
-        elif mode[k] == FORCE:
-            effort[k] = target[k]
-        if sprung[k]:
-            effort[k] += stiffness[k] * (rest[k] - position[k]) - damping[k] * velocity[k]
+                axes.motor[k] = (pull + axes.d[k] * jump) / (1.0 + axes.d[k])
+        elif axes.mode[k] == SERVO:
+            error = axes.target[k] - axes.position[k]
+            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * axes.max_deceleration[k] * abs(error)))
+            axes.motor[k] = min(
+                max(axes.pace[k] + np.copysign(closing, error), -axes.max_velocity[k]), axes.max_velocity[k]
+            )
+        elif axes.mode[k] == VELOCITY:
+            axes.motor[k] = axes.target[k]
+        elif axes.mode[k] == FORCE:
+            axes.effort[k] = axes.target[k]
+        if axes.sprung[k]:
+            axes.effort[k] += axes.stiffness[k] * (axes.rest[k] - axes.position[k]) - axes.damping[k] * axes.velocity[k]
 
 
 @compiled
@@ -150,6 +187,14 @@ class TreeControl:
         self._slowed: dict[int, tuple[float, float, float]] = {}
         rows = motions.slices[index]
         self.position, self.velocity = motions.position[rows], motions.velocity[rows]
+        self._table = table_of(
+            Axes(
+                self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
+                self._damping, self._rest, self.target, self._pace, self._max_velocity, self._max_deceleration,
+                self.position, self.velocity, self._integral, self._kick, self._kick_ticks, self._motor, self._asked,
+                self._effort,
+            )
+        )  # fmt: skip
         self._sort()
 
     def _spring_setup(self, owners: list[Joint]) -> None:
@@ -341,13 +386,7 @@ class TreeControl:
     def apply(self) -> None:
         """Set motors and torques of this tick."""
         self._motions.joints(self._index)
-        outputs(
-            self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
-            self._damping, self._rest, self.target, self._pace, self._max_velocity,
-            self._max_deceleration, self.position,
-            self.velocity, self._dt, self._integral, self._kick, self._kick_ticks, self._motor,
-            self._asked, self._effort,
-        )  # fmt: skip
+        outputs(self._table, self._dt)
         if self._laden:
             self._motions.apply_gravity(self._index)
         for row, (low, high, _) in self._slowed.items():
@@ -409,6 +448,8 @@ class TreeControl:
             pybullet.setJointMotorControlArray(
                 self.tree.uid, idle, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(idle), physicsClientId=self._client
             )
+        if self.links:
+            self._motions.drive(self._index, np.flatnonzero(by_motor).tolist())
         self._driven, self._pushed = np.flatnonzero(by_motor).tolist(), np.flatnonzero(by_effort).tolist()
         self._driven_links = [self.links[row] for row in self._driven]
         self._driven_strength = self._strength[self._driven].tolist()
@@ -420,20 +461,31 @@ class TreeControl:
         return kept(self, _KEPT)
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Continue from `snapshot` in a new Bullet world."""
+        """Continue from `snapshot`."""
         put_back(self, snapshot)
         self._sort()
 
-    def follow(self, before: TreeControl) -> None:
-        """Take the commands of ``before``, the same axes in an earlier world, as if they came now."""
-        for name in ("target", "_pace", "_max_velocity", "_max_deceleration", "_yield_stiffness", "owned"):
-            getattr(self, name)[:] = getattr(before, name)
-        aimed = before.mode == POSITION
-        self.mode[~aimed] = before.mode[~aimed]
+    def held(self) -> dict[str, Any]:
+        """The commands now, for `follow`."""
+        return {name: getattr(self, name).copy() for name in ("mode", *_COMMANDED)}
+
+    def follow(self, held: dict[str, Any]) -> None:
+        """Begin anew with commands that `held` gave, as if they came now."""
+        self.mode[:] = FREE
+        for array in (self._integral, self._kick, self._kick_ticks, self._asked):
+            array[:] = 0
+        self._stops, self._slowed = {}, {}
+        for name in _COMMANDED:
+            getattr(self, name)[:] = held[name]
+        aimed = held["mode"] == POSITION
+        self.mode[~aimed] = held["mode"][~aimed]
         for row in np.flatnonzero(aimed).tolist():
-            self._aim(row, float(before.target[row]))
+            self._aim(row, float(held["target"][row]))
         self._sort()
 
+
+_COMMANDED = ("target", "_pace", "_max_velocity", "_max_deceleration", "_yield_stiffness", "owned")
+"""Attributes of a `TreeControl`, beside the modes, that commands set."""
 
 _KEPT = (
     "mode", "target", "_integral", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from ligature.physics.control import TreeControl
-    from ligature.physics.world import World
+from ligature.physics.control import TreeControl
+from ligature.physics.joints import Joints
 
 Array = NDArray[np.float64]
 
@@ -20,32 +18,29 @@ class Drive:
 
     Parameters
     ----------
-    world, joints
-        Where the joints are, and their indices.
+    controls, joints
+        The controllers of all joints, and the indices of those of the arm.
     max_velocity
         Largest speeds (n,) at which set-points are followed.
     max_deceleration
         Decelerations (n,) with which the joints brake before a set-point.
-    give
+    yield_stiffness
         Stiffness in N·m/rad with which the motors yield to a load; 0 is as strong as they are.
     """
 
     def __init__(
-        self, world: World, joints: Sequence[int], max_velocity: Array, max_deceleration: Array, yield_stiffness: float
-    ) -> None:
-        self._world, self._joints, self._max_velocity, self._max_deceleration = (
-            world,
-            tuple(joints),
-            max_velocity,
-            max_deceleration,
-        )
+        self, controls: Joints, joints: Sequence[int], max_velocity: Array, max_deceleration: Array,
+        yield_stiffness: float,
+    ) -> None:  # fmt: skip
+        self._controls, self._joints = controls, tuple(joints)
+        self._max_velocity, self._max_deceleration = max_velocity, max_deceleration
         self._yield_stiffness = np.full(len(joints), yield_stiffness)
         control = self._control
         self._rows = np.array([control.row[joint] for joint in self._joints], dtype=np.int64)
 
     @property
     def _control(self) -> TreeControl:
-        return self._world.control_of(self._joints[0])
+        return self._controls.control_of(self._joints[0])
 
     def read(self) -> Array:
         """Positions, velocities and motor efforts now, (3, n)."""

@@ -5,29 +5,17 @@ World axes, m/s² and newtons.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from ligature.model.scene import Scene
-from ligature.physics.articulation import Tree
 from ligature.physics.bodies import Placement
 from ligature.physics.control import TreeControl
-from ligature.physics.motions import Motions
+from ligature.physics.engine import Engine
 
 Array = NDArray[np.float64]
-
-
-def common_gravity(scene: Scene) -> Array:
-    """The gravity (3,) that most moving bodies share."""
-    moving = [b for b in scene.bodies if not b.static and b.index not in scene.rod_bodies]
-    counts = Counter(tuple(b.gravity.tolist()) for b in moving)
-    if not counts:
-        return np.array(scene.world.gravity)
-    return np.array(max(counts, key=lambda g: (counts[g], g)))
 
 
 class Lift:
@@ -50,24 +38,21 @@ class Lift:
             )
 
 
-def gravity_lifts(
-    client: int, scene: Scene, trees: Sequence[Tree], controls: Sequence[TreeControl],
-    place_of: Mapping[int, Placement], motions: Motions, common: Array,
-) -> list[Lift]:  # fmt: skip
+def gravity_lifts(engine: Engine, controls: Sequence[TreeControl]) -> list[Lift]:
     """What has to be pushed every tick so that every body feels its own gravity.
 
     Where nobody measures the joints' reactions, the joints carry it: efforts of a whole tree are set in one call.
     """
     lifts = []
-    for k, tree in enumerate(trees):
-        places = [place_of[body] for body in tree.link_of]
-        forces = [place.body.mass * (place.body.gravity - common) for place in places]
+    for k, tree in enumerate(engine.trees):
+        places = [engine.place_of[body] for body in tree.link_of]
+        forces = [place.body.mass * (place.body.gravity - engine.gravity) for place in places]
         pushed = [i for i, force in enumerate(forces) if np.any(force)]
-        measured = any(scene.joints[joint].feedback for _, joint, _, _ in tree.axes)
+        measured = any(engine.scene.joints[joint].feedback for _, joint, _, _ in tree.axes)
         if pushed and tree.static and not measured:
             for i in pushed:
-                motions.force[places[i].row] = forces[i]
+                engine.motions.force[places[i].row] = forces[i]
             controls[k].carry()
         elif pushed:
-            lifts.append(Lift(client, [places[i] for i in pushed], [forces[i] for i in pushed]))
+            lifts.append(Lift(engine.client, [places[i] for i in pushed], [forces[i] for i in pushed]))
     return lifts

@@ -14,6 +14,7 @@ from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Body, Joint, JointType, Scene
 from ligature.model.state import StateRecord
 from ligature.physics.articulation import inertia_of
+from ligature.physics.overlaps import DEEP
 from ligature.physics.world import World
 
 Array = NDArray[np.float64]
@@ -25,8 +26,8 @@ MAX_SPEED = 50.0
 LEAP = 10.0
 """Gain of speed in m/s within an update, beyond what gravity gives, that nothing without a command has."""
 
-DEEP, OPEN = 0.005, 0.001
-"""Overlap and gap in metres from which they are a likely cause."""
+OPEN = 0.001
+"""Gap in metres from which it is a likely cause."""
 
 STRONG_GRAVITY = 100.0
 """Gravity in m/s² from which it is a likely cause."""
@@ -112,10 +113,11 @@ class Guard:
         if gap > OPEN:
             name = scene.joints[loop].identity.key
             return f"joint '{name}' closes a loop that gapes by {1e3 * gap:.3g} mm", "let its pivots meet"
-        depth, other = self._world.overlap(members)
+        depth, one, other = self._world.queries.overlap(members)
         if depth > DEEP:
             name = scene.bodies[other].identity.identifier
-            return f"it overlaps '{name}' by {1e3 * depth:.3g} mm", "move them apart, or let them not collide"
+            who = "it" if one == body.index else f"'{scene.bodies[one].identity.identifier}'"
+            return f"{who} overlaps '{name}' by {1e3 * depth:.3g} mm", "move them apart, or let them not collide"
         masses = [scene.bodies[i].mass for i in members if scene.bodies[i].mass > 0.0]
         if max(masses) > UNEQUAL * min(masses):
             return f"joined bodies of {min(masses):g} kg and {max(masses):g} kg", "give them masses that are closer"

@@ -168,6 +168,7 @@ class Motions:
         self._uids = [tree.uid for tree in trees]
         self._still = {k for k, tree in enumerate(trees) if tree.static}
         self._rigid = {k for k, tree in enumerate(trees) if not tree.axes}
+        self._bare = {k for k, tree in enumerate(trees) if not tree.frames}
         self._going = [k for k in range(len(trees)) if k not in self._still]
         self._turning = [k for k in range(len(trees)) if k not in self._rigid]
         self._bases: set[int] = set()
@@ -175,6 +176,8 @@ class Motions:
         self._jointed: set[int] = set()
         self._linked: set[int] = set()
         self._measured = [False] * len(trees)
+        self._limp: list[Integers] = [np.arange(rows.start, rows.stop) for rows in self.slices]
+        self._begun = False
 
     def _lay_out(self, tree_index: int, tree: Tree) -> None:
         """Fill the rows of one tree's links."""
@@ -196,12 +199,23 @@ class Motions:
             self.pose, self.force,
                self._load, self.push)  # fmt: skip
 
+    def drive(self, tree: int, axes: Sequence[int]) -> None:
+        """From now on motors drive ``axes`` of a tree, and no others: Bullet keeps the last effort of a motor."""
+        rows = self.slices[tree]
+        self._limp[tree] = np.setdiff1d(np.arange(rows.start, rows.stop), rows.start + np.array(axes, dtype=np.int64))
+
     def measure(self, tree: int) -> None:
         """Fill `reaction` for the axes of a tree from now on."""
         self._measured[tree] = True
 
+    def begin(self) -> None:
+        """No tick is over yet, so that no motor has an effort and no joint a reaction: Bullet has those of before."""
+        self._begun = True
+        self.forget_all()
+
     def expire(self) -> None:
         """The world moved on: read again when asked."""
+        self._begun = False
         self._bases &= self._still
         self._paces &= self._still
         self._jointed &= self._rigid
@@ -248,6 +262,10 @@ class Motions:
             if links:
                 states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
                 self.position[rows], self.velocity[rows], reaction, self.effort[rows] = zip(*states, strict=True)
+                if self._begun:
+                    self.effort[rows], reaction = 0.0, np.zeros(6)
+                elif len(self._limp[tree]):
+                    self.effort[self._limp[tree]] = 0.0
                 for axis, effort in self.sent.items():
                     self.effort[axis] = effort
                 if self._measured[tree]:
@@ -261,6 +279,8 @@ class Motions:
             self.base(tree)
             self.pace(tree)
             self.joints(tree)
+            if tree in self._bare:
+                return
             _follow(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._joints, self._frame,
                     self._speed, self.pose, self.twist)  # fmt: skip
 

@@ -9,7 +9,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from ligature.kernels import compiled
-from ligature.model.poses import compose_rows
+from ligature.model.poses import compose
 from ligature.model.scene import JointType, Scene
 from ligature.model.state import StateRecord
 from ligature.physics.articulation import Tree
@@ -22,6 +22,27 @@ Flags = NDArray[np.bool_]
 
 _REPORTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 """Joints whose position is reported; all others report 0 (ADF specification §15.5)."""
+
+
+@compiled
+def _write_bodies(
+    rows: Integers, bodies: Integers, local: Array, pose: Array, twist: Array, body_pose: Array, body_twist: Array
+) -> None:
+    """Write poses and twists of ``rows`` to rows ``bodies`` (n,), with the body frames ``local`` (n, 7)."""
+    for i in range(rows.shape[0]):
+        row, body = rows[i], bodies[i]
+        compose(pose[row], local[i], body_pose[body])
+        for a in range(6):
+            body_twist[body, a] = twist[row, a]
+
+
+@compiled
+def _write_wrenches(measured: Integers, loaded: Integers, reaction: Array, wrench: Array) -> None:
+    """Add up the reactions of the axes ``measured`` (n,) on the bodies ``loaded`` (n,)."""
+    wrench[:] = 0.0
+    for i in range(measured.shape[0]):
+        for a in range(6):
+            wrench[loaded[i], a] += reaction[measured[i], a]
 
 
 @compiled
@@ -77,13 +98,14 @@ class Readout:
         """Fill a state record."""
         motions = self._motions
         motions.everything()
-        compose_rows(motions.pose[self._rows], self._local, self._bodies, state["body_pose"][0])
-        state["body_twist"][0][self._bodies] = motions.twist[self._rows]
+        record = state[0]
+        _write_bodies(
+            self._rows, self._bodies, self._local, motions.pose, motions.twist, record["body_pose"],
+            record["body_twist"],
+        )  # fmt: skip
         _write_joints(
             self._joints, self._axes, self._turns, self._feedback, motions.position, motions.velocity, motions.effort,
-            state["joint_position"][0], state["joint_velocity"][0], state["joint_effort"][0],
+            record["joint_position"], record["joint_velocity"], record["joint_effort"],
         )  # fmt: skip
         if len(self._loaded):
-            wrench = state["body_wrench"][0]
-            wrench[:] = 0.0
-            np.add.at(wrench, self._loaded, motions.reaction[self._measured])
+            _write_wrenches(self._measured, self._loaded, motions.reaction, record["body_wrench"])

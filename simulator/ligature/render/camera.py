@@ -137,7 +137,7 @@ def view_of(camera: Camera, pose: Array, resolution: tuple[int, int] | None = No
 
 
 def unproject(depth: NDArray[np.float32], view: CameraView) -> NDArray[np.float32]:
-    """Points (h, w, 3) in the optical frame of linear ``depth`` (h, w); NaN where nothing is."""
+    """Points (h, w, 3) in the optical frame of linear ``depth`` (h, w) seen by ``view``; NaN where nothing is."""
     height, width = depth.shape
     K = view.intrinsics
     v = (np.arange(height) - K[1, 2]) / K[1, 1]

@@ -166,6 +166,7 @@ class Renderer:
     def points(self, depth: NDArray[np.float32], view: CameraView, shaders: ShaderFiles) -> NDArray[np.float32] | None:
         """What ``depth compute shaders`` make of linear ``depth`` (h, w): the x, y, z (h, w, 3) that they write.
 
+        ``view`` is the camera that saw it, ``shaders`` names the shaders' files.
         None when the shaders cannot be used, which `problems` then states.
         """
         with self._context:

@@ -62,6 +62,12 @@ class Kinematics(Protocol):
     def jacobian_spatial(self, q: ArrayLike) -> Array:
         """Spatial Jacobian (6, n)."""
 
+    def describe(
+        self, base: Array, absolute: bool, measured: Array, setpoint: Array, wrench: Array,
+        js: Array, poses: Array, vectors: Array, jacobians: Array,
+    ) -> None:  # fmt: skip
+        """Fill in what the arm reports of its tip."""
+
 
 class Arm(Device):
     """What PSM, ECM and MTM have in common.

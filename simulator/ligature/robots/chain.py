@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ligature.kernels import compiled
+from ligature.robots.poses import write_pose
 
 Array = NDArray[np.float64]
 
@@ -119,6 +120,23 @@ class Chain:
         J = np.empty((len(rows), 6, self.n))
         _jacobian_rows(self._table, self._modified, self._tip, rows, True, J)
         return J.reshape(*shape, 6, self.n)
+
+    def describe(
+        self, base: Array, absolute: bool, measured: Array, setpoint: Array, wrench: Array,
+        js: Array, poses: Array, vectors: Array, jacobians: Array,
+    ) -> None:  # fmt: skip
+        """Fill in what an arm reports of its tip, in one call; the last four change.
+
+        ``base`` (4, 4) is its base in the reference frame; ``measured`` and ``setpoint`` (3, n) are its joints, and
+        ``wrench`` (6,) acts on the tip, in base axes. ``js`` (2, 3, m) receives the joints, ``poses`` (4, 7) the tip
+        measured and asked for in the reference frame, then in the base; ``vectors`` (4, 6) the tip's twist in axes of
+        the reference frame and of the base, then the wrench in those of the tip, or of the base where it is
+        ``absolute``, and of the reference frame; ``jacobians`` (2, 6, m) the body and the spatial one.
+        """
+        _describe(
+            self._table, self._modified, self._tip, base, absolute, measured, setpoint, wrench, js, poses, vectors,
+            jacobians,
+        )  # fmt: skip
 
     def _rows(self, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:
         """``q`` as rows (m, n) of its own, and the shape that its leading axes had."""
@@ -233,3 +251,47 @@ def _into_tip(T: Array, J: Array, j: int) -> None:
     for i in range(3):
         J[i, j] = T[0, i] * vx + T[1, i] * vy + T[2, i] * vz
         J[3 + i, j] = T[0, i] * wx + T[1, i] * wy + T[2, i] * wz
+
+
+@compiled
+def _describe(
+    table: Array, modified: bool, tip: Array, base: Array, absolute: bool, measured: Array, setpoint: Array,
+    wrench: Array, js: Array, poses: Array, vectors: Array, jacobians: Array,
+) -> None:  # fmt: skip
+    """See `Chain.describe`."""
+    n = table.shape[0]
+    js[0, :, :n], js[1, :, :n] = measured, setpoint
+    T, turned, R = np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3))
+    for k in range(2):
+        identity(T)
+        for j in range(n):
+            if modified:
+                advance(table[j], modified, js[k, 0, j], T)
+            if k == 0:
+                _screw(T, table[j, 5] != 0.0, jacobians[1], j)
+            if not modified:
+                advance(table[j], modified, js[k, 0, j], T)
+        append(T, tip)
+        if k == 0:
+            R[:] = T[:3, :3]
+            jacobians[0] = jacobians[1]
+            for j in range(n):
+                _into_tip(T, jacobians[0], j)
+        write_pose(T, poses[2 + k])
+        turned[:] = base
+        append(turned, T)
+        write_pose(turned, poses[k])
+    for half in range(0, 6, 3):
+        for i in range(3):
+            twist = 0.0
+            for a in range(3):
+                for j in range(n):
+                    twist += R[i, a] * jacobians[0, half + a, j] * measured[1, j]
+            vectors[1, half + i] = twist
+            on_tip = R[0, i] * wrench[half] + R[1, i] * wrench[half + 1] + R[2, i] * wrench[half + 2]
+            vectors[2, half + i] = wrench[half + i] if absolute else on_tip
+        for i in range(3):
+            vectors[0, half + i] = vectors[3, half + i] = 0.0
+            for a in range(3):
+                vectors[0, half + i] += base[i, a] * vectors[1, half + a]
+                vectors[3, half + i] += base[i, a] * wrench[half + a]

@@ -127,7 +127,7 @@ class Device:
             self._switch_off(State.DISABLED)
         elif step is Action.PAUSE:
             self._stop_moves()
-            self._state = State.PAUSED
+            self._state, self._pending = State.PAUSED, None
         elif step is Action.RESUME:
             self._state = State.ENABLED
             self._hold_all()
@@ -147,8 +147,12 @@ class Device:
         self._emit_state()
 
     def _power_up(self, then: Action) -> None:
-        self._pending, self._due, self._busy = then, self.time + POWER_UP_SECONDS, True
-        self.emit("desired_state", "ENABLED" if then is Action.POWER_UP else "HOMED")
+        """Begin to switch the drives on, or go on with it: clients repeat a command until it has its effect."""
+        if self._pending is None:
+            self._due, self._busy = self.time + POWER_UP_SECONDS, True
+        if self._pending is not Action.HOME:
+            self._pending = then
+        self.emit("desired_state", "ENABLED" if self._pending is Action.POWER_UP else "HOMED")
 
     def _begin_home(self) -> None:
         if self._state is State.ENABLED and self._homed:

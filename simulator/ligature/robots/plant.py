@@ -62,31 +62,39 @@ class IdealPlant:
         self._pushed = False
 
     def read(self) -> Array:
+        """Position, velocity and effort (3, joints)."""
         return self._state
 
     def servo(self, position: Array, velocity: Array) -> None:
+        """Move to a position and velocity at once."""
         self._pushed = False
         self._state[0], self._state[1], self._state[2] = position, velocity, 0.0
 
     def push(self, effort: Array) -> None:
+        """Drive by effort from the next step on."""
         self._pushed = True
         self._state[2] = effort
 
     def free(self) -> None:
+        """Stop, without effort."""
         self._pushed = False
         self._state[1:] = 0.0
 
     def place(self, position: Array) -> None:
+        """Stand still at a position."""
         self.free()
         self._state[0] = position
 
     def reset(self) -> None:
+        """Be as at the start of a run, at the position where it is."""
         self.free()
 
     def snapshot(self) -> Any:
+        """What a restore needs."""
         return self._pushed, self._state.copy()
 
     def restore(self, snapshot: Any) -> None:
+        """Be again as in a snapshot."""
         self._pushed = snapshot[0]
         self._state[:] = snapshot[1]
 

@@ -46,40 +46,7 @@ def rotation_vector(R: Array) -> Array:
 
 
 @compiled
-def describe_tip(tips: Array, base: Array, twist: Array, wrench: Array, poses: Array, vectors: Array) -> None:
-    """What an arm reports of its tip, in the axes in which it reports it.
-
-    ``tips`` (2, 4, 4) are T_base_tip as measured and as asked for, ``base`` (4, 4) the base in the reference
-    frame, ``twist`` (6,) the tip's in axes of the tip, ``wrench`` (6,) that on the tip in base axes. ``poses``
-    (4, 7) receives both tips in the base, then in the reference frame; ``vectors`` (4, 6) the twist in base and
-    reference axes, the wrench in axes of the reference frame and of the tip.
-    """
-    T = np.empty((4, 4))
-    for k in range(2):
-        _write_pose(tips[k], poses[k])
-        for i in range(3):
-            for j in range(4):
-                T[i, j] = base[i, 0] * tips[k, 0, j] + base[i, 1] * tips[k, 1, j] + base[i, 2] * tips[k, 2, j]
-            T[i, 3] += base[i, 3]
-        _write_pose(T, poses[2 + k])
-    R = tips[0]
-    for half in range(0, 6, 3):
-        for i in range(3):
-            turn = R[i, 0] * twist[half] + R[i, 1] * twist[half + 1] + R[i, 2] * twist[half + 2]
-            vectors[0, half + i] = turn
-            vectors[2, half + i] = (
-                base[i, 0] * wrench[half] + base[i, 1] * wrench[half + 1] + base[i, 2] * wrench[half + 2]
-            )
-            vectors[3, half + i] = R[0, i] * wrench[half] + R[1, i] * wrench[half + 1] + R[2, i] * wrench[half + 2]
-        for i in range(3):
-            local = vectors[0]
-            vectors[1, half + i] = (
-                base[i, 0] * local[half] + base[i, 1] * local[half + 1] + base[i, 2] * local[half + 2]
-            )
-
-
-@compiled
-def _write_pose(T: Array, pose: Array) -> None:
+def write_pose(T: Array, pose: Array) -> None:
     """Pose (7,) of ``T`` (4, 4), as `ligature.model.frames.matrix_pose7` has it."""
     squares = (T[0, 0] - T[1, 1] - T[2, 2], T[1, 1] - T[0, 0] - T[2, 2],
                T[2, 2] - T[0, 0] - T[1, 1], T[0, 0] + T[1, 1] + T[2, 2])  # fmt: skip

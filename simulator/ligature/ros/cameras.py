@@ -29,7 +29,7 @@ from ligature.ros.start import start_node
 WORLD = "world"
 """The frame that world poses are in, after the prefix of the scene."""
 
-_PICTURES = {
+PICTURES = {
     "ImageData": Image,
     "ImageData/compressed": CompressedImage,
     "CameraInfo": CameraInfo,
@@ -74,7 +74,7 @@ class CameraTopics:
         self.frame = f"{name}_{eye}" if eye else name
         self.optical_frame = f"{self.frame}_optical"
         base = f"{camera.identity.topic}/{eye}" if eye else camera.identity.topic
-        self._pictures = {topic: _advertise(f"{base}/{topic}", type_) for topic, type_ in _PICTURES.items()}
+        self._pictures = {topic: _advertise(f"{base}/{topic}", type_) for topic, type_ in PICTURES.items()}
         self._cloud = _advertise(f"{base}/DepthData", PointCloud2) if depth else None
         self._names = rospy.Publisher(f"{base}/IdNames", String, queue_size=1, latch=True)
         self._names.publish(names)

@@ -18,7 +18,7 @@ from rospy.impl.tcpros_pubsub import TCPROSSub
 from rospy.impl.tcpros_service import TCPService
 
 MOST_BYTES = 32 * 1024
-"""Most bytes of a message or request; 64 joints with names and all of position, velocity and effort take 5 KB."""
+"""Most bytes of a message or request; 250 joints with names and all of position, velocity and effort take 20 KB."""
 
 WARNING_PAUSE = 2.0
 """Seconds between two warnings."""

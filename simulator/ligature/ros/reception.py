@@ -35,13 +35,14 @@ RESETS = {"Reset": False, "Reset/Bodies": True, "ResetBodies": True}
 """Topics below the world's Command, and whether they put back bodies only (interface reference §2.2)."""
 
 _RELEASED = ("body", "actuator", "camera", "light")
-_COMMANDS = {
+COMMANDS = {
     "body": RigidBodyCmd,
     "ghost": GhostObjectCmd,
     "actuator": ActuatorCmd,
     "camera": CameraCmd,
     "light": LightCmd,
 }
+"""Kinds of objects and the messages that command them; sensors have `SensorCmd` or `ContactSensorCmd`."""
 
 
 class Reception:
@@ -62,7 +63,7 @@ class Reception:
 
     def subscribe(self, template: Any, topic: str) -> None:
         """Take commands for one object."""
-        message = _COMMANDS.get(template.kind)
+        message = COMMANDS.get(template.kind)
         if message is None:
             message = ContactSensorCmd if isinstance(template, conversion.ContactTemplate) else SensorCmd
         self._listen(f"{topic}/Command", message, self._command_of(template))

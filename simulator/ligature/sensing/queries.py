@@ -1,4 +1,4 @@
-"""What sensors and actuators need of the physics; `ligature.physics.World` implements it.
+"""What sensors and actuators need of the physics: `ligature.physics.World` and its parts implement it.
 
 Poses are x y z qx qy qz qw in world axes, lengths in metres.
 """
@@ -43,7 +43,7 @@ class Posed(Protocol):
         """Pose (7,) of a body now."""
 
 
-class Pushable(Queries, Posed, Protocol):
+class Pushable(Posed, Protocol):
     """Bodies that sensors push."""
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
@@ -54,8 +54,7 @@ class Touchable(Protocol):
     """Bodies whose contacts are watched."""
 
     def touches(self, most: int) -> tuple[Array, Array]:
-        """Contact points of the last step, (n, 3), and the forces on one of the two bodies, (n, 3); at most
-        ``most``."""
+        """Contact points of the last step (n, 3), and the forces (n, 3) on one of the two bodies; at most ``most``."""
 
 
 class Attachable(Protocol):

@@ -16,7 +16,7 @@ from ligature.model.hits import RayHits
 from ligature.model.scene import Scene, Sensor, SensorType
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem, kept, put_back
-from ligature.sensing.queries import Posed, Pushable
+from ligature.sensing.queries import Posed, Pushable, Queries
 
 Array = NDArray[np.float64]
 
@@ -25,11 +25,11 @@ class Rays(Subsystem):
     """The rays of all sensors of a scene, one after the other, in the order of the state record.
 
     Resistance sensors push in every tick; rays are measured when the state is written. ``elements`` gives the poses of
-    rod elements, which ``queries`` lacks.
+    rod elements, which ``bodies`` lacks.
     """
 
-    def __init__(self, scene: Scene, queries: Pushable, elements: Posed) -> None:
-        self._queries = queries
+    def __init__(self, scene: Scene, queries: Queries, bodies: Pushable, elements: Posed) -> None:
+        self._queries, self._bodies = queries, bodies
         self.sensors = [s for s in scene.sensors if s.type is not SensorType.CONTACT]
         counts = [len(s.rays) for s in self.sensors]
         ends = np.cumsum([0, *counts])
@@ -42,7 +42,7 @@ class Rays(Subsystem):
     def step(self, tick: int) -> None:
         """Apply the forces of every resistance sensor in the coming step of the bodies."""
         for stick in self._stick:
-            stick.step(self._queries)
+            stick.step(self._queries, self._bodies)
 
     def sense(self, state: StateRecord) -> None:
         """Cast every ray among the bodies of the state, and write the hits."""
@@ -106,12 +106,12 @@ class _Stick:
         for array in (self._on_sensed, self._on_parent, self._error, self._offset):
             array[:] = 0.0
 
-    def step(self, bodies: Pushable) -> None:
+    def step(self, queries: Queries, bodies: Pushable) -> None:
         """Push the bodies that the rays hit, and the parent back."""
         parent = self._sensor.parent
         T_parent = pose7_matrix((self._elements or bodies).pose7(parent))
         segments = _segments(self._sensor, T_parent)
-        hits = bodies.ray_test(segments[:, 0], segments[:, 1])
+        hits = queries.ray_test(segments[:, 0], segments[:, 1])
         poses = {body: pose7_matrix(bodies.pose7(body)) for body in set(hits.body.tolist()) if body >= 0}
         for ray, body in enumerate(hits.body.tolist()):
             if body < 0:

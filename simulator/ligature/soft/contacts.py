@@ -61,8 +61,9 @@ class BodyContacts:
         self, scene: Scene, own: int, block: TissueBlock, bodies: SutureBodies, piercers: list[ScenePiercer], dt: float
     ) -> None:
         self._scene, self._own, self._block, self._bodies, self._dt = scene, own, block, bodies, dt
-        excluded = scene.bodies[own].no_collision_with | scene.rod_bodies | {own}
-        self.listed = [b.index for b in scene.bodies if b.colliders and b.index not in excluded]
+        excluded = scene.bodies[own].no_collision_with | {own}
+        placed = {link.body for tree in scene.articulations for link in tree.links} - excluded
+        self.listed = [b.index for b in scene.bodies if b.colliders and b.index in placed]
         self._piercers = {p.body.index: p for p in piercers}
         n = len(self.listed) + 1
         self._partners = contact.Partners(np.zeros((n, 7)), np.zeros((n, 6)), np.zeros(n), np.zeros((n, 3, 3)))

@@ -40,7 +40,7 @@ class HeldBodies(Bodies, Protocol):
 
 
 class Masses(Protocol):
-    """Masses of bodies, larger while they are held, see `ligature.physics.grasp_support`."""
+    """Masses of bodies, larger while they are held, see `ligature.physics.masses`."""
 
     def mass_of(self, body: int) -> tuple[float, Array]:
         """Mass and principal moments (3,) of a body."""
@@ -49,5 +49,9 @@ class Masses(Protocol):
         """Whether something holds a body, so that it does not fall."""
 
 
-class SutureBodies(HeldBodies, Masses, Protocol):
-    """The rigid bodies around threads and holes of a scene."""
+class SutureBodies(HeldBodies, Protocol):
+    """The rigid bodies around threads and holes of a scene, and how heavy they are."""
+
+    @property
+    def masses(self) -> Masses:
+        """Masses of the bodies."""

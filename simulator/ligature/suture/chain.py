@@ -16,11 +16,17 @@ first that is loaded and the top follows from these nodes alone. World axes.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @inlined
-def invert_spd6(A, out):
+def invert_spd6(A: Array, out: Array) -> None:
     """Inverse of the symmetric positive definite ``A`` (6, 6) by L D Lᵀ; ``A`` is used up."""
     for j in range(6):
         for k in range(j):
@@ -52,7 +58,7 @@ def invert_spd6(A, out):
 
 
 @inlined
-def _carry_admittance(Y, r, B, out):
+def _carry_admittance(Y: Array, r: Array, B: Array, out: Array) -> None:
     """X Y Xᵀ: the admittance of a node, felt at its pivot in the rows of the joint."""
     rx, ry, rz = r[0], r[1], r[2]
     for c in range(3):
@@ -82,7 +88,7 @@ def _carry_admittance(Y, r, B, out):
 
 
 @inlined
-def _add_impedance(Z, r, B, H, E):
+def _add_impedance(Z: Array, r: Array, B: Array, H: Array, E: Array) -> None:
     """H += Xᵀ Z X: the impedance of a joint, felt at the centre of the next node; ``E`` (6, 3) is scratch."""
     rx, ry, rz = r[0], r[1], r[2]
     for i in range(6):
@@ -103,7 +109,7 @@ def _add_impedance(Z, r, B, H, E):
 
 
 @inlined
-def apply_lever(d, r, B, out):
+def apply_lever(d: Array, r: Array, B: Array, out: Array) -> None:
     """out = X d: motion of the pivot, and turn in joint axes with the sign of the first node."""
     out[0] = d[0] - (r[1] * d[5] - r[2] * d[4])
     out[1] = d[1] - (r[2] * d[3] - r[0] * d[5])
@@ -113,7 +119,7 @@ def apply_lever(d, r, B, out):
 
 
 @inlined
-def add_joint_force(load, r, B, sign, out):
+def add_joint_force(load: Array, r: Array, B: Array, sign: float, out: Array) -> None:
     """out += sign Xᵀ load: force and moment of a joint on a node's centre."""
     fx, fy, fz = sign * load[0], sign * load[1], sign * load[2]
     out[0] += fx
@@ -127,13 +133,13 @@ def add_joint_force(load, r, B, sign, out):
 
 
 @inlined
-def _times6(A, v, out):
+def _times6(A: Array, v: Array, out: Array) -> None:
     for i in range(6):
         out[i] = A[i, 0] * v[0] + A[i, 1] * v[1] + A[i, 2] * v[2] + A[i, 3] * v[3] + A[i, 4] * v[4] + A[i, 5] * v[5]
 
 
 @inlined
-def _clear_admittance(compliance, Z):
+def _clear_admittance(compliance: Array, Z: Array) -> None:
     for a in range(6):
         for b in range(6):
             Z[a, b] = 0.0
@@ -141,7 +147,7 @@ def _clear_admittance(compliance, Z):
 
 
 @inlined
-def _invert_node(fixed, H, Y):
+def _invert_node(fixed: bool, H: Array, Y: Array) -> None:
     if fixed:
         for a in range(6):
             for b in range(6):
@@ -151,7 +157,7 @@ def _invert_node(fixed, H, Y):
 
 
 @inlined
-def _join(Y, fixed, r, B, compliance, Z, scratch):
+def _join(Y: Array, fixed: bool, r: Array, B: Array, compliance: Array, Z: Array, scratch: Array) -> None:
     """Impedance ``Z`` of a joint with the eliminated node of admittance ``Y`` behind it, at its lever ``r``."""
     if fixed:
         _clear_admittance(compliance, Z)
@@ -163,7 +169,10 @@ def _join(Y, fixed, r, B, compliance, Z, scratch):
 
 
 @kernel
-def factor(n, top, fixed, H, r_near, r_far, B, compliance, Y, Z, scratch):
+def factor(
+    n: int, top: int, fixed: Flags, H: Array, r_near: Array, r_far: Array, B: Array, compliance: Array, Y: Array,
+    Z: Array, scratch: Array,
+) -> None:  # fmt: skip
     """Eliminate the chain's ``n`` nodes from both ends towards ``top``: fills ``Y`` (n, 6, 6), ``Z`` (n - 1, 6, 6).
 
     ``H`` is used up. ``r_near[j]``, ``r_far[j]`` are the levers of joint j on its nodes j and j + 1; nodes with
@@ -184,7 +193,10 @@ def factor(n, top, fixed, H, r_near, r_far, B, compliance, Y, Z, scratch):
 
 
 @kernel
-def solve(n, top, r_near, r_far, B, Y, Z, c, g, d, load, scratch):
+def solve(
+    n: int, top: int, r_near: Array, r_far: Array, B: Array, Y: Array, Z: Array, c: Array, g: Array, d: Array,
+    load: Array, scratch: Array,
+) -> None:  # fmt: skip
     """Corrections ``d`` (n, 6) and multipliers ``load`` (n - 1, 6) for the rows ``c`` and loads ``g`` of the nodes.
 
     ``top`` is that of `factor`; ``g`` is left as it came.
@@ -232,7 +244,10 @@ def solve(n, top, r_near, r_far, B, Y, Z, c, g, d, load, scratch):
 
 
 @inlined
-def _substitute_back(low, top, r_near, r_far, B, Y, Z, d, load, u, w, far):
+def _substitute_back(
+    low: int, top: int, r_near: Array, r_far: Array, B: Array, Y: Array, Z: Array, d: Array, load: Array, u: Array,
+    w: Array, far: Array,
+) -> None:  # fmt: skip
     """Complete nodes and joints below ``top``, down to ``low``, from what is above them."""
     for i in range(top - 1, low - 1, -1):
         apply_lever(d[i + 1], r_far[i], B[i], far)
@@ -247,7 +262,10 @@ def _substitute_back(low, top, r_near, r_far, B, Y, Z, d, load, u, w, far):
 
 
 @kernel
-def solve_within(low, top, r_near, r_far, B, Y, Z, g, d, load, scratch):
+def solve_within(
+    low: int, top: int, r_near: Array, r_far: Array, B: Array, Y: Array, Z: Array, g: Array, d: Array, load: Array,
+    scratch: Array,
+) -> None:  # fmt: skip
     """Corrections ``d`` of the nodes ``low`` … ``top`` for loads ``g`` on them alone; what lies outside yields along.
 
     Outside, nothing is computed; ``load`` is scratch.

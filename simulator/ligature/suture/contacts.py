@@ -9,10 +9,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
-from ligature.suture.layout import SLIPS
+from ligature.suture.layout import SLIPS, Nodes, Shapes, Touches, Work
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
 
 SLACK = 0.5
 """Distance, in radii, at which a contact is found even at rest."""
@@ -31,7 +38,10 @@ GROUP = 8
 
 
 @kernel
-def detect(first, n, nodes, shapes, old, new, work, tension, counts, self_skip, dt):
+def detect(
+    first: int, n: int, nodes: Nodes, shapes: Shapes, old: Touches, new: Touches, work: Work, tension: Array,
+    counts: Integers, self_skip: int, dt: float,
+) -> None:  # fmt: skip
     """Fill ``new`` with the contacts of elements ``first`` … ``first + n - 1``; ``old`` are the last tick's.
 
     ``tension`` (elements,) is that of the last tick. ``counts`` returns the contacts found, and those for
@@ -49,7 +59,7 @@ def detect(first, n, nodes, shapes, old, new, work, tension, counts, self_skip, 
 
 
 @inlined
-def _world_segments(first, n, nodes, work, dt):
+def _world_segments(first: int, n: int, nodes: Nodes, work: Work, dt: float) -> None:
     """Segment, reach and box of every element; the box covers what the tick may sweep."""
     for e in range(n):
         i = first + e
@@ -79,12 +89,14 @@ def _world_segments(first, n, nodes, work, dt):
 
 
 @inlined
-def _distance(a, b):
+def _distance(a: Array, b: Array) -> float:
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @inlined
-def _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt):
+def _touch_bodies(
+    first: int, n: int, nodes: Nodes, shapes: Shapes, new: Touches, work: Work, tension: Array, capacity: int, dt: float
+) -> int:
     missed = 0
     p, normal, R = work.three[0], work.three[1], work.R[nodes.x.shape[0]]
     for c in range(shapes.node.shape[0]):
@@ -121,7 +133,9 @@ def _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt):
 
 
 @inlined
-def _recede(nodes, work, e, k, s, gap, nx, ny, nz, dt):
+def _recede(
+    nodes: Nodes, work: Work, e: int, k: int, s: float, gap: float, nx: float, ny: float, nz: float, dt: float
+) -> bool:
     """Whether element ``e`` at ``s`` stays clear of the plane that node ``k`` shows it, by their present motion."""
     begin, end = work.segment[e], work.ahead[e]
     px = begin[0, 0] + s * (begin[1, 0] - begin[0, 0])
@@ -137,7 +151,9 @@ def _recede(nodes, work, e, k, s, gap, nx, ny, nz, dt):
 
 
 @inlined
-def _depth_at(kind, size, planes, pose, R, segment, s, p, normal):
+def _depth_at(
+    kind: int, size: Array, planes: Array, pose: Array, R: Array, segment: Array, s: float, p: Array, normal: Array
+) -> float:
     dx = segment[0, 0] + s * (segment[1, 0] - segment[0, 0]) - pose[0]
     dy = segment[0, 1] + s * (segment[1, 1] - segment[0, 1]) - pose[1]
     dz = segment[0, 2] + s * (segment[1, 2] - segment[0, 2]) - pose[2]
@@ -146,7 +162,10 @@ def _depth_at(kind, size, planes, pose, R, segment, s, p, normal):
 
 
 @inlined
-def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
+def _deepest(
+    kind: int, size: Array, planes: Array, pose: Array, R: Array, segment: Array, reach: float, radius: float,
+    p: Array, normal: Array,
+) -> tuple[float, float]:  # fmt: skip
     """Parameter (0..1) of the point of a segment nearest to a convex part, and the distance there.
 
     The distance is convex along the segment, so its slope brackets the lowest point. Where both ends
@@ -193,7 +212,10 @@ def _deepest(kind, size, planes, pose, R, segment, reach, radius, p, normal):
 
 
 @inlined
-def _record(first, nodes, new, work, e, k, key, s, d, inside, nx, ny, nz, friction, dt):
+def _record(
+    first: int, nodes: Nodes, new: Touches, work: Work, e: int, k: int, key: int, s: float, d: float, inside: float,
+    nx: float, ny: float, nz: float, friction: float, dt: float,
+) -> None:  # fmt: skip
     """Add the contact of element ``e`` at ``s`` with node ``k``, whose surface is at ``d`` along -normal.
 
     ``inside`` is the depth of the point that node ``k`` keeps, below its skin.
@@ -227,14 +249,16 @@ def _record(first, nodes, new, work, e, k, key, s, d, inside, nx, ny, nz, fricti
 
 
 @inlined
-def _to_local(nodes, work, i, point, out):
+def _to_local(nodes: Nodes, work: Work, i: int, point: Array, out: Array) -> None:
     out[0], out[1], out[2] = rotate_back(
         work.R[i], point[0] - nodes.x[i, 0], point[1] - nodes.x[i, 1], point[2] - nodes.x[i, 2]
     )
 
 
 @inlined
-def _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip):
+def _touch_self(
+    first: int, n: int, nodes: Nodes, shapes: Shapes, new: Touches, work: Work, capacity: int, self_skip: int
+) -> int:
     """Contacts between elements more than ``self_skip`` apart along the rod, boxes of groups first."""
     missed = 0
     groups = (n + GROUP - 1) // GROUP
@@ -260,7 +284,7 @@ def _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip):
 
 
 @inlined
-def _overlap(a, b):
+def _overlap(a: Array, b: Array) -> bool:
     return (
         a[0, 0] <= b[1, 0] and b[0, 0] <= a[1, 0]
         and a[0, 1] <= b[1, 1] and b[0, 1] <= a[1, 1]
@@ -269,7 +293,7 @@ def _overlap(a, b):
 
 
 @inlined
-def _nearest(a, b):
+def _nearest(a: Array, b: Array) -> tuple[float, float]:
     """Parameters (0..1) of the nearest points of two segments, for crossing and parallel ones alike.
 
     Source: Ericson, Real-Time Collision Detection, §5.1.9; parallel segments meet in the middle of
@@ -299,7 +323,7 @@ def _nearest(a, b):
 
 
 @inlined
-def _pass(a, b, dx, dy, dz, length, both):
+def _pass(a: Array, b: Array, dx: float, dy: float, dz: float, length: float, both: float) -> bool:
     """Whether strands that were (dx, dy, dz) apart end the tick apart, and on the same sides of each other."""
     s, t = _nearest(a, b)
     ex = a[0, 0] + s * (a[1, 0] - a[0, 0]) - b[0, 0] - t * (b[1, 0] - b[0, 0])
@@ -310,7 +334,7 @@ def _pass(a, b, dx, dy, dz, length, both):
 
 
 @inlined
-def _touch_pair(first, nodes, new, work, capacity, i, j, offset):
+def _touch_pair(first: int, nodes: Nodes, new: Touches, work: Work, capacity: int, i: int, j: int, offset: int) -> int:
     a, b = work.segment[i], work.segment[j]
     s, t = _nearest(a, b)
     dx = a[0, 0] + s * (a[1, 0] - a[0, 0]) - b[0, 0] - t * (b[1, 0] - b[0, 0])
@@ -334,14 +358,14 @@ def _touch_pair(first, nodes, new, work, capacity, i, j, offset):
 
 
 @inlined
-def _before(touches, a, b):
+def _before(touches: Touches, a: int, b: int) -> bool:
     if touches.key[a] != touches.key[b]:
         return touches.key[a] < touches.key[b]
     return touches.node[a, 0] < touches.node[b, 0]
 
 
 @inlined
-def _swap(touches, a, b):
+def _swap(touches: Touches, a: int, b: int) -> None:
     for s in range(2):
         touches.node[a, s], touches.node[b, s] = touches.node[b, s], touches.node[a, s]
         for k in range(3):
@@ -358,7 +382,7 @@ def _swap(touches, a, b):
 
 
 @inlined
-def _sort(touches, begin):
+def _sort(touches: Touches, begin: int) -> None:
     """Sort new contacts from ``begin`` on by key and element (insertion sort)."""
     for c in range(begin + 1, touches.count[0]):
         k = c
@@ -368,7 +392,7 @@ def _sort(touches, begin):
 
 
 @inlined
-def _continue_friction(old, new, constraints):
+def _continue_friction(old: Touches, new: Touches, constraints: int) -> None:
     """Continue slip, normal force and mode of the last tick's contacts; both lists are sorted."""
     o = 0
     while o < old.count[0] and old.bilateral[o]:

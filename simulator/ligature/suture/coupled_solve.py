@@ -8,10 +8,17 @@ axes, SI units.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6, solve, solve_within
 from ligature.suture.coupling import push
+from ligature.suture.layout import Nodes, Touches, Work
 from ligature.suture.rotations import cross, rotate
+
+Array = NDArray[np.float64]
+
 
 MAX_CG = 40
 
@@ -20,7 +27,7 @@ CG_TOLERANCE = 1e-6
 
 
 @kernel
-def gather(n, total, nodes, touches, work):
+def gather(n: int, total: int, nodes: Nodes, touches: Touches, work: Work) -> tuple[int, int, int]:
     """Find the nodes that closed contacts couple: returns the first and last node of the chain, and a count of rows.
 
     ``work.rows`` receives these nodes and those between them, then the bodies with a load. Without contacts
@@ -54,7 +61,7 @@ def gather(n, total, nodes, touches, work):
 
 
 @inlined
-def _apply_coupling(rows, nodes, touches, work, p, out):
+def _apply_coupling(rows: int, nodes: Nodes, touches: Touches, work: Work, p: Array, out: Array) -> None:
     """out = E p: the load on each movable node of a contact from the other's motion."""
     for m in range(rows):
         i = work.rows[m]
@@ -75,7 +82,7 @@ def _apply_coupling(rows, nodes, touches, work, p, out):
 
 
 @inlined
-def _precondition(n, low, high, rows, work, g, d):
+def _precondition(n: int, low: int, high: int, rows: int, work: Work, g: Array, d: Array) -> None:
     """d = S⁻¹ g: the chain by its direct solver, every body alone."""
     solve_within(
         low, high, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, g, d, work.coupled_load, work.six
@@ -84,7 +91,7 @@ def _precondition(n, low, high, rows, work, g, d):
 
 
 @inlined
-def _move_bodies(n, rows, work, g, d):
+def _move_bodies(n: int, rows: int, work: Work, g: Array, d: Array) -> None:
     for m in range(rows):
         i = work.rows[m]
         if i >= n:
@@ -96,7 +103,7 @@ def _move_bodies(n, rows, work, g, d):
 
 
 @inlined
-def _dot(rows, work, a, b):
+def _dot(rows: int, work: Work, a: Array, b: Array) -> float:
     s = 0.0
     for m in range(rows):
         i = work.rows[m]
@@ -106,7 +113,7 @@ def _dot(rows, work, a, b):
 
 
 @kernel
-def couple(n, low, high, rows, nodes, touches, work):
+def couple(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work) -> None:
     """Complete ``work.d`` and ``work.load`` by the coupling of contacts between movable nodes.
 
     ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``.
@@ -128,7 +135,7 @@ def couple(n, low, high, rows, nodes, touches, work):
 
 
 @inlined
-def _iterate(n, low, high, rows, nodes, touches, work):
+def _iterate(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work) -> None:
     """Conjugate gradients for ``work.d`` of the coupled nodes."""
     p, r, z, s = work.cg[0], work.cg[1], work.cg[2], work.cg[3]
     _apply_coupling(rows, nodes, touches, work, work.d, r)

@@ -12,9 +12,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
-from ligature.suture.layout import SLIPS, STICKS, YIELDS
+from ligature.suture.layout import SLIPS, STICKS, YIELDS, Nodes, Touches, Work
 from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
+
+Array = NDArray[np.float64]
+
 
 MAX_SWITCHES = 3
 """Switches between stick and slip after which a contact yields for the rest of the tick."""
@@ -27,7 +33,7 @@ PRESSURE = 0.1
 
 
 @inlined
-def lever_of(work, touches, c, side):
+def lever_of(work: Work, touches: Touches, c: int, side: int) -> tuple[float, float, float]:
     """Lever of contact ``c`` from the centre of its node ``side``: along the capsule's axis, then to its skin."""
     p, n = touches.local[c, side], touches.normal[c]
     rx, ry, rz = rotate(work.R[touches.node[c, side]], p[0], p[1], p[2])
@@ -36,7 +42,9 @@ def lever_of(work, touches, c, side):
 
 
 @inlined
-def _travel(nodes, work, touches, c, side):
+def _travel(
+    nodes: Nodes, work: Work, touches: Touches, c: int, side: int
+) -> tuple[float, float, float, float, float, float]:
     """How far contact ``c`` has moved with its node ``side`` in this tick, and its lever.
 
     A capsule that rolls moves its skin but not its axis, so that pressure alone never rolls it; a point
@@ -58,7 +66,9 @@ def _travel(nodes, work, touches, c, side):
 
 
 @inlined
-def _opening(nodes, work, touches, c):
+def _opening(
+    nodes: Nodes, work: Work, touches: Touches, c: int
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """Gap of contact ``c`` now, the slip its friction resists (3), and its levers on both nodes (6)."""
     px, py, pz, ax, ay, az = _travel(nodes, work, touches, c, 0)
     sx, sy, sz, bx, by, bz = _travel(nodes, work, touches, c, 1)
@@ -72,7 +82,7 @@ def _opening(nodes, work, touches, c):
 
 
 @inlined
-def _add_spring(K, rx, ry, rz, H):
+def _add_spring(K: Array, rx: float, ry: float, rz: float, H: Array) -> None:
     """H += Jᵀ K J for a spring K (3, 3) at the lever r, J = [1, -[r]]."""
     for i in range(3):
         # Row of -K [r] = (r x K_i) with the sign of the transposed product.
@@ -106,7 +116,7 @@ def _add_spring(K, rx, ry, rz, H):
 
 
 @inlined
-def push(g, sign, fx, fy, fz, rx, ry, rz):
+def push(g: Array, sign: float, fx: float, fy: float, fz: float, rx: float, ry: float, rz: float) -> None:
     """g += sign (f, r x f)."""
     mx, my, mz = cross(rx, ry, rz, fx, fy, fz)
     g[0] += sign * fx
@@ -118,7 +128,9 @@ def push(g, sign, fx, fy, fz, rx, ry, rz):
 
 
 @inlined
-def _friction(touches, c, wx, wy, wz, scale, dt):
+def _friction(
+    touches: Touches, c: int, wx: float, wy: float, wz: float, scale: float, dt: float
+) -> tuple[float, float, float]:
     """Stiffness of the bristle of contact ``c`` across its motion and along it, and the factor of its force."""
     limit = touches.friction[c] * touches.press[c] * dt * dt
     size = math.sqrt(wx * wx + wy * wy + wz * wz)
@@ -129,14 +141,16 @@ def _friction(touches, c, wx, wy, wz, scale, dt):
 
 
 @inlined
-def rigid(touches, c):
-    """Whether ``c`` is a point constraint; a bilateral contact with friction is a grasp, whose `Touches.press` is
-    given."""
+def rigid(touches: Touches, c: int) -> bool:
+    """Whether ``c`` is a point constraint.
+
+    A bilateral contact with friction is a grasp, whose `Touches.press` is given.
+    """
     return touches.bilateral[c] and touches.friction[c] == 0.0
 
 
 @kernel
-def add_contacts(nodes, touches, work, stiffness, dt):
+def add_contacts(nodes: Nodes, touches: Touches, work: Work, stiffness: float, dt: float) -> None:
     """Add all closed contacts to ``work.H`` and ``work.g``."""
     scale = stiffness * dt * dt
     for c in range(touches.count[0]):
@@ -175,7 +189,7 @@ def add_contacts(nodes, touches, work, stiffness, dt):
 
 
 @inlined
-def _moved(nodes, work, touches, c, side):
+def _moved(nodes: Nodes, work: Work, touches: Touches, c: int, side: int) -> tuple[float, float, float]:
     """Displacement of the point of contact ``c`` on a node by the solved correction."""
     i = touches.node[c, side]
     if nodes.fixed[i]:
@@ -187,7 +201,7 @@ def _moved(nodes, work, touches, c, side):
 
 
 @kernel
-def settle_contacts(nodes, touches, work, stiffness, dt):
+def settle_contacts(nodes: Nodes, touches: Touches, work: Work, stiffness: float, dt: float) -> bool:
     """Forces of the contacts as solved, and which of them touch and stick; True if the solve assumed otherwise."""
     changed = False
     per_dt2 = 1.0 / (dt * dt)
@@ -222,7 +236,7 @@ def settle_contacts(nodes, touches, work, stiffness, dt):
 
 
 @inlined
-def _settle_friction(touches, c, w, press, stiffness):
+def _settle_friction(touches: Touches, c: int, w: Array, press: float, stiffness: float) -> bool:
     """Whether contact ``c`` sticks or slips after a solve; True if the solve assumed otherwise."""
     limit = touches.friction[c] * press
     before = touches.friction[c] * touches.press[c]
@@ -246,7 +260,7 @@ def _settle_friction(touches, c, w, press, stiffness):
 
 
 @kernel
-def conclude_contacts(touches, stiffness):
+def conclude_contacts(touches: Touches, stiffness: float) -> None:
     """The slip that the next tick's friction starts from."""
     for c in range(touches.count[0]):
         slip, w = touches.slip[c], touches.ended[c]

@@ -24,8 +24,8 @@ from ligature.suture.bodies import HeldBodies
 from ligature.suture.passage_forces import react, solve_needle
 from ligature.suture.rod import Rod
 from ligature.suture.rods import Rods
-from ligature.suture.tables import table_of
 from ligature.suture.tracking import follow_needle, follow_rod, look_for_needle, look_for_rod
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 

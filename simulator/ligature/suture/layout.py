@@ -133,6 +133,43 @@ class Work(NamedTuple):
     group_box: Array  # (elements, 2, 3)
 
 
+class Constants(NamedTuple):
+    """Numbers of a rod that never change, (1,) each."""
+
+    first: NDArray[np.int64]  # row of the first element among the nodes
+    self_skip: NDArray[np.int64]  # elements on either side of one that do not touch it
+    stiffness: Array  # of contacts, N/m
+    max_speed: Array  # beyond which the rod has diverged, m/s
+    dt: Array  # length of a tick, s
+
+
+class RodArrays(NamedTuple):
+    """All that a tick of a rod works on, but contact points, which change places, and constraints."""
+
+    constants: Constants
+    nodes: Nodes
+    joints: Joints
+    shapes: Shapes
+    work: Work
+    shape_poses: Array  # (S, 7) as `Shapes.pose`, kept over a tick
+    impulse: Array  # (N, 6) of the tick
+    tension: Array  # (elements,) N
+    counts: NDArray[np.int64]  # (5,) what `ligature.suture.substeps.run_tick` returns
+
+
+def rod_arrays(
+    nodes: Nodes, joints: Joints, shapes: Shapes, work: Work, first: int, self_skip: int, stiffness: float,
+    max_speed: float, dt: float,
+) -> RodArrays:  # fmt: skip
+    """The arrays of a rod at rest with these groups and constants."""
+    whole, real = (np.array([first]), np.array([self_skip])), (np.array([c]) for c in (stiffness, max_speed, dt))
+    return RodArrays(
+        constants=Constants(*whole, *real), nodes=nodes, joints=joints, shapes=shapes, work=work,
+        shape_poses=np.zeros_like(shapes.pose), impulse=np.zeros((len(nodes.mass), 6)),
+        tension=np.zeros(len(work.segment)), counts=np.zeros(5, np.int64),
+    )  # fmt: skip
+
+
 def nodes(total: int) -> Nodes:
     """``total`` nodes of mass 1 at the origin, at rest."""
     z = np.zeros

@@ -11,11 +11,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6
-from ligature.suture.layout import SLIPS, STICKS, YIELDS
+from ligature.suture.layout import SLIPS, STICKS, YIELDS, Nodes, Work
+from ligature.suture.passages import Passages
 from ligature.suture.rotations import cross, matrix_of, multiply, quaternion_of, rotation_vector
 from ligature.suture.tracking import open_passages
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
 
 MAX_SWITCHES = 6
 """Changes of mode in a tick after which a row yields for the rest of it."""
@@ -28,7 +36,7 @@ MAX_STEPS = 8
 
 
 @inlined
-def _begin_passage(p, c):
+def _begin_passage(p: Passages, c: int) -> None:
     """Springs of passage ``c`` as the last tick left them."""
     p.switches[c] = 0
     for r in range(6):
@@ -36,7 +44,7 @@ def _begin_passage(p, c):
 
 
 @inlined
-def _set_row(p, c, r, stretch):
+def _set_row(p: Passages, c: int, r: int, stretch: float) -> None:
     """Spring of row ``r`` in its mode, the row being stretched as given."""
     k, limit = p.stiffness[c, r], p.limit[c, r]
     p.secant[c, r], p.bias[c, r] = k, 0.0
@@ -47,7 +55,7 @@ def _set_row(p, c, r, stretch):
 
 
 @inlined
-def respond(p, c, elapsed):
+def respond(p: Passages, c: int, elapsed: float) -> None:
     """Passage ``c`` as it acts on its node: stiffness ``p.K`` and load ``p.load`` at the start of the tick."""
     T, K = p.T, p.K[c]
     for i in range(6):
@@ -67,7 +75,7 @@ def respond(p, c, elapsed):
 
 
 @inlined
-def begin_passages(p, owner):
+def begin_passages(p: Passages, owner: int) -> None:
     """Springs of the passages of a rod as the last tick left them."""
     for c in range(p.filled[0]):
         if p.owner[c] == owner:
@@ -77,7 +85,7 @@ def begin_passages(p, owner):
 
 
 @inlined
-def restart_passages(p, owner):
+def restart_passages(p: Passages, owner: int) -> None:
     """Springs of the passages of a rod as they were, after a step that did not settle."""
     for c in range(p.filled[0]):
         if p.owner[c] == owner:
@@ -85,7 +93,7 @@ def restart_passages(p, owner):
 
 
 @inlined
-def add_passage_forces(p, owner, nodes, work, elapsed, h):
+def add_passage_forces(p: Passages, owner: int, nodes: Nodes, work: Work, elapsed: float, h: float) -> None:
     """Add the passages of a rod to the matrices and loads of its nodes."""
     for c in range(p.filled[0]):
         i = p.node[c]
@@ -96,7 +104,7 @@ def add_passage_forces(p, owner, nodes, work, elapsed, h):
 
 
 @inlined
-def settle_passages(p, owner, nodes, elapsed):
+def settle_passages(p: Passages, owner: int, nodes: Nodes, elapsed: float) -> bool:
     """Forces of the passages of a rod as solved; True when a solve with other modes has to follow."""
     changed = False
     for c in range(p.filled[0]):
@@ -107,7 +115,7 @@ def settle_passages(p, owner, nodes, elapsed):
 
 
 @inlined
-def add_passage_impulses(p, owner, impulse, h):
+def add_passage_impulses(p: Passages, owner: int, impulse: Array, h: float) -> None:
     """Add the impulses of a rod's passages in ``h`` seconds to those (N, 6) of its nodes."""
     for c in range(p.filled[0]):
         if p.owner[c] == owner:
@@ -117,7 +125,7 @@ def add_passage_impulses(p, owner, impulse, h):
 
 
 @inlined
-def move(p, c, x, q):
+def move(p: Passages, c: int, x: Array, q: Array) -> None:
     """Write the motion of passage ``c`` with its node, now at ``x`` (3,) and ``q`` (4,), to ``p.d`` in its axes."""
     b, lever, A, d = p.q[c], p.lever[c], p.axes[c], p.d
     tx, ty, tz, tw = multiply(q[0], q[1], q[2], q[3], -b[0], -b[1], -b[2], b[3])
@@ -131,7 +139,7 @@ def move(p, c, x, q):
 
 
 @inlined
-def _press(p, c):
+def _press(p: Passages, c: int) -> None:
     """Force of passage ``c`` on its path for the motion in ``p.d``."""
     for i in range(6):
         s = p.load[c, i]
@@ -141,7 +149,7 @@ def _press(p, c):
 
 
 @inlined
-def _fill_jacobian(p, c):
+def _fill_jacobian(p: Passages, c: int) -> None:
     """Motion at passage ``c``, in its axes, for one of the node, in world axes: ``p.J``."""
     A, lever, J = p.axes[c], p.lever[c], p.J
     for k in range(3):
@@ -155,7 +163,7 @@ def _fill_jacobian(p, c):
 
 
 @inlined
-def _add_passage(p, c, x, q, H, g, elapsed, h):
+def _add_passage(p: Passages, c: int, x: Array, q: Array, H: Array, g: Array, elapsed: float, h: float) -> None:
     """Add passage ``c`` to the matrix ``H`` (6, 6) and the load ``g`` (6,) of its node, both times h²."""
     respond(p, c, elapsed)
     move(p, c, x, q)
@@ -181,7 +189,7 @@ def _add_passage(p, c, x, q, H, g, elapsed, h):
 
 
 @inlined
-def _settle_passage(p, c, x, q, elapsed):
+def _settle_passage(p: Passages, c: int, x: Array, q: Array, elapsed: float) -> bool:
     """Force of passage ``c`` with its node as solved; True when a row sticks or slips other than the solve assumed."""
     move(p, c, x, q)
     _press(p, c)
@@ -209,7 +217,7 @@ def _settle_passage(p, c, x, q, elapsed):
 
 
 @inlined
-def _add_passage_impulse(p, c, h):
+def _add_passage_impulse(p: Passages, c: int, h: float) -> None:
     """Add the impulse of passage ``c`` on its path in ``h`` seconds to ``p.impulse``; ``p.d`` gets force and moment.
 
     Both are about the node's centre, in world axes.
@@ -224,7 +232,10 @@ def _add_passage_impulse(p, c, h):
 
 
 @kernel
-def solve_needle(passage_table, path, pose, twist, mass, inertia, pull, H, Y, g, dt):
+def solve_needle(
+    passage_table: Integers, path: int, pose: Array, twist: Array, mass: float, inertia: Array, pull: Array, H: Array,
+    Y: Array, g: Array, dt: float,
+) -> None:  # fmt: skip
     """Impulses in this tick of all passages of a needle that is not attached to a rod.
 
     ``pose`` (7,) and ``twist`` (6,) are those of the needle, ``pull`` (6,) the other force and moment
@@ -283,7 +294,7 @@ def solve_needle(passage_table, path, pose, twist, mass, inertia, pull, H, Y, g,
 
 
 @inlined
-def _turn_row(q, vx, vy, vz):
+def _turn_row(q: Array, vx: float, vy: float, vz: float) -> None:
     """Turn the quaternion ``q`` (4,) by a rotation vector."""
     ex, ey, ez, ew = quaternion_of(vx, vy, vz)
     x, y, z, w = multiply(ex, ey, ez, ew, q[0], q[1], q[2], q[3])
@@ -292,7 +303,7 @@ def _turn_row(q, vx, vy, vz):
 
 
 @kernel
-def react(passage_table, site_pose, c, out):
+def react(passage_table: Integers, site_pose: Array, c: int, out: Array) -> float:
     """Impulse and moment (6,) of passage ``c`` on its hole's body, about that body's centre, to ``out``."""
     p = open_passages(passage_table)
     pose, x, i = site_pose[p.hole[c]], p.x[c], p.impulse[c]

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
 from ligature.suture.rotations import matrix_of, multiply, rotate
 
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
 
 @inlined
-def _compose(pose, local, out_p, out_q, R):
+def _compose(pose: Array, local: Array, out_p: Array, out_q: Array, R: Array) -> None:
     matrix_of(pose[3], pose[4], pose[5], pose[6], R)
     x, y, z = rotate(R, local[0], local[1], local[2])
     out_p[0], out_p[1], out_p[2] = pose[0] + x, pose[1] + y, pose[2] + z
@@ -19,7 +26,10 @@ def _compose(pose, local, out_p, out_q, R):
 
 
 @kernel
-def survey(due, ranges, local, extent, motion, dt, out_pose, out_box, out_sweep, corners, margin, near, R):
+def survey(
+    due: Flags, ranges: Integers, local: Array, extent: Array, motion: Array, dt: float, out_pose: Array,
+    out_box: Array, out_sweep: Array, corners: Array, margin: float, near: Flags, R: Array,
+) -> bool:  # fmt: skip
     """Place the parts of the bodies that are ``due`` (b,), and flag in ``near`` (b,) those within ``margin`` of a box.
 
     ``motion`` (b, 13) are pose and twist of the bodies' inertial frames, ``ranges`` (b, 2) their rows among
@@ -47,7 +57,10 @@ def survey(due, ranges, local, extent, motion, dt, out_pose, out_box, out_sweep,
 
 
 @inlined
-def _place_parts(begin, end, local, extent, motion, dt, out_pose, out_box, out_sweep, R):
+def _place_parts(
+    begin: int, end: int, local: Array, extent: Array, motion: Array, dt: float, out_pose: Array, out_box: Array,
+    out_sweep: Array, R: Array,
+) -> None:  # fmt: skip
     """Pose, box and sweep of the parts ``begin`` … ``end`` of a body."""
     speed = math.sqrt(motion[7] ** 2 + motion[8] ** 2 + motion[9] ** 2)
     spin = math.sqrt(motion[10] ** 2 + motion[11] ** 2 + motion[12] ** 2)
@@ -68,7 +81,7 @@ def _place_parts(begin, end, local, extent, motion, dt, out_pose, out_box, out_s
 
 
 @kernel
-def bounds(points, out):
+def bounds(points: Array, out: Array) -> None:
     """Corners ``out`` (2, 3) of the box around ``points`` (n, 3)."""
     for a in range(3):
         out[0, a], out[1, a] = points[0, a], points[0, a]
@@ -78,7 +91,10 @@ def bounds(points, out):
 
 
 @kernel
-def write_elements(first, x, q, v, w, inertial_to_body, tension, bodies, poses, twists, tensions, R):
+def write_elements(
+    first: int, x: Array, q: Array, v: Array, w: Array, inertial_to_body: Array, tension: Array, bodies: Integers,
+    poses: Array, twists: Array, tensions: Array, R: Array,
+) -> None:  # fmt: skip
     """Poses of body frames, twists and tension of a rod's elements, to rows ``bodies`` (n,) of the last arrays.
 
     The elements are the nodes from ``first`` on; ``inertial_to_body`` (n, 7) are their body frames in I.
@@ -98,7 +114,7 @@ def write_elements(first, x, q, v, w, inertial_to_body, tension, bodies, poses, 
 
 
 @kernel
-def sound(first, n, x, q, v, w, max_speed):
+def sound(first: int, n: int, x: Array, q: Array, v: Array, w: Array, max_speed: float) -> bool:
     """Whether the ``n`` nodes from ``first`` on are finite and slower than ``max_speed``."""
     for i in range(first, first + n):
         total = q[i, 3]

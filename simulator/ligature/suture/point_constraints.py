@@ -7,18 +7,27 @@ axes, SI units.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined
-from ligature.suture.layout import SLIPS
+from ligature.suture.layout import SLIPS, Nodes, Touches, Work
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
 
 FIRST_GRASP_KEY = -2
 """Key of the first grasp; the next ones have lower keys."""
 
 
 @inlined
-def _constrain(nodes, work, touches, i, k, points):
-    """Add point constraints that hold ``points`` (m, 2, 3), given in the frames of nodes i and k, together this
-    tick."""
+def _constrain(nodes: Nodes, work: Work, touches: Touches, i: int, k: int, points: Array) -> None:
+    """Add point constraints that hold ``points`` (m, 2, 3) together this tick.
+
+    The points are given in the frames of nodes i and k.
+    """
     for node in (i, k):
         matrix_of(nodes.q[node, 0], nodes.q[node, 1], nodes.q[node, 2], nodes.q[node, 3], work.R[node])
     for m in range(points.shape[0]):
@@ -47,7 +56,7 @@ def _constrain(nodes, work, touches, i, k, points):
 
 
 @inlined
-def _grasp(nodes, work, old, touches, g, i, k, points):
+def _grasp(nodes: Nodes, work: Work, old: Touches, touches: Touches, g: int, i: int, k: int, points: Array) -> None:
     """Add thread grasp number ``g`` of the element at node i by the pads of node k.
 
     ``points[0, 1]`` is the middle of the pads and ``points[1, 1]`` their normal, in the frame of node k;
@@ -95,7 +104,9 @@ def _grasp(nodes, work, old, touches, g, i, k, points):
 
 
 @inlined
-def add_point_constraints(nodes, work, old, touches, constraints, points):
+def add_point_constraints(
+    nodes: Nodes, work: Work, old: Touches, touches: Touches, constraints: Integers, points: Array
+) -> None:
     """Add all ``constraints`` (g, 3), each two nodes and whether it is a grasp, with ``points`` (g, m, 2, 3).
 
     ``old`` are the contacts of the last tick.

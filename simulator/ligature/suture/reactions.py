@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined
 from ligature.suture.chain import add_joint_force
 from ligature.suture.coupling import lever_of
+from ligature.suture.layout import Joints, Touches, Work
 from ligature.suture.rotations import cross
+
+Array = NDArray[np.float64]
 
 
 @inlined
-def _joint_load(n, work, joints, i, out):
+def _joint_load(n: int, work: Work, joints: Joints, i: int, out: Array) -> None:
     """Total force and moment (6,) of the joints on the centre of chain node ``i``, times dt²."""
     for a in range(6):
         out[a] = 0.0
@@ -22,9 +28,11 @@ def _joint_load(n, work, joints, i, out):
 
 
 @inlined
-def add_reactions(n, joints, touches, work, impulse, dt):
-    """Add the impulses of joints and contacts on every node to ``impulse``, in N s, with the moment about its
-    centre."""
+def add_reactions(n: int, joints: Joints, touches: Touches, work: Work, impulse: Array, dt: float) -> None:
+    """Add the impulses of joints and contacts on every node to ``impulse``.
+
+    In N s, with the moment about the node's centre.
+    """
     for i in range(n):
         _joint_load(n, work, joints, i, work.sum6)
         for a in range(6):
@@ -47,8 +55,11 @@ def add_reactions(n, joints, touches, work, impulse, dt):
 
 
 @inlined
-def find_tension(first, n, joints, work, tension, dt):
-    """Tension of each element in newtons: the mean pull of its joints along it, positive when taut."""
+def find_tension(first: int, n: int, joints: Joints, work: Work, tension: Array, dt: float) -> None:
+    """Tension of each element in newtons: the mean pull of its joints along it, positive when taut.
+
+    0 for an element whose joints are in one place, which has no direction.
+    """
     for e in range(tension.shape[0]):
         i = first + e
         near = work.lever[i - 1, 1] if i > 0 else work.lever[i, 0]
@@ -64,4 +75,5 @@ def find_tension(first, n, joints, work, tension, dt):
                 joined += 1
                 f = joints.load[j]
                 pull += f[0] * ux + f[1] * uy + f[2] * uz
-        tension[e] = pull / (joined * math.sqrt(ux * ux + uy * uy + uz * uz) * dt * dt)
+        length = math.sqrt(ux * ux + uy * uy + uz * uz)
+        tension[e] = pull / (joined * length * dt * dt) if length > 0.0 else 0.0

@@ -25,7 +25,7 @@ from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.springs import springs
 from ligature.suture.substeps import run_tick
-from ligature.suture.tables import table_of
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 
@@ -135,15 +135,15 @@ class Rod:
         self._nodes = self._new_nodes()
         self._shapes = shapes or layout.no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
-        self._work = layout.work(self._chain, self._total, n, capacity)
         self._touches = tuple(layout.touches(capacity) for _ in range(3))
-        self._tables = [table_of(group) for group in (self._nodes, self.joints, self._shapes, self._work)]
         self._touch_tables = {id(touches): table_of(touches) for touches in self._touches}
-        self._shape_poses = np.zeros_like(self._shapes.pose)
-        self._counts = np.zeros(5, np.int64)
-        self._stiffness = 1.0 / (INDENTATION * float(description.radius.min()))
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
-        self._self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
+        self._arrays = layout.rod_arrays(
+            self._nodes, self.joints, self._shapes, layout.work(self._chain, self._total, n, capacity), self._first,
+            1 + int(np.ceil(np.pi * description.radius.max() / lengths.min())),
+            1.0 / (INDENTATION * float(description.radius.min())), MAX_SPEED, dt,
+        )  # fmt: skip
+        self._table = table_of(self._arrays)
         self._permanent = [self._constraint_of(attachment) for attachment in others]
         self._mobile = {p.body: p.mass > 0.0 for p in partners}
         self._fixed = {p.body: p.fixed for p in partners}
@@ -160,8 +160,7 @@ class Rod:
         self.take_passages(passages(1), 0)
         self.springs = springs()
         self._spring_table = table_of(self.springs)
-        self.impulse = np.zeros((self._total, 6))
-        self.tension = np.zeros(n)
+        self.impulse, self.tension = self._arrays.impulse, self._arrays.tension
         self.newton_steps, self.settled_soundly = 0, True
         self.reset()
 
@@ -489,18 +488,17 @@ class Rod:
         """Advance by one tick; `impulse` then holds the impulse on each partner."""
         a, b, c = self._touches
         last, next_, scratch = (self._touch_tables[id(touches)] for touches in self._touches)
-        nodes, joints, shapes, work = self._tables
         if self._pads:
             self._find_grasped()
         constraints, points = self._constraint_rows
         run_tick(
-            self._first, self._chain, self._total, nodes, joints, shapes, self._shape_poses, last, next_, scratch,
-            work, self._passage_table, self._owner, self._spring_table, constraints, points, self._motion, self._met,
-            self._counts, self._self_skip, self._stiffness, self.impulse, self.tension, MAX_SPEED, self.dt,
+            self._table, last, next_, scratch, self._passage_table, self._owner, self._spring_table, constraints,
+            points, self._motion, self._met,
         )  # fmt: skip
-        self.newton_steps, self.settled_soundly = int(self._counts[2]), bool(self._counts[4])
+        _, _, self.newton_steps, in_scratch, finite = self._arrays.counts.tolist()
+        self.settled_soundly = bool(finite)
         self._end_pulls()
-        self._touches = (c, a, b) if self._counts[3] else (b, c, a)
+        self._touches = (c, a, b) if in_scratch else (b, c, a)
 
     def impulse_on(self, body: int) -> Array:
         """Linear and angular impulse (6,) of the last tick on a partner, about its centre of mass."""

@@ -8,17 +8,24 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined
+
+Array = NDArray[np.float64]
 
 
 @inlined
-def cross(ax, ay, az, bx, by, bz):
+def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
     """Vector product a × b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @inlined
-def multiply(ax, ay, az, aw, bx, by, bz, bw):
+def multiply(
+    ax: float, ay: float, az: float, aw: float, bx: float, by: float, bz: float, bw: float
+) -> tuple[float, float, float, float]:
     """Quaternion product a b: the rotation b, then a."""
     return (
         aw * bx + ax * bw + ay * bz - az * by,
@@ -29,7 +36,7 @@ def multiply(ax, ay, az, aw, bx, by, bz, bw):
 
 
 @inlined
-def quaternion_of(vx, vy, vz):
+def quaternion_of(vx: float, vy: float, vz: float) -> tuple[float, float, float, float]:
     """Quaternion of a rotation vector (the exponential map)."""
     square = vx * vx + vy * vy + vz * vz
     if square < 0.01:
@@ -42,7 +49,7 @@ def quaternion_of(vx, vy, vz):
 
 
 @inlined
-def rotation_vector(x, y, z, w):
+def rotation_vector(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
     """Rotation vector of a quaternion (the logarithm), its length in 0..pi."""
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
@@ -58,7 +65,7 @@ def rotation_vector(x, y, z, w):
 
 
 @inlined
-def turn(q, i, vx, vy, vz):
+def turn(q: Array, i: int, vx: float, vy: float, vz: float) -> None:
     """Turn the quaternion ``q[i]`` by a rotation vector in world axes, in place, and renormalise it."""
     ex, ey, ez, ew = quaternion_of(vx, vy, vz)
     x, y, z, w = multiply(ex, ey, ez, ew, q[i, 0], q[i, 1], q[i, 2], q[i, 3])
@@ -67,7 +74,7 @@ def turn(q, i, vx, vy, vz):
 
 
 @inlined
-def matrix_of(x, y, z, w, R):
+def matrix_of(x: float, y: float, z: float, w: float, R: Array) -> None:
     """Write the rotation matrix of a unit quaternion into ``R`` (3, 3)."""
     R[0, 0], R[0, 1], R[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
     R[1, 0], R[1, 1], R[1, 2] = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
@@ -75,7 +82,7 @@ def matrix_of(x, y, z, w, R):
 
 
 @inlined
-def rotate(R, x, y, z):
+def rotate(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """R v."""
     return (
         R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
@@ -85,7 +92,7 @@ def rotate(R, x, y, z):
 
 
 @inlined
-def rotate_back(R, x, y, z):
+def rotate_back(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Rᵀ v."""
     return (
         R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
@@ -95,7 +102,9 @@ def rotate_back(R, x, y, z):
 
 
 @inlined
-def left_jacobian_inverse_times(vx, vy, vz, ux, uy, uz):
+def left_jacobian_inverse_times(
+    vx: float, vy: float, vz: float, ux: float, uy: float, uz: float
+) -> tuple[float, float, float]:
     """Jl(v)⁻¹ u: how the rotation vector v changes when its rotation is turned by u from the left.
 
     Source: Barfoot, State Estimation for Robotics, eq. 7.76b.

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined
+from ligature.suture.layout import Nodes, Work
 from ligature.suture.rotations import multiply, rotation_vector
-from ligature.suture.tables import opener
+from ligature.tables import opener
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -54,7 +55,7 @@ open_springs = opener(springs(1))
 
 
 @inlined
-def begin_springs(s, nodes):
+def begin_springs(s: Springs, nodes: Nodes) -> None:
     """Keep where the nodes are as the tick begins."""
     for c in range(s.filled[0]):
         i = s.node[c]
@@ -67,7 +68,7 @@ def begin_springs(s, nodes):
 
 
 @inlined
-def settle_springs(s, nodes):
+def settle_springs(s: Springs, nodes: Nodes) -> None:
     """Forces of the springs with the nodes where they are."""
     for c in range(s.filled[0]):
         i, q, b = s.node[c], nodes.q[s.node[c]], s.q[c]
@@ -80,7 +81,7 @@ def settle_springs(s, nodes):
 
 
 @inlined
-def add_springs(s, nodes, work, h):
+def add_springs(s: Springs, nodes: Nodes, work: Work, h: float) -> None:
     """Add the springs to the matrices and loads of their nodes, both times h²."""
     settle_springs(s, nodes)
     for c in range(s.filled[0]):
@@ -93,7 +94,7 @@ def add_springs(s, nodes, work, h):
 
 
 @inlined
-def add_spring_impulses(s, impulse, h):
+def add_spring_impulses(s: Springs, impulse: Array, h: float) -> None:
     """Add the impulses of the springs in ``h`` seconds to those (N, 6) of the nodes."""
     for c in range(s.filled[0]):
         for a in range(6):

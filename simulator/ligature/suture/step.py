@@ -14,7 +14,9 @@ from ligature.kernels import inlined, kernel
 from ligature.suture.chain import factor, solve
 from ligature.suture.coupled_solve import couple, gather
 from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
+from ligature.suture.layout import Joints, Nodes, Touches, Work
 from ligature.suture.passage_forces import add_passage_forces, settle_passages
+from ligature.suture.passages import Passages
 from ligature.suture.rotations import (
     cross,
     left_jacobian_inverse_times,
@@ -24,7 +26,7 @@ from ligature.suture.rotations import (
     rotation_vector,
     turn,
 )
-from ligature.suture.springs import add_springs, settle_springs
+from ligature.suture.springs import Springs, add_springs, settle_springs
 
 MAX_NEWTON = 8
 """Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
@@ -37,7 +39,7 @@ MAX_SWING = 0.5
 
 
 @kernel
-def predict(total, nodes, work, dt, damped):
+def predict(total: int, nodes: Nodes, work: Work, dt: float, damped: bool) -> None:
     """Free motion: start poses to ``work.x``, predicted poses to ``nodes`` and ``work.xp``.
 
     Damping of a whole tick is taken off in its ``damped`` step.
@@ -59,7 +61,7 @@ def predict(total, nodes, work, dt, damped):
 
 
 @inlined
-def joint_angle(nodes, joints, j):
+def joint_angle(nodes: Nodes, joints: Joints, j: int) -> tuple[float, float, float, float, float, float, float]:
     """Rotation vector of joint ``j`` in its own frame: the six-DOF coordinates, second-order exact."""
     ax, ay, az, aw = multiply(
         nodes.q[j, 0], nodes.q[j, 1], nodes.q[j, 2], nodes.q[j, 3],
@@ -75,7 +77,7 @@ def joint_angle(nodes, joints, j):
 
 
 @inlined
-def _axis_row(joints, j, a, angle, dt):
+def _axis_row(joints: Joints, j: int, a: int, angle: float, dt: float) -> tuple[float, float]:
     """Stiffness and moment of one axis of a joint's spring, damper and stop, both times dt²."""
     k, d = joints.stiffness[j, a] * dt * dt, joints.damping[j, a] * dt
     s = k + d
@@ -89,7 +91,7 @@ def _axis_row(joints, j, a, angle, dt):
 
 
 @kernel
-def linearise(n, total, nodes, joints, work, dt):
+def linearise(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: float) -> None:
     """Levers, axes and rows of all joints at the present poses."""
     per_dt2 = 1.0 / (dt * dt)
     for i in range(total):
@@ -115,7 +117,7 @@ def linearise(n, total, nodes, joints, work, dt):
 
 
 @kernel
-def assemble(n, total, nodes, joints, work):
+def assemble(n: int, total: int, nodes: Nodes, joints: Joints, work: Work) -> None:
     """Node matrices H (inertia, stiffness of the tension) and loads g (of the free motion)."""
     for i in range(total):
         H, R = work.H[i], work.R[i]
@@ -144,7 +146,7 @@ def assemble(n, total, nodes, joints, work):
 
 
 @inlined
-def _stiffen_by_tension(n, joints, work, i):
+def _stiffen_by_tension(n: int, joints: Joints, work: Work, i: int) -> None:
     """Add the resistance to turning that the forces at a node's pivots bring, as far as it is positive."""
     lever, load = work.lever, joints.load
     g, ux, uy, uz = 0.0, 0.0, 0.0, 0.0
@@ -169,7 +171,7 @@ def _stiffen_by_tension(n, joints, work, i):
 
 
 @kernel
-def correct(n, total, nodes, work):
+def correct(n: int, total: int, nodes: Nodes, work: Work) -> float:
     """Move all nodes by the correction ``work.d``; returns the largest swing of a lever.
 
     Rolling about the line between its pivots moves no pivot, and does not count.
@@ -197,7 +199,7 @@ def correct(n, total, nodes, work):
 
 
 @kernel
-def finish(n, total, nodes, joints, work, dt):
+def finish(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: float) -> None:
     """Velocities from the motion of the tick, and the joint angles that damping starts from next."""
     for i in range(total):
         if nodes.fixed[i]:
@@ -216,7 +218,10 @@ def finish(n, total, nodes, joints, work, dt):
 
 
 @kernel
-def advance(n, total, nodes, joints, touches, work, passages, owner, springs, stiffness, dt, damped, elapsed):
+def advance(
+    n: int, total: int, nodes: Nodes, joints: Joints, touches: Touches, work: Work, passages: Passages, owner: int,
+    springs: Springs, stiffness: float, dt: float, damped: bool, elapsed: float,
+) -> tuple[int, bool]:  # fmt: skip
     """One step of ``total`` nodes, the first ``n`` of them a chain.
 
     It ends ``elapsed`` seconds after the tick began. ``passages`` are those of all rods; this one is ``owner``, with

@@ -7,24 +7,33 @@ axes, SI units.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture.contacts import detect
 from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
+from ligature.suture.passages import Passages
 from ligature.suture.placing import sound
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
-from ligature.suture.springs import add_spring_impulses, begin_springs, open_springs
+from ligature.suture.springs import Springs, add_spring_impulses, begin_springs, open_springs
 from ligature.suture.step import advance
-from ligature.suture.tables import opener
 from ligature.suture.tracking import open_passages
+from ligature.tables import opener
 
-open_nodes = opener(layout.nodes(1))
-open_joints = opener(layout.joints(1))
-open_shapes = opener(layout.no_shapes(1))
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
 open_touches = opener(layout.touches(1))
-open_work = opener(layout.work(2, 2, 1, 1))
+open_rod = opener(
+    layout.rod_arrays(
+        layout.nodes(1), layout.joints(1), layout.no_shapes(1), layout.work(2, 2, 1, 1), 0, 0, 0.0, 0.0, 0.0
+    )
+)
 
 REFINEMENT, MAX_PARTS = 4, 16
 """How many steps take the place of one that did not settle, and the most in a tick."""
@@ -34,14 +43,14 @@ MAX_STEPS = 16
 
 
 @inlined
-def _copy2(a, b):
+def _copy2(a: Array, b: Array) -> None:
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
             b[i, k] = a[i, k]
 
 
 @inlined
-def _place(nodes, motion, met):
+def _place(nodes: layout.Nodes, motion: Array, met: Integers) -> None:
     """Set the nodes ``met[:, 1]`` to the motion of their bodies, rows ``met[:, 0]`` of ``motion`` (b, 13)."""
     for m in range(met.shape[0]):
         row, i = motion[met[m, 0]], met[m, 1]
@@ -52,7 +61,7 @@ def _place(nodes, motion, met):
 
 
 @inlined
-def _keep(nodes, joints, work):
+def _keep(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
     _copy2(nodes.x, work.kept_x)
     _copy2(nodes.q, work.kept_q)
     _copy2(nodes.v, work.kept_v)
@@ -62,7 +71,7 @@ def _keep(nodes, joints, work):
 
 
 @inlined
-def _take_back(nodes, joints, work):
+def _take_back(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
     _copy2(work.kept_x, nodes.x)
     _copy2(work.kept_q, nodes.q)
     _copy2(work.kept_v, nodes.v)
@@ -72,7 +81,7 @@ def _take_back(nodes, joints, work):
 
 
 @inlined
-def _move_shapes(nodes, shapes, h):
+def _move_shapes(nodes: layout.Nodes, shapes: layout.Shapes, h: float) -> None:
     """Advance the parts of bodies by ``h`` seconds with their nodes."""
     for c in range(shapes.node.shape[0]):
         k = shapes.node[c]
@@ -85,7 +94,7 @@ def _move_shapes(nodes, shapes, h):
 
 
 @inlined
-def _scale_loads(joints, factor):
+def _scale_loads(joints: layout.Joints, factor: float) -> None:
     """Scale the loads, which are times the square of the step, to another step."""
     for j in range(joints.load.shape[0]):
         for a in range(6):
@@ -94,33 +103,42 @@ def _scale_loads(joints, factor):
 
 @inlined
 def _one_step(
-    first, n, total, nodes, joints, shapes, old, new, work, passages, owner, springs, constraints, points, tension,
-    counts, self_skip, stiffness, h, begins, elapsed,
-):  # fmt: skip
+    rod: layout.RodArrays, old: layout.Touches, new: layout.Touches, passages: Passages, owner: int,
+    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float,
+) -> tuple[int, bool]:  # fmt: skip
+    """A step of ``h`` seconds that ends ``elapsed`` seconds after the tick began; see `advance` for what it returns."""
+    nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
+    n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
     new.count[0] = 0
     add_point_constraints(nodes, work, old, new, constraints, points)
-    detect(first, work.segment.shape[0], nodes, shapes, old, new, work, tension, counts, self_skip, h)
-    return advance(n, total, nodes, joints, new, work, passages, owner, springs, stiffness, h, begins, elapsed)
+    detect(
+        constants.first[0], elements, nodes, rod.shapes, old, new, work, rod.tension, rod.counts,
+        constants.self_skip[0], h,
+    )  # fmt: skip
+    return advance(
+        n, total, nodes, joints, new, work, passages, owner, springs, constants.stiffness[0], h, begins, elapsed
+    )
 
 
 @kernel
 def run_tick(
-    first, n, total, node_table, joint_table, shape_table, shape_poses, last, next_, scratch, work_table,
-    passage_table, owner, spring_table, constraints, points, motion, met, counts, self_skip, stiffness, impulse,
-    tension, max_speed, dt,
-):  # fmt: skip
+    rod_table: Integers, last: Integers, next_: Integers, scratch: Integers, passage_table: Integers, owner: int,
+    spring_table: Integers, constraints: Integers, points: Array, motion: Array, met: Integers,
+) -> None:  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``scratch``.
 
-    Groups of arrays come as the tables of `ligature.suture.tables`. ``counts`` returns: contacts found,
+    Groups of arrays come as the tables of `ligature.tables`. `RodArrays.counts` returns: contacts found,
     contacts for which there was no room, Newton steps, whether the contacts lie in ``scratch``, and whether all
-    elements are finite and slower than ``max_speed``.
+    elements are finite and slower than the maximum speed.
     """
-    nodes, joints, shapes = open_nodes(node_table), open_joints(joint_table), open_shapes(shape_table)
-    a, b, c, work = open_touches(last), open_touches(next_), open_touches(scratch), open_work(work_table)
-    passages, springs = open_passages(passage_table), open_springs(spring_table)
+    rod, passages, springs = open_rod(rod_table), open_passages(passage_table), open_springs(spring_table)
+    a, b, c = open_touches(last), open_touches(next_), open_touches(scratch)
+    nodes, joints, shapes, work, impulse, counts = rod.nodes, rod.joints, rod.shapes, rod.work, rod.impulse, rod.counts
+    n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
+    first, dt = rod.constants.first[0], rod.constants.dt[0]
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
-    _copy2(shapes.pose, shape_poses)
+    _copy2(shapes.pose, rod.shape_poses)
     begin_passages(passages, owner)
     begin_springs(springs, nodes)
     for i in range(total):
@@ -135,9 +153,8 @@ def run_tick(
         _scale_loads(joints, (size / scale) ** 2)
         scale = size
         more, settled = _one_step(
-            first, n, total, nodes, joints, shapes, old, new, work, passages, owner, springs, constraints, points,
-            tension, counts, self_skip, stiffness, h, done == 0, dt * (done + size) / MAX_PARTS,
-        )  # fmt: skip
+            rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
+        )
         steps += more
         if not settled and size > 1 and steps < MAX_STEPS:
             _take_back(nodes, joints, work)
@@ -157,9 +174,8 @@ def run_tick(
         new = c if in_c else b
         while done % (REFINEMENT * size) == 0:
             size *= REFINEMENT
-    _copy2(shape_poses, shapes.pose)
+    _copy2(rod.shape_poses, shapes.pose)
     _scale_loads(joints, (MAX_PARTS / scale) ** 2)
-    find_tension(first, n, joints, work, tension, dt)
+    find_tension(first, n, joints, work, rod.tension, dt)
     counts[2], counts[3] = steps, 1 if in_c else 0
-    elements = work.segment.shape[0]
-    counts[4] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, max_speed) else 0
+    counts[4] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, rod.constants.max_speed[0]) else 0

@@ -35,7 +35,7 @@ class Suture(Subsystem):
     def reset(self) -> None:
         """Put the rods back to their initial shapes and empty the holes."""
         self.rods.reset()
-        self.rods.update_masses(self._bodies)
+        self.rods.update_masses(self._bodies.masses)
         self.holes.reset()
 
     def snapshot(self) -> dict[str, Any]:

@@ -7,12 +7,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture import passages as arrays
 from ligature.suture.layout import SLIPS, STICKS
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
-from ligature.suture.tables import opener
+from ligature.tables import opener
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
 
 open_nodes = opener(layout.nodes(1))
 open_passages = opener(arrays.passages(1))
@@ -30,17 +37,17 @@ LOST = 0.003
 
 
 @inlined
-def _wrap(angle, middle):
+def _wrap(angle: float, middle: float) -> float:
     return middle + (angle - middle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @inlined
-def _body_rotation(pose, R):
+def _body_rotation(pose: Array, R: Array) -> None:
     matrix_of(pose[3], pose[4], pose[5], pose[6], R)
 
 
 @inlined
-def _into_hole(sites, h, R, x, y, z):
+def _into_hole(sites: arrays.Sites, h: int, R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A world point in the frame of hole ``h``, whose body has the rotation ``R``."""
     p, o, L = sites.pose[h], sites.origin[h], sites.R[h]
     bx, by, bz = rotate_back(R, x - p[0], y - p[1], z - p[2])
@@ -48,14 +55,14 @@ def _into_hole(sites, h, R, x, y, z):
 
 
 @inlined
-def _turn_into_hole(sites, h, R, x, y, z):
+def _turn_into_hole(sites: arrays.Sites, h: int, R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A world direction in the frame of hole ``h``."""
     bx, by, bz = rotate_back(R, x, y, z)
     return rotate_back(sites.R[h], bx, by, bz)
 
 
 @inlined
-def _known(p, path, hole, depth):
+def _known(p: arrays.Passages, path: int, hole: int, depth: float) -> bool:
     """Whether a crossing of ``hole`` at ``depth`` belongs to a present passage."""
     known = False
     for c in range(p.filled[0]):
@@ -65,7 +72,10 @@ def _known(p, path, hole, depth):
 
 
 @inlined
-def _enter(p, sites, path, hole, owner, node, element, depth, x, y, z):
+def _enter(
+    p: arrays.Passages, sites: arrays.Sites, path: int, hole: int, owner: int, node: int, element: int,
+    depth: float, x: float, y: float, z: float,
+) -> int:  # fmt: skip
     """A new passage at the world point; returns its row, -1 when the table is full."""
     c = p.filled[0]
     if c == p.hole.shape[0]:
@@ -84,7 +94,7 @@ def _enter(p, sites, path, hole, owner, node, element, depth, x, y, z):
 
 
 @inlined
-def _set_axes(p, c, tx, ty, tz, nx, ny, nz):
+def _set_axes(p: arrays.Passages, c: int, tx: float, ty: float, tz: float, nx: float, ny: float, nz: float) -> None:
     """Axes of passage ``c``: tangent, normal, and outwards."""
     ox, oy, oz = cross(tx, ty, tz, nx, ny, nz)
     A = p.axes[c]
@@ -94,7 +104,7 @@ def _set_axes(p, c, tx, ty, tz, nx, ny, nz):
 
 
 @inlined
-def _mark_axes(p, c):
+def _mark_axes(p: arrays.Passages, c: int) -> None:
     """Fix the present axes of passage ``c`` in the hole's body, whose rotation is in ``p.B``."""
     for k in range(3):
         a, b, d = rotate_back(p.B, p.axes[c, 0, k], p.axes[c, 1, k], p.axes[c, 2, k])
@@ -102,7 +112,7 @@ def _mark_axes(p, c):
 
 
 @inlined
-def _arc_axes(p, c, paths, path, angle):
+def _arc_axes(p: arrays.Passages, c: int, paths: arrays.Paths, path: int, angle: float) -> None:
     """Axes of passage ``c`` where the needle, whose rotation is in ``p.A``, has the given angle."""
     X, Y = paths.x[path], paths.y[path]
     ca, sa = math.cos(angle), math.sin(angle)
@@ -113,7 +123,7 @@ def _arc_axes(p, c, paths, path, angle):
 
 
 @inlined
-def _arc_point(p, paths, path, angle):
+def _arc_point(p: arrays.Passages, paths: arrays.Paths, path: int, angle: float) -> tuple[float, float, float]:
     """World point of a needle, whose rotation is in ``p.A``, at an angle of its arc."""
     X, Y, m, pose, r = paths.x[path], paths.y[path], paths.centre[path], paths.pose[path], paths.radius[path]
     ca, sa = r * math.cos(angle), r * math.sin(angle)
@@ -122,7 +132,7 @@ def _arc_point(p, paths, path, angle):
 
 
 @inlined
-def _enter_needle(p, paths, sites, path, hole):
+def _enter_needle(p: arrays.Passages, paths: arrays.Paths, sites: arrays.Sites, path: int, hole: int) -> None:
     """Find where the arc of a needle crosses the opening of a hole that it did not pass before."""
     _body_rotation(paths.pose[path], p.A)
     _body_rotation(sites.pose[hole], p.B)
@@ -160,7 +170,7 @@ def _enter_needle(p, paths, sites, path, hole):
 
 
 @kernel
-def follow_needle(passage_table, path_table, site_table, c):
+def follow_needle(passage_table: Integers, path_table: Integers, site_table: Integers, c: int) -> bool:
     """Bring passage ``c`` of a needle up to date; False when the needle has left the hole."""
     p, paths, sites = open_passages(passage_table), open_paths(path_table), open_sites(site_table)
     path, pose = p.path[c], sites.pose[p.hole[c]]
@@ -184,7 +194,7 @@ def follow_needle(passage_table, path_table, site_table, c):
 
 
 @inlined
-def _element_ends(p, nodes, i):
+def _element_ends(p: arrays.Passages, nodes: layout.Nodes, i: int) -> tuple[float, float, float, float, float, float]:
     """World ends of the axis of rod node ``i``."""
     q, axis = nodes.q[i], nodes.axis[i]
     matrix_of(q[0], q[1], q[2], q[3], p.A)
@@ -195,7 +205,7 @@ def _element_ends(p, nodes, i):
 
 
 @inlined
-def _rod_axes(p, c, tx, ty, tz):
+def _rod_axes(p: arrays.Passages, c: int, tx: float, ty: float, tz: float) -> None:
     """Axes of passage ``c`` about a tangent, the second one near that of the puncture; ``p.B`` is the body's."""
     f = p.frame[c]
     nx, ny, nz = rotate(p.B, f[0, 1], f[1, 1], f[2, 1])
@@ -211,7 +221,10 @@ def _rod_axes(p, c, tx, ty, tz):
 
 
 @inlined
-def _enter_rod(p, sites, nodes, first, before, path, owner, hole):
+def _enter_rod(
+    p: arrays.Passages, sites: arrays.Sites, nodes: layout.Nodes, first: int, before: Array, path: int, owner: int,
+    hole: int,
+) -> None:  # fmt: skip
     """Find elements of a rod that cross the opening of a hole where it did not pass before."""
     _body_rotation(sites.pose[hole], p.B)
     n = before.shape[0] - 1
@@ -242,7 +255,10 @@ def _enter_rod(p, sites, nodes, first, before, path, owner, hole):
 
 
 @kernel
-def follow_rod(passage_table, path_table, site_table, node_table, first, before, c):
+def follow_rod(
+    passage_table: Integers, path_table: Integers, site_table: Integers, node_table: Integers, first: int,
+    before: Array, c: int,
+) -> bool:  # fmt: skip
     """Bring passage ``c`` of a rod up to date; False when the rod has left the hole."""
     p, paths, sites = open_passages(passage_table), open_paths(path_table), open_sites(site_table)
     nodes = open_nodes(node_table)
@@ -280,7 +296,10 @@ def follow_rod(passage_table, path_table, site_table, node_table, first, before,
 
 
 @inlined
-def _relate(p, paths, sites, c, x, y, z, hx, hy, hz, nx, ny, nz, q, bend):
+def _relate(
+    p: arrays.Passages, paths: arrays.Paths, sites: arrays.Sites, c: int, x: float, y: float, z: float, hx: float,
+    hy: float, hz: float, nx: float, ny: float, nz: float, q: Array, bend: float,
+) -> bool:  # fmt: skip
     """Stretch, levers and constants of passage ``c``, whose path is at x, y, z and whose puncture at h.
 
     A stretch beyond the tissue's strength moves the puncture. ``p.B`` holds the rotation of the hole's
@@ -316,7 +335,7 @@ def _relate(p, paths, sites, c, x, y, z, hx, hy, hz, nx, ny, nz, q, bend):
 
 
 @inlined
-def _turned(p, c):
+def _turned(p: arrays.Passages, c: int) -> None:
     """Rotation of the axes against those of the puncture, in the former, to ``stretch[3:]``."""
     A, E, f = p.axes[c], p.stretch[c], p.frame[c]
     sx, sy, sz, trace = 0.0, 0.0, 0.0, 0.0
@@ -332,7 +351,7 @@ def _turned(p, c):
 
 
 @inlined
-def _tear(p, c):
+def _tear(p: arrays.Passages, c: int) -> None:
     """Move the puncture where the stretch exceeds the tissue's strength."""
     A, E = p.axes[c], p.stretch[c]
     rx, ry, rz = 0.0, 0.0, 0.0
@@ -360,7 +379,7 @@ def _tear(p, c):
 
 
 @inlined
-def _turn_frame(f, rx, ry, rz):
+def _turn_frame(f: Array, rx: float, ry: float, rz: float) -> None:
     """Turn the columns of ``f`` (3, 3) by a rotation vector (Rodrigues), and make them a triad again."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     s, v = math.sin(angle) / angle, (1.0 - math.cos(angle)) / (angle * angle)
@@ -384,7 +403,7 @@ def _turn_frame(f, rx, ry, rz):
 
 
 @inlined
-def _recoil(p, sites, c, hole, x, y, z):
+def _recoil(p: arrays.Passages, sites: arrays.Sites, c: int, hole: int, x: float, y: float, z: float) -> None:
     """Mobility and velocity of the hole at passage ``c``, in its axes.
 
     Several paths in one hole share its mass: each sees a lighter hole, so that together they do not push
@@ -421,7 +440,7 @@ def _recoil(p, sites, c, hole, x, y, z):
 
 
 @inlined
-def _hole_centre(p, sites, h):
+def _hole_centre(p: arrays.Passages, sites: arrays.Sites, h: int) -> tuple[float, float, float, float]:
     """World centre of a hole, and its radius; the rotation of its body goes to ``p.B``."""
     pose, o, half = sites.pose[h], sites.origin[h], sites.half[h]
     _body_rotation(pose, p.B)
@@ -430,7 +449,9 @@ def _hole_centre(p, sites, h):
 
 
 @kernel
-def look_for_needle(passage_table, path_table, site_table, path, gaps):
+def look_for_needle(
+    passage_table: Integers, path_table: Integers, site_table: Integers, path: int, gaps: Array
+) -> None:
     """Find the holes that a needle has entered; ``gaps`` (H,) receives lower bounds of its distances to all."""
     p, paths, sites = open_passages(passage_table), open_paths(path_table), open_sites(site_table)
     pose, m = paths.pose[path], paths.centre[path]
@@ -446,7 +467,10 @@ def look_for_needle(passage_table, path_table, site_table, path, gaps):
 
 
 @kernel
-def look_for_rod(passage_table, site_table, node_table, first, before, path, owner, gaps):
+def look_for_rod(
+    passage_table: Integers, site_table: Integers, node_table: Integers, first: int, before: Array, path: int,
+    owner: int, gaps: Array,
+) -> None:  # fmt: skip
     """Find the holes that a rod has entered; ``gaps`` (H,) receives lower bounds of its distances to all.
 
     ``before`` (n + 1,) is the length of the rod up to each element, the first of which is node ``first``.

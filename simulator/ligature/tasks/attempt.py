@@ -37,7 +37,7 @@ CAMERA = "CameraFrame"
 
 
 class Attempt:
-    """Watches ``task`` in ``scene``; begins anew when the scene is reset.
+    """Watches ``task`` in ``scene``, of a suture ``pairs`` of holes; begins anew when the scene is reset.
 
     Raises ValueError for a task that there is not, `MissingBodies` for a scene in which it cannot be done.
     """

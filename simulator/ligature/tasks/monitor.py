@@ -59,7 +59,7 @@ class Measures:
 
 
 class Monitor:
-    """Takes one state record after the other; any rate of 100 Hz and more will do.
+    """Takes one state record of ``scene`` after the other; any rate of 100 Hz and more will do.
 
     Raises `ligature.tasks.MissingBodies` for a scene without needle or holes, unless it gets the ``scenery``.
     """

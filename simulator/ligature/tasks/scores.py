@@ -59,7 +59,21 @@ class EstimationScore:
 def judge_estimate(
     scenery: Scenery, body_pose: Array, T_world_camera: Array, T_camera_needle: Array, time: float
 ) -> EstimationScore:
-    """Judge a reported pose (4, 4) of the needle's body in the camera frame against bodies at ``body_pose``."""
+    """Judge a reported pose of the needle's body.
+
+    Parameters
+    ----------
+    scenery
+        Needle and holes of the scene.
+    body_pose
+        Where the bodies are, (bodies, 7), world axes.
+    T_world_camera
+        The camera's body in the world, (4, 4).
+    T_camera_needle
+        The reported pose of the needle's body in the camera's frame, (4, 4).
+    time
+        Simulated seconds until the report.
+    """
     T = T_world_camera @ T_camera_needle
     reported = scenery.points @ T[:3, :3].T + T[:3, 3]
     errors = np.linalg.norm(reported - scenery.needle_points(body_pose), axis=1)
@@ -108,7 +122,11 @@ def _laterals(name: str, passage: Passage) -> Report:
 
 
 def judge_insertion(scenery: Scenery, body_pose: Array, passages: Sequence[Passage], time: float) -> InsertionScore:
-    """Judge the newest insertion with bodies at ``body_pose`` (bodies, 7)."""
+    """Judge the newest insertion, the last two of ``passages``.
+
+    ``scenery`` names needle and holes, ``body_pose`` (bodies, 7) is where the bodies are, ``time`` is in simulated
+    seconds.
+    """
     pair, is_exit, axial = _closest(scenery, body_pose)
     failed = InsertionScore(False, time, pair, axial, None, None)
     if not is_exit:
@@ -180,7 +198,11 @@ def holes_of(pairs: Sequence[int]) -> list[tuple[int, bool]]:
 def judge_suture(
     scenery: Scenery, body_pose: Array, passages: Sequence[Passage], time: float, pairs: int = SUTURE_PAIRS
 ) -> SutureScore:
-    """Judge a suture of ``pairs`` throws, from pair 1 on, entry before exit."""
+    """Judge a suture of ``pairs`` throws, from pair 1 on, entry before exit.
+
+    ``scenery`` names needle and holes, ``body_pose`` (bodies, 7) is where the bodies are, ``passages`` are those so
+    far, ``time`` is in simulated seconds.
+    """
     _, _, axial = _closest(scenery, body_pose)
     wanted = holes_of(range(1, pairs + 1))
     newest = list(passages[-len(wanted) :])

@@ -53,8 +53,10 @@ GRIP = (0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class ProxySpec:
-    """A proxy's root link on ROS, and limits (2, n) of the joints that the grip drives, in the order of its
-    commands."""
+    """A proxy's root link on ROS.
+
+    ``limits`` (2, n) are those of the joints that the grip drives, in the order of its commands.
+    """
 
     topic: str
     limits: Array

@@ -1,5 +1,7 @@
-"""Forces from a follower's tip to the hand that drives it: axes of the view to those of the device. Newtons,
-seconds."""
+"""Forces from a follower's tip to the hand that drives it: axes of the view to those of the device.
+
+Newtons, seconds.
+"""
 
 from __future__ import annotations
 

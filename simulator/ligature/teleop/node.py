@@ -201,8 +201,10 @@ class Teleop:
         return all(tips[arm.name] is not None and not arm.obstacle() for arm in driven)
 
     def _take_in(self, now: float, tips: dict[str, Tip | None]) -> None:
-        """Empty the queue; of a leader that drives, no reading is passed over but those that came too late to
-        matter."""
+        """Empty the queue.
+
+        Of a leader that drives, no reading is passed over but those that came too late to matter.
+        """
         waiting: set[str] = set()
         for _ in range(len(self._inbox)):
             name, value = self._inbox.popleft()

@@ -15,7 +15,7 @@ from adf_studio.ligature.authoring.shapes import Shape
 from adf_studio.ligature.mesh import load_mesh
 from adf_studio.mesh_data import points_of
 from adf_studio.object_operators import solid_of
-from adf_studio.placing import rest_pose
+from adf_studio.placing import own_solid, rest_pose
 from adf_studio.read_file import import_file
 from adf_studio.write_file import export_file
 
@@ -226,7 +226,7 @@ def test_b13_a_decomposition_can_be_cancelled_at_once_and_is_kept(monkeypatch, t
     part = bpy.context.object
     select(part)
     bpy.ops.adf.make(role="BODY")
-    vertices, faces = points_of(part)
+    vertices, faces = points_of(own_solid(part))
     settings = {"threshold": 0.3, "max_convex_hull": 6, "resolution": 500, "mcts_iterations": 20, "mcts_nodes": 8}
     job = Job(vertices, faces, settings)
     start = time.monotonic()

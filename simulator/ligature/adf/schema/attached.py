@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ligature.adf.schema.blocks import COLOUR, IDENTITY, PARENT, F, N, P, T, U, V, shaders
 from ligature.adf.schema.keys import POSE_ZERO, ZERO, Fault, Key, Status, Type, each, ignored, spellings
 
@@ -73,7 +75,7 @@ CAMERA = (
     Key("up", V, (0.0, 0.0, 1.0), doc="up direction"),
     Key("clipping plane", MAP, doc="nearest and farthest distance seen"),
     Key("clipping plane.near", N, 0.1, "m", "nearest distance seen", required=True),
-    Key("clipping plane.far", N, 10.0, "m", "farthest distance seen", required=True),
+    Key("clipping plane.far", N, 10.0, "m", "farthest distance seen", required=True, most=math.inf),
     Key("field view angle", N, 0.7, "rad", "vertical field of view"),
     Key("orthographic view width", N, unit="m", doc="orthographic when present"),
     Key("stereo", MAP, doc="two eyes side by side"),

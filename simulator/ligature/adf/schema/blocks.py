@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ligature.adf.schema.keys import FARTHEST, POSE_ZERO, Fault, Key, Status, Type, each, ignored, spellings
+from ligature.adf.schema.keys import LARGEST_SCALE, POSE_ZERO, Fault, Key, Status, Type, each, ignored, spellings
 
 N, U, F, T, P, C = Type.NUMBER, Type.UNSIGNED, Type.FLAG, Type.TEXT, Type.PATH, Type.CHOICE
 V, POSE, MAP, MAPS = Type.VECTOR, Type.POSE, Type.MAP, Type.MAPS
@@ -71,12 +71,12 @@ def geometry(block: str, doc: str) -> tuple[Key, ...]:
     """Dimensions of a primitive shape; which of them it must have states `SHAPE_KEYS`."""
     return (
         Key(block, MAP, doc=doc),
-        *each("xyz", N, f"{block}.{{}}", unit="m", doc="full edge of a box along {}", most=FARTHEST),
-        Key(f"{block}.radius", N, unit="m", doc="radius of a round shape", most=FARTHEST),
-        Key(f"{block}.height", N, unit="m", doc="height of a round shape; of a capsule with both caps", most=FARTHEST),
+        *each("xyz", N, f"{block}.{{}}", unit="m", doc="full edge of a box along {}"),
+        Key(f"{block}.radius", N, unit="m", doc="radius of a round shape"),
+        Key(f"{block}.height", N, unit="m", doc="height of a round shape; of a capsule with both caps"),
         Key(f"{block}.axis", C, "Z", doc="axis of a round shape", choices=AXES, fault=Fault.VALUE),
         Key(f"{block}.normal", V, doc="normal of a plane"),
-        Key(f"{block}.offset", N, unit="m", doc="distance of a plane from the origin along its normal", most=FARTHEST),
+        Key(f"{block}.offset", N, unit="m", doc="distance of a plane from the origin along its normal"),
     )
 
 
@@ -109,7 +109,6 @@ COLLISION = (
         None,
         "m, rad",
         "pose of the primitive in B; inertial offset when absent",
-        most=FARTHEST,
     ),
     *_compound("compound collision shape", "several collision primitives"),
     Key("collision mesh", P, doc="collision mesh in the low-resolution folder; '' is none"),
@@ -123,7 +122,7 @@ COLLISION = (
     ),
     Key("collision margin", N, 0.001, "m", "collision margin", least=0.0),
     Key("collision groups", Type.INTEGERS, (), doc="two bodies in groups collide only if they share one"),
-    Key("scale", N, 1.0, doc="factor on meshes and joint pivots"),
+    Key("scale", N, 1.0, doc="factor on meshes and joint pivots", most=LARGEST_SCALE),
 )
 
 

@@ -19,8 +19,8 @@ from ligature.adf.schema.blocks import (
     shaders,
 )
 from ligature.adf.schema.keys import (
-    FARTHEST,
     HEAVIEST,
+    LONGEST_ARM,
     POSE_ZERO,
     STRONGEST,
     ZERO,
@@ -92,8 +92,8 @@ SOFT_TISSUE = (
         least=0.0, status=Status.OURS, fault=Fault.OBJECT),
     Key("ligature tissue.slits", Type.MAPS, doc="slits, and wounds without tissue", status=Status.OURS),
     Key("ligature tissue.slits[].from", V, unit="m", doc="corner of a box in B; flat along one axis it is a slit",
-        required=True, most=FARTHEST, status=Status.OURS, fault=Fault.OBJECT),
-    Key("ligature tissue.slits[].to", V, unit="m", doc="opposite corner", required=True, most=FARTHEST,
+        required=True, status=Status.OURS, fault=Fault.OBJECT),
+    Key("ligature tissue.slits[].to", V, unit="m", doc="opposite corner", required=True,
         status=Status.OURS, fault=Fault.OBJECT),
     Key("ligature tissue.layers", Type.MAPS, doc="layers from the top (+z of B) down", status=Status.OURS),
     Key("ligature tissue.layers[].thickness", N, unit="m", doc="thickness; the lowest layer takes the rest", least=0.0,
@@ -118,9 +118,9 @@ BODY = (
     ),
     Key("inertia", MAP, doc="principal moments about the inertial frame; estimated when absent"),
     *each(("ix", "iy", "iz"), N, "inertia.{}", unit="kg·m²", doc="principal moment", required=True, least=0.0),
-    Key("inertial offset", POSE, None, "m, rad", "inertial frame I in B", most=FARTHEST),
+    Key("inertial offset", POSE, None, "m, rad", "inertial frame I in B", most=LONGEST_ARM),
     Key("gravity", V, unit="m/s²", doc="gravity of this body, in world axes", most=STRONGEST),
-    Key("location", POSE, POSE_ZERO, "m, rad", "initial pose of B in the world", most=FARTHEST),
+    Key("location", POSE, POSE_ZERO, "m, rad", "initial pose of B in the world"),
     Key("friction", MAP, doc="surface friction"),
     Key("friction.static", N, 0.5, doc="friction coefficient"),
     Key("friction.rolling", N, 0.01, doc="rolling friction coefficient"),
@@ -145,15 +145,24 @@ BODY = (
 )
 
 
-def _six(block: str, default: float, unit: str, doc: str) -> tuple[Key, ...]:
+def _six(block: str, default: float, unit: str, doc: str, least: float | None = None) -> tuple[Key, ...]:
     return (
-        Key(block, Type.NUMBER_OR_MAP, unit=unit, doc=f"{doc}; of a six-DOF joint a block"),
+        Key(
+            block,
+            Type.NUMBER_OR_MAP,
+            unit=unit,
+            doc=f"{doc}; of a six-DOF joint a block",
+            fault=Fault.VALUE,
+            least=least,
+        ),
         *(
             key
             for half in ("linear", "angular")
             for key in (
                 Key(f"{block}.{half}", MAP, doc=f"{half} axes of a six-DOF joint", fault=Fault.VALUE),
-                *each("xyz", N, f"{block}.{half}.{{}}", default, unit, f"{doc}, axis {{}}", fault=Fault.VALUE),
+                *each(
+                    "xyz", N, f"{block}.{half}.{{}}", default, unit, f"{doc}, axis {{}}", fault=Fault.VALUE, least=least
+                ),
             )
         ),
     )
@@ -191,16 +200,16 @@ JOINT = (
     Key("parent", T, "", doc="parent body, §4.5", required=True, fault=Fault.OBJECT),
     Key("child", T, "", doc="child body, §4.5", required=True, fault=Fault.OBJECT),
     Key("type", C, doc="joint type, §14", required=True, choices=JOINT_TYPES),
-    Key("parent pivot", V, unit="m", doc="joint origin in the parent's body frame", required=True, most=FARTHEST),
-    Key("child pivot", V, unit="m", doc="joint origin in the child's body frame", required=True, most=FARTHEST),
+    Key("parent pivot", V, unit="m", doc="joint origin in the parent's body frame", required=True),
+    Key("child pivot", V, unit="m", doc="joint origin in the child's body frame", required=True),
     Key("parent axis", V, doc="joint axis in the parent's body frame", required=True),
     Key("child axis", V, doc="joint axis in the child's body frame", required=True),
     Key("offset", N, None, "rad", "rotation of the child about the axis at joint position 0"),
     Key("child offset", N, 0.0, "rad", "old name of `offset`, which wins"),
     Key("joint offset", N, 0.0, "rad", "rotation of the constraint frame about the axis"),
     Key("joint limits", MAP, doc="unlimited unless both ends are given"),
-    Key("joint limits.low", N, unit="rad, m", doc="lower limit", most=FARTHEST),
-    Key("joint limits.high", N, unit="rad, m", doc="upper limit", most=FARTHEST),
+    Key("joint limits.low", N, unit="rad, m", doc="lower limit"),
+    Key("joint limits.high", N, unit="rad, m", doc="upper limit"),
     *each("xyz", N, "joint limits.{}", 0.7, "rad", "half angle of a cone twist about frame {}"),
     *_limits("linear", "m"),
     *_limits("angular", "rad"),
@@ -209,8 +218,8 @@ JOINT = (
     Key("max motor impulse", N, 0.1, "N·m·s, N·s", "motor strength for each ms"),
     Key("joint erp", N, 0.1, doc="error reduction of the constraint, §15.4"),
     Key("joint cfm", N, 0.1, doc="constraint force mixing, §15.4"),
-    *_six("damping", 0.7, "N·s/m, N·m·s/rad", "damper of a spring; revolute and prismatic joints ignore it"),
-    *_six("stiffness", 1.0, "N/m, N·m/rad", "spring"),
+    *_six("damping", 0.7, "N·s/m, N·m·s/rad", "damper of a spring; revolute and prismatic joints ignore it", 0.0),
+    *_six("stiffness", 1.0, "N/m, N·m/rad", "spring", 0.0),
     *_six("equilibrium point", 0.0, "m, rad", "rest position; the middle of the limits when absent"),
     Key("enable feedback", F, False, doc="compute effort and wrench"),
     Key("enable motor", Type.ANY, doc="0 or false: no position commands"),
@@ -303,7 +312,7 @@ SUTURE = (
     Key("length", N, unit="m", doc="length of the thread", required=True),
     Key("diameter", N, unit="m", doc="diameter; or give `USP size`"),
     Key("USP size", T, "", doc="such as 2-0"),
-    Key("density", N, 1200.0, "kg/m³", "density"),
+    Key("density", N, 1200.0, "kg/m³", "density", least=0.0),
     Key("youngs modulus", N, 2.0e9, "Pa", "Young's modulus"),
     Key("poisson ratio", N, 0.4, doc="ratio that gives the shear modulus"),
     Key("damping time", N, 0.002, "s", "bending damping over bending stiffness"),

@@ -69,7 +69,7 @@ class Key:
         What AMBF gives up when the value is bad or missing.
     least, most
         Smallest value and largest magnitude that can be simulated; a value beyond is an error. ``most`` holds for each
-        component of a vector, and for the position of a pose.
+        component of a vector, and for the position of a pose; of a length in metres it is `FARTHEST` unless given.
     """
 
     path: str
@@ -83,6 +83,10 @@ class Key:
     fault: Fault = Fault.FILE
     least: float | None = None
     most: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.most is None and self.unit.split(",")[0] == "m" and self.status in (Status.USED, Status.OURS):
+            object.__setattr__(self, "most", FARTHEST)
 
     @property
     def block(self) -> str:
@@ -113,6 +117,12 @@ def spellings(*names: str) -> dict[str, str]:
 
 FARTHEST = 1e4
 """Largest length in metres: beyond it collisions of things of millimetres lose their precision."""
+
+LONGEST_ARM = 100.0
+"""Largest distance in metres of a centre of mass from its body's frame: the lever multiplies errors of rotation."""
+
+LARGEST_SCALE = 1e3
+"""Largest factor on a mesh: one in millimetres where metres are meant, the other way round."""
 
 HEAVIEST, STRONGEST = 1e6, 1e3
 """Largest mass in kg and gravity in m/s² that can be simulated."""

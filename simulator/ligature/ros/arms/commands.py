@@ -23,7 +23,7 @@ def listeners(arm: int, kind: ArmKind) -> list[tuple[str, type, Take]]:
     """Topic, type and converter of every command of an arm."""
     return [
         (topic, type_, _taker(arm, command, read))
-        for command, type_, read, *aliases in _TABLE
+        for command, type_, read, *aliases in COMMANDS
         if command.kind in (None, kind)
         for topic in (command.verb, *aliases)
     ]
@@ -117,7 +117,7 @@ def _impedance(message: Any) -> Fields:
     return _xyz(message.force_position), _xyzw(message.force_orientation), _xyzw(message.torque_orientation), *gains
 
 
-_TABLE: list[tuple[Any, ...]] = [
+COMMANDS: list[tuple[Any, ...]] = [
     (crtk.StateCommand, StringStamped, _stamped_text),
     (crtk.Hold, Empty, _nothing),
     (crtk.Free, Empty, _nothing),

@@ -15,7 +15,7 @@ from ligature.model.scene import ArmKind
 QUEUE = 100
 STATES = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
 
-_LATCHED: dict[str, type] = {
+LATCHED: dict[str, type] = {
     "goal_reached": Bool,
     "desired_state": String,
     "error": String,
@@ -25,11 +25,13 @@ _LATCHED: dict[str, type] = {
     "trajectory_j/ratio_v": Float64,
     "trajectory_j/ratio_a": Float64,
 }
-_OF_KIND: dict[ArmKind, dict[str, type]] = {
+"""Events that every arm publishes, latched."""
+LATCHED_OF_KIND: dict[ArmKind, dict[str, type]] = {
     ArmKind.PSM: {"tool_type": String, "tool_type_request": Empty, "arm_clutch": Joy, "manip_clutch": Joy},
     ArmKind.ECM: {"endoscope_type": String, "arm_clutch": Joy, "manip_clutch": Joy},
     ArmKind.MTM: {"orientation_locked": Bool, "gripper/closed": Bool, "gripper/pinch": Empty},
 }
+"""Events of one kind of arm."""
 _LOGS: dict[str, Callable[[str], None]] = {
     "error": rospy.logerr,
     "warning": rospy.logwarn,
@@ -65,7 +67,7 @@ class EventTopics:
         self._clock = Clock()
         self._state = [0, False, False]
         self._operating = rospy.Publisher(f"{root}/operating_state", OperatingState, latch=True, queue_size=QUEUE)
-        topics = {**_LATCHED, **_OF_KIND[kind]}
+        topics = {**LATCHED, **LATCHED_OF_KIND[kind]}
         self._publishers = {
             name: rospy.Publisher(f"{root}/{name}", type_, latch=True, queue_size=QUEUE)
             for name, type_ in topics.items()

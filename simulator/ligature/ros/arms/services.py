@@ -28,6 +28,16 @@ from ligature.ros.arms.readings import set_pose
 Array = NDArray[np.float64]
 CRTK_VERSION = "1.1.0"
 
+SERVICES: dict[str, type] = {
+    "operating_state": TriggerOperatingState,
+    "crtk_version": Trigger,
+    "forward_kinematics": QueryForwardKinematics,
+    "local/forward_kinematics": QueryForwardKinematics,
+    "inverse_kinematics": QueryInverseKinematics,
+    "actuator_to_joint_position": ConvertFloat64Array,
+}
+"""Services of every arm."""
+
 
 class Services:
     """The services of one arm.
@@ -40,14 +50,16 @@ class Services:
         self, root: str, events: EventTopics, kinematics: Callable[[], Kinematics], base: Callable[[], Array]
     ) -> None:
         self._kinematics, self._base = kinematics, base
-        rospy.Service(
-            f"{root}/operating_state", TriggerOperatingState, lambda _: TriggerOperatingStateResponse(events.state())
-        )
-        rospy.Service(f"{root}/crtk_version", Trigger, lambda _: TriggerResponse(True, CRTK_VERSION))
-        rospy.Service(f"{root}/forward_kinematics", QueryForwardKinematics, lambda r: self._forward(r, self._base()))
-        rospy.Service(f"{root}/local/forward_kinematics", QueryForwardKinematics, lambda r: self._forward(r, np.eye(4)))
-        rospy.Service(f"{root}/inverse_kinematics", QueryInverseKinematics, self._inverse)
-        rospy.Service(f"{root}/actuator_to_joint_position", ConvertFloat64Array, self._convert)
+        answers: dict[str, Callable[[Any], Any]] = {
+            "operating_state": lambda _: TriggerOperatingStateResponse(events.state()),
+            "crtk_version": lambda _: TriggerResponse(True, CRTK_VERSION),
+            "forward_kinematics": lambda request: self._forward(request, self._base()),
+            "local/forward_kinematics": lambda request: self._forward(request, np.eye(4)),
+            "inverse_kinematics": self._inverse,
+            "actuator_to_joint_position": self._convert,
+        }
+        for name, type_ in SERVICES.items():
+            rospy.Service(f"{root}/{name}", type_, answers[name])
 
     def _forward(self, request: Any, base: Array) -> QueryForwardKinematicsResponse:
         kinematics, cp = self._kinematics(), Pose()

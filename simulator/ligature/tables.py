@@ -19,16 +19,23 @@ from numpy.typing import NDArray
 
 
 def table_of(group: NamedTuple) -> NDArray[np.int64]:
-    """Addresses and shapes of the arrays of ``group``, for the function that `opener` makes.
+    """Addresses and shapes of the arrays of ``group``, or of groups in it, for the function that `opener` makes.
 
     Valid as long as the group lives. Raises ValueError for an array that is not contiguous.
     """
+    return np.array(_words(group), dtype=np.int64)
+
+
+def _words(group: NamedTuple) -> list[int]:
     words: list[int] = []
-    for name, array in zip(group._fields, group, strict=True):
-        if not array.flags.c_contiguous:
+    for name, item in zip(group._fields, group, strict=True):
+        if isinstance(item, tuple):
+            words += _words(item)  # type: ignore[arg-type]
+        elif not item.flags.c_contiguous:
             raise ValueError(f"array '{name}' is not contiguous; copy it with numpy.ascontiguousarray")
-        words += [array.ctypes.data, *array.shape]
-    return np.array(words, dtype=np.int64)
+        else:
+            words += [item.ctypes.data, *item.shape]
+    return words
 
 
 def opener(example: NamedTuple) -> Callable[[Any], Any]:
@@ -39,17 +46,26 @@ def opener(example: NamedTuple) -> Callable[[Any], Any]:
     def open_table(typing_context: Any, table: Any) -> Any:
         def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             words = make_array(signature.args[0])(context, builder, arguments[0]).data
-            arrays, at = [], 0
-            for array_type in kind.types:
-                row = [builder.load(cgutils.gep_inbounds(builder, words, at + i)) for i in range(1 + array_type.ndim)]
-                at += len(row)
-                arrays.append(_array_at(context, builder, array_type, row[0], row[1:]))
-            return context.make_tuple(builder, kind, arrays)
+            return _group_at(context, builder, kind, words, 0)[0]
 
         return kind(types.Array(types.int64, 1, "C")), build
 
     opened: Callable[[Any], Any] = open_table
     return opened
+
+
+def _group_at(context: Any, builder: Any, kind: Any, words: Any, at: int) -> tuple[Any, int]:
+    """A group of numba type ``kind`` from the words at index ``at``, and the index after it."""
+    items = []
+    for item in kind.types:
+        if isinstance(item, types.BaseTuple):
+            group, at = _group_at(context, builder, item, words, at)
+            items.append(group)
+        else:
+            row = [builder.load(cgutils.gep_inbounds(builder, words, at + i)) for i in range(1 + item.ndim)]
+            at += len(row)
+            items.append(_array_at(context, builder, item, row[0], row[1:]))
+    return context.make_tuple(builder, kind, items), at
 
 
 def _array_at(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:

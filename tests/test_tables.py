@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from ligature.kernels import kernel
-from ligature.suture.tables import opener, table_of
+from ligature.tables import opener, table_of
 
 
 class Group(NamedTuple):

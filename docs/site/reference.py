@@ -1,0 +1,190 @@
+"""Pages of the reference that are generated from the code: commands, topics, Python modules, as Markdown."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import typer
+from ligature.cli import ambf_simulator
+from ligature.cli.main import app
+from ligature.model.scene import ArmKind
+from ligature.ros.arms.commands import COMMANDS
+from ligature.ros.arms.events import LATCHED, LATCHED_OF_KIND
+from ligature.ros.arms.outlet import EVERY, SELDOM
+from ligature.ros.arms.readings import readings
+from ligature.ros.arms.services import SERVICES
+from ligature.ros.cameras import PICTURES
+from ligature.ros.reception import COMMANDS as OBJECTS
+from ligature.ros.reception import RESETS
+
+PACKAGE = Path(__file__).resolve().parents[2] / "simulator" / "ligature"
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(text: str | None) -> str:
+    return (text or "").replace("|", "\\|").replace("\n", " ")
+
+
+# --- commands ---------------------------------------------------------------------------------
+
+
+def commands() -> str:
+    """Every command with its arguments and options, as the command line itself knows them."""
+    group = typer.main.get_command(app)
+    assert isinstance(group, click.Group)
+    text = [
+        "# Commands\n\nGenerated from the command line. [Command line](command_line.md) has the table of all commands and what "
+        "they have in common.\n"
+    ]
+    text += [_command(name, command) for name, command in group.commands.items()]
+    parser = ambf_simulator.parser()
+    rows = [
+        (" ".join(f"`{flag}`" for flag in action.option_strings), _cell(action.help))
+        for action in parser._actions
+        if not isinstance(action, argparse._HelpAction)
+    ]
+    text.append(f"## ambf_simulator\n\n{parser.description}\n\n{_table(('flag', 'meaning'), rows)}")
+    return "\n".join(text)
+
+
+def _command(name: str, command: click.Command) -> str:
+    context = click.Context(command, info_name=f"ligature {name}")
+    usage = " ".join(command.collect_usage_pieces(context))
+    rows = [_parameter(parameter) for parameter in command.params if not getattr(parameter, "hidden", False)]
+    table = _table(("argument or option", "default", "meaning"), rows)
+    return f"## ligature {name}\n\n{command.help}\n\n```text\nligature {name} {usage}\n```\n\n{table}"
+
+
+def _parameter(parameter: click.Parameter) -> tuple[str, str, str]:
+    written = [parameter.human_readable_name] if isinstance(parameter, click.Argument) else list(parameter.opts)
+    written += parameter.secondary_opts
+    default = parameter.default
+    shown = "" if default in (None, "", ()) or callable(default) or default is False else f"`{default}`"
+    return ", ".join(f"`{word}`" for word in written), shown, _cell(getattr(parameter, "help", ""))
+
+
+# --- topics -----------------------------------------------------------------------------------
+
+
+def _type(message: Any) -> str:
+    return f"`{message._type}`"
+
+
+def topics() -> str:
+    """Every topic and service, from the tables that the ROS process advertises from."""
+    objects = [(kind, _type(command).replace("Cmd", "State"), _type(command)) for kind, command in OBJECTS.items()] + [
+        ("sensor", "`ambf_msgs/SensorState`", "`ambf_msgs/SensorCmd`")
+    ]
+    objects.append(("contact sensor", "`ambf_msgs/ContactSensorState`", "`ambf_msgs/ContactSensorCmd`"))
+    kinds = [kind for kind in ArmKind if readings(kind, (), "")]
+    found = {kind: {reading.topic: reading for reading in readings(kind, (), "")} for kind in kinds}
+    everywhere = {topic: reading for kind in kinds for topic, reading in found[kind].items()}
+    published = [
+        (f"`{topic}`", _type(type(reading.message)), _kinds(k for k in kinds if topic in found[k]), f"{200 // EVERY.get(topic, SELDOM)} Hz")
+        for topic, reading in everywhere.items()
+    ]  # fmt: skip
+    published += [(f"`{name}`", _type(type_), "all", "on change, latched") for name, type_ in LATCHED.items()]
+    published += [
+        (f"`{name}`", _type(type_), kind.value, "on change, latched")
+        for kind, events in LATCHED_OF_KIND.items() for name, type_ in events.items()
+    ]  # fmt: skip
+    listened = [
+        (", ".join(f"`{topic}`" for topic in (command.verb, *aliases)), _type(type_), command.kind.value if command.kind else "all", _first(command.__doc__))
+        for command, type_, _, *aliases in COMMANDS
+    ]  # fmt: skip
+    return "\n".join(
+        [
+            "# Topics and services\n\nGenerated from the tables of the code. What the topics mean: "
+            "[ROS interface](ros_interface.md), [arms](arms.md), [cameras](cameras.md), [tasks](tasks.md).\n",
+            "## Objects\n\nEvery object has `<object>/State` and `<object>/Command`.\n",
+            _table(("object", "State", "Command"), objects),
+            "## World\n",
+            _table(
+                ("topic", "type"),
+                [("`World/State`", "`ambf_msgs/WorldState`"), ("`World/Command`", "`ambf_msgs/WorldCmd`")]
+                + [(f"`World/Command/{name}`", "`std_msgs/Empty`") for name in RESETS],
+            ),
+            "## Cameras\n\nBelow `<camera>`, and below `<camera>/left` and `<camera>/right` of stereo cameras.\n",
+            _table(("topic", "type"), [(f"`{topic}`", _type(type_)) for topic, type_ in PICTURES.items()]),
+            "## Arms: published\n\nBelow the arm's name, such as `/PSM1`.\n",
+            _table(("topic", "type", "arms", "rate"), published),
+            "## Arms: commands\n",
+            _table(("topic", "type", "arms", "meaning"), listened),
+            "## Arms: services\n",
+            _table(("service", "type"), [(f"`{name}`", _type(type_)) for name, type_ in SERVICES.items()]),
+        ]
+    )
+
+
+def _kinds(kinds: Iterable[ArmKind]) -> str:
+    names = [kind.value for kind in kinds]
+    return "all" if len(names) == len(ArmKind) else ", ".join(names)
+
+
+def _first(text: str | None) -> str:
+    return _cell((text or "").strip().split("\n\n")[0])
+
+
+# --- Python -----------------------------------------------------------------------------------
+
+ROOMS = (
+    "adf",
+    "mesh",
+    "authoring",
+    "model",
+    "robots",
+    "simulation",
+    "tasks",
+    "datasets",
+    "environments",
+    "render",
+    "tissue",
+    "client",
+)
+"""What programs import; the other packages serve a run and are described in the architecture."""
+
+
+def modules(room: str) -> list[str]:
+    """The modules of a package that have public objects, by their names."""
+    folder = PACKAGE / room
+    if not folder.is_dir():
+        return [f"ligature.{room}"]
+    paths = sorted(path for path in folder.rglob("*.py") if path.name != "__init__.py" and "names" not in path.parts)
+    names = [
+        ".".join(("ligature", *path.relative_to(PACKAGE).with_suffix("").parts)) for path in paths if _public(path)
+    ]
+    return [f"ligature.{room}", *names]
+
+
+def _public(path: Path) -> bool:
+    found = ast.parse(path.read_text("utf-8")).body
+    return any(isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_") for node in found)
+
+
+def api(room: str) -> str:
+    """The page of one package: what it exports under the package's name, the rest under the names of its modules."""
+    exported = _exported("ligature") | _exported(f"ligature.{room}")
+    text = [f"# ligature.{room}\n", f"```{{eval-rst}}\n.. automodule:: ligature.{room}\n```\n"]
+    for name in modules(room)[1:]:
+        left_out = ", ".join(sorted(exported))
+        text.append(f"## {name}\n\n```{{eval-rst}}\n.. automodule:: {name}\n   :exclude-members: {left_out}\n```\n")
+    return "\n".join(text)
+
+
+def package() -> str:
+    """The page of the package itself."""
+    return "# ligature\n\n```{eval-rst}\n.. automodule:: ligature\n```\n"
+
+
+def _exported(name: str) -> set[str]:
+    return set(getattr(importlib.import_module(name), "__all__", ()))

@@ -1,0 +1,149 @@
+"""Masses of bodies in their response to forces: larger while pads hold a light body or a command drives it.
+
+World axes, SI units.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from ligature.model.subsystem import kept, put_back
+from ligature.physics.articulation import inertia_of, is_alone
+from ligature.physics.bodies import Placement
+from ligature.physics.body_commands import BodyCommands
+from ligature.physics.engine import Engine
+from ligature.physics.welds import Welds
+
+Array = NDArray[np.float64]
+
+MIN_HELD_MASS = 0.05
+"""Minimum mass in kg of a held body in its response to forces; its weight stays its own, the rest moves with the
+holder.
+
+The holder is an arm of kilograms. Stiff pads and a taut thread would throw a needle of 0.1 g from one to the other
+within a tick: a force F meets the next reaction only after F dt²/m, 11 mm for 1 N.
+"""
+
+MIN_COMMANDED_MASS = 0.5
+"""Minimum mass in kg of a body whose velocity a command sets in each tick: that of the challenge's needle.
+
+Such a body pushes with its own momentum: one of 0.1 g with 3 mN at 30 mm/s, which does not open the rim of a hole.
+"""
+
+IMMOVABLE = 1e6
+"""Mass in kg, and inertia, that no thread or tissue moves in a tick."""
+
+
+class Masses:
+    """The masses of an engine's bodies, by who holds and commands them."""
+
+    def __init__(self, engine: Engine, commands: BodyCommands, welds: Welds) -> None:
+        self._engine, self._commands, self._welds = engine, commands, welds
+        bodies = engine.scene.bodies
+        self._free_bodies = {tree.root for tree in engine.trees if is_alone(tree, bodies)}
+        self._light_bodies = {body for body in self._free_bodies if bodies[body].mass < MIN_COMMANDED_MASS}
+        self._hold_counts: dict[int, int] = {}
+        self._grasp_counts: dict[int, int] = {}
+        self._attached_loads: dict[int, tuple[Placement, Array]] = {}
+
+    def set_held(self, body: int, held: bool, grasped: bool = False) -> None:
+        """Count one more holder of ``body``, or one less; a body that pads have ``grasped`` gets added mass.
+
+        A welded body needs none: it is as heavy as its holder.
+        """
+        change = 1 if held else -1
+        for counts in (self._hold_counts, self._grasp_counts) if grasped else (self._hold_counts,):
+            counts[body] = counts.get(body, 0) + change
+            if counts[body] == 0:
+                del counts[body]
+        if grasped and body in self._free_bodies:
+            self._update(body)
+
+    def is_held(self, body: int) -> bool:
+        """Whether something holds a body."""
+        return body in self._hold_counts
+
+    def mass_of(self, body: int) -> tuple[float, Array]:
+        """Mass and principal moments (3,) of a body in its response to forces now."""
+        held = body in self._free_bodies and self.is_held(body)
+        return self._at_least(MIN_HELD_MASS if held else 0.0, body)
+
+    def attached_load(self, body: int) -> tuple[float, Array, Array]:
+        """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
+        if self._commands.driven(body):
+            return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
+        own, (held_mass, held_inertia) = self._engine.scene.bodies[body], self.mass_of(body)
+        palms = [self._engine.scene.bodies[palm] for palm in self._welds.parents(body)]
+        mass = held_mass - own.mass + sum(palm.mass for palm in palms)
+        inertia = held_inertia - inertia_of(own)
+        inertia += sum((np.full(3, inertia_of(palm).max()) for palm in palms), np.zeros(3))
+        return mass, inertia, self._commands.wrench(body)
+
+    def carry(self, body: int, wrench: Array) -> None:
+        """Apply ``wrench`` (6,) in the coming tick, which moves the added mass of a body with its holders."""
+        if body in self._attached_loads:
+            self._attached_loads[body][0].load(wrench.tolist())
+
+    def lift(self) -> None:
+        """Cancel the weight of added mass in the coming tick."""
+        for place, force in self._attached_loads.values():
+            place.push(force)
+
+    def update_commanded(self, body: int, before: bool) -> None:
+        """Update the mass of a light free body that was driven ``before`` a command began or ended."""
+        if body in self._light_bodies and self._commands.driven(body) != before:
+            self._update(body)
+
+    def _update(self, body: int) -> None:
+        """Set the mass of a body in Bullet, and record the force that corrects the weight of the added part.
+
+        A held body keeps its own weight; a commanded body falls as before, and its command corrects that.
+        """
+        place, commanded = self._engine.place_of[body], self._commands.driven(body)
+        least = MIN_COMMANDED_MASS if commanded else MIN_HELD_MASS if body in self._grasp_counts else 0.0
+        mass, inertia = self._at_least(least, body)
+        pybullet.changeDynamics(
+            place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self._engine.client
+        )
+        extra = mass - place.body.mass
+        if extra > 0.0:
+            fall = place.body.gravity if commanded else np.zeros(3)
+            self._attached_loads[body] = place, extra * (fall - self._engine.gravity)
+        else:
+            self._attached_loads.pop(body, None)
+
+    def _at_least(self, mass: float, body: int) -> tuple[float, Array]:
+        """Mass and principal moments (3,) of a body, scaled up to ``mass``."""
+        described = self._engine.scene.bodies[body]
+        scale = mass / described.mass if mass > described.mass else 1.0
+        return scale * described.mass, scale * inertia_of(described)
+
+    def restart(self) -> None:
+        """Begin anew: only welds hold bodies."""
+        self._hold_counts, self._grasp_counts = dict(Counter(self._welds.children)), {}
+        self._set_all()
+
+    def snapshot(self) -> dict[str, Any]:
+        """What lasts from tick to tick."""
+        return kept(self, _KEPT)
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`, after commands were restored."""
+        put_back(self, snapshot)
+        self._set_all()
+
+    def _set_all(self) -> None:
+        """Set the masses of grasped and commanded bodies, and of those that no longer are."""
+        for body in sorted(self._free_bodies):
+            loaded = body in self._attached_loads or body in self._grasp_counts
+            if loaded or (body in self._light_bodies and self._commands.driven(body)):
+                self._update(body)
+
+
+_KEPT = ("_hold_counts", "_grasp_counts")
+"""Attributes that last from tick to tick; the attached loads follow from them and from commands."""

@@ -1,0 +1,129 @@
+"""Whatever a browser sends: controls keep values that a person could have chosen, and the page goes on."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from ligature.cockpit.address import Address
+from ligature.cockpit.gate import HEADERS, Gate
+from ligature.cockpit.intake import placeable, rejections
+from ligature.cockpit.page import serve
+from websockets.exceptions import ConnectionClosed
+
+from tests.cockpit.conftest import until
+from tests.cockpit.test_gate import get, talk
+
+MESSAGES = 100_000 if os.environ.get("LIGATURE_EXAMPLES") == "new" else 3_000
+OPTIONS = ("Step 1", "Step 10", "Step 100")
+ODD = (
+    None, True, False, 0, -1, 1, 3, 2**63, -(10**9), 0.5, 1e308, math.inf, -math.inf, math.nan, "", "abc", "Step 1",
+    "Step 100000000000000000000", "1", "x" * 100_000, "\0", b"\xff", [], [1, 2], {}, {"value": 1},
+)  # fmt: skip
+PROPERTIES = ("value", "value", "value", "min", "max", "options", "visible", "removed", "uuid", "__class__", "label")
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    found = serve(Address("127.0.0.1", 0), Gate(Address("127.0.0.1", 0), ""))
+    yield found
+    found.stop()
+
+
+def controls(server: viser.ViserServer) -> dict[str, Any]:
+    """One control of each kind that the page has, by the property that must hold of its value."""
+    gui = server.gui
+    return {
+        "slider": gui.add_slider("s", -1.0, 1.0, 0.1, 0.0), "steps": gui.add_button_group("g", OPTIONS),
+        "choice": gui.add_dropdown("d", OPTIONS), "text": gui.add_text("t", ""), "flag": gui.add_checkbox("c", False),
+        "button": gui.add_button("b"),
+    }  # fmt: skip
+
+
+def sound(shown: dict[str, Any]) -> bool:
+    """Whether every control has a value that a person could have chosen."""
+    values = {name: control.value for name, control in shown.items()}
+    return (
+        -1.0 <= values["slider"] <= 1.0 and values["steps"] in OPTIONS and values["choice"] in OPTIONS
+        and isinstance(values["text"], str) and len(values["text"]) <= 200
+        and type(values["flag"]) is bool and type(values["button"]) is bool
+    )  # fmt: skip
+
+
+def update(uuid: Any, updates: Any) -> bytes:
+    return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
+
+
+def test_controls_keep_values_that_a_person_could_have_chosen(server: viser.ViserServer) -> None:
+    shown, rng = controls(server), random.Random(5)
+    uuids = [control._impl.uuid for control in shown.values()]
+    before = rejections.count
+    connection = talk(server.get_port())
+    for _ in range(MESSAGES):
+        names = rng.sample(PROPERTIES, rng.randint(1, 2))
+        connection.send(update(rng.choice(uuids), {name: rng.choice(ODD) for name in names}))
+    connection.send(update(uuids[3], {"value": "the last one"}))
+    until(lambda: shown["text"].value == "the last one", "all messages are taken")
+    assert rejections.count - before > MESSAGES // 2
+    assert sound(shown), {name: control.value for name, control in shown.items()}
+    connection.close()
+
+
+@pytest.mark.parametrize("junk", [b"", b"\xc1", b"\xff" * 100, b"\x93\x01\x02\x03", b'{"type": 3}', b"x" * 2_000_000])
+def test_junk_ends_its_connection_and_no_other(
+    server: viser.ViserServer, junk: bytes, capfd: pytest.CaptureFixture[str]
+) -> None:
+    shown = controls(server)
+    good, bad = talk(server.get_port()), talk(server.get_port())
+    bad.send(junk)
+    with pytest.raises(ConnectionClosed):
+        while True:
+            bad.recv(timeout=20.0)
+    good.send(update(shown["flag"]._impl.uuid, {"value": True}))
+    until(lambda: shown["flag"].value, "the other browser is heard")
+    assert "Traceback" not in capfd.readouterr().err
+    good.close()
+
+
+def test_a_gizmo_goes_where_it_can_be_dragged_only() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        q = rng.normal(size=4)
+        assert placeable(rng.uniform(-2, 2, 3).tolist(), (q / np.linalg.norm(q)).tolist())
+    for position in ((0, 0), (0, 0, math.nan), (0, 0, 1e9), "abc", None, ("a", "b", "c"), 3):
+        assert not placeable(position, (1, 0, 0, 0))
+    for quaternion in ((0, 0, 0, 0), (1, 0, 0), (math.inf, 0, 0, 0), None, {"w": 1}):
+        assert not placeable((0, 0, 0), quaternion)
+
+
+def test_no_other_page_shows_this_one(server: viser.ViserServer) -> None:
+    for path, host in (("/", f"127.0.0.1:{server.get_port()}"), ("/", "example.org"), ("/index.html", "localhost")):
+        _, _, headers = get(server.get_port(), path, Host=host)
+        assert {name: headers.get(name) for name in HEADERS} == HEADERS
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        "GET / HTTP/1.1\r\nHost: [::1\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n",
+        "GET / HTTP/1.1\r\n\r\n",
+        f"GET /{'a' * 5000} HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        "GET //[::1?token=1 HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://[::1\r\n\r\n",
+    ],
+)
+def test_odd_requests_are_answered_as_such(server: viser.ViserServer, request_: str) -> None:
+    with socket.create_connection(("127.0.0.1", server.get_port()), timeout=20.0) as connection:
+        connection.sendall(request_.encode())
+        status = connection.recv(4096).split(b" ")[1]
+    assert status in (b"400", b"403", b"404"), status
+    assert get(server.get_port(), Host="localhost")[0] == 200

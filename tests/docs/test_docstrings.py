@@ -1,0 +1,77 @@
+"""Docstrings of the public surface name every parameter, what is returned and what is raised.
+
+The form (summary, sections) is checked by ruff's pydocstyle rules in numpy's convention.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from tests.conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "docs" / "site"))
+from reference import ROOMS as ROOMS_OF_THE_REFERENCE  # noqa: E402
+
+ROOMS = ["ligature", *(f"ligature.{name}" for name in ROOMS_OF_THE_REFERENCE)]
+EVIDENT = {"self", "cls", "args", "kwargs"}
+
+
+def surface() -> Iterator[tuple[str, Any]]:
+    """Public classes, their methods, and functions, by their names."""
+    for room in ROOMS:
+        module = importlib.import_module(room)
+        for name in getattr(module, "__all__", ()):
+            thing = getattr(module, name)
+            if not getattr(thing, "__module__", "").startswith("ligature"):
+                continue
+            yield f"{room}.{name}", thing
+            if inspect.isclass(thing):
+                for key, member in vars(thing).items():
+                    function = member.fget if isinstance(member, property) else getattr(member, "__func__", member)
+                    if not key.startswith("_") and inspect.isfunction(function):
+                        yield f"{room}.{name}.{key}", function
+
+
+SURFACE = dict(surface())
+
+
+def parameters(thing: Any) -> list[str]:
+    """Names of the parameters that a caller gives."""
+    call: Callable[..., Any] = thing.__init__ if inspect.isclass(thing) else thing
+    if inspect.isclass(thing) and ("__init__" not in vars(thing) or dataclasses.is_dataclass(thing)):
+        return []  # fields have documentation of their own
+    return [name for name in inspect.signature(call).parameters if name not in EVIDENT and not name.startswith("_")]
+
+
+def unexplained(thing: Any) -> list[str]:
+    """Parameters that the docstring does not name: in a section, or as ``name`` in its text."""
+    text = inspect.getdoc(thing) or ""
+    if inspect.isclass(thing):
+        text += "\n" + (inspect.getdoc(thing.__init__) or "")
+    return [
+        name
+        for name in parameters(thing)
+        if not re.search(rf"``[^`]*\b{name}\b[^`]*``|^{name}(, \w+)*$", text, re.MULTILINE)
+    ]
+
+
+def test_the_surface_is_not_empty() -> None:
+    assert len(SURFACE) > 100
+
+
+@pytest.mark.parametrize("name", SURFACE)
+def test_public_object_explains_its_parameters(name: str) -> None:
+    thing = SURFACE[name]
+    text = inspect.getdoc(thing)
+    assert text, f"{name} has no docstring"
+    few = parameters(thing)
+    if len(few) > 1:
+        assert unexplained(thing) == []
