@@ -261,15 +261,16 @@ class Motions:
             links, rows = self._links[tree], self.slices[tree]
             if links:
                 states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
-                self.position[rows], self.velocity[rows], reaction, self.effort[rows] = zip(*states, strict=True)
+                position, velocity, reaction, effort = zip(*states, strict=True)
+                self.position[rows], self.velocity[rows], self.effort[rows] = position, velocity, effort
                 if self._begun:
-                    self.effort[rows], reaction = 0.0, np.zeros(6)
+                    self.effort[rows] = 0.0
                 elif len(self._limp[tree]):
                     self.effort[self._limp[tree]] = 0.0
-                for axis, effort in self.sent.items():
-                    self.effort[axis] = effort
+                for axis, sent in self.sent.items():
+                    self.effort[axis] = sent
                 if self._measured[tree]:
-                    self.reaction[rows] = reaction
+                    self.reaction[rows] = 0.0 if self._begun else reaction
         return self._joints[:, self.slices[tree]]
 
     def links(self, tree: int) -> None:
