@@ -59,6 +59,46 @@ CACHES: dict[str, str] = {
         "written before it is read in every tick",
     ),  # fmt: skip
     "ImpulseExchange._solvers": "scratch of a tick",
+    "Rod._spring_table": "addresses of arrays",
+    "Rod.springs": "written by every tick that tissue takes part in",
+    # soft tissue
+    "ElasticGrid._table": "follows from the grid, made at the first contact",
+    **dict.fromkeys(
+        (
+            "ElasticGrid._scratch",
+            "Factor._work",
+            "Interface._response",
+            "Lips._near",
+            "Lips._gap",
+            "NeedleInTissue._rows",
+            "NeedleInTissue._weights8",
+            "NeedleInTissue._weights4",
+            "NeedleInTissue._normal",
+            "NeedleInTissue._wrench",
+            "NeedleInTissue._left",
+            "NeedleInTissue._count",
+            "ThreadInTissue._rows",
+            "ThreadInTissue._points",
+            "ThreadInTissue._tangent",
+            "ThreadInTissue._share",
+            "ThreadInTissue._settles",
+            "BodyContacts._partners",
+            "BodyContacts._work",
+            "BodyContacts._found",
+            "BodyContacts._values",
+            "BodyContacts._scratch",
+            "BodyContacts.overflow",
+            "Parts.live",
+            "ScenePiercer.drift",
+            "ScenePiercer.centre",
+            "ScenePiercer.spring",
+            "ScenePiercer._R6",
+            "SceneThread._springs",
+            "SceneThread._moves",
+        ),
+        "written before it is read in every tick",
+    ),
+    "Tissues._reported": "what of the problems was reported",
     # what is read from Bullet when somebody asks
     **dict.fromkeys(
         (
@@ -121,7 +161,7 @@ CACHES: dict[str, str] = {
     "Axes._setpoint": "of an arm whose drives are off it is read from the joints",
     # what waits for whoever reports it
     "Device.events": "an outbox",
-    **dict.fromkeys(("World.problems", "Rods.problems", "ArmSet.problems"), "an outbox"),
+    **dict.fromkeys(("World.problems", "Rods.problems", "ArmSet.problems", "Tissues._problems"), "an outbox"),
 }
 """Attributes that a snapshot need not hold, as ``Class.attribute``, each with the reason."""
 

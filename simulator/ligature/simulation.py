@@ -45,6 +45,7 @@ from ligature.sensing.ghosts import Ghosts
 from ligature.sensing.mounts import Mounts
 from ligature.sensing.rays import Rays
 from ligature.sensing.touches import Touches
+from ligature.soft import BeforeRods, Tissues
 from ligature.suture import Insertion, Suture
 
 Array = NDArray[np.float64]
@@ -223,9 +224,11 @@ class Simulation:
         actuator_grasps, rods = ActuatorGrasps(scene, self._world), self._suture.rods
         self._actuators = Actuators(scene, ActuatorAttachments(scene, self._world, rods, actuator_grasps), self._rays)
         self.grasps = Grasps(scene, self._world, rods, actuator_grasps, lambda: self._actuators.held)
+        self.tissues = Tissues(scene, self._world, rods, dt)
+        before, after = ((BeforeRods(self.tissues),), (self.tissues,)) if scene.tissues else ((), ())
         self._tick: dict[str, tuple[Subsystem, ...]] = {
             "control": (self.arms, self._actuators, self._rays, Controllers(self._world)),
-            "suture": (self._suture, self.grasps),
+            "suture": (*before, self._suture, *after, self.grasps),
             "bodies": (self._world,),
             "sensing": (self._touches, self._mounts, Ghosts(scene, queries), Contacts(scene, queries)),
         }
@@ -402,6 +405,7 @@ class Simulation:
         self._world.set_pose(body, pose)
         self._suture.rods.carry(body, pose7_matrix(pose) @ inverse(before))
         self._suture.holes.forget(body)
+        self.tissues.forget(body)
         self._write_state()
         self._watch_anew()
 
@@ -455,6 +459,8 @@ class Simulation:
             if name not in left_out:
                 digest.update(np.ascontiguousarray(self.state[name]).tobytes())
         _digest(self._suture.snapshot(), digest.update)
+        if self.scene.tissues:
+            _digest(self.tissues.snapshot(), digest.update)
         return digest.hexdigest()
 
     def close(self) -> None:

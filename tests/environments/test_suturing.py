@@ -74,9 +74,10 @@ def test_images_are_what_the_camera_sees() -> None:
     env.close()
 
 
-def test_turning_the_needle_along_its_arc_inserts_it() -> None:
+@pytest.mark.parametrize("task", ["insert", "puncture"])
+def test_turning_the_needle_along_its_arc_inserts_it(task: str) -> None:
     """A policy that turns the hand about the middle of the throw's circle, by the actions that an agent has."""
-    env = SuturingEnv("insert")
+    env = SuturingEnv(task)
     observation, info = env.reset(seed=3)
     goal, first, total, done, angle = env.goal, info["distance"], 0.0, False, -0.4
     base = frame(env.base_rotation, env.base_position)
@@ -133,7 +134,7 @@ def test_what_the_arm_refuses_is_reported_and_the_episode_goes_on() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"task": "knit"}, "task must be one of reach, pick, insert"),
+        ({"task": "knit"}, "task must be one of reach, pick, insert, puncture"),
         ({"action": "torque"}, "action must be one of cartesian, joint"),
         ({"arm": "MTML"}, "'MTML' is not a PSM"),
         ({"arm": "PSM9"}, "no arm is called 'PSM9'"),

@@ -15,6 +15,7 @@ from ligature.bundle import launch_file, scene_names
 from ligature.cli.missing import remedy
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
 from ligature.cli.supervisor import supervise
+from ligature.model.softening import Softening
 
 app = typer.Typer(
     add_completion=False,
@@ -108,6 +109,10 @@ def run(
     cockpit: Annotated[bool, typer.Option("--cockpit", help="Serve the web page (cockpit) on this machine.")] = False,
     cockpit_at: CockpitAddress = None,
     devices: Devices = None,
+    soft: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(help="A rigid body that is to be soft tissue, BODY or BODY=MATERIAL; repeatable."),
+    ] = None,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -116,6 +121,7 @@ def run(
     try:
         for text in arms:
             arm_entry(text)
+        Softening(soft or ())
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     options = RunOptions(
@@ -123,7 +129,7 @@ def run(
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
         task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
-        devices=indices(devices) or (),
+        devices=indices(devices) or (), soft=tuple(soft or ()),
     )  # fmt: skip
     supervise(options)
 

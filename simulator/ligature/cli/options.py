@@ -24,7 +24,8 @@ class RunOptions:
     whether pictures are published (None: of those cameras for which the scene asks for it), ``window`` whether
     one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
     the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines for the user at
-    the start, ``devices`` are indices of the input devices whose proxies are there.
+    the start, ``devices`` are indices of the input devices whose proxies are there, ``soft`` bodies
+    that are soft tissue.
     """
 
     scene: str
@@ -48,11 +49,14 @@ class RunOptions:
     ros: bool = True
     notes: tuple[str, ...] = ()
     devices: tuple[int, ...] = ()
+    soft: tuple[str, ...] = ()
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
         arms = [arm_entry(text) for text in self.arms] if self.arms else None
-        return ligature.load(self.scene, self.models, self.files, self.roots, self.prefix, arms, self.devices)
+        return ligature.load(
+            self.scene, self.models, self.files, self.roots, self.prefix, arms, self.devices, self.soft
+        )
 
     def shown_cameras(self, scene: Scene) -> tuple[Camera, ...]:
         """The cameras whose pictures are published."""
@@ -68,7 +72,7 @@ class RunOptions:
     def from_text(cls, text: str) -> RunOptions:
         """The options of `to_text`."""
         values = json.loads(text)
-        for name in ("models", "files", "roots", "arms", "notes", "devices"):
+        for name in ("models", "files", "roots", "arms", "notes", "devices", "soft"):
             if values.get(name) is not None:
                 values[name] = tuple(values[name])
         return cls(**values)

@@ -1,4 +1,4 @@
-"""Gymnasium environments; importing it registers ``ligature/Reach-v0``, ``Pick-v0``, ``Insert-v0``."""
+"""Gymnasium environments; importing it registers ``ligature/Reach-v0`` and the other tasks of `goals`."""
 
 from functools import partial
 from typing import Any
@@ -9,7 +9,7 @@ from ligature.environments.suturing import SuturingEnv
 
 __all__ = ["SuturingEnv", "make_vec"]
 
-for _task in ("reach", "pick", "insert"):
+for _task in ("reach", "pick", "insert", "puncture"):
     gymnasium.register(
         id=f"ligature/{_task.capitalize()}-v0",
         entry_point="ligature.environments.suturing:SuturingEnv",

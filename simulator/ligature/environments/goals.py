@@ -156,7 +156,7 @@ class Insert:
         self._body = scene.bodies[scenery.needle]
         self.arc = NeedleArc.of(scene.needles[0], self._body)
         poses = simulation.state["body_pose"][0]
-        entry, exit = poses[scenery.entries[0], :3], poses[scenery.exits[0], :3]
+        entry, exit = self._ends()
         self.throw = Throw.through(entry, exit, self.arc.radius, UP)
         self._last = self.throw.towards_exit + RECOMMENDED_AXIAL / self.arc.radius + self.MORE
         T_base = pose7_matrix(poses[_base_of(simulation, arm)])
@@ -165,6 +165,11 @@ class Insert:
         if grasp is None:
             raise ValueError(f"{arm.name} cannot hold the needle so that it reaches the whole throw")
         self._take(simulation, arm, way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc))
+
+    def _ends(self) -> tuple[Array, Array]:
+        """Where the tip goes in and out, (3,) each."""
+        poses = self._simulation.state["body_pose"][0]
+        return poses[self._scenery.entries[0], :3], poses[self._scenery.exits[0], :3]
 
     def _take(self, simulation: Simulation, arm: PsmArm, T_world_arc: Array, T_base_tool: Array) -> None:
         """Close the jaws on the needle, put where it is wanted."""
@@ -198,6 +203,12 @@ class Insert:
         local = self.throw.axes.T @ (tip - self.throw.centre)
         return tip, float(np.arctan2(local[1], local[0]))
 
+    def _is_through(self) -> bool:
+        poses = self._simulation.state["body_pose"][0]
+        self._watch.observe(self._simulation.time, poses)
+        score = judge_insertion(self._scenery, poses, self._watch.passages, self._simulation.time)
+        return score.success and score.pair == 1 and bool(score.axial >= RECOMMENDED_AXIAL)
+
     def _on_circle(self, angle: float) -> Array:
         local = self.arc.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
         return np.asarray(self.throw.centre + self.throw.axes @ local)
@@ -209,10 +220,7 @@ class Insert:
 
     def distance(self, simulation: Simulation, arm: PsmArm) -> float:
         """Way of the tip along the circle that is left, and how far it is beside it."""
-        poses = simulation.state["body_pose"][0]
-        self._watch.observe(simulation.time, poses)
-        score = judge_insertion(self._scenery, poses, self._watch.passages, simulation.time)
-        self._done = self._done or (score.success and score.pair == 1 and score.axial >= RECOMMENDED_AXIAL)
+        self._done = self._done or self._is_through()
         if self._done:
             return 0.0
         tip, angle = self._tip()
@@ -221,5 +229,35 @@ class Insert:
         return self.arc.radius * (self._last - near) + beside + UNDONE
 
 
-GOALS: dict[str, type] = {"reach": Reach, "pick": Pick, "insert": Insert}
+class Puncture(Insert):
+    """Drive the needle, which is in hand above a block of soft tissue, in at one place of its top and out at another.
+
+    Its tip shall go along the circle of its radius through both. Done when the needle is in the tissue, has punctured
+    its surface twice, and the tip is 5 mm beyond the second place.
+    """
+
+    holes = 0
+    scene, arm = "needle_insertion", "PSM2"
+    models, thread = (0, 1, 2), True
+    CHORD = 0.014
+
+    def _ends(self) -> tuple[Array, Array]:
+        """Two places on the top of the block, either side of its middle."""
+        if not self._simulation.scene.tissues:
+            raise ValueError("the scene has no body of soft tissue to puncture")
+        nodes = self._simulation.state["tissue_node"][0, self._simulation.scene.tissues[0].rows]
+        middle = np.append(0.5 * (nodes.min(axis=0) + nodes.max(axis=0))[:2], nodes[:, 2].max())
+        aside = np.array([0.5 * self.CHORD, 0.0, 0.0])
+        return middle - aside, middle + aside
+
+    def _is_through(self) -> bool:
+        state = self._simulation.state
+        n = int(state["insertion_count"][0])
+        inside = (state["insertion_hole"][0, :n] == -1) & (state["insertion_body"][0, :n] == self._scenery.needle)
+        _, angle = self._tip()
+        beyond = self.throw.towards_exit + RECOMMENDED_AXIAL / self.arc.radius
+        return bool(inside.any() and state["puncture_count"][0, 0] >= 2 and beyond < angle < np.pi)
+
+
+GOALS: dict[str, type] = {"reach": Reach, "pick": Pick, "insert": Insert, "puncture": Puncture}
 """Tasks by name."""

@@ -71,10 +71,10 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     Parameters
     ----------
     task
-        ``reach``, ``pick`` or ``insert`` (`ligature.environments.goals`).
+        ``reach``, ``pick``, ``insert`` or ``puncture`` (`ligature.environments.goals`).
     scene
-        A launch file with a PSM and a needle, and holes for ``insert``; by default what the task needs of a scene of
-        ours, without the other arms, and for ``reach`` without the thread.
+        A launch file with a PSM and a needle, holes for ``insert`` and soft tissue for ``puncture``; by default what
+        the task needs of a scene of ours, without the other arms, and for ``reach`` without the thread.
     arm
         Name of the arm; by default the one that does the task. Another one brings the whole scene.
     action, observation, reward

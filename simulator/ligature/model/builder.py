@@ -50,6 +50,7 @@ from ligature.model.scene import (
     ShaderFiles,
     WorldSettings,
 )
+from ligature.model.softening import Softening
 from ligature.model.sutures import thread
 
 KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
@@ -58,7 +59,7 @@ KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
 class SceneBuilder:
     """Collects the objects of a scene; `finish` settles what needs all of them."""
 
-    def __init__(self, name: str, resolver: Resolver, world: WorldSettings) -> None:
+    def __init__(self, name: str, resolver: Resolver, world: WorldSettings, softening: Softening | None = None) -> None:
         self.name = name
         self.resolver = resolver
         self.world = world
@@ -80,6 +81,7 @@ class SceneBuilder:
         self._linked: list[tuple[int, int]] = []
         self._no_rod: set[int] = set()
         self._lost = LostBodies()
+        self.softening = softening or Softening(())
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
@@ -92,6 +94,7 @@ class SceneBuilder:
         self.models.append(model)
         before = {kind: len(self._list(kind)) for kind in KINDS}
         self._note_unusable(document, model)
+        self.softening.apply(document)
         parts = converted(document, self.resolver, shaders, self.world.gravity)
         local = self._add_bodies(parts, model)
         if not top.flag("ligature rod"):

@@ -29,6 +29,7 @@ from ligature.model.builder import SceneBuilder
 from ligature.model.geometry import shader_files
 from ligature.model.naming import prefixed, topic_name
 from ligature.model.scene import InputDevice, Scene, ShaderFiles, WorldSettings
+from ligature.model.softening import Softening
 
 SKYBOX_FACES = ("right", "left", "top", "bottom", "front", "back")
 
@@ -45,6 +46,7 @@ def load(
     namespace_prefix: str = "",
     arms: Sequence[Mapping[str, str]] | None = None,
     devices: Sequence[int] = (),
+    soft: Sequence[str] = (),
 ) -> Scene:
     """Load a scene.
 
@@ -66,13 +68,17 @@ def load(
         what the file states and what is found.
     devices
         Indices of the input devices of a launch file whose proxies are to be there.
+    soft
+        Rigid bodies that are to be soft tissue, ``BODY`` or ``BODY=MATERIAL`` (`ligature.model.softening`).
 
     Raises
     ------
     SceneError
         When there is nothing to run: the file is not readable, or no body could be created.
+    ValueError
+        For a material of ``soft`` that does not exist.
     """
-    start = launch_file(Path(path))
+    start, softening = launch_file(Path(path)), Softening(soft)
     resolver = Resolver.for_file(start, [Path(root) for root in (*roots, *(Path(f).parent for f in files))])
     try:
         document = read_any(start, resolver)
@@ -80,12 +86,15 @@ def load(
         raise SceneError(*error.diagnostics) from error
     if document.kind == "launch":
         assert isinstance(document, LaunchDocument)
-        scene = _load_launch(document, models, files, resolver, arms, devices)
+        scene = _load_launch(document, models, files, resolver, arms, devices, softening)
     elif document.kind == "model":
-        scene = _load_models([document], files, resolver, start.stem, arms)
+        scene = _load_models([document], files, resolver, start.stem, arms, softening)
     else:
         message = f"'{start}' is a {document.kind} file, not a launch or model file"
         raise SceneError(Diagnostic(Severity.ERROR, message, Mark(document.path, 1, 1), "name the launch file"))
+    findings = softening.report(Mark(document.path, 1, 1))
+    if findings:
+        scene = replace(scene, diagnostics=(*scene.diagnostics, *findings))
     if not scene.bodies:
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
         raise SceneError(Diagnostic(Severity.ERROR, "the file yields no body to simulate", document.top.mark), *errors)
@@ -98,8 +107,9 @@ def _load_models(
     resolver: Resolver,
     name: str,
     arms: Sequence[Mapping[str, str]] | None,
+    softening: Softening,
 ) -> Scene:
-    builder = SceneBuilder(name, resolver, _with_arms(WorldSettings(), arms))
+    builder = SceneBuilder(name, resolver, _with_arms(WorldSettings(), arms), softening)
     for document in [*_extra(files, resolver, builder), *documents]:
         builder.diagnostics += document.diagnostics
         builder.add_model(document, None)
@@ -123,11 +133,12 @@ def _load_launch(
     resolver: Resolver,
     arms: Sequence[Mapping[str, str]] | None,
     devices: Sequence[int],
+    softening: Softening,
 ) -> Scene:
     found = list(launch.diagnostics)
     world = _world_document(launch, resolver, found)
     shaders = None if world is None else shader_files(world.top, "shaders", world.path.parent)
-    builder = SceneBuilder(launch.path.stem, resolver, _with_arms(_settings(world, shaders, launch), arms))
+    builder = SceneBuilder(launch.path.stem, resolver, _with_arms(_settings(world, shaders, launch), arms), softening)
     builder.diagnostics += found
     if world is not None:
         _add_environment(world, builder, resolver)

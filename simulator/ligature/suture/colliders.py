@@ -44,7 +44,7 @@ class Colliders:
 
     def __init__(self, scene: Scene, dt: float) -> None:
         parts = [
-            (body.index, inverse(body.T_body_inertial) @ part.T_body_shape, *_arrays(part.shape))
+            (body.index, inverse(body.T_body_inertial) @ part.T_body_shape, *shape_arrays(part.shape))
             for body in scene.bodies
             if body.index not in scene.rod_bodies
             for part in body.colliders
@@ -165,7 +165,7 @@ _PLACED = ("pose", "box", "sweep")
 """Arrays of all parts that follow their bodies."""
 
 
-def _arrays(shape: Shape) -> tuple[int, Array, Array, Array]:
+def shape_arrays(shape: Shape) -> tuple[int, Array, Array, Array]:
     """Kind, sizes (3,), planes (n, 4) and box (2, 3) of a shape in its own frame."""
     none = np.zeros((0, 4))
     if isinstance(shape, Box):

@@ -23,6 +23,7 @@ from ligature.suture.description import Attachment, RodDescription, frame_quater
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
+from ligature.suture.springs import springs
 from ligature.suture.substeps import run_tick
 from ligature.tables import table_of
 
@@ -95,6 +96,8 @@ class Rod:
     ----------
     joints
         The joints of the chain with their springs, angles and loads, those of the attachments at its ends included.
+    springs
+        What tissue does to the nodes; whoever fills them does so before every tick.
     tension
         (n,) pull along each element in newtons at the last tick.
     settled_soundly
@@ -155,6 +158,8 @@ class Rod:
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
         self.take_passages(passages(1), 0)
+        self.springs = springs()
+        self._spring_table = table_of(self.springs)
         self.impulse, self.tension = self._arrays.impulse, self._arrays.tension
         self.newton_steps, self.settled_soundly = 0, True
         self.reset()
@@ -317,6 +322,36 @@ class Rod:
         self._pulled.setdefault(i, (nodes.gravity[i].copy(), float(nodes.mass[i]), nodes.inertia[i].copy()))
         nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = acceleration, mass, inertia
 
+    def add_spring(self, node: int, stiffness: Array, load: Array) -> int:
+        """Let load - stiffness d, (6,) and (6, 6), act on a node in this tick; its row in `springs`, -1 when full."""
+        row = int(self.springs.filled[0])
+        if row == len(self.springs.node):
+            return -1
+        self.springs.node[row], self.springs.K[row], self.springs.load[row] = node, stiffness, load
+        self.springs.filled[0] = row + 1
+        return row
+
+    def clear_springs(self) -> None:
+        """Remove the springs of the last tick."""
+        self.springs.filled[0] = 0
+
+    def moved(self, spring: int) -> Array:
+        """Motion (6,) of a spring's node in the tick."""
+        i, nodes = int(self.springs.node[spring]), self._nodes
+        turn = matrix_quaternion(quaternion_matrix(nodes.q[i]) @ quaternion_matrix(self.springs.q[spring]).T)
+        axis, w = (turn[:3], turn[3]) if turn[3] >= 0.0 else (-turn[:3], -turn[3])
+        size = float(np.sqrt(axis @ axis))
+        return np.concatenate(
+            [nodes.x[i] - self.springs.x[spring], 2.0 * np.arctan2(size, w) / max(size, 1e-300) * axis]
+        )
+
+    def joint_load(self, body: int) -> Array:
+        """Force and moment (6,) of the rod on a partner in the last tick, without those of `springs`."""
+        node = self.node_of[body]
+        n = int(self.springs.filled[0])
+        own = self.springs.impulse[:n][self.springs.node[:n] == node].sum(axis=0)
+        return np.asarray((self.impulse[node] - own) / self.dt)
+
     def _end_pulls(self) -> None:
         """Undo `pull_partner`."""
         nodes = self._nodes
@@ -457,8 +492,8 @@ class Rod:
             self._find_grasped()
         constraints, points = self._constraint_rows
         run_tick(
-            self._table, last, next_, scratch, self._passage_table, self._owner, constraints, points, self._motion,
-            self._met,
+            self._table, last, next_, scratch, self._passage_table, self._owner, self._spring_table, constraints,
+            points, self._motion, self._met,
         )  # fmt: skip
         _, _, self.newton_steps, in_scratch, finite = self._arrays.counts.tolist()
         self.settled_soundly = bool(finite)

@@ -26,6 +26,7 @@ from ligature.suture.rotations import (
     rotation_vector,
     turn,
 )
+from ligature.suture.springs import Springs, add_springs, settle_springs
 
 MAX_NEWTON = 8
 """Most Newton steps of a tick; one is the rule, more follow large turns and changing contacts."""
@@ -219,11 +220,12 @@ def finish(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: flo
 @kernel
 def advance(
     n: int, total: int, nodes: Nodes, joints: Joints, touches: Touches, work: Work, passages: Passages, owner: int,
-    stiffness: float, dt: float, damped: bool, elapsed: float,
+    springs: Springs, stiffness: float, dt: float, damped: bool, elapsed: float,
 ) -> tuple[int, bool]:  # fmt: skip
     """One step of ``total`` nodes, the first ``n`` of them a chain.
 
-    It ends ``elapsed`` seconds after the tick began. ``passages`` are those of all rods; this one is ``owner``.
+    It ends ``elapsed`` seconds after the tick began. ``passages`` are those of all rods; this one is ``owner``, with
+    ``springs`` of its own.
 
     Returns the Newton steps taken and whether contacts and shape settled. Contacts in ``touches`` were
     found at the poses of the step's start; ``stiffness`` is theirs (N/m).
@@ -236,6 +238,7 @@ def advance(
         assemble(n, total, nodes, joints, work)
         add_contacts(nodes, touches, work, stiffness, dt)
         add_passage_forces(passages, owner, nodes, work, elapsed, dt)
+        add_springs(springs, nodes, work, dt)
         low, high, rows = gather(n, total, nodes, touches, work)
         top = high if high >= 0 else n - 1
         factor(n, top, nodes.fixed, work.H, work.lever[:, 0], work.lever[:, 1], work.B, work.compliance,
@@ -251,6 +254,7 @@ def advance(
             for a in range(6):
                 joints.load[j, a] = work.load[j, a]
         settled = largest < LARGE_SWING and not changed
+    settle_springs(springs, nodes)
     conclude_contacts(touches, stiffness)
     finish(n, total, nodes, joints, work, dt)
     return steps, settled

@@ -19,6 +19,7 @@ from ligature.suture.placing import sound
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
+from ligature.suture.springs import Springs, add_spring_impulses, begin_springs, open_springs
 from ligature.suture.step import advance
 from ligature.suture.tracking import open_passages
 from ligature.tables import opener
@@ -103,7 +104,7 @@ def _scale_loads(joints: layout.Joints, factor: float) -> None:
 @inlined
 def _one_step(
     rod: layout.RodArrays, old: layout.Touches, new: layout.Touches, passages: Passages, owner: int,
-    constraints: Integers, points: Array, h: float, begins: bool, elapsed: float,
+    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float,
 ) -> tuple[int, bool]:  # fmt: skip
     """A step of ``h`` seconds that ends ``elapsed`` seconds after the tick began; see `advance` for what it returns."""
     nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
@@ -114,13 +115,15 @@ def _one_step(
         constants.first[0], elements, nodes, rod.shapes, old, new, work, rod.tension, rod.counts,
         constants.self_skip[0], h,
     )  # fmt: skip
-    return advance(n, total, nodes, joints, new, work, passages, owner, constants.stiffness[0], h, begins, elapsed)
+    return advance(
+        n, total, nodes, joints, new, work, passages, owner, springs, constants.stiffness[0], h, begins, elapsed
+    )
 
 
 @kernel
 def run_tick(
     rod_table: Integers, last: Integers, next_: Integers, scratch: Integers, passage_table: Integers, owner: int,
-    constraints: Integers, points: Array, motion: Array, met: Integers,
+    spring_table: Integers, constraints: Integers, points: Array, motion: Array, met: Integers,
 ) -> None:  # fmt: skip
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``scratch``.
 
@@ -128,7 +131,7 @@ def run_tick(
     contacts for which there was no room, Newton steps, whether the contacts lie in ``scratch``, and whether all
     elements are finite and slower than the maximum speed.
     """
-    rod, passages = open_rod(rod_table), open_passages(passage_table)
+    rod, passages, springs = open_rod(rod_table), open_passages(passage_table), open_springs(spring_table)
     a, b, c = open_touches(last), open_touches(next_), open_touches(scratch)
     nodes, joints, shapes, work, impulse, counts = rod.nodes, rod.joints, rod.shapes, rod.work, rod.impulse, rod.counts
     n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
@@ -137,6 +140,7 @@ def run_tick(
     _keep(nodes, joints, work)
     _copy2(shapes.pose, rod.shape_poses)
     begin_passages(passages, owner)
+    begin_springs(springs, nodes)
     for i in range(total):
         for k in range(6):
             impulse[i, k] = 0.0
@@ -149,7 +153,7 @@ def run_tick(
         _scale_loads(joints, (size / scale) ** 2)
         scale = size
         more, settled = _one_step(
-            rod, old, new, passages, owner, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
+            rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
         )
         steps += more
         if not settled and size > 1 and steps < MAX_STEPS:
@@ -159,6 +163,7 @@ def run_tick(
             continue
         add_reactions(n, joints, new, work, impulse, h)
         add_passage_impulses(passages, owner, impulse, h)
+        add_spring_impulses(springs, impulse, h)
         done += size
         if done == MAX_PARTS:
             break

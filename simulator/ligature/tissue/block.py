@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ligature.mesh.grid import Grid
 from ligature.model.material import TissueMaterial
 from ligature.tissue.elastic import STEP, ElasticGrid
-from ligature.tissue.interface import Interface
+from ligature.tissue.interface import UNUSED, Interface
 from ligature.tissue.lips import Lips
 from ligature.tissue.location import locate
 from ligature.tissue.paths import begin_path, extend_path, paths
@@ -18,6 +18,10 @@ from ligature.tissue.puncture import NeedleInTissue
 from ligature.tissue.thread import ThreadInTissue
 
 Array = NDArray[np.float64]
+
+
+RESERVED = 40
+"""Points that needles find unused at least, as far as ways that nothing is in can be closed for them."""
 
 
 class TissueBlock:
@@ -55,6 +59,7 @@ class TissueBlock:
         self.lips = Lips(self.elastic)
         self.interface = Interface(self.elastic, ticks)
         self.paths = paths()
+        self.ages = np.zeros(len(self.paths.count), dtype=np.int64)
         self.needles: list[NeedleInTissue] = []
         self.threads: list[ThreadInTissue] = []
         self._begin()
@@ -70,6 +75,26 @@ class TissueBlock:
         thread = ThreadInTissue(self.interface, self.paths, radius, friction)
         self.threads.append(thread)
         return thread
+
+    def has_room(self) -> bool:
+        """Whether a body may touch one more point: paths of needles keep a part for themselves."""
+        return int((self.interface.points.status == UNUSED).sum()) > RESERVED
+
+    def make_room(self) -> None:
+        """Close the oldest ways that nothing is in, where there is too little room for new ones."""
+        status, paths = self.interface.points.status, self.paths
+        used = np.flatnonzero(paths.count)
+        self.ages[used] += 1
+        self.ages[paths.count == 0] = 0
+        for path in used[np.argsort(-self.ages[used], kind="stable")].tolist():
+            if (status == UNUSED).sum() >= RESERVED and (paths.count == 0).any():
+                return
+            nodes = paths.node[path, : paths.count[path]]
+            inside = [needle.is_in(path) for needle in self.needles]
+            if not any(inside) and not any(thread.engaged[nodes].any() for thread in self.threads):
+                for i in nodes.tolist():
+                    self.interface.release(i)
+                paths.count[path], paths.length[path], self.ages[path] = 0, np.inf, 0
 
     def lay_path(self, places: Array, radius: float) -> int:
         """Make a way through the tissue, for needles and threads of ``radius`` metres; returns the path.
@@ -114,6 +139,7 @@ class TissueBlock:
         self._begin()
         for _, line in self._lines():
             line.follow()
+        self.make_room()
 
     def _begin(self) -> None:
         d = self.elastic.predict()
@@ -134,6 +160,7 @@ class TissueBlock:
         self.interface.reset()
         for array in self.paths:
             array[:] = 0
+        self.ages[:] = 0
         self.paths.length[:] = np.inf
         for _, line in self._lines():
             line.reset()
@@ -142,7 +169,7 @@ class TissueBlock:
     def snapshot(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick, as named arrays."""
         kept = {name: getattr(self.elastic, name).copy() for name in ("x", "v", "frames")}
-        kept["lip_force"] = self.lips.force.copy()
+        kept["lip_force"], kept["ages"] = self.lips.force.copy(), self.ages.copy()
         kept.update({f"point_{name}": array for name, array in self.interface.snapshot().items()})
         kept.update({f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)})
         for prefix, line in self._lines():
@@ -159,7 +186,7 @@ class TissueBlock:
         """
         for name in ("x", "v", "frames"):
             getattr(self.elastic, name)[:] = snapshot[name]
-        self.lips.force[:] = snapshot["lip_force"]
+        self.lips.force[:], self.ages[:] = snapshot["lip_force"], snapshot["ages"]
         self.interface.restore(_with_prefix(snapshot, "point_"))
         for name, array in zip(self.paths._fields, self.paths, strict=True):
             array[:] = snapshot[f"path_{name}"]

@@ -23,7 +23,7 @@ from ligature.tissue.elastic import ElasticGrid
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-CAPACITY = 96
+CAPACITY = 160
 """Most points at one time."""
 
 SPACING = 1.6e-3
@@ -187,6 +187,7 @@ class Interface:
         for array in self.points:
             array[:] = 0
         self.expected[:] = 0.0
+        self.cell_of[:] = 0
         self.tick = 0
 
     def snapshot(self) -> dict[str, Array]:

@@ -69,6 +69,8 @@ class Rows(NamedTuple):
     elastic: Integers  # (M,) the rows that are
     H: Array  # (6, 6)
     g: Array  # (6,)
+    K: Array  # (6, 6) stiffness of the rows that are elastic, as the needle sees it
+    load: Array  # (6,) force and moment of all rows on the needle where it does not move
 
 
 class Held(NamedTuple):
@@ -99,7 +101,7 @@ def rows(capacity: int = MOST_ROWS) -> Rows:
     i = lambda: np.zeros(M, np.int64)  # noqa: E731
     return Rows(
         i(), i(), z((M, 3)), z((M, 6)), z(M), z(M), z(M), z(M), i(), z(M), z((M, M)), z((M, M)), z((7, M)), i(),
-        z((6, 6)), z(6),
+        z((6, 6)), z(6), z((6, 6)), z(6),
     )  # fmt: skip
 
 
@@ -375,66 +377,83 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
     return m
 
 
+@inlined
+def _reduce(rows, m):
+    """Stiffness and load of the rows on the needle for the limits as they are; elastic rows, -1 where it failed."""
+    n = 0
+    for a in range(m):
+        if rows.side[a] == 0:
+            rows.elastic[n] = a
+            n += 1
+        else:
+            rows.force[a] = rows.high[a] if rows.side[a] > 0 else rows.low[a]
+    for i in range(6):
+        rows.load[i] = 0.0
+        for j in range(6):
+            rows.K[i, j] = 0.0
+    for a in range(m):
+        if rows.side[a] != 0:
+            for i in range(6):
+                rows.load[i] -= rows.J[a, i] * rows.force[a]
+    for p in range(n):
+        a = rows.elastic[p]
+        b = rows.rest[a]
+        for c in range(m):
+            if rows.side[c] != 0:
+                b -= rows.C[a, c] * rows.force[c]
+        rows.X[6, p] = b
+        for i in range(6):
+            rows.X[i, p] = rows.J[a, i]
+        for q in range(p + 1):
+            rows.A[p, q] = rows.C[a, rows.elastic[q]]
+        rows.A[p, p] += rows.soft[a]
+    if not cholesky(rows.A, n):
+        return -1
+    for c in range(7):
+        X = rows.X[c]
+        for p in range(n):
+            total = X[p]
+            for q in range(p):
+                total -= rows.A[p, q] * X[q]
+            X[p] = total / rows.A[p, p]
+    for i in range(6):
+        for p in range(n):
+            rows.load[i] -= rows.X[i, p] * rows.X[6, p]
+        for j in range(i + 1):
+            total = 0.0
+            for p in range(n):
+                total += rows.X[i, p] * rows.X[j, p]
+            rows.K[i, j], rows.K[j, i] = total, total
+    return n
+
+
+@inlined
+def _expand(rows, n, delta):
+    """Forces of the ``n`` elastic rows after `_reduce` for a motion ``delta`` (6,) of the needle."""
+    for p in range(n - 1, -1, -1):
+        total = rows.X[6, p]
+        for i in range(6):
+            total += rows.X[i, p] * delta[i]
+        for q in range(p + 1, n):
+            total -= rows.A[q, p] * rows.force[rows.elastic[q]]
+        rows.force[rows.elastic[p]] = total / rows.A[p, p]
+
+
 @kernel
 def solve_rows(rows, m, H, g, delta):
     """Forces of the rows and motion ``delta`` (6,) of the needle; returns the repetitions, negative where it failed."""
     for turn in range(MOST_PASSES):
-        n = 0
-        for a in range(m):
-            if rows.side[a] == 0:
-                rows.elastic[n] = a
-                n += 1
-            else:
-                rows.force[a] = rows.high[a] if rows.side[a] > 0 else rows.low[a]
-        for i in range(6):
-            rows.g[i] = g[i]
-            for j in range(6):
-                rows.H[i, j] = H[i, j]
-        for a in range(m):
-            if rows.side[a] != 0:
-                for i in range(6):
-                    rows.g[i] -= rows.J[a, i] * rows.force[a]
-        for p in range(n):
-            a = rows.elastic[p]
-            b = rows.rest[a]
-            for c in range(m):
-                if rows.side[c] != 0:
-                    b -= rows.C[a, c] * rows.force[c]
-            rows.X[6, p] = b
-            for i in range(6):
-                rows.X[i, p] = rows.J[a, i]
-            for q in range(p + 1):
-                rows.A[p, q] = rows.C[a, rows.elastic[q]]
-            rows.A[p, p] += rows.soft[a]
-        if not cholesky(rows.A, n):
+        n = _reduce(rows, m)
+        if n < 0:
             return -1
-        for c in range(7):
-            X = rows.X[c]
-            for p in range(n):
-                total = X[p]
-                for q in range(p):
-                    total -= rows.A[p, q] * X[q]
-                X[p] = total / rows.A[p, p]
         for i in range(6):
-            for p in range(n):
-                rows.g[i] -= rows.X[i, p] * rows.X[6, p]
+            delta[i] = g[i] + rows.load[i]
             for j in range(i + 1):
-                total = 0.0
-                for p in range(n):
-                    total += rows.X[i, p] * rows.X[j, p]
-                rows.H[i, j] += total
+                rows.H[i, j] = H[i, j] + rows.K[i, j]
         if not cholesky(rows.H, 6):
             return -1
-        for i in range(6):
-            delta[i] = rows.g[i]
         solve_cholesky(rows.H, 6, delta)
-        for p in range(n - 1, -1, -1):
-            total = rows.X[6, p]
-            for i in range(6):
-                total += rows.X[i, p] * delta[i]
-            for q in range(p + 1, n):
-                total -= rows.A[q, p] * rows.force[rows.elastic[q]]
-            rows.force[rows.elastic[p]] = total / rows.A[p, p]
+        _expand(rows, n, delta)
         changed = False
         for a in range(m):
             side = rows.side[a]
@@ -464,7 +483,7 @@ def _stretch(rows, m, a, delta):
 
 
 @kernel
-def conclude(points, paths, held, rows, m, delta):
+def conclude(points, paths, held, rows, m, delta, clip):
     """Keep what the rows leave: forces on the tissue, anchors, tears, what was cut; True if the tip got through."""
     through = False
     held.load[0], held.load[1], held.load[2] = 0.0, 0.0, 0.0
@@ -476,7 +495,8 @@ def conclude(points, paths, held, rows, m, delta):
     turn = 0
     for a in range(m):
         i, kind, force = rows.point[a], rows.kind[a], rows.force[a]
-        rows.force[a] = min(max(force, rows.low[a]), rows.high[a])
+        if clip:
+            rows.force[a] = min(max(force, rows.low[a]), rows.high[a])
         force = rows.force[a]
         excess = 0.0
         if rows.side[a] != 0:
@@ -523,9 +543,43 @@ def couple(points, paths, held, rows, shape, tip_friction, s, dt, drop, H, g, de
     m = gather(points, paths, held, rows, shape, tip_friction, s)
     if solve_rows(rows, m, H, g, delta) < 0:
         return left, -1
-    through = conclude(points, paths, held, rows, m, delta)
+    through = conclude(points, paths, held, rows, m, delta, True)
     for i in range(6):
         wrench[i] = 0.0
         for a in range(m):
             wrench[i] -= rows.force[a] * rows.J[a, i]
     return left, (1 if through else 0)
+
+
+@kernel
+def begin_coupling(points, paths, held, rows, shape, tip_friction, s, dt, drop, H, g, delta):
+    """A tick of a needle whose motion another solver finds: (path that the tip has left or -1, rows or -1).
+
+    ``H``, ``g`` are the equations as far as they are known before; they decide which rows are at their limits.
+    ``rows.K`` and ``rows.load`` are then what that solver is to include.
+    """
+    engage(points, paths, held, shape)
+    left = follow_tip(points, paths, held, dt, drop)
+    m = gather(points, paths, held, rows, shape, tip_friction, s)
+    if solve_rows(rows, m, H, g, delta) < 0 or _reduce(rows, m) < 0:
+        return left, -1
+    return left, m
+
+
+@kernel
+def end_coupling(points, paths, held, rows, m, delta, wrench):
+    """End what `begin_coupling` began, the needle having moved by ``delta`` (6,): True if the tip got through.
+
+    Rows keep to the limits that it assumed: where a force goes beyond its limit, it does so for this tick alone.
+    """
+    n = 0
+    for a in range(m):
+        if rows.side[a] == 0:
+            n += 1
+    _expand(rows, n, delta)
+    through = conclude(points, paths, held, rows, m, delta, False)
+    for i in range(6):
+        wrench[i] = 0.0
+        for a in range(m):
+            wrench[i] -= rows.force[a] * rows.J[a, i]
+    return through

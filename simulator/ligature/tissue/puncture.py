@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ligature.tissue import needle as states
 from ligature.tissue.interface import HARD, SPACING, USED, Interface
 from ligature.tissue.location import cross_surface, locate
-from ligature.tissue.needle import couple, held, rows
+from ligature.tissue.needle import begin_coupling, couple, end_coupling, held, rows
 from ligature.tissue.paths import MOST_NODES, MOST_PATHS, Paths, begin_path, extend_path
 from ligature.tissue.tearing import tear
 
@@ -63,6 +63,7 @@ class NeedleInTissue:
         self._delta, self._wrench = np.zeros(6), np.zeros(6)
         self._weights8, self._weights4, self._normal = np.zeros(8), np.zeros(4), np.zeros(3)
         self._before = np.full(3, np.nan)
+        self._left, self._count = -1, 0
 
     # --- the tick -----------------------------------------------------------------------------
 
@@ -93,24 +94,67 @@ class NeedleInTissue:
         FloatingPointError
             When the needle's equations are singular or not finite.
         """
-        h, p = self._held, self._interface.points
-        self._shape[:3], self._shape[3:6], self._shape[6:9], self._shape[11:] = tip, tangent, normal, centre
-        if h.tip[0] == states.OUTSIDE:
-            self._look_for_surface()
+        self._place(tip, tangent, normal, centre)
         left, fate = couple(
-            p, self._paths, h, self._rows, self._shape, TIP_FRICTION, self._interface.fraction, dt, DROP, H, g,
-            self._delta, self._wrench,
+            self._interface.points, self._paths, self._held, self._rows, self._shape, TIP_FRICTION,
+            self._interface.fraction, dt, DROP, H, g, self._delta, self._wrench,
         )  # fmt: skip
         if fate < 0 or not math.isfinite(self._delta.sum()):
             raise FloatingPointError("the equations of the needle in tissue have no finite solution")
+        self._conclude(left, fate > 0)
+        return self._delta.copy(), self._wrench.copy()
+
+    def begin(
+        self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array, dt: float = 1e-3
+    ) -> tuple[Array, Array]:
+        """Begin a tick of a needle whose motion another solver finds, such as that of its thread; see `couple`.
+
+        Returns
+        -------
+        Stiffness (6, 6) and load (6,) of the tissue: the needle feels load - stiffness δ.
+
+        Raises
+        ------
+        FloatingPointError
+            When the needle's equations are singular or not finite.
+        """
+        self._place(tip, tangent, normal, centre)
+        self._left, self._count = begin_coupling(
+            self._interface.points, self._paths, self._held, self._rows, self._shape, TIP_FRICTION,
+            self._interface.fraction, dt, DROP, H, g, self._delta,
+        )  # fmt: skip
+        if self._count < 0 or not math.isfinite(self._delta.sum()):
+            raise FloatingPointError("the equations of the needle in tissue have no finite solution")
+        return self._rows.K.copy(), self._rows.load.copy()
+
+    def end(self, delta: Array) -> Array:
+        """End a tick in which the needle moved by ``delta`` (6,); returns force and moment (6,) of the tissue on it."""
+        self._delta[:] = delta
+        through = end_coupling(
+            self._interface.points, self._paths, self._held, self._rows, self._count, self._delta, self._wrench
+        )
+        self._conclude(self._left, through)
+        return self._wrench.copy()
+
+    def forget(self) -> None:
+        """Pass over a tick in which the needle is far from the tissue."""
+        self._before[:] = np.nan
+
+    def _place(self, tip: Array, tangent: Array, normal: Array, centre: Array) -> None:
+        self._shape[:3], self._shape[3:6], self._shape[6:9], self._shape[11:] = tip, tangent, normal, centre
+        if self._held.tip[0] == states.OUTSIDE:
+            self._look_for_surface()
+
+    def _conclude(self, left: int, through: bool) -> None:
+        """Follow the tip: out of the tissue, further in, or off the surface."""
+        h = self._held
         if left >= 0:
             self._lay_exit(left)
-        if fate > 0:
+        if through:
             self._get_through()
         elif h.tip[0] in (states.TOUCHES, states.SLIDES) and h.tip_side[0] < 0:
             self._let_go()
-        self._before[:] = tip
-        return self._delta.copy(), self._wrench.copy()
+        self._before[:] = self._shape[:3]
 
     def _look_for_surface(self) -> None:
         """Begin a contact where the tip came through the surface in the last tick."""
@@ -310,9 +354,24 @@ class NeedleInTissue:
         return int(self._held.tip[0])
 
     @property
+    def first_point(self) -> int:
+        """Point of the interface at which the needle went in, or which its tip touches; -1 for a needle outside."""
+        inside = np.flatnonzero(self._held.engaged)
+        return int(inside[0]) if len(inside) else int(self._held.tip[2])
+
+    def is_in(self, path: int) -> bool:
+        """Whether the needle is in a path, or may come back to it in this step."""
+        return bool(self._held.passing[path]) or int(self._held.tip[1]) == path
+
+    @property
     def passages(self) -> int:
         """Nodes of paths that hold the needle."""
         return int(self._held.engaged.sum())
+
+    @property
+    def engaged(self) -> NDArray[np.int64]:
+        """Points of the interface that hold the needle, (N,) of 0 and 1."""
+        return self._held.engaged
 
     @property
     def depth(self) -> float:
@@ -329,13 +388,21 @@ class NeedleInTissue:
         """Force of the shaft on the tissue along itself, N."""
         return float(self._held.load[1])
 
+    def withdraw(self) -> None:
+        """Take the needle out at once; its path stays."""
+        h, p = self._held, self._interface.points
+        if h.tip[0] in (states.TOUCHES, states.SLIDES):
+            self._let_go()
+        p.force[h.engaged == 1] = 0.0
+        self.reset()
+
     def reset(self) -> None:
         """Take the needle out without a trace."""
         for array in self._held:
             array[:] = 0
         self._held.tip[:] = [states.OUTSIDE, -1, -1]
         self._before[:] = np.nan
-        self._delta[:] = 0.0
+        self._delta[:], self._shape[:9], self._shape[11:] = 0.0, 0.0, 0.0
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick."""

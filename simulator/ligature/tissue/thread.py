@@ -40,6 +40,19 @@ class Springs(NamedTuple):
     start: Array
 
 
+class Rows(NamedTuple):
+    """The nodes of a tick, k of them; in the directions E of a node: along, across, and the third."""
+
+    node: Integers  # (k,)
+    segment: Integers  # (k,) of the thread
+    part: Array  # (k,) of the segment
+    start: Array  # (k, 3)
+    E: Array  # (k, 3, 3)
+    stretch: Array  # (k, 3) when the tick begins
+    soft: Array  # (k, 3, 3) compliance
+    limit: Array  # (k, 2) along and across
+
+
 class ThreadInTissue:
     """One thread of a block of tissue.
 
@@ -63,9 +76,9 @@ class ThreadInTissue:
         self._share = np.zeros(n)
         self._torn = np.zeros((n, 3))
         self._side = np.zeros((n, 2), dtype=np.int64)
-        self._points = np.zeros((0, 3))
-        self._rows: dict[int, tuple[Array, ...]] = {}
-        self._tangents: dict[int, Array] = {}
+        self._points = np.zeros((2, 3))
+        self._tangent = np.zeros((n, 3))
+        self._rows = self._gather(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
         self._settles = 0
 
     # --- the tick -----------------------------------------------------------------------------
@@ -91,31 +104,36 @@ class ThreadInTissue:
         """Springs of a tick that begins with the thread's points at ``points`` (n, 3)."""
         self._points = np.array(points, dtype=np.float64)
         self._settles = 0
-        self._find(points)
+        nodes, segment, part = self._find()
         self._share_out()
-        nodes = np.flatnonzero(self.engaged)
-        self._rows = {int(i): self._row(int(i), nodes) for i in nodes}
+        self._rows = self._gather(nodes, segment, part)
         return self._springs()
 
-    def _find(self, points: Array) -> None:
-        """Where along the thread its nodes are now; those off its ends are let go."""
+    def _find(self) -> tuple[Integers, Integers, Array]:
+        """Where along the thread its nodes are now, by segment and part of it; those off its ends are let go."""
+        nodes = np.flatnonzero(self.engaged)
+        if not len(nodes):
+            return nodes, nodes, np.zeros(0)
+        points, y = self._points, self._interface.points.at[nodes]
         edge = np.diff(points, axis=0)
         size = np.sqrt((edge**2).sum(axis=1))
         begin = np.concatenate([[0.0], np.cumsum(size)])
-        for i in np.flatnonzero(self.engaged).tolist():
-            y = self._interface.points.at[i]
-            part = np.clip(((y - points[:-1]) * edge).sum(axis=1) / size**2, 0.0, 1.0)
-            away = ((points[:-1] + part[:, None] * edge - y) ** 2).sum(axis=1)
-            along = begin[:-1] + part * size
-            # The nearest of those that lie near its last place: a thread may pass a node more than once.
-            near = np.abs(along - self._at[i]) < CAPTURE
-            if not near.any():
-                self._drop(i)
-                continue
-            k = int(np.flatnonzero(near)[np.argmin(away[near])])
-            self._at[i] = along[k]
-            if (k == 0 and part[k] == 0.0) or (k == len(size) - 1 and part[k] == 1.0):
-                self._drop(i)
+        away = y[:, None] - points[:-1]
+        parts = np.clip((away * edge).sum(axis=2) / size**2, 0.0, 1.0)
+        along = begin[:-1] + parts * size
+        # The nearest of those that lie near its last place: a thread may pass a node more than once.
+        near = np.abs(along - self._at[nodes, None]) < CAPTURE
+        square = ((away - parts[:, :, None] * edge) ** 2).sum(axis=2)
+        segment = np.argmin(np.where(near, square, np.inf), axis=1)
+        row = np.arange(len(nodes))
+        part = parts[row, segment]
+        off = ((segment == 0) & (part == 0.0)) | ((segment == len(size) - 1) & (part == 1.0)) | ~near.any(axis=1)
+        for i in nodes[off].tolist():
+            self._drop(i)
+        kept = ~off
+        nodes, segment, part = nodes[kept], segment[kept], part[kept]
+        self._at[nodes] = along[row[kept], segment]
+        return nodes, segment, part
 
     def _drop(self, i: int) -> None:
         self.engaged[i] = 0
@@ -123,7 +141,7 @@ class ThreadInTissue:
 
     def _share_out(self) -> None:
         """Length of path that each node stands for, and the direction of the path there."""
-        self._tangents.clear()
+        self._tangent[:] = 0.0
         for path in np.flatnonzero(self._paths.count).tolist():
             n = int(self._paths.count[path])
             nodes, s = self._paths.node[path, :n], self._paths.s[path, :n]
@@ -148,89 +166,116 @@ class ThreadInTissue:
         edge *= turned / np.sqrt((edge**2).sum(axis=1))[:, None]
         total = np.concatenate([edge[:1], edge[1:] + edge[:-1], edge[-1:]])
         total /= np.sqrt((total**2).sum(axis=1))[:, None]
-        self._tangents.update(zip(nodes.tolist(), total, strict=True))
+        self._tangent[nodes] = total
 
-    def _row(self, i: int, nodes: Integers) -> tuple[Array, ...]:
-        """Directions (3, 3), stretch at the start, compliance in those directions, limits along and across, place."""
+    def _gather(self, nodes: Integers, segment: Integers, part: Array) -> Rows:
+        """Directions, stretch, compliance and limits of the nodes when the tick begins."""
         interface, p = self._interface, self._interface.points
-        points = self._points
-        begin = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)))])
-        k = int(np.clip(np.searchsorted(begin, self._at[i], side="right") - 1, 0, len(begin) - 2))
-        share = (self._at[i] - begin[k]) / (begin[k + 1] - begin[k])
-        start = points[k] + share * (points[k + 1] - points[k])
-        tangent = self._tangents.get(i, (points[k + 1] - points[k]) / (begin[k + 1] - begin[k]))
-        whole = p.C[i, nodes].sum(axis=0)
-        whole = 0.5 * (whole + whole.T)
-        base = p.start[i] + interface.fraction * p.move[i] - whole @ p.mean[i]
-        for j in np.flatnonzero(p.status).tolist():
-            if not self.engaged[j]:
-                base = base + p.C[i, j] @ (p.force[j] - p.mean[j])
-        across = start - base - self._torn[i]
-        across -= (across @ tangent) * tangent
-        size = np.sqrt((across**2).sum())
-        other = np.eye(3)[int(np.argmin(np.abs(tangent)))]
-        normal = across / size if size > 1e-9 else np.cross(tangent, other)
-        normal /= np.sqrt((normal**2).sum())
-        E = np.stack([tangent, normal, np.cross(tangent, normal)])
+        first = self._points[segment]
+        edge = self._points[segment + 1] - first
+        start = first + part[:, None] * edge
+        tangent = self._tangent[nodes]
+        lone = (tangent == 0.0).all(axis=1)
+        tangent[lone] = edge[lone] / np.sqrt((edge[lone] ** 2).sum(axis=1))[:, None]
+        whole = p.C[nodes[:, None], nodes].sum(axis=1)
+        whole = 0.5 * (whole + whole.transpose(0, 2, 1))
+        others = np.flatnonzero((p.status != 0) & (self.engaged == 0))
+        change = p.force[others] - p.mean[others]
+        base = p.start[nodes] + interface.fraction * p.move[nodes]
+        base -= np.einsum("iab,ib->ia", whole, p.mean[nodes])
+        base += np.einsum("ijab,jb->ia", p.C[nodes[:, None], others], change)
+        across = start - base - self._torn[nodes]
+        across -= (across * tangent).sum(axis=1)[:, None] * tangent
+        size = np.sqrt((across**2).sum(axis=1))
+        other = np.eye(3)[np.argmin(np.abs(tangent), axis=1)]
+        normal = np.where((size > 1e-9)[:, None], across, np.cross(tangent, other))
+        normal /= np.sqrt((normal**2).sum(axis=1))[:, None]
+        E = np.stack([tangent, normal, np.cross(tangent, normal)], axis=1)
         # Along the thread its own length counts: towards its first point the tangent turns round.
-        slid = self._anchor[i] - self._at[i] + float(tangent @ (p.at[i] - base))
-        stretch = np.array([slid, size, 0.0])
-        soft = E @ whole @ E.T + p.soft[i] * np.eye(3)
-        limit = np.array([self._friction * p.friction[i], p.strength[i]]) * self._share[i]
-        return E, stretch, soft, limit, start, np.array([k, share])
+        slid = self._anchor[nodes] - self._at[nodes] + (tangent * (p.at[nodes] - base)).sum(axis=1)
+        stretch = np.stack([slid, size, np.zeros(len(nodes))], axis=1)
+        soft = E @ whole @ E.transpose(0, 2, 1) + p.soft[nodes, None, None] * np.eye(3)
+        limit = np.stack([self._friction * p.friction[nodes], p.strength[nodes]], axis=1) * self._share[nodes, None]
+        return Rows(nodes, segment, part, start, E, stretch, soft, limit)
 
-    def _law(self, i: int) -> tuple[Array, Array]:
-        """Force on the tissue at a node, in its directions: bias (3,), and stiffness (3, 3)."""
-        _, stretch, soft, limit, _, _ = self._rows[i]
-        fixed = np.array([self._side[i, 0], self._side[i, 1], 0]) != 0
-        force = np.zeros(3)
-        force[:2] = self._side[i] * limit
-        K = np.zeros((3, 3))
-        free = np.flatnonzero(~fixed)
-        K[np.ix_(free, free)] = np.linalg.inv(soft[np.ix_(free, free)])
-        force[free] = K[np.ix_(free, free)] @ (stretch[free] - soft[np.ix_(free, np.flatnonzero(fixed))] @ force[fixed])
+    def _law(self) -> tuple[Array, Array]:
+        """Force on the tissue at the nodes, in their directions: bias (k, 3), and stiffness (k, 3, 3)."""
+        rows = self._rows
+        k = len(rows.node)
+        side = np.zeros((k, 3))
+        side[:, :2] = self._side[rows.node]
+        free = side == 0.0
+        both = free[:, :, None] & free[:, None, :]
+        K = np.where(both, np.linalg.inv(np.where(both, rows.soft, np.eye(3))), 0.0)
+        force = np.zeros((k, 3))
+        force[:, :2] = side[:, :2] * rows.limit
+        force += np.einsum("iab,ib->ia", K, rows.stretch - np.einsum("iab,ib->ia", rows.soft, force))
         return force, K
 
     def _springs(self) -> Springs:
-        k = len(self._rows)
-        out = Springs(np.zeros(k, np.int64), np.zeros(k), np.zeros((k, 3, 3)), np.zeros((k, 3)), np.zeros((k, 3)))
-        for row, (i, (E, _, _, _, start, place)) in enumerate(self._rows.items()):
-            force, K = self._law(i)
-            out.segment[row], out.share[row], out.start[row] = int(place[0]), place[1], start
-            out.bias[row], out.stiffness[row] = -E.T @ force, E.T @ K @ E
-        return out
+        rows = self._rows
+        force, K = self._law()
+        turned = rows.E.transpose(0, 2, 1)
+        bias = -np.einsum("iab,ib->ia", turned, force)
+        return Springs(rows.segment, rows.part, turned @ K @ rows.E, bias, rows.start)
+
+    def _moved(self, points: Array) -> Array:
+        """How far the thread has moved at its nodes, in their directions, (k, 3)."""
+        rows = self._rows
+        first, last = points[rows.segment], points[rows.segment + 1]
+        return np.einsum("iab,ib->ia", rows.E, first + rows.part[:, None] * (last - first) - rows.start)
 
     def settle(self, points: Array) -> Springs | None:
         """Take the thread's points (n, 3) as solved with the springs; new springs where limits were mistaken, or None.
 
         After None the forces stand, the anchors have followed, and what has torn is known.
         """
-        changed = False
         self._settles += 1
-        ends = []
-        for i, (E, stretch, soft, limit, start, place) in self._rows.items():
-            k, share = int(place[0]), place[1]
-            moved = E @ (points[k] + share * (points[k + 1] - points[k]) - start)
-            force, K = self._law(i)
-            force = force + K @ moved
-            # What the bristles alone are stretched by at the end of the tick.
-            excess = stretch + moved - soft @ force
-            for row in range(2):
-                side = self._side[i, row]
-                if side == 0 and abs(force[row]) > limit[row] * (1.0 + 1e-9):
-                    self._side[i, row], changed = int(np.sign(force[row])), True
-                elif side != 0 and side * excess[row] < 0.0 and self._settles < MOST_SETTLES:
-                    self._side[i, row], changed = 0, True
-            ends.append((i, E, force, excess))
-        if changed and self._settles < 2 * MOST_SETTLES:
+        rows, moved = self._rows, self._moved(points)
+        force, K = self._law()
+        force = force + np.einsum("iab,ib->ia", K, moved)
+        # What the bristles alone are stretched by at the end of the tick.
+        excess = rows.stretch + moved - np.einsum("iab,ib->ia", rows.soft, force)
+        if self._change_sides(force, excess, self._settles < MOST_SETTLES) and self._settles < 2 * MOST_SETTLES:
             return self._springs()
-        for i, E, force, excess in ends:
-            self._interface.points.force[i] = E.T @ force
-            if self._side[i, 0]:
-                self._anchor[i] -= excess[0]
-            if self._side[i, 1]:
-                self._torn[i] += excess[1] * E[1]
+        self._interface.points.force[rows.node] = np.einsum("iba,ib->ia", rows.E, force)
+        self._follow_limits(excess)
         return None
+
+    def _change_sides(self, force: Array, excess: Array, back: bool) -> bool:
+        """Which rows are at their limits after a solve, and with ``back`` which are not any more; True on a change."""
+        side, limit = self._side[self._rows.node], self._rows.limit
+        now = np.where((side == 0) & (np.abs(force[:, :2]) > limit * (1.0 + 1e-9)), np.sign(force[:, :2]), side)
+        if back:
+            now = np.where((side != 0) & (side * excess[:, :2] < 0.0), 0, now)
+        self._side[self._rows.node] = now
+        return bool((now != side).any())
+
+    def _follow_limits(self, excess: Array) -> None:
+        """Move anchors that slip, and note what tears."""
+        rows = self._rows
+        side = self._side[rows.node]
+        self._anchor[rows.node] -= np.where(side[:, 0] != 0, excess[:, 0], 0.0)
+        self._torn[rows.node] += np.where(side[:, 1] != 0, excess[:, 1], 0.0)[:, None] * rows.E[:, 1]
+
+    def conclude(self, points: Array, forces: Array) -> None:
+        """End a tick whose springs another solver took as they were.
+
+        Parameters
+        ----------
+        points
+            The thread's points at the end, (n, 3).
+        forces
+            Of the thread on the tissue at the nodes of the springs, (k, 3), as that solver found them.
+
+        Limits that a force goes beyond act from the next tick on.
+        """
+        rows = self._rows
+        local = np.einsum("iab,ib->ia", rows.E, forces)
+        excess = rows.stretch + self._moved(points) - np.einsum("iab,ib->ia", rows.soft, local)
+        self._interface.points.force[rows.node] = forces
+        self._follow_limits(excess)
+        self._change_sides(local, excess, True)
 
     # --- the tissue step ----------------------------------------------------------------------
 
@@ -238,6 +283,15 @@ class ThreadInTissue:
         """Tear; after the tissue has moved."""
         tear(self._interface, self._paths, self._torn)
         self.engaged[self._interface.points.status != 1] = 0
+
+    @property
+    def shares(self) -> Array:
+        """Length of path that each point stands for, (N,) m; it counts where the thread is engaged."""
+        return self._share
+
+    def segment_of(self, i: int) -> int:
+        """Segment of the thread that was at a point in the last tick."""
+        return int(self._rows.segment[self._rows.node == i][:1].sum())
 
     # --- state --------------------------------------------------------------------------------
 
