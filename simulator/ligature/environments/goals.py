@@ -144,7 +144,8 @@ class Insert:
     """
 
     holes = 1
-    scene, arm, models, thread = "suturing", "PSM2", (0, 1, 4, 5), True
+    scene, arm, thread = "suturing", "PSM2", True
+    models: tuple[int, ...] = (0, 1, 4, 5)
     DEPTHS = (0.020, 0.0205, 0.021)
     BEFORE, MORE, LOOK = 0.4, 0.1, 0.15
     SHIFT, TURN = 0.002, 0.08
