@@ -164,7 +164,7 @@ class BodyContacts:
         if self._scene.bodies[index].static or self._bodies.driven(index):
             p.light[row], p.spin[row] = 0.0, 0.0
         else:
-            mass, inertia = self._bodies.mass_of(index)
+            mass, inertia = self._bodies.masses.mass_of(index)
             p.light[row] = 1.0 / mass
             p.spin[row] = (R / inertia) @ R.T
 
@@ -173,7 +173,7 @@ class BodyContacts:
         p = self._partners
         if self._own_free and not self._bodies.driven(self._own):
             pose, _ = self._bodies.motion(self._own)
-            mass, inertia = self._bodies.mass_of(self._own)
+            mass, inertia = self._bodies.masses.mass_of(self._own)
             R = frame.R.T @ quaternion_matrix(pose[3:])
             p.pose[0, :3], p.light[0], p.spin[0] = frame.into(pose[:3]), 1.0 / mass, (R / inertia) @ R.T
         else:
