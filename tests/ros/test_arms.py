@@ -317,12 +317,15 @@ def test_a_servo_stream_is_followed(arm, rate):
 
     def send(t: float) -> None:
         arm.servo_jp(start + swing * np.sin(2.0 * np.pi * t) ** 2)
-        errors.append(np.abs(arm.measured_jp() - arm.setpoint_jp()).max())
+        measured, wanted = arm.hear("measured_js"), arm.hear("setpoint_js")
+        if measured.header.stamp == wanted.header.stamp:
+            errors.append(np.abs(np.subtract(measured.position, wanted.position)).max())
 
     stream(send, 1.0, rate)
     until(lambda: np.abs(arm.measured_jp() - start).max() < 2e-3, "the arm is back")
-    # 0.31 rad/s: what a measured and a set value of two messages 10 ms apart differ by
-    assert np.percentile(errors, 95) < 0.01
+    assert len(errors) > 10
+    # at 0.31 rad/s the arm is 3 ms behind
+    assert np.percentile(errors, 95) < 2e-3
 
 
 @on_every_arm

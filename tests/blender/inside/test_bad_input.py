@@ -180,7 +180,7 @@ def test_an_object_without_a_place_is_named_and_nothing_is_written(tmp_path, val
         change = "scale" if value == 0.0 else "location"
         kept = tuple(getattr(obj, change))
         setattr(obj, change, (value, *kept[1:]))
-        report = "has a scale of zero" if value == 0.0 else "has a transform that is not a number"
+        report = "has a scale of zero" if value == 0.0 else "has a transform that is not finite"
         fails(bpy.ops.adf.export_file, f"'{obj.name}' {report}", **target)
         assert snapshot(tmp_path) == before
         setattr(obj, change, kept)
