@@ -324,8 +324,8 @@ def test_a_servo_stream_is_followed(arm, rate):
     stream(send, 1.0, rate)
     until(lambda: np.abs(arm.measured_jp() - start).max() < 2e-3, "the arm is back")
     assert len(errors) > 10
-    # at 0.31 rad/s the arm is 3 ms behind
-    assert np.percentile(errors, 95) < 2e-3
+    # at 0.31 rad/s the arm is an update behind
+    assert np.percentile(errors, 95) < 4e-3
 
 
 @on_every_arm
