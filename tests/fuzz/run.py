@@ -27,8 +27,8 @@ from tests.fuzz.mutate import mutate
 from tests.fuzz.scenes import scene
 from tests.fuzz.seeds import Seed, seeds, write_scene
 
-LIMIT = 10.0
-"""Seconds for one mutant; the slowest valid seed takes 0.3."""
+LIMIT = 20.0
+"""Seconds for one mutant; the slowest valid seed takes 0.3, and the first of a worker loads compiled code."""
 
 START_LIMIT = 120.0
 """Seconds in which a worker must be ready, its compiled code loaded."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import ligature
 import numpy as np
 import pytest
 
@@ -23,13 +24,14 @@ def test_a_scene_of_ours_answers(
 ) -> None:
     from ambf_msgs.msg import RigidBodyState, WorldState
 
+    name = ligature.load(launch).arms[0].name
     program = Program([str(BIN / "ligature"), "run", str(launch), "--no-cameras"], ros_env)
     try:
         program.wait_for("first state published")
         assert listen("/ambf/env/World/State", WorldState).wait().n_devices >= 0
-        tool = listen("/ambf/env/psm1/toolyawlink/State", RigidBodyState)
+        tool = listen(f"/ambf/env/{name.lower()}/toolyawlink/State", RigidBodyState)
         before = tool.wait().pose.position
-        psm = Psm(node, "PSM1")
+        psm = Psm(node, name)
         psm.check_connections(10.0)
         assert psm.enable(10.0) and psm.home(20.0)
         assert psm.move_jp(psm.setpoint_jp() + [0.1, -0.1, 0.01, 0.0, 0.0, 0.0]).wait()

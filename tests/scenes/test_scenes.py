@@ -66,9 +66,10 @@ def test_is_drawn_with_something_in_the_middle(launch: Path) -> None:
 def test_arms_of_the_field_are_there(launch: Path) -> None:
     """Names that clients look for: both PSMs with their tool, the needle or what else is handled, the camera frame."""
     scene = ligature.load(launch)
-    assert {"PSM1", "PSM2", "ECM"} <= {arm.name for arm in scene.arms}
-    topics = {body.identity.topic for body in scene.bodies}
-    assert {"/ambf/env/psm1/toolyawlink", "/ambf/env/phantom/CameraFrame"} <= topics
+    arms = {"PSM2"} if launch.parent.name == "needle_insertion" else {"PSM1", "PSM2", "ECM"}
+    assert arms <= {arm.name for arm in scene.arms}
+    tools = {f"/ambf/env/{arm.lower()}/toolyawlink" for arm in arms if arm != "ECM"}
+    assert {*tools, "/ambf/env/phantom/CameraFrame"} <= {body.identity.topic for body in scene.bodies}
 
 
 def authored_by(name: str) -> ModuleType:

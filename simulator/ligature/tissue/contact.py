@@ -2,11 +2,13 @@
 
 A body's convex parts are compared with the faces of the surface. Each part has at most one point of contact with each
 face, the deepest: the best of a few, from which a search with ever smaller steps goes on. All points of a block are
-solved at once by projected Gauss–Seidel on
-    u_i = w_i + Σ D_ij f_j,   D_ij = C_ij + h² (recoil of the body + recoil of the block's own rigid body),
+solved at once by projected Gauss–Seidel on ::
 
-with u the gap along the normal and the stretch across it at the end of the tick: f_n ≥ 0, u_n + c f_n ≥ 0, one of them
-zero, and |f_t| ≤ μ f_n, u_t + c f_t = 0 unless it slips (Coulomb friction by bristles of compliance c).
+    u_i = w_i + Σ D_ij f_j,   D_ij = C_ij + h² (recoil of the body + recoil of the block's own rigid body)
+    f_n ≥ 0, u_n + c f_n ≥ 0, one of them zero; ‖f_t‖ ≤ μ f_n, u_t + c f_t = 0 unless it slips
+
+with u the gap along the normal and the stretch across it at the end of the tick (Coulomb friction by bristles of
+compliance c).
 """
 
 from __future__ import annotations
