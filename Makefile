@@ -69,8 +69,12 @@ lint: developers
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
+# those that watch real time come alone, one after the other
+IN_REAL_TIME := tests/ros tests/cli tests/cockpit tests/teleop
 unit: developers blender-module
-	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python $(PYTHON) -m pytest -m "not slow" tests
+	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python $(PYTHON) -m pytest -m "not slow" -n 2 --dist loadfile \
+		tests $(IN_REAL_TIME:%=--ignore=%)
+	$(PYTHON) -m pytest -m "not slow" $(IN_REAL_TIME)
 
 # the newest Blender as a Python module, beside the binary; without network the rest is tested without it
 blender-module: developers
