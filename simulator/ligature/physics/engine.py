@@ -49,9 +49,8 @@ def common_gravity(scene: Scene) -> Array:
 class Engine:
     """The trees of ``scene`` in a Bullet client.
 
-    Bullet's contacts cannot be read or set, so whatever begins anew begins without: `forget_contacts`. A client that
-    met numbers which are not finite is replaced by `rebuild`; whoever keeps one of these attributes over that has those
-    of the client that is gone.
+    Bullet's contacts and the order of its broad phase cannot be read or set, so whatever begins anew does so in another
+    client, by `rebuild`; whoever keeps one of these attributes over that has those of the client that is gone.
 
     Attributes
     ----------
@@ -105,8 +104,8 @@ class Engine:
     def forget_contacts(self) -> None:
         """Take all shapes out of Bullet's world and put them back in their first order, where they are now.
 
-        Their contacts, pairs and boxes go, with what solvers know from the last tick. What follows is a function of
-        where bodies are and how they move.
+        Their contacts, pairs and boxes go, with what solvers know from the last tick. In a client that has stepped,
+        the broad phase remembers more; see `rebuild`.
         """
         for uid, link, group, mask in self._colliders:
             pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)

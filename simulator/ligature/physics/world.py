@@ -352,7 +352,7 @@ class World(Subsystem):
         }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Forget Bullet's contacts and continue from `snapshot`."""
+        """Continue from `snapshot` in another Bullet client."""
         self._begin()
         for name, part in self._parts().items():
             part.restore(snapshot[name])
