@@ -96,6 +96,7 @@ CACHES: dict[str, str] = {
             "NeedleArrays.H",
             "NeedleArrays.g",
             "NeedleArrays.wrench",
+            "NeedleArrays.way",
             "Strand.rows",
             "Strand.tangent",
             "Strand.three",

@@ -33,7 +33,7 @@ PADS = {"0.5k": (12, 9, 3), "1k": (17, 9, 4), "1.5k": (20, 12, 4)}
 PASSAGES = 12
 TICKS = 800
 
-SCENES = {"0.5k": 0.0064, "1k": 0.0049, "1.5k": 0.0042}
+SCENES = {"0.5k": 0.0066, "1k": 0.0052, "1.5k": 0.0043}
 """Edges in metres of the cells of a pad of 100 x 60 x 10 mm in a scene."""
 
 INSIDE = {"no needle": 0, "needle": 800, "thread": 1500}
@@ -60,6 +60,8 @@ def scene_us(cell: float, inside: str, folder: Path) -> dict[str, Any]:
     blocks = [pad_, *tools, *([kit.needle()] if inside != "no needle" else [])]
     simulation = Simulation(kit.load(folder, *blocks, *([kit.THREAD] if inside == "thread" else [])))
     (piece,) = simulation.tissues.pieces
+    for name in ("Left", "Right"):
+        simulation.bodies[f"BODY {name}"].command_twist([0] * 6)
     bite = kit.Bite(simulation, depth=0.0048) if inside != "no needle" else None
     simulation.step(INSIDE[inside])
     if bite is not None:

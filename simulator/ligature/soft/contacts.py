@@ -155,8 +155,9 @@ class BodyContacts:
         """Push the bodies by what the tissue does to them."""
         push = self._contacts.partners.push
         for row in np.flatnonzero(push.any(axis=1)).tolist():
-            impulse = self._dt * push[row]
-            self._bodies.apply_impulse(self.listed[row - 1], impulse[:3], impulse[3:])
+            impulse, body = self._dt * push[row], self.listed[row - 1] if row else self._own
+            if row or not self._scene.bodies[body].static:
+                self._bodies.apply_impulse(body, impulse[:3], impulse[3:])
 
     # --- state --------------------------------------------------------------------------------
 

@@ -65,6 +65,9 @@ SWEEPS = 12
 SOFT = 1e-5
 """Compliance of a bristle, m/N."""
 
+ROLLING = 0.3e-3
+"""Lever in metres by which the tissue's push on a body that rolls lies before its middle."""
+
 TIP = 4e-3
 """Length of a needle from its tip, m, that does not touch the surface as a body, for it punctures it."""
 
@@ -351,7 +354,7 @@ def _anchor(contacts: Contacts, points: Points, r: int, found: int) -> None:
 
 
 @inlined
-def _weigh(work: Solve, found: int) -> None:
+def _set_weights(work: Solve, found: int) -> None:
     """Weights of a face's corners at a place that was found."""
     u, v = work.values[found, 4], work.values[found, 5]
     w = work.weights
@@ -364,7 +367,7 @@ def _begin(field: Field, points: Points, contacts: Contacts, found: int) -> None
     t, work, partners = contacts.touching, contacts.solve, contacts.partners
     part, q = work.found[found, 0], work.found[found, 1]
     body = contacts.parts.body[part]
-    _weigh(work, found)
+    _set_weights(work, found)
     away = 0.0
     for k in range(3):
         at = 0.0
@@ -403,7 +406,7 @@ def match_contacts(field: Field, points: Points, contacts: Contacts, count: int,
         if row >= 0:
             work.known[row] = False
             if value[0] < t.distance[row] - DEEPER:
-                _weigh(work, f)
+                _set_weights(work, f)
                 place_point(field, points, t.point[row], field.faces[q], work.weights)
                 settle_point(field, points, t.point[row])
                 _anchor(contacts, points, row, f)
@@ -584,4 +587,34 @@ def touch(field: Field, points: Points, contacts: Contacts, dt: float) -> bool:
         push[3] -= y * f[2] - z * f[1]
         push[4] -= z * f[0] - x * f[2]
         push[5] -= x * f[1] - y * f[0]
+    if n > 0:
+        _resist_rolling(contacts, n, dt)
     return n > 0
+
+
+@inlined
+def _resist_rolling(contacts: Contacts, n: int, dt: float) -> None:
+    """Let bodies that turn on the tissue feel a moment against it, at most `ROLLING` times the force that presses them.
+
+    What turns slowly is braked in proportion, so that a tick never turns it back.
+    """
+    t, partners, work = contacts.touching, contacts.partners, contacts.solve
+    for b in range(1, partners.push.shape[0]):
+        if partners.light[b] == 0.0:
+            continue
+        pressed = 0.0
+        for a in range(n):
+            r = work.rows[a]
+            if t.body[r] == b:
+                f, m = t.force[r], t.normal[r]
+                pressed += f[0] * m[0] + f[1] * m[1] + f[2] * m[2]
+        if pressed <= 0.0:
+            continue
+        w, spin = partners.twist[b, 3:6], partners.spin[b]
+        speed = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        limit = ROLLING * pressed
+        slow = limit * dt * (spin[0, 0] + spin[1, 1] + spin[2, 2])
+        for k in range(3):
+            moment = limit * w[k] / max(speed, slow)
+            partners.push[b, 3 + k] -= moment
+            partners.push[0, 3 + k] += moment

@@ -157,7 +157,7 @@ class Interface:
         self.expected[:] = snapshot["expected"]
         for name, array in zip(self.points._fields, self.points, strict=True):
             array[:] = snapshot[name]
-        recall(self.table)
+        refresh(self.table)
 
 
 def _field(elastic: ElasticGrid, ticks: int) -> Field:
@@ -396,7 +396,7 @@ def begin(table: Integers, expected: Array) -> None:
 
 
 @kernel
-def recall(table: Integers) -> None:
+def refresh(table: Integers) -> None:
     """Find again what follows from a restored state."""
     t = open_tissue(table)
     for k in range(t.points.filled[0]):

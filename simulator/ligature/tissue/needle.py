@@ -23,6 +23,7 @@ from ligature.kernels import inlined, kernel
 from ligature.tables import opener
 from ligature.tissue.dense import cholesky, solve_cholesky
 from ligature.tissue.layout import MOST_PATHS, MOST_POINTS, Paths, Points, open_tissue
+from ligature.tissue.location import cross_surface
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -115,12 +116,13 @@ class NeedleArrays(NamedTuple):
     g: Array  # (6,)
     delta: Array  # (6,) its motion in the tick, that of the centre of mass first
     wrench: Array  # (6,) of the tissue on it
+    way: Array  # (3,) scratch
 
 
 def needle_arrays(points: int = MOST_POINTS, paths: int = MOST_PATHS, capacity: int = MOST_ROWS) -> NeedleArrays:
     """A needle that is outside, at the origin."""
     z = np.zeros
-    return NeedleArrays(held(points, paths), rows(points, capacity), z(14), z((6, 6)), z(6), z(6), z(6))
+    return NeedleArrays(held(points, paths), rows(points, capacity), z(14), z((6, 6)), z(6), z(6), z(6), z(3))
 
 
 def rows(points: int, capacity: int) -> Rows:
@@ -637,3 +639,17 @@ def end_coupling(tissue: Integers, needle: Integers, m: int) -> bool:
     through = conclude(t.points, t.paths, n.held, n.rows, m, n.delta, False)
     _sum_up(n.rows, m, n.wrench)
     return through
+
+
+@kernel
+def look_for_surface(tissue: Integers, needle: Integers, before: Array, weights: Array, normal: Array) -> int:
+    """Face that the tip has come through since it was ``before`` (3,), or -1; see `cross_surface` for what it fills."""
+    field, n = open_tissue(tissue).field, open_needle(needle)
+    shape, way = n.shape, n.way
+    x, y, z = shape[0] - before[0], shape[1] - before[1], shape[2] - before[2]
+    size = math.sqrt(x * x + y * y + z * z)
+    if not (size > 0.0 and x * shape[3] + y * shape[4] + z * shape[5] > 0.0):
+        return -1
+    way[0], way[1], way[2] = x / size, y / size, z / size
+    face, _ = cross_surface(field.x, field.faces, before, way, size, -1.0, weights, normal)
+    return face

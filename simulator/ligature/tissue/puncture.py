@@ -18,7 +18,7 @@ from ligature.tissue import needle as states
 from ligature.tissue.interface import HARD, SPACING, Interface
 from ligature.tissue.layout import MOST_NODES, USED, Paths
 from ligature.tissue.location import cross_surface, locate
-from ligature.tissue.needle import begin_coupling, couple, end_coupling, needle_arrays
+from ligature.tissue.needle import begin_coupling, couple, end_coupling, look_for_surface, needle_arrays
 from ligature.tissue.paths import begin_path, extend_path
 from ligature.tissue.tearing import tear
 
@@ -164,18 +164,13 @@ class NeedleInTissue:
 
     def _look_for_surface(self) -> None:
         """Begin a contact where the tip came through the surface in the last tick."""
-        tip, tangent = self._shape[:3], self._shape[3:6]
-        way = tip - self._before
-        size = float(np.sqrt((way**2).sum()))
-        if not (size > 0.0 and float((way * tangent).sum()) > 0.0):
-            return
-        self._meet(self._before, way / size, size)
+        face = look_for_surface(self._interface.table, self.table, self._before, self._weights4, self._normal)
+        if face >= 0:
+            self._meet(face)
 
-    def _meet(self, start: Array, direction: Array, reach: float) -> None:
+    def _meet(self, face: int) -> None:
+        """Begin a contact where the tip comes through a face: in a path that opens there, or on the surface."""
         x, grid = self._interface.elastic.x, self._interface.elastic.grid
-        face, _ = cross_surface(x, grid.faces, start, direction, reach, -1.0, self._weights4, self._normal)
-        if face < 0:
-            return
         h = self._held
         crossing = self._weights4 @ x[grid.faces[face]]
         path, sense = self._opening(crossing)
@@ -341,7 +336,10 @@ class NeedleInTissue:
         near = h.engaged.astype(bool) & (np.abs(h.sigma) < 3e-3)
         if near.any() or self._locate(tip) < 0:
             return
-        self._meet(tip - 2e-3 * tangent, tangent, 2e-3)
+        elastic, start = self._interface.elastic, tip - 2e-3 * tangent
+        face, _ = cross_surface(elastic.x, elastic.grid.faces, start, tangent, 2e-3, -1.0, self._weights4, self._normal)
+        if face >= 0:
+            self._meet(face)
 
     def _locate(self, at: Array) -> int:
         elastic = self._interface.elastic

@@ -67,7 +67,7 @@ class Strand(NamedTuple):
     rows: Rows
     tangent: Array  # (N, 3) direction of the path, towards the thread's last point
     three: Array  # (3, 3) scratch
-    grip: Array  # (1,) friction of the thread over that of a needle
+    friction: Array  # (1,) of the thread over that of a needle
 
 
 def strand(points: int) -> Strand:
@@ -238,7 +238,7 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
                 for k in range(3):
                     total += E[a, k] * (W[k, 0] * E[b, 0] + W[k, 1] * E[b, 1] + W[k, 2] * E[b, 2])
                 rows.soft[r, a, b] = total
-        rows.limit[r, 0] = strand.grip[0] * points.friction[i] * held.share[i]
+        rows.limit[r, 0] = strand.friction[0] * points.friction[i] * held.share[i]
         rows.limit[r, 1] = points.strength[i] * held.share[i]
 
 

@@ -66,7 +66,7 @@ class ThreadInTissue:
     def __init__(self, interface: Interface, paths: Paths, radius: float, friction: float = 1.0) -> None:
         self._interface, self._paths, self.radius = interface, paths, radius
         self._strand = strand(len(interface.points.status))
-        self._strand.grip[0] = friction
+        self._strand.friction[0] = friction
         self._held = self._strand.held
         self.table = table_of(self._strand)
         self.engaged = self._held.engaged
