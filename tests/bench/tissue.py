@@ -33,8 +33,8 @@ PADS = {"0.5k": (12, 9, 3), "1k": (17, 9, 4), "1.5k": (20, 12, 4)}
 PASSAGES = 12
 TICKS = 800
 
-SCENES = {"0.5k": 0.0066, "1k": 0.0052, "1.5k": 0.0043}
-"""Edges in metres of the cells of a pad of 100 x 60 x 10 mm in a scene."""
+SCENES = {"0.5k": 0.06, "1k": 0.12, "1.5k": 0.19}
+"""Lengths in metres of pads of 60 x 10 mm across, with cells of 5 mm."""
 
 INSIDE = {"no needle": 0, "needle": 800, "thread": 1500}
 """What is in the tissue, and ticks that it takes to get there."""
@@ -50,13 +50,13 @@ def pad(cells: tuple[int, int, int], **options) -> TissueBlock:
     return TissueBlock(grid, [TissueMaterial(1e5)], rim.any(axis=1), **options)
 
 
-def scene_us(cell: float, inside: str, folder: Path) -> dict[str, Any]:
+def scene_us(length: float, inside: str, folder: Path) -> dict[str, Any]:
     """Thread CPU time in microseconds that tissue adds to a tick of a scene, beside two tools that press it."""
     tools = [
         kit.body(name, "shape: CAPSULE, geometry: {radius: 0.003, height: 0.03, axis: Z}", (x, 0.015, 0.1205), 0.1)
-        for name, x in (("Left", -0.03), ("Right", 0.03))
+        for name, x in (("Left", -0.022), ("Right", 0.022))
     ]
-    pad_ = kit.pad("    fixed: [-z]\n", size=(0.1, 0.06, 0.01), cell=cell)
+    pad_ = kit.pad("    fixed: [-z]\n", size=(length, 0.06, 0.01), cell=0.005)
     blocks = [pad_, *tools, *([kit.needle()] if inside != "no needle" else [])]
     simulation = Simulation(kit.load(folder, *blocks, *([kit.THREAD] if inside == "thread" else [])))
     (piece,) = simulation.tissues.pieces
@@ -155,10 +155,10 @@ def main() -> int:
     reference = statistics.median(chain_step_us() for _ in range(3))
     sys.stdout.write(f"reference, 40 Bullet bodies with point joints: {reference:.0f} us a step\n")
     found: dict[str, dict[str, Any]] = {}
-    for name, cell in SCENES.items():
+    for name, length in SCENES.items():
         for inside in INSIDE:
             with tempfile.TemporaryDirectory() as folder:
-                figures = scene_us(cell, inside, Path(folder))
+                figures = scene_us(length, inside, Path(folder))
             found[f"{name}, {inside}"] = {**figures, "reference_us": reference, "ratio": figures["median"] / reference}
             sys.stdout.write(
                 f"{name}, {inside}: {figures['nodes']} nodes, {figures['points']} points of contact with two tools, "
