@@ -268,7 +268,7 @@ class ADF_OT_export_variants(Asks, bpy.types.Operator):
 
     bl_idname = "adf.export_variants"
     bl_label = "Export Variants"
-    bl_options = {"REGISTER"}
+    bl_options = {"REGISTER", "UNDO"}
 
     replace: REPLACE
 

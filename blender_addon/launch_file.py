@@ -121,7 +121,7 @@ def prepared_scene(scene: bpy.types.Scene, path: Path) -> tuple[Export, list[tup
     for collection, name, top in names.targets():
         file = folder / name
         try:
-            done = prepared(collection, file, file.parent if names.in_place(collection, file) else folder, top)
+            done = prepared(collection, file, file.parent if names.keeps(collection, file) else folder, top)
         except ExportError as error:
             raise ExportError(f"{collection.name}: {error}", error.obj) from error
         whole.files.update(done.files)
@@ -151,30 +151,37 @@ class _Names:
         stored = self._stored = scene.adf
         self._folder = path.parent.resolve()
         here = Path(bpy.path.abspath(stored.filepath)).parent.resolve() if stored.filepath else None
-        self._stays = here is None or here == self._folder
+        self._stays, self._is_new = here == self._folder, here is None
         self._new: dict[str, str] = {}
         self.world, self.devices, self.colours = (
-            self._inside(name) for name in (stored.world_path, stored.devices_path, stored.colours_path)
+            self._inside(name, collection)
+            for name, collection in (
+                (stored.world_path, stored.world),
+                (stored.devices_path, stored.devices),
+                (stored.colours_path, stored.colours),
+            )
         )
-        self.models = [self._inside(entry.path) for entry in stored.models]
+        self.models = [self._inside(entry.path, entry.collection) for entry in stored.models]
         self.environment = ""
         if stored.environment is not None and stored.world is not None:
             around = os.path.dirname(self.world)
             given = os.path.normpath(os.path.join(around, stored.world.adf.world.environment))
-            named = self._inside(given)
+            named = self._inside(given, stored.environment)
             self.environment = stored.world.adf.world.environment if named == given else os.path.relpath(named, around)
         self.roots = self._roots()
 
-    def _inside(self, name: str) -> str:
+    def _inside(self, name: str, collection: bpy.types.Collection | None) -> str:
         """The name itself, or one below the folder that no other file has."""
         if name not in self._new:
-            self._new[name] = self._renamed(name)
+            self._new[name] = self._renamed(name, collection)
         return self._new[name]
 
-    def _renamed(self, name: str) -> str:
-        whole = os.path.normpath(os.path.join(self._folder, name))
-        if not name or self._stays or Path(whole).is_relative_to(self._folder):
+    def _renamed(self, name: str, collection: bpy.types.Collection | None) -> str:
+        whole = Path(os.path.normpath(os.path.join(self._folder, name)))
+        if not name or self._stays or whole.is_relative_to(self._folder):
             return name
+        if self._is_new and collection is not None and self.in_place(collection, whole):
+            return name  # a new launch file names files where they were opened from
         parts = [part for part in Path(name).parts if part not in ("..", Path(name).anchor)]
         wanted = found = Path(*parts[-2:]) if Path(name).is_absolute() else Path(*parts)
         taken, number = {os.path.normpath(new) for new in self._new.values()}, 2
@@ -199,10 +206,14 @@ class _Names:
         own = collection.adf.filepath
         return bool(own) and Path(bpy.path.abspath(own)).resolve() == file.resolve()
 
+    def keeps(self, collection: bpy.types.Collection, file: Path) -> bool:
+        """Whether a file is saved where it was opened from, and the launch file does not go elsewhere."""
+        return (self._stays or self._is_new) and self.in_place(collection, file)
+
     def _roots(self) -> tuple[Path, ...]:
         """Folders of files that are saved where they were opened from, outside the launch file's own."""
         targets = [(collection, self._folder / name) for collection, name, _ in self.targets()]
-        return tuple({file.parent.resolve(): None for c, file in targets if self._stays and self.in_place(c, file)})
+        return tuple({file.parent.resolve(): None for c, file in targets if self.keeps(c, file)})
 
     def store(self) -> None:
         """Make these the names of the scene."""

@@ -32,6 +32,9 @@ SINGLE = 2.0**-23
 TURN = 5e-7
 """Radians, and lengths of directions, below which a difference is the noise of single precision."""
 
+TINY = 1e-9
+"""Metres and radians below which a number is none."""
+
 MOVED = 2e-6
 """Radians below which an orientation counts as the same (see `placement.SAME_PLACE`)."""
 
@@ -258,12 +261,12 @@ def _shifted(was: float, before: float, now: float, noise: float) -> float:
     own = 0.5 * float(np.spacing(np.float32(abs(before))))
     if abs(now - before) <= max(own, noise):
         return was
-    return settled(now if abs(was - before) <= own else was + float(now - before), was, noise)
+    return settled(now if abs(was - before) <= own else was + float(now - before), was, max(noise, TINY))
 
 
 def _added(was: Vector, first: Vector, last: Vector, noise: float) -> Vector:
     return tuple(  # type: ignore[return-value]
-        w if abs(b - a) <= max(noise, 1e-12) else settled(w + b - a, w, noise)
+        w if abs(b - a) <= max(noise, TINY) else settled(w + b - a, w, max(noise, TINY))
         for w, a, b in zip(was, first, last, strict=True)
     )
 
@@ -275,7 +278,7 @@ def _added_angle(was: float, first: float, last: float) -> float:
 
 def _settled(values: Array | Vector, was: Vector | None, noise: float) -> Vector:
     old = was or (None, None, None)
-    return tuple(settled(float(v), w, noise) for v, w in zip(values, old, strict=True))  # type: ignore[return-value]
+    return tuple(settled(float(v), w, max(noise, TINY)) for v, w in zip(values, old, strict=True))  # type: ignore[return-value]
 
 
 def _wrapped(values: tuple[float, ...], was: Vector) -> Vector:
