@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import ast
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ def commands() -> str:
         "# Commands\n\nGenerated from the command line. [Command line](command_line.md) has the table of all commands and what "
         "they have in common.\n"
     ]
-    text += [_command(name, command) for name, command in group.commands.items()]
+    text += [_command(name, command) for name, command in _leaves(group)]
     parser = ambf_simulator.parser()
     rows = [
         (" ".join(f"`{flag}`" for flag in action.option_strings), _cell(action.help))
@@ -55,6 +55,15 @@ def commands() -> str:
     ]
     text.append(f"## ambf_simulator\n\n{parser.description}\n\n{_table(('flag', 'meaning'), rows)}")
     return "\n".join(text)
+
+
+def _leaves(group: click.Group, before: str = "") -> Iterator[tuple[str, click.Command]]:
+    """The commands of a group and of the groups in it, by all their words."""
+    for name, command in group.commands.items():
+        if isinstance(command, click.Group):
+            yield from _leaves(command, f"{before}{name} ")
+        else:
+            yield f"{before}{name}", command
 
 
 def _command(name: str, command: click.Command) -> str:
