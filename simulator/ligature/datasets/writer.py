@@ -18,7 +18,8 @@ import numpy as np
 
 import ligature
 from ligature.camera_simulation import Simulation
-from ligature.model.scene import ArmDescription, ArmKind
+from ligature.model.scene import ArmDescription, ArmKind, Scene
+from ligature.model.soft import TissueBody
 
 FORMAT = "ligature dataset 1"
 DEPTH_UNIT = 1e-4
@@ -164,6 +165,8 @@ class DatasetWriter:
         for rod in scene.rods[:1]:
             yield "thread/points", state["body_pose"][list(rod.bodies), :3], {"dtype": "f4"}
             yield "thread/tension", state["rod_tension"][list(rod.bodies)], {"dtype": "f4"}
+        for tissue in scene.tissues:
+            yield from _tissue(scene, tissue, state)
         for name, camera in self._cameras.items():
             yield from self._pictures(name, camera)
 
@@ -231,6 +234,19 @@ class DatasetWriter:
             self.close()
         else:
             self.abandon()
+
+
+def _tissue(scene: Scene, tissue: TissueBody, state: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
+    """Nodes, forces and punctures of a body of tissue, in world axes."""
+    names = [scene.bodies[other.body].identity.name for other in scene.tissues]
+    own = names[tissue.index] if names.count(names[tissue.index]) == 1 else f"{names[tissue.index]}{tissue.index}"
+    single, k = {"dtype": "f4"}, tissue.index
+    yield f"tissue/{own}/points", state["tissue_node"][tissue.rows], single
+    yield f"tissue/{own}/wrench", state["tissue_wrench"][k], single
+    yield f"tissue/{own}/peak_force", state["tissue_peak"][k], single
+    yield f"tissue/{own}/puncture_count", state["puncture_count"][k], {"dtype": "i4"}
+    yield f"tissue/{own}/puncture_points", state["puncture_point"][k], single
+    yield f"tissue/{own}/puncture_normals", state["puncture_normal"][k], single
 
 
 def _motion(arm: ArmDescription, record: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:

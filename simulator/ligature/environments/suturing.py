@@ -203,7 +203,13 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         ])  # fmt: skip
 
     def _info(self, distance: float) -> dict[str, Any]:
-        return {"distance": distance, "is_success": distance <= 0.0, "sim_time": self._simulation.time}
+        info = {"distance": distance, "is_success": distance <= 0.0, "sim_time": self._simulation.time}
+        if self._simulation.scene.tissues:
+            state = self._simulation.state
+            info["tissue_force"] = float(np.linalg.norm(state["tissue_wrench"][0, 0, :3]))
+            info["tissue_peak_force"] = float(state["tissue_peak"][0, 0])
+            info["punctures"] = int(state["puncture_count"][0, 0])
+        return info
 
     def render(self) -> Any:
         """A picture (480, 640, 3) of the camera."""
