@@ -84,6 +84,8 @@ def replay(
 
 
 def _again(record: Record, scene: Path | None, dataset: Path | None, console: Console) -> int:
+    rate = RunOptions.from_text(record.header.options).rate
+    console.print(f"{len(record.commands)} commands, {record.updates / rate:.3f} s of simulated time", markup=False)
     clock = time.perf_counter()
     with ExitStack() as files:
         simulation = resimulate(record, scene, _sampling(dataset, files) if dataset else lambda _: None)

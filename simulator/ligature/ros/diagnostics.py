@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from ligature.adf import Severity
 from ligature.bus import Block
+from ligature.ros.arms.rivals import Rival
 
 PERIOD = 1.0
 FRESH = 60.0
@@ -19,7 +22,7 @@ SLOW = 0.95
 class Diagnostics:
     """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take.
 
-    ``faults`` are the arms in FAULT, each with the reason.
+    ``faults`` are the arms in FAULT, each with the reason; ``rivals`` publish what the simulator leaves to them.
     """
 
     def __init__(self, block: Block) -> None:
@@ -28,6 +31,7 @@ class Diagnostics:
         self._next = 0.0
         self.missed = 0
         self.faults: dict[str, str] = {}
+        self.rivals: Mapping[str, Rival] = {}
 
     def publish(self, now: float) -> None:
         """Publish when a second has passed; ``now`` on the monotonic clock."""
@@ -62,6 +66,7 @@ class Diagnostics:
             "camera frames dropped": str(figures["frames_dropped"]),
             "camera frame time (ms)": f"{1e3 * figures['frame_seconds']:.1f}",
         }
+        rows.update({f"{part} left to": f"{rival.node} ({rival.topic})" for part, rival in self.rivals.items()})
         status.values = [KeyValue(key=k, value=v) for k, v in rows.items()]
         faults = [
             DiagnosticStatus(

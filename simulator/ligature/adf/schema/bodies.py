@@ -30,6 +30,7 @@ from ligature.adf.schema.keys import (
     Type,
     each,
     ignored,
+    unused,
 )
 
 C, I, MAP, POSE = Type.CHOICE, Type.INTEGER, Type.MAP, Type.POSE
@@ -216,8 +217,12 @@ JOINT = (
     *gains("controller", "joint PID, §15.6", required=False),
     OUTPUT_TYPE,
     Key("max motor impulse", N, 0.1, "N·m·s, N·s", "motor strength for each ms"),
-    Key("joint erp", N, 0.1, doc="error reduction of the constraint, §15.4"),
-    Key("joint cfm", N, 0.1, doc="constraint force mixing, §15.4"),
+    *unused(
+        (
+            Key("joint erp", N, 0.1, doc="error reduction of the constraint, §15.4; articulations have no error"),
+            Key("joint cfm", N, 0.1, doc="constraint force mixing, §15.4; articulations do not yield"),
+        )
+    ),
     *_six("damping", 0.7, "N·s/m, N·m·s/rad", "damper of a spring; revolute and prismatic joints ignore it", 0.0),
     *_six("stiffness", 1.0, "N/m, N·m/rad", "spring", 0.0),
     *_six("equilibrium point", 0.0, "m, rad", "rest position; the middle of the limits when absent"),
