@@ -80,10 +80,25 @@ def primitives(block: str, prefix: str) -> dict[str, dict[str, Any]]:
     }
     if block.endswith("[].geometry"):
         listed = block.partition("[]")[0]
-        return {f"{block}.{key}": {listed: [dict(shape)]} for key, shape in kinds.items()}
+        return {f"{block}.{key}": {listed: [dict(shape)], "collision shape": None} for key, shape in kinds.items()}
     return {f"{block}.{key}": shaped(shape, prefix) for key, shape in kinds.items()}
 
 
+ANY_SHAPE = {
+    "shape": "SPHERE",
+    "geometry": {
+        "x": 0.1,
+        "y": 0.1,
+        "z": 0.1,
+        "radius": 0.1,
+        "height": 0.3,
+        "normal": {"x": 0, "y": 0, "z": 1},
+        "offset": 0.1,
+    },
+}
+"""Dimensions for any primitive."""
+
+CONE = {"type": "cone twist", "joint limits": {"x": 0.5, "y": 0.5, "z": 0.5}}
 SIX = {"type": "six dof spring", "joint limits": {half: {"low": AT, "high": AT} for half in ("linear", "angular")}}
 SPRING = {"type": "linear spring", "joint limits": {"low": -0.1, "high": 0.1}}
 CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
@@ -97,7 +112,7 @@ CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
         for path, context in primitives(block, prefix).items()
     },
     **{
-        (kind, f"{block}[].{key}"): {block: [dict(CUBE)]}
+        (kind, f"{block}[].{key}"): {block: [dict(ANY_SHAPE)], "collision shape": None}
         for kind in ("body", "ghost object") for block in ("compound shape", "compound collision shape")
         for key in ("shape", "offset")
     },
@@ -106,21 +121,36 @@ CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
     ("body", "low resolution path"): {"collision shape": None},
     ("ghost object", "low resolution path"): {"collision shape": None},
     ("body", "color components.ambient.level"): {"color components": {"diffuse": {"r": 0.5, "g": 0.5, "b": 0.5}, "transparency": 1}},
-    ("joint", "child offset"): {},
-    ("joint", "joint limits.x"): {"type": "cone twist"}, ("joint", "joint limits.y"): {"type": "cone twist"},
-    ("joint", "joint limits.z"): {"type": "cone twist"},
+    ("body", "controller output type"): {"controller": {half: {"P": 10, "D": 1} for half in ("linear", "angular")}},
+    ("joint", "parent"): {"child": "BODY far"}, ("joint", "child offset"): {},
+    ("camera", "camera intrinsics.f"): {"camera intrinsics": {"cx": 320, "cy": 240}},
+    ("camera", "publish depth noise.std dev"): {"publish depth": True, "publish depth noise": {"mean": 0.0, "bias": 0.0}},
+    **{
+        (kind, path): shaped(ANY_SHAPE, prefix)
+        for kind in ("body", "ghost object") for path, prefix in (("shape", ""), ("collision shape", "collision "))
+    },
+    ("joint", "joint limits.x"): CONE, ("joint", "joint limits.y"): CONE,
+    ("joint", "joint limits.z"): CONE,
     ("joint", "joint limits.low"): {"joint limits": {"high": 1.0}},
     ("joint", "joint limits.high"): {"joint limits": {"low": -1.0}},
     ("sensor", "mesh"): {"array": None}, ("sensor", "distance threshold"): {"type": "Contact"},
     ("sensor", "process contact details"): {"type": "Contact"},
     ("camera", "orthographic view width"): {}, ("suture", "USP size"): {"diameter": None},
-    ("light", "location.orientation"): {"direction": None, "location": {"position": AT}},
+    ("light", "location.orientation"): {"direction": None, "location": dict(AT)},
     ("camera", "field view angle"): {},
 }  # fmt: skip
 """What must stand beside a key for it to count; None takes a key away."""
 
 BESIDE: list[tuple[str, dict[str, Any]]] = [
-    ("color components", {"color components": {"transparency": 0.5}}),
+    (
+        "color components",
+        {
+            "color components": {
+                "transparency": 0.5,
+                **{part: {"r": 0.5, "g": 0.5, "b": 0.5} for part in ("diffuse", "specular", "emission")},
+            }
+        },
+    ),
     ("color rgba", {"color rgba": {"r": 0.5, "g": 0.5, "b": 0.5, "a": 0.5}}),
     ("inertia.", {"inertia": {"ix": 0.01, "iy": 0.01, "iz": 0.01}}),
     ("publish frequency", {"publish frequency": {"low": 10, "high": 100}}),
@@ -165,12 +195,13 @@ PAIRS: dict[tuple[str, str], list[Any]] = {
     ("world", "environment"): ["proxy.yaml", "environment.yaml"],
     ("input device", "simulated multibody"): ["proxy.yaml", "proxy2.yaml"],
     ("input device", "root link"): ["BODY handle", "BODY knob"],
-    ("*", "sensors"): [[], ["X"]],
+    ("suture", "elements"): [10, 12], ("body", "collision groups"): [[0], [1]],
 }  # fmt: skip
 """Two values of keys whose type does not suggest any."""
 
 CHECKED_ELSEWHERE = {
     ("*", "adf version"): "only one value is right",
+    ("actuator", "type"): "there is only one",
     ("launch", "color config"): "never opened, as the table says",
     ("model", "soft bodies"): "of kinds that are not simulated",
     ("model", "vehicles"): "of kinds that are not simulated",
@@ -196,10 +227,12 @@ class Files:
             "devices.yaml": {"input devices": ["X"], "X": SUBJECTS["input device"]},
             "no_devices.yaml": {"input devices": []},
             "model.yaml": {
+                "high resolution path": "./",
+                "low resolution path": "./",
                 "bodies": ["BODY base", "BODY link", "BODY far"],
-                "BODY base": {"name": "base", **still},
+                "BODY base": {"name": "base", "collision groups": [0], **still},
                 "BODY link": {"name": "link", "mass": 0.1, **BOX},
-                "BODY far": {"name": "far", "mass": 0.1, **BOX},
+                "BODY far": {"name": "far", "mass": 0.1, "mesh": "part.obj"},
             },
             "proxy.yaml": {
                 "bodies": ["BODY handle", "BODY knob"], "BODY handle": {"name": "handle", "mass": 0.1, **BOX},

@@ -219,16 +219,21 @@ def picture_bytes(format: str) -> bytes:
     return file.getvalue()
 
 
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    """A chunk of a PNG."""
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
+def png_head(width: int, height: int) -> bytes:
+    """The first 33 bytes of a PNG of grey pixels."""
+    return b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0))
+
+
 def png_of(width: int, height: int) -> bytes:
     """A PNG of black pixels, however many."""
-
-    def chunk(kind: bytes, content: bytes) -> bytes:
-        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
-
     packer = zlib.compressobj(9)
     content = b"".join(packer.compress(b"\0" * (1 + width)) for _ in range(height)) + packer.flush()
-    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", content) + chunk(b"IEND", b"")
+    return png_head(width, height) + _chunk(b"IDAT", content) + _chunk(b"IEND", b"")
 
 
 def read_any_picture(path: Path) -> None:

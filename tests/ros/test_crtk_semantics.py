@@ -227,7 +227,8 @@ def test_commands_are_in_the_frame_that_measured_cp_names_and_local_ones_in_the_
         goal = psm.setpoint_cp()
         goal[0] += STEP
         psm.servo_cp(goal)
-        until(lambda: np.linalg.norm(psm.measured_cp()[:3] - goal[:3]) < 5e-4, "it gets there", 10.0)
+        until(lambda: np.linalg.norm(psm.measured_cp()[:3] - goal[:3]) < 1e-4, "it gets there", 10.0)
+        steady(psm.measured_jp, within=1e-4)
         moved = pose7_matrix(np.array(_seven(psm.hear("local/measured_cp").pose)))[:3, 3] - local[:3, 3]
         assert moved == pytest.approx(turn[:3, :3].T @ [STEP, 0.0, 0.0], abs=5e-4)
         assert psm.hear("local/measured_cp").header.frame_id == "PSM2_base"
