@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import threading
+import xmlrpc.client
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ import rosgraph
 import rospy
 from rosgraph.xmlrpc import XmlRpcHandler, XmlRpcNode
 
-from ligature.ros.master import NO_ANSWER, WATCHER, is_simulator, lives
+from ligature.ros.master import NO_ANSWER, WATCHER, Hasty, is_simulator, lives
 
 PERIOD = 5.0
 """Seconds between two looks without a call of the master, which may have been restarted."""
@@ -111,18 +112,23 @@ class Rivals(threading.Thread):
 
     def _register(self, known: set[str]) -> None:
         """Have the master call about the topics that it does not know to be listened to."""
-        master = rosgraph.Master(self._me + WATCHER)
-        for topic in self._part_of:
-            if topic.endswith(WATCHED) and topic not in known:
-                master.registerSubscriber(topic, "*", self._uri)
-                self._called.set()  # whoever came between the look and this is seen by another look
+        missing = [topic for topic in self._part_of if topic.endswith(WATCHED) and topic not in known]
+        if missing:
+            self._ask_all("registerSubscriber", [(topic, "*", self._uri) for topic in missing])
+            self._called.set()  # whoever came between the look and this is seen by another look
 
     def _leave(self) -> None:
         """Have the master forget this listener."""
         with suppress(*NO_ANSWER):
-            master = rosgraph.Master(self._me + WATCHER)
-            for topic in filter(lambda name: name.endswith(WATCHED), self._part_of):
-                master.unregisterSubscriber(topic, self._uri)
+            topics = [topic for topic in self._part_of if topic.endswith(WATCHED)]
+            self._ask_all("unregisterSubscriber", [(topic, self._uri) for topic in topics])
+
+    def _ask_all(self, method: str, arguments: Sequence[tuple[str, ...]]) -> None:
+        """Have the master do the same with each of ``arguments``, in one request."""
+        calls = xmlrpc.client.MultiCall(xmlrpc.client.ServerProxy(rosgraph.get_master_uri(), Hasty()))
+        for each in arguments:
+            getattr(calls, method)(self._me + WATCHER, *each)
+        calls()
 
 
 class _Listener(XmlRpcHandler):  # type: ignore[misc]
