@@ -122,6 +122,7 @@ CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
     ("ghost object", "low resolution path"): {"collision shape": None},
     ("body", "color components.ambient.level"): {"color components": {"diffuse": {"r": 0.5, "g": 0.5, "b": 0.5}, "transparency": 1}},
     ("body", "controller output type"): {"controller": {half: {"P": 10, "D": 1} for half in ("linear", "angular")}},
+    **{(kind, "use material"): {"color rgba": {"r": 1, "g": 0, "b": 0, "a": 1}} for kind in ("body", "ghost object")},
     ("joint", "parent"): {"child": "BODY far"}, ("joint", "child offset"): {},
     ("camera", "camera intrinsics.f"): {"camera intrinsics": {"cx": 320, "cy": 240}},
     ("camera", "publish depth noise.std dev"): {"publish depth": True, "publish depth noise": {"mean": 0.0, "bias": 0.0}},

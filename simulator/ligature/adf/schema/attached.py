@@ -79,7 +79,7 @@ CAMERA = (
     Key("field view angle", N, 0.7, "rad", "vertical field of view"),
     Key("orthographic view width", N, unit="m", doc="orthographic when present"),
     Key("stereo", MAP, doc="two eyes side by side"),
-    Key("stereo.mode", T, doc="any text", required=True),
+    *unused((Key("stereo.mode", T, doc="any text", required=True),)),
     Key("stereo.eye separation", N, 0.2, "m", "distance of the eyes", required=True),
     Key("stereo.focal length", N, 0.5, "m", "distance of the common plane", required=True),
     *unused((Key("monitor", U, 0, doc="monitor of the window"),)),

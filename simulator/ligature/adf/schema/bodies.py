@@ -238,7 +238,7 @@ GHOST = (
     *IDENTITY,
     *PARENT,
     *LOOKS,
-    *COLLISION,
+    *unused(COLLISION, "collision groups"),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame"),
     Key("inertial offset", POSE, None, "m, rad", "taken when `collision offset` is absent"),
     *ignored(("mass", "inertia", "friction", "damping", "restitution"), "a ghost has no mechanics"),
@@ -313,7 +313,7 @@ VEHICLE = (
     *ignored(("high resolution path",), "no effect"),
 )
 SUTURE = (
-    *IDENTITY,
+    *unused(IDENTITY, "passive"),
     Key("length", N, unit="m", doc="length of the thread", required=True),
     Key("diameter", N, unit="m", doc="diameter; or give `USP size`"),
     Key("USP size", T, "", doc="such as 2-0"),

@@ -111,9 +111,12 @@ def ignored(names: str | Iterable[str], doc: str) -> tuple[Key, ...]:
     return tuple(Key(name, Type.ANY, doc=doc, status=Status.IGNORED) for name in names)
 
 
-def unused(keys: Iterable[Key]) -> tuple[Key, ...]:
-    """Keys that AMBF uses and that have no effect here; their values are checked all the same."""
-    return tuple(replace(key, status=Status.UNUSED) for key in keys)
+def unused(keys: Iterable[Key], *paths: str) -> tuple[Key, ...]:
+    """Keys that AMBF uses and that have no effect here; their values are checked all the same.
+
+    With ``paths`` only those; the others stay as they are.
+    """
+    return tuple(replace(key, status=Status.UNUSED) if not paths or key.path in paths else key for key in keys)
 
 
 def spellings(*names: str) -> dict[str, str]:
