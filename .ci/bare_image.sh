@@ -48,17 +48,5 @@ told=$(within "$entry $command")
 within "$entry check suturing" || fail "'$entry check suturing'"
 within "$entry bench suturing --seconds 1" || fail "'$entry bench suturing'"
 within "$entry render peg_transfer --camera cameraL --width 320 --out pictures && ls pictures" || fail "'$entry render'"
-set -m
-mkfifo "$room/told"
-within "exec $entry run suturing" >"$room/told" 2>&1 &
-run=$! first=
-while IFS= read -r -t 120 line; do
-    echo "$try: $line"
-    if [[ $line == *"first state published"* ]]; then
-        first=yes
-        kill -INT -- "-$run"
-    fi
-done <"$room/told"
-[ -n "$first" ] || { kill -KILL -- "-$run"; fail "'$entry run suturing' published no state"; }
-wait "$run" || fail "'$entry run' ended with status $? after Ctrl-C"
+run_to_first_state 120 within "exec $entry run suturing" || fail "'$entry run' ended with status $? after Ctrl-C"
 echo "$try: passed"

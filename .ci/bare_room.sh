@@ -59,3 +59,29 @@ inside() { # as root of the bare machine, in the project's folder
     env -i "${ways[@]}" HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 TERM=dumb \
         chroot "$room" /bin/sh -c 'cd /home/project && exec "$@"' sh "$@"
 }
+
+set -m # a job is a process group of its own, and takes Ctrl-C as on a terminal
+first= silence=0 ending=0
+run_to_first_state() { # DEADLINE COMMAND…: Ctrl-C after the first state; the status is COMMAND's
+    # sets, in seconds, $first: till that state, $silence: longest without a line, $ending: from Ctrl-C to the end
+    local deadline=$1 begin=$SECONDS before=$SECONDS run gap line
+    shift
+    mkfifo "$room/told"
+    "$@" >"$room/told" 2>&1 &
+    run=$!
+    while IFS= read -r -t "$deadline" line; do
+        gap=$((SECONDS - before)) before=$SECONDS
+        [ "$gap" -le "$silence" ] || silence=$gap
+        echo "$try: $line"
+        if [ -z "$first" ] && [[ $line == *"first state published"* ]]; then
+            first=$((SECONDS - begin)) ending=$SECONDS
+            kill -INT -- "-$run"
+        fi
+        [ $((SECONDS - begin)) -lt "$deadline" ] || break
+    done <"$room/told"
+    [ -n "$first" ] || { kill -KILL -- "-$run" 2>/dev/null; fail "no first state within $deadline s: $*"; }
+    local status=0
+    wait "$run" || status=$?
+    ending=$((SECONDS - ending))
+    return "$status"
+}

@@ -51,17 +51,5 @@ named=$(user ligature run suturing 2>&1 | sed -n 's/.*apt install //p' || true)
 # shellcheck disable=SC2086
 step "installing the Debian packages that 'ligature run' names" apt install -y --no-install-recommends $named
 user sed -i 's/^include-system-site-packages = false/include-system-site-packages = true/' "$env/pyvenv.cfg"
-set -m # a job is a process group of its own, and takes Ctrl-C as on a terminal
-mkfifo "$room/told"
-user ligature run suturing >"$room/told" 2>&1 &
-run=$! first=
-while IFS= read -r -t 120 line; do
-    echo "$try: $line"
-    if [[ $line == *"first state published"* ]]; then
-        first=yes
-        kill -INT -- "-$run"
-    fi
-done <"$room/told"
-[ -n "$first" ] || { kill -KILL -- "-$run"; fail "'ligature run' published no state"; }
-wait "$run" || fail "'ligature run' ended with status $? after Ctrl-C"
+run_to_first_state 120 user ligature run suturing || fail "'ligature run' ended with status $? after Ctrl-C"
 echo "$try: passed"

@@ -10,6 +10,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ligature.cli import check
 
 EDGE = 0.04
 
@@ -43,10 +44,12 @@ def scene(folder: Path, apart: float, joined: bool) -> ligature.Scene:
 def test_what_joints_hold_inside_is_reported_and_still_until_it_has_parted(
     tmp_path_factory: pytest.TempPathFactory, depth: float
 ) -> None:
-    loaded = scene(tmp_path_factory.mktemp("held"), EDGE - depth, joined=True)
+    folder = tmp_path_factory.mktemp("held")
+    loaded = scene(folder, EDGE - depth, joined=True)
     simulation = ligature.Simulation(loaded)
     try:
         (found,) = [str(problem) for problem in simulation.problems if problem.code == "overlap"]
+        assert [found] == [str(f) for f in check.findings(folder / "model.yaml", [], False) if f.code == "overlap"]
         assert "'BODY box'" in found and "'BODY wall'" in found and f"{1e3 * depth:.3g} mm" in found
         simulation.step(300)
         assert np.abs(simulation.state["body_twist"][0]).max() < 0.1

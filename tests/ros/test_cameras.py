@@ -18,6 +18,7 @@ from ligature.render.context import RenderUnavailable, create_context
 from PIL import Image as Pixels
 
 from tests.ros.conftest import BIN, Program
+from tests.waiting import stays, until
 
 pytestmark = pytest.mark.ros
 
@@ -79,14 +80,13 @@ def pixels(message: Any) -> np.ndarray:
 
 def together(*listeners: Any, seconds: float = 15.0) -> list[Any]:
     """One message of each listener, all of one stamp."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
+
+    def found() -> list[Any]:
         by_stamp = [{m.header.stamp: m for m in list(listener.messages)} for listener in listeners]
         common = set(by_stamp[0]).intersection(*by_stamp[1:])
-        if common:
-            return [messages[max(common)] for messages in by_stamp]
-        time.sleep(0.02)
-    raise AssertionError("no common stamp")
+        return [messages[max(common)] for messages in by_stamp] if common else []
+
+    return until(found, "a common stamp", seconds)
 
 
 def test_the_topics_are_those_of_the_interface_and_nothing_of_silent_cameras(simulator: Program, node: Any) -> None:
@@ -243,11 +243,10 @@ def test_a_new_parent_name_carries_the_camera_along(simulator: Program, node: An
     node.set_param(f"{NS}/cameraR/parent_name", "Pin")
     state = states.wait(lambda m: m.parent_name.data == "/ambf/env/Pin")
     assert (state.pose.position.x, state.pose.position.y) == (local.x, local.y)
-    deadline = time.monotonic() + 5
     wanted = np.add(BEADS["Pin"], (0.0, 0.03, 0.0))
-    while not np.allclose(_frames(tf).get("cameraR", ("", np.eye(4)))[1][:3, 3], wanted, atol=1e-6):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    until(
+        lambda: np.allclose(_frames(tf).get("cameraR", ("", np.eye(4)))[1][:3, 3], wanted, atol=1e-6), "the new frame"
+    )
     node.set_param(f"{NS}/cameraR/parent_name", "")
     states.wait(lambda m: m.parent_name.data == "")
 
@@ -286,15 +285,11 @@ def test_without_opengl_the_simulator_reports_it_and_runs_on(
     listener = listen("/blind/ambf/env/World/State", WorldState)
     before = listener.wait().sim_time
     listener.wait(lambda m: m.sim_time > before + 0.5)
-    deadline = time.monotonic() + 10
-    while "render_process" in program.children():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    until(lambda: "render_process" not in program.children(), "the end of the render process")
     assert not [line for line in program.lines if "render process ended" in line]
 
 
 def test_cameras_are_left_out_when_asked(start: Callable[..., Program], scene: Path, node: Any) -> None:
     program = start(BIN / "ligature", "run", scene, "--ns", "/none", "--no-cameras")
     program.wait_for("first state published")
-    time.sleep(0.5)
-    assert "render_process" not in program.children()
+    stays(lambda: "render_process" not in program.children(), "no render process", 0.5)

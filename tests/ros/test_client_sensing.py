@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.ros.conftest import BIN, Program
+from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 
@@ -49,13 +49,6 @@ def client(tmp_path_factory: Any, ros_env: dict[str, str], node: Any) -> Iterato
         program.end()
 
 
-def wait_for(condition: Callable[[], Any], seconds: float = 10.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "not within the time"
-        time.sleep(0.01)
-
-
 def test_rays_report_what_they_hit_and_how_near_it_is(client: Any) -> None:
     rays = client.get_obj_handle("tip_sensor_array")
     assert rays.get_count() == 2 and rays.get_range(0) == pytest.approx(2.0) and rays.get_parent() == "Probe"
@@ -69,16 +62,16 @@ def test_an_actuator_takes_what_a_ray_hits_and_lets_go(client: Any) -> None:
     actuator = client.get_obj_handle("tip_actuator0")
     rays = client.get_obj_handle("tip_sensor_array")
     actuator.actuate_from_sensor_data(rays.get_identifier())
-    wait_for(lambda: actuator._state.actuated)
+    until(lambda: actuator._state.actuated)
     actuator.deactuate()
-    wait_for(lambda: not actuator._state.actuated)
+    until(lambda: not actuator._state.actuated)
 
 
 def test_a_contact_sensor_names_what_touches(client: Any) -> None:
     probe, touch = client.get_obj_handle("probe"), client.get_obj_handle("touch")
     assert touch.get_num_contact_events() == 0 and touch.get_contact_event(0) is None
     probe.set_pos(0.95, 0.0, 0.0)
-    wait_for(lambda: touch.get_num_contact_events() == 1)
+    until(lambda: touch.get_num_contact_events() == 1)
     assert touch.get_all_contact_object_names() == [touch.get_contact_object_name(0)] == ["/ambf/env/Wall"]
     assert touch.get_contact_event(0).contact_data[0].distance.data < 0.05
 
@@ -87,5 +80,5 @@ def test_a_light_is_moved_and_stays(client: Any) -> None:
     lamp = client.get_obj_handle("lamp")
     assert lamp.get_pos().z == pytest.approx(2.0)
     lamp.set_pos(0.0, 1.0, 2.0)
-    wait_for(lambda: lamp.get_pos().y == pytest.approx(1.0))
+    until(lambda: lamp.get_pos().y == pytest.approx(1.0))
     assert lamp.get_pos_command().y == 1.0

@@ -8,13 +8,13 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from ligature.cli.master import master_answers
 
 from tests.fuzz.kills import STAGES, kill
 from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
+from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 WORLD = "/ambf/env/World/State"
@@ -63,14 +63,6 @@ def alive(pid: int) -> bool:
         return False
 
 
-def wait_until(condition: Callable[[], Any], seconds: float) -> Any:
-    deadline = time.monotonic() + seconds
-    while not (result := condition()):
-        assert time.monotonic() < deadline, "condition not met in time"
-        time.sleep(0.05)
-    return result
-
-
 def test_a_master_is_started_when_none_answers_and_all_ends_within_two_seconds(
     start: Callable[..., Program], own_env: dict[str, str]
 ) -> None:
@@ -93,10 +85,10 @@ def test_a_killed_ros_process_is_back_within_three_seconds_and_physics_never_pau
     program = start(BIN / "ligature", "run", SMALL, "-p", "200")
     program.wait_for("first state published")
     client = watch(ros_env)
-    wait_until(lambda: len(seen(client)) > 20, 15)
+    until(lambda: len(seen(client)) > 20, seconds=15)
     killed_at = time.time()
     os.kill(program.children()["ros_process"], signal.SIGKILL)
-    back = wait_until(lambda: [row for row in seen(client) if row[0] > killed_at + 0.3], 10)
+    back = until(lambda: [row for row in seen(client) if row[0] > killed_at + 0.3], seconds=10)
     assert back[0][0] - killed_at < 3.0
     before = [row for row in seen(client) if row[0] <= killed_at][-1]
     wall, simulated = back[0][0] - before[0], back[0][1] - before[1]
@@ -119,14 +111,14 @@ def test_a_restarted_master_finds_the_simulator_again(
     master = start_master(port, own_env)
     try:
         client = watch(own_env)
-        wait_until(lambda: len(seen(client)) > 10, 15)
+        until(lambda: len(seen(client)) > 10, seconds=15)
         listing = subprocess.run(["rostopic", "list"], env=own_env, capture_output=True, text=True, check=True).stdout
         assert "/ambf/env/phantom/Needle/Command" in listing.split()
         moved = start(
             "/usr/bin/rostopic", "pub", "-r", "20", "/ambf/env/World/Command", "ambf_msgs/WorldCmd",
             "{enable_step_throttling: true, step_clock: true, n_skip_steps: 1}", env=own_env,
         )  # fmt: skip
-        wait_until(lambda: seen(client)[-1][2] == seen(client)[-20][2], 10)
+        until(lambda: seen(client)[-1][2] == seen(client)[-20][2], seconds=10)
         moved.process.kill()
     finally:
         assert program.end() == 0
@@ -147,7 +139,7 @@ def test_no_process_survives_a_killed_supervisor(start: Callable[..., Program]) 
     program.wait_for("first state published")
     pids = program.children()
     program.process.kill()
-    wait_until(lambda: not any(alive(pid) for pid in pids.values()), 5)
+    until(lambda: not any(alive(pid) for pid in pids.values()), seconds=5)
 
 
 @pytest.mark.parametrize("number", [2, 4], ids=lambda number: STAGES[number])

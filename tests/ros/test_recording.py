@@ -16,6 +16,7 @@ import pytest
 from rich.console import Console
 
 from tests.ros.conftest import BIN, ROOT, Program
+from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 SCENE = ROOT / "scenes" / "suturing" / "launch.yaml"
@@ -63,10 +64,7 @@ def moved(node: Any) -> None:
     assert psm.home(20.0)
     assert psm.move_jp(psm.setpoint_jp() + [0.2, -0.1, 0.02, 0.4, 0.2, -0.2]).wait()
     report = node.Publisher("/surgical_robotics_challenge/completion_report/testers/task2", Bool, queue_size=1)
-    deadline = time.monotonic() + 10.0
-    while report.get_num_connections() < 2:
-        assert time.monotonic() < deadline, "recorder and judge do not listen"
-        time.sleep(0.05)
+    until(lambda: report.get_num_connections() == 2, "recorder and judge listen")
     report.publish(Bool(data=True))
     time.sleep(0.5)
     psm.close()
@@ -94,10 +92,7 @@ def session(ros_env: dict[str, str], node: Any, tmp_path_factory: pytest.TempPat
         recorder = Program([str(BIN / "ligature"), "record", str(found.bag)], ros_env)
         recorder.wait_for("recording to")
         part = folder / "session.part.bag.active"
-        deadline = time.monotonic() + 30.0
-        while not part.exists():
-            assert time.monotonic() < deadline, recorder.output
-            time.sleep(0.05)
+        until(part.exists, "the bag", 30.0)
         moved(node)
         live = found.ligature("score", "insertion", "--json")
         assert live.returncode == 1, live.stdout + live.stderr

@@ -103,6 +103,7 @@ def who_publishes(begin: Callable[..., Program], seconds: float) -> list[tuple[f
     ]
 
 
+@pytest.mark.timeout(LISTENING + 290)
 def test_of_arms_that_are_there_already_no_message_is_ours(begin: Callable[..., Program], arms_scene: Path) -> None:
     real_console(begin, "MTMR")
     program = simulator(begin, arms_scene)

@@ -46,9 +46,14 @@ def test_an_insertion_that_was_not_made_is_reported_with_measures(
     fields = {row.key: row.value for row in measures.wait().values}
     assert fields["drops"] == "0"
     assert {"time", "tissue_force", "thread_tension", "path_length_PSM1", "path_length_PSM2"} <= set(fields)
-    before = float(fields["time"])
-    publish(f"{root}/restart", Empty).publish(Empty())
-    measures.wait(lambda m: float(next(row.value for row in m.values if row.key == "time")) < before)
+
+    def passed(message: Any) -> float:
+        return float(next(row.value for row in message.values if row.key == "time"))
+
+    restart = publish(f"{root}/restart", Empty)
+    measures.wait(lambda m: passed(m) > 2.0)
+    restart.publish(Empty())
+    measures.wait(lambda m: passed(m) < 1.0)
     assert any("not done:" in line for line in program.lines)
     assert program.end() == 0
 

@@ -10,6 +10,7 @@ from rich.console import Console
 import ligature
 from ligature.adf import AdfError, Diagnostic, Document, Resolver, Severity, read_any
 from ligature.model import reach
+from ligature.physics import overlaps
 
 _STYLES = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "", Severity.DEBUG: "dim"}
 
@@ -54,7 +55,7 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
         return list(error.diagnostics)
-    return _distinct([*document.diagnostics, *scene.diagnostics, *reach.findings(scene)])
+    return _distinct([*document.diagnostics, *scene.diagnostics, *reach.findings(scene), *overlaps.findings(scene)])
 
 
 def _has_bodies(document: Document) -> bool:

@@ -31,7 +31,7 @@ from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
 from ligature.model.parts import joint_of
 from ligature.model.piercing import Hole, Needle
-from ligature.model.rods import rod_chains, without_joints_between
+from ligature.model.rods import joined, rod_chains, without_joints_between
 from ligature.model.scene import (
     Actuator,
     Attachment,
@@ -147,6 +147,10 @@ class SceneBuilder:
         rods, between = without_joints_between(
             rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints
         )
+        moved_elements, found = joined(rods, self.bodies, self.joints)
+        self.diagnostics += found
+        for index, pose in moved_elements.items():
+            self.bodies[index] = replace(self.bodies[index], T_world_body=pose)
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
         self._report_joints_between(between)

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import Array
 from ligature.model.scene import Body, Capsule, Cylinder, Joint, JointType, RodChain, Sphere
 
@@ -48,6 +49,39 @@ def without_joints_between(
     between = {j for chain in chains for j in chain.anchors if {joints[j].parent, joints[j].child} <= members}
     kept = tuple(replace(chain, anchors=tuple(j for j in chain.anchors if j not in between)) for chain in chains)
     return kept, tuple(joints[j] for j in sorted(between))
+
+
+def joined(
+    chains: Sequence[RodChain], bodies: Sequence[Body], joints: Sequence[Joint]
+) -> tuple[dict[int, Array], list[Diagnostic]]:
+    """Where elements start that their joints hold further off than an element is long, by body (4, 4), with a report.
+
+    The element in the middle of the chain's places stays, and the others follow from it; no element turns.
+    """
+    moved: dict[int, Array] = {}
+    found = []
+    for chain in chains:
+        places = np.array([bodies[b].T_world_body[:3, 3] for b in chain.bodies])
+        root = int(np.argmin(np.linalg.norm(places - np.median(places, axis=0), axis=1)))
+        last = len(chain.bodies) - 1
+        ways = [(i, i - 1, i - 1) for i in range(root + 1, last + 1)] + [(i, i + 1, i) for i in range(root - 1, -1, -1)]
+        for i, before, link in ways:
+            body, other, joint = bodies[chain.bodies[i]], bodies[chain.bodies[before]], joints[chain.joints[link]]
+            there = moved.get(other.index, other.T_world_body)
+            at = there[:3, :3] @ _pivot(joint, other.index, bodies) + there[:3, 3]
+            own = body.T_world_body[:3, :3] @ _pivot(joint, body.index, bodies) + body.T_world_body[:3, 3]
+            off = float(np.linalg.norm(at - own))
+            if off <= max(chain.lengths[i], chain.lengths[before]):
+                continue
+            moved[body.index] = body.T_world_body.copy()
+            moved[body.index][:3, 3] += at - own
+            message = (
+                f"'{body.identity.identifier}' starts {1e3 * off:.3g} mm off its location, where "
+                f"'{joint.identity.key}' holds it as an element of a rod"
+            )
+            hint = "move the body, or the joint's pivots"
+            found.append(Diagnostic(Severity.INFO, message, joint.identity.mark, hint, "moved"))
+    return moved, found
 
 
 def _round(body: Body) -> bool:

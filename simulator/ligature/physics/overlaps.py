@@ -36,6 +36,15 @@ class Overlap:
         return Diagnostic(Severity.WARNING, message, one.mark, "move them apart, or disable their collision", "overlap")
 
 
+def findings(scene: Scene) -> list[Diagnostic]:
+    """A warning for each of `held_overlaps` where ``scene`` starts."""
+    engine = Engine(scene, 1e-3)
+    try:
+        return [found.finding(scene) for found in held_overlaps(engine)]
+    finally:
+        engine.close()
+
+
 def held_overlaps(engine: Engine) -> list[Overlap]:
     """Overlaps beyond `DEEP` between links of trees with a fixed base, static bodies, and links of one tree.
 

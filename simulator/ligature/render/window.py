@@ -38,7 +38,7 @@ class Window:
     def __init__(self, title: str) -> None:
         if not os.environ.get("DISPLAY"):
             raise RenderUnavailable("no window: there is no display; set DISPLAY, or run without '--window'")
-        glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_X11)  # moderngl finds contexts of X11 only
+        glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_X11)  # as DISPLAY says; Wayland offers it too
         if not glfw.init():
             raise RenderUnavailable(f"no window: the display '{os.environ['DISPLAY']}' cannot be opened")
         for hint, value in (
@@ -53,7 +53,7 @@ class Window:
             raise RenderUnavailable("no window: the display has no OpenGL 3.3")
         glfw.make_context_current(self._window)
         glfw.swap_interval(1)
-        self.context = tidy(moderngl.create_context(require=330))
+        self.context = tidy(moderngl.create_context(require=330, context=_Functions()))  # type: ignore[arg-type]
         self._program = self.context.program(_VERTEX, _FRAGMENT)
         self._quad = self.context.vertex_array(self._program, [])
         self._texture: moderngl.Texture | None = None
@@ -126,3 +126,16 @@ class Window:
         x, y = glfw.get_cursor_pos(self._window)
         width, height = glfw.get_window_size(self._window)
         return x * self.size[0] / max(width, 1), y * self.size[1] / max(height, 1)
+
+
+class _Functions:
+    """OpenGL's functions for moderngl, from GLFW; moderngl's own loader needs libGL.so, which only developers have."""
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_error: object) -> None: ...
+
+    def load_opengl_function(self, name: str) -> int:
+        return int(glfw.get_proc_address(name) or 0)
+
+    def release(self) -> None: ...

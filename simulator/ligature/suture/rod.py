@@ -227,7 +227,6 @@ class Rod:
             **{name: getattr(self.joints, name) for name in JOINTS_KEPT},
             **{f"touch_{name}": np.array(getattr(touches, name)[:n]) for name in TOUCHES_KEPT},
             **kept(self, _KEPT),
-            "skip": self.skip,
         }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
@@ -242,7 +241,6 @@ class Rod:
         for name in TOUCHES_KEPT:
             getattr(touches, name)[:n] = snapshot[f"touch_{name}"]
         put_back(self, {name: snapshot[name] for name in _KEPT})
-        self.skip[:] = snapshot["skip"]
         self._near = None
         self._constraint_rows = self._gather_constraints()
 
@@ -370,11 +368,6 @@ class Rod:
         poses = np.empty_like(own)
         compose_rows(own, self._inertial_to_body, np.arange(len(own)), poses)
         return poses
-
-    @property
-    def skip(self) -> NDArray[np.bool_]:
-        """Pairs of parts of bodies and elements that do not collide, (parts, n)."""
-        return self._shapes.skip
 
     @property
     def contacts(self) -> layout.Touches:

@@ -1,0 +1,82 @@
+"""Rods recognised in scenes: where their elements start when locations and joints differ."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ligature
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ligature.suture.description import from_chain
+
+N, LENGTH = 8, 0.02
+
+
+def xyz(*values: float) -> dict[str, float]:
+    return dict(zip("xyz", values, strict=True))
+
+
+def thread(folder: Path, shifts: dict[int, list[float]]) -> ligature.Scene:
+    """A straight thread along x, elements of it ``shifts`` metres off."""
+    model: dict[str, object] = {
+        "bodies": [f"BODY {i}" for i in range(N)], "joints": [f"JOINT {i}" for i in range(N - 1)],
+    }  # fmt: skip
+    for i in range(N):
+        place = np.array([LENGTH * i, 0.0, 1.0]) + shifts.get(i, [0.0, 0.0, 0.0])
+        model[f"BODY {i}"] = {
+            "name": str(i), "mass": 1e-4, "collision shape": "CAPSULE",
+            "collision geometry": {"radius": 5e-4, "height": LENGTH, "axis": "X"},
+            "location": {"position": xyz(*place.tolist()), "orientation": {"r": 0.0, "p": 0.0, "y": 0.0}},
+        }  # fmt: skip
+    for i in range(N - 1):
+        model[f"JOINT {i}"] = {
+            "name": str(i), "type": "six dof spring", "parent": f"BODY {i}", "child": f"BODY {i + 1}",
+            "parent pivot": xyz(LENGTH / 2, 0, 0), "child pivot": xyz(-LENGTH / 2, 0, 0),
+            "parent axis": xyz(1, 0, 0), "child axis": xyz(1, 0, 0),
+            "joint limits": {
+                "linear": {end: xyz(0, 0, 0) for end in ("low", "high")},
+                "angular": {"low": xyz(-3, -3, -3), "high": xyz(3, 3, 3)},
+            },
+            "stiffness": {half: xyz(1e-3, 1e-3, 1e-3) for half in ("linear", "angular")},
+            "damping": {half: xyz(1e-5, 1e-5, 1e-5) for half in ("linear", "angular")},
+        }  # fmt: skip
+    path = folder / "model.yaml"
+    path.write_text(yaml.safe_dump(model, sort_keys=False))
+    return ligature.load(path)
+
+
+shift = st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(shifts=st.dictionaries(st.integers(0, N - 1), shift, max_size=N))
+def test_elements_start_no_further_from_their_joints_than_they_are_long(
+    tmp_path_factory: pytest.TempPathFactory, shifts: dict[int, list[float]]
+) -> None:
+    scene = thread(tmp_path_factory.mktemp("thread"), shifts)
+    (chain,) = scene.rods
+    rod = from_chain(scene, chain)
+    ends = [
+        np.einsum("nij,nj->ni", rod.T_world_inertial[k : N - 1 + k, :3, :3], rod.pivots[:, k])
+        + rod.T_world_inertial[k : N - 1 + k, :3, 3]
+        for k in (0, 1)
+    ]
+    assert np.linalg.norm(ends[1] - ends[0], axis=1).max() <= LENGTH * 1.001
+    reported = {f.message.split("'")[1] for f in scene.diagnostics if f.code == "moved"}
+    written = [np.array([LENGTH * i, 0.0, 1.0]) + shifts.get(i, [0.0, 0.0, 0.0]) for i in range(N)]
+    stayed = [i for i in range(N) if (scene.bodies[chain.bodies[i]].T_world_body[:3, 3] == written[i]).all()]
+    assert len(reported) == N - len(stayed)
+
+
+def test_a_thread_with_elements_at_the_wrong_place_stays_in_one_piece(tmp_path: Path) -> None:
+    simulation = ligature.Simulation(thread(tmp_path, {1: [1e3, 0.0, 0.0], 5: [0.0, -0.5, 0.0]}))
+    try:
+        simulation.step(200)
+        assert simulation.problems == []
+        places = simulation.state["body_pose"][0, :, :3]
+        assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 1.05 * LENGTH
+    finally:
+        simulation.close()
