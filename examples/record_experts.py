@@ -1,7 +1,7 @@
 """Records demonstrations of a learning environment's scripted expert as a dataset.
 
-``python examples/record_experts.py OUT.h5 --task reach --episodes 50``; ``ligature dataset export OUT.h5 FOLDER`` makes a
-dataset of LeRobot of it. Ctrl-C and SIGTERM keep the episodes that have ended.
+``python examples/record_experts.py OUT.h5 --task reach --episodes 50``; ``ligature dataset export OUT.h5 FOLDER`` makes
+a dataset of LeRobot of it. Ctrl-C and SIGTERM keep the episodes that have ended.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def main() -> int:
     arguments.add_argument("--task", choices=sorted(EXPERTS), default="reach")
     arguments.add_argument("--episodes", type=int, default=50)
     arguments.add_argument("--seed", type=int, default=1000, help="of the first episode")
-    arguments.add_argument("--noise", type=float, default=0.4, help="that disturbs the expert, as a share of an action")
+    arguments.add_argument("--noise", type=float, default=0.1, help="that disturbs the expert, as a share of an action")
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
     given = arguments.parse_args()
     env = SuturingEnv(given.task, max_steps=MOST)
