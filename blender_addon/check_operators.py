@@ -5,18 +5,22 @@ from pathlib import Path
 import bpy
 
 from . import making
+from .collecting import deleted_end, deleted_owner, notes_of
 from .ligature.adf import AdfError, Resolver
 from .ligature.adf.diagnostics import Severity
 from .ligature.adf.reader import read_text
 from .ligature.adf.schema import BY_PATH
 from .ligature.authoring.lint import Finding, lint
-from .placing import SHAPED, rest_pose
+from .placing import SHAPED, place, rest_pose
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier, store, unset
 from .write_file import NO_MESH, ExportError, current_text, has_mesh, members
 
 OWN = {"identifier": "its own"}
 """The fix of a copy that has the identifier of its original."""
+
+DELETE, UNHANG = {"object": "deleted"}, {"parent": "none"}
+"""The fixes of a joint, and of what hung on a body, whose body was deleted."""
 
 ICONS = {"ERROR": "ERROR", "WARNING": "INFO", "INFO": "DOT"}
 
@@ -28,6 +32,7 @@ def check_file(collection):
         return copies
     objects = {obj.adf.key: obj for obj in members(collection)}
     broken = [finding for obj in objects.values() for finding in _unplaced(obj)]
+    broken += [finding for obj in objects.values() for finding in _bereft(collection, list(objects.values()), obj)]
     if broken:
         return [(finding, objects.get(finding.key)) for finding in broken]
     try:
@@ -66,6 +71,30 @@ def _unwritten(obj):
     if obj.adf.role in SHAPED and obj.type not in ("MESH", "EMPTY"):
         message, _, hint = NO_MESH.format(obj.type.lower()).partition("; ")
         yield Finding("not-a-mesh", Severity.WARNING, obj.adf.key, message, hint)
+    elif not obj.adf.was:  # its mesh file, which tells the rules of files, is not written yet
+        for note in notes_of(obj):
+            message, _, hint = f"it {note}".partition("; ")
+            fix = {"collision mesh type": "CONVEX_HULL"}
+            yield Finding("concave-moving", Severity.WARNING, obj.adf.key, message, hint, fix)
+
+
+def _bereft(collection, objects, obj):
+    """What names a body that was deleted."""
+    if obj.adf.role == "JOINT":
+        for end in ("parent", "child"):
+            gone = deleted_end(collection, objects, obj, end)
+            if gone:
+                hint = f"choose another {end} body, or delete the joint"
+                message = f"it joins '{gone}', which was deleted"
+                yield Finding("deleted-body", Severity.ERROR, obj.adf.key, message, hint, DELETE)
+                return
+        return
+    gone = deleted_owner(collection, objects, obj)
+    if gone:
+        message = f"it hangs on '{gone}', which was deleted"
+        yield Finding(
+            "deleted-body", Severity.ERROR, obj.adf.key, message, "parent it to another, or delete it", UNHANG
+        )
 
 
 def _units(scene):
@@ -105,10 +134,10 @@ class ADF_OT_check(bpy.types.Operator):
             if collection.adf.kind not in ("NONE", "OTHER"):
                 found += [(finding, obj, collection.name) for finding, obj in check_file(collection)]
         errors = 0
-        for finding, obj, place in found:
+        for finding, obj, where in found:
             item = listed.add()
             item.severity, item.rule = finding.severity.name, finding.rule
-            item.message = f"{obj.name if obj else finding.key or place}: {finding.message}"
+            item.message = f"{obj.name if obj else finding.key or where}: {finding.message}"
             item.hint, item.object, item.fixable = finding.hint, obj, bool(finding.fix and obj)
             errors += finding.severity >= Severity.ERROR
         self.report({"WARNING"} if errors else {"INFO"}, f"{len(listed)} findings, {errors} errors")
@@ -141,6 +170,8 @@ class ADF_OT_fix(bpy.types.Operator):
                 if finding.fix and (finding.rule, obj) in wanted:
                     mend(obj, finding.fix)
                     mended += 1
+            for obj in [o for o in collection.all_objects if o.adf.role == "JOINT" and not o.adf.key]:
+                bpy.data.objects.remove(obj)
         bpy.ops.adf.check()
         self.report({"INFO"}, f"{mended} findings mended")
         return {"FINISHED"} if mended else {"CANCELLED"}
@@ -150,6 +181,14 @@ def mend(obj, fix):
     """Give an object the values of a fix."""
     if fix is OWN:
         making.make_own(obj)
+        return
+    if fix is DELETE:
+        obj.adf.key = ""  # it is removed when all findings have been gone through
+        return
+    if fix is UNHANG:
+        T = rest_pose(obj)
+        obj.parent, obj.adf.parent_text, obj.adf.hung = None, "", False
+        place(obj, T)
         return
     kind = KIND_OF_ROLE[obj.adf.role]
     group = getattr(obj.adf, identifier(kind))

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import bpy
 
+from .ligature.adf.references import merged
 from .mesh_data import Solid, Textures, mesh_print, surfaces_of
 from .mesh_files import MeshSource
-from .placed import Placed, unchanged_groups
-from .placing import SHAPED, placed, solids_of
+from .placed import Placed, State, unchanged_groups
+from .placing import SHAPED, children_with, owner_of, placed, shapes_of, solids_of
 from .properties import KIND_OF_ROLE
+from .references import file_of, qualified, topic_name
 from .schema_properties import fetch, identifier
 
 FILE_KINDS = {"MODEL": "model", "WORLD": "world", "INPUT_DEVICES": "input devices"}
@@ -32,14 +34,25 @@ class ExportError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One object of a file: its key now and in the file, its properties by path, where it stands."""
+    """One object of a file.
+
+    Attributes
+    ----------
+    key, was, like
+        Its key now and in the file, and that of the object it was copied from.
+    name
+        What it is called in Blender, if it was renamed there.
+    values, placed, before
+        Its properties by path, where it stands, and its state just after the import.
+    """
 
     key: str
     was: str
+    like: str
+    name: str
     values: dict
     placed: Placed
-    same: set[str]
-    """Groups of placed keys that have not changed since the import."""
+    before: State | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +73,8 @@ class Collected:
         Identifiers that the file had.
     meshes
         What the mesh files of each object are made of, for a model whose meshes were asked for.
+    notes
+        What the user should know before anything is written.
     """
 
     kind: str
@@ -71,6 +86,7 @@ class Collected:
     has_meshes: bool = False
     imported_keys: list[str] = field(default_factory=list)
     meshes: list[MeshSource] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
 def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -92,17 +108,44 @@ def collect(collection: bpy.types.Collection, with_meshes: bool = False) -> Coll
     _check_keys(objects)
     values = [_values(obj) for obj in objects]
     places = [placed(obj) for obj in objects]
-    same = [_same(*pair) for pair in zip(objects, places, strict=True)]
-    for one in zip(objects, places, same, strict=True):
-        _check_joint(*one)
+    states = [json.loads(obj.adf.imported) if obj.adf.imported else None for obj in objects]
+    for one in zip(objects, places, states, strict=True):
+        _check_ends(collection, objects, *one)
+    parts = [
+        Part(o.adf.key, o.adf.was, o.adf.like, _new_name(o), *rest)
+        for o, *rest in zip(objects, values, places, states, strict=True)
+    ]
     return Collected(
         kind, stored.source, stored.filepath, stored.byte_order_mark,
-        fetch(getattr(stored, identifier(kind)), kind),
-        [Part(o.adf.key, o.adf.was, *rest) for o, *rest in zip(objects, values, places, same, strict=True)],
-        any(has_mesh(obj) for obj in objects),
-        json.loads(stored.imported_keys or "[]"),
-        _meshes(objects) if with_meshes and kind == "model" else [],
+        fetch(getattr(stored, identifier(kind)), kind), parts, any(has_mesh(obj) for obj in objects),
+        json.loads(stored.imported_keys or "[]"), _meshes(objects) if with_meshes and kind == "model" else [],
+        [f"'{obj.name}' {note}" for obj in objects for note in notes_of(obj)],
     )  # fmt: skip
+
+
+def _new_name(obj: bpy.types.Object) -> str:
+    """The name for the file of an object that was renamed in Blender since it was opened or written."""
+    if not obj.adf.called or obj.adf.called == obj.name:
+        return ""
+    return obj.name if obj.adf.role == "JOINT" else topic_name(obj.name)
+
+
+def notes_of(obj: bpy.types.Object) -> list[str]:
+    """What surprises about an object that is not in the file yet."""
+    if obj.adf.was or obj.adf.role not in SHAPED:
+        return []
+    if obj.type not in ("MESH", "EMPTY"):
+        return [f"is a {obj.type.lower()}, whose shape is not written; convert it to a mesh"]
+    if obj.adf.role == "BODY" and obj.type == "MESH" and collides_as_triangles(obj):
+        return ["moves and collides as a triangle mesh; decompose it into convex pieces, or fit primitives"]
+    return []
+
+
+def collides_as_triangles(obj: bpy.types.Object) -> bool:
+    """Whether a moving body has neither primitives nor convex pieces, nor a hull around its mesh."""
+    own = obj.adf.body
+    parts = shapes_of(obj, "COLLISION") or children_with(obj, "HULL")
+    return not parts and own.collision_mesh_type == "CONCAVE_MESH" and own.mass > 0.0
 
 
 def _check_keys(objects: list[bpy.types.Object]) -> None:
@@ -127,13 +170,30 @@ def _values(obj: bpy.types.Object) -> dict:
     return found
 
 
-def _same(obj: bpy.types.Object, place: Placed) -> set[str]:
-    return unchanged_groups(json.loads(obj.adf.imported) if obj.adf.imported else None, place.state())
-
-
-def _check_joint(obj: bpy.types.Object, place: Placed, same: set[str]) -> None:
-    """A joint whose body was deleted, or that has no place in a body of its file, cannot be written anew."""
-    if place.ends is None or "ends" in same:
+def _check_ends(
+    collection: bpy.types.Collection,
+    objects: list[bpy.types.Object],
+    obj: bpy.types.Object,
+    place: Placed,
+    before: State | None,
+) -> None:
+    """Refuse what cannot be written: instances of collections, and objects whose bodies were deleted."""
+    if obj.instance_type == "COLLECTION" and obj.instance_collection is not None and obj.adf.role in SHAPED:
+        words = f"'{obj.name}' shows the collection '{obj.instance_collection.name}', whose objects are not written"
+        raise ExportError(f"{words}; use Object > Apply > Make Instances Real, and join them", obj)
+    if place.ends is None:
+        gone = deleted_owner(collection, objects, obj)
+        if gone:
+            raise ExportError(
+                f"'{obj.name}' hangs on '{gone}', which was deleted; parent it to another, or delete it", obj
+            )
+        return
+    for end in ("parent", "child"):
+        gone = deleted_end(collection, objects, obj, end)
+        if gone:
+            words = f"'{obj.name}' joins '{gone}', which was deleted"
+            raise ExportError(f"{words}; choose another {end} body in the Physics tab, or delete the joint", obj)
+    if "ends" in unchanged_groups(before, place.state()):
         return
     for end, key in zip(("parent", "child"), place.ends, strict=True):
         if not key:
@@ -142,26 +202,58 @@ def _check_joint(obj: bpy.types.Object, place: Placed, same: set[str]) -> None:
         raise ExportError(f"'{obj.name}' joins a body of a file that is not open, so that it has no place there", obj)
 
 
+def deleted_end(
+    collection: bpy.types.Collection, objects: list[bpy.types.Object], joint: bpy.types.Object, end: str
+) -> str:
+    """What a joint calls a body that is no more; empty when the body is there, or of a file that is not open."""
+    body, text = getattr(joint.adf, f"{end}_object"), getattr(joint.adf, f"{end}_text")
+    if body is None:
+        return text if _was_here(collection, objects, text) else ""
+    there = file_of(body)
+    if there is None:  # its file was closed, or it was deleted from this one
+        return body.name if not text or _was_here(collection, objects, text) else ""
+    return "" if body in (objects if there is collection else members(there)) else body.name
+
+
+def deleted_owner(collection: bpy.types.Collection, objects: list[bpy.types.Object], obj: bpy.types.Object) -> str:
+    """What an object calls the body that it hung on and that is no more."""
+    owner = owner_of(obj)
+    if owner is not None:
+        return "" if owner.users_collection else owner.name
+    return obj.adf.parent_text if obj.adf.hung and _was_here(collection, objects, obj.adf.parent_text) else ""
+
+
+def _was_here(collection: bpy.types.Collection, objects: list[bpy.types.Object], text: str) -> bool:
+    """Whether a text names an object that the file had and that is no more."""
+    now = [qualified(collection, obj) for obj in objects]
+    space = getattr(getattr(collection.adf, collection.adf.kind.lower(), None), "namespace", "")
+    had = [merged(space, "") + key for key in json.loads(collection.adf.imported_keys or "[]")]
+    return bool(text) and any(n.endswith(text) for n in had) and not any(n.endswith(text) for n in now)
+
+
 # --- meshes -----------------------------------------------------------------------------------
 
 
 def _meshes(objects: list[bpy.types.Object]) -> list[MeshSource]:
     """The meshes of all objects; the triangles of those alone whose files have to be written."""
     shaped = [obj for obj in objects if obj.adf.role in SHAPED]
+    solids = {obj.name_full: solids_of(obj) for obj in shaped}
+    prints = {name: mesh_print(parts) for name, parts in solids.items()}
     groups = {o.name_full: getattr(o.adf, o.adf.role.lower()) for o in bpy.data.objects if o.adf.role in SHAPED}
     names = {name: {g.mesh.lower(), g.collision_mesh.lower()} for name, g in groups.items()}
     written: set[str] = set()
     found = []
-    for obj, solids in zip(shaped, [solids_of(obj) for obj in shaped], strict=True):
-        now = mesh_print(solids)
+    for obj in shaped:
+        now = prints[obj.name_full]
         source = MeshSource(
             key=obj.adf.key, name=obj.name, clean_name=bpy.path.clean_name(obj.name), type=obj.type, print=now,
             **_own(obj),
         )  # fmt: skip
         if obj.adf.mesh_print != now:
-            source.taken = set().union(*(used for name, used in names.items() if name != obj.name_full))
+            # a file that looks the same for all who use it is changed for all of them
+            source.taken = set().union(*(used for name, used in names.items() if prints.get(name) != now))
             whole = obj.type == "MESH" and (now not in written or bool(source.mesh))
-            _read_triangles(source, solids, whole)
+            _read_triangles(source, solids[obj.name_full], whole)
             written |= {now} if obj.type == "MESH" else set()
         found.append(source)
     return found

@@ -55,6 +55,16 @@ def cache_folder() -> str:
     return bpy.utils.user_resource("DATAFILES", path="adf_studio", create=True)
 
 
+def custom_properties(owner: bpy.types.ID) -> dict:
+    """The properties that add-ons gave an object or scene, by name; also of add-ons that are not enabled."""
+    groups = [owner]
+    if hasattr(owner, "bl_system_properties_get"):  # from 5.0 those of add-ons lie apart from the user's own
+        groups.append(owner.bl_system_properties_get() or {})
+    found = {name: group[name] for group in groups for name in group.keys()}  # noqa: SIM118  (no dict)
+    enabled = [name for name in owner.bl_rna.properties.keys() if name.startswith("ambf_")]  # noqa: SIM118
+    return {**found, **{name: getattr(owner, name) for name in enabled}}
+
+
 def line_shader():
     """Shader and name of the colour uniform for plain lines of one colour."""
     import gpu

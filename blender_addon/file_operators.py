@@ -1,19 +1,136 @@
 """Import and export of model, world and launch files, with entries in the File menu."""
 
+import json
 import re
 from pathlib import Path
 
 import bpy
+from bpy.app.handlers import persistent
 
 from .compat import HAS_FILE_HANDLER
-from .launch_file import export_scene, import_launch
+from .folders import allow_folders, forget_session
+from .launch_file import export_scene, import_launch, prepared_scene
 from .ligature.adf import AdfError
 from .preview_operators import is_previewing
-from .read_file import import_file
-from .write_file import ExportError, after_export, export_file, export_variants
+from .read_file import import_file, outside_folders, worded
+from .write_file import ExportError, after_export, export_file, export_variants, prepared, prepared_variants
+
+FURTHER = bpy.props.StringProperty(
+    name="Further Folder",
+    description="Folder outside the scene's own from which meshes may be read; it is remembered in the blend file",
+    subtype="DIR_PATH",
+)
+REPLACE = bpy.props.BoolProperty(
+    name="Replace Files",
+    description="Replace existing files that this scene neither was opened from nor wrote; else a dialog lists them",
+    options={"SKIP_SAVE"},
+)
 
 
-class ADF_OT_import(bpy.types.Operator):
+class Asks:
+    """An operator that asks before it reads outside, or replaces files of others, when a user started it."""
+
+    asking = False
+
+    def by_user(self):
+        """Whether a user is there to be asked."""
+        return self.asking and not bpy.app.background
+
+    def ask_folders(self, operator, paths, **arguments):
+        """Ask for the folders outside the scene's own that hold meshes; None when there is nothing to ask."""
+        found = []
+        for path in paths:
+            try:
+                found += outside_folders(path, (Path(self.root),) if self.root else ())
+            except (AdfError, OSError):
+                continue  # opening it reports that
+        if not found or not self.by_user():
+            return None
+        words = json.dumps(arguments)
+        return bpy.ops.adf.allow_folders(
+            "INVOKE_DEFAULT", operator=operator, arguments=words, folders=json.dumps(found)
+        )
+
+    def ask_replace(self, operator, done, **arguments):
+        """Ask before anything surprising is written; None when there is nothing to ask."""
+        if self.replace or not (done.foreign or done.notes) or not self.by_user():
+            return None
+        lists = {"files": json.dumps([str(file) for file in done.foreign]), "notes": json.dumps(done.notes)}
+        words = json.dumps({**arguments, "replace": bool(done.foreign)})
+        return bpy.ops.adf.confirm_export("INVOKE_DEFAULT", operator=operator, arguments=words, **lists)
+
+
+class ADF_OT_allow_folders(bpy.types.Operator):
+    """Read meshes from folders outside the scene's own, and remember them in the blend file"""
+
+    bl_idname = "adf.allow_folders"
+    bl_label = "Read Meshes From There"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    folders: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    operator: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    arguments: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    allow: bpy.props.BoolProperty(name="Read from there", default=True, options={"SKIP_SAVE"})
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_props_dialog(self, width=600)
+
+    def draw(self, context):
+        self.layout.label(text="Meshes lie outside this scene's folder, in:", icon="FILE_FOLDER")
+        for folder in json.loads(self.folders or "[]"):
+            self.layout.label(text=folder)
+        self.layout.prop(self, "allow")
+
+    def execute(self, context):
+        if self.allow:
+            allow_folders(context.scene, json.loads(self.folders or "[]"))
+        if self.operator:
+            return getattr(bpy.ops.adf, self.operator)(**_arguments(self.arguments))
+        return {"FINISHED"}
+
+
+class ADF_OT_confirm_export(bpy.types.Operator):
+    """Write after the user has seen which files are replaced and what surprises"""
+
+    bl_idname = "adf.confirm_export"
+    bl_label = "Write Anyway"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    files: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    notes: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    operator: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    arguments: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_props_dialog(self, width=700)
+
+    def draw(self, context):
+        files, notes = json.loads(self.files or "[]"), json.loads(self.notes or "[]")
+        if files:
+            self.layout.label(text="These files are not this scene's own and would be replaced:", icon="ERROR")
+            _listed(self.layout, files)
+        if notes:
+            self.layout.label(text="What is written may surprise:", icon="INFO")
+            _listed(self.layout, notes)
+
+    def execute(self, context):
+        if not self.operator:
+            return {"CANCELLED"}
+        return getattr(bpy.ops.adf, self.operator)(**_arguments(self.arguments))
+
+
+def _listed(layout, lines, most=20):
+    for line in lines[:most]:
+        layout.label(text=line)
+    if len(lines) > most:
+        layout.label(text=f"and {len(lines) - most} more")
+
+
+def _arguments(text):
+    return json.loads(text or "{}")
+
+
+class ADF_OT_import(Asks, bpy.types.Operator):
     """Open model, world, input-devices or launch files; each becomes a collection, a launch file with all it names"""
 
     bl_idname = "adf.import_file"
@@ -24,13 +141,10 @@ class ADF_OT_import(bpy.types.Operator):
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
     filter_glob: bpy.props.StringProperty(default="*.yaml;*.yml;*.ambf", options={"HIDDEN"})
-    root: bpy.props.StringProperty(
-        name="Further Folder",
-        description="Folder outside the scene's own from which meshes may be read",
-        subtype="DIR_PATH",
-    )
+    root: FURTHER
 
     def invoke(self, context, event):
+        self.asking = True
         if self.filepath or self.files:
             return self.execute(context)
         context.window_manager.fileselect_add(self)
@@ -38,14 +152,25 @@ class ADF_OT_import(bpy.types.Operator):
 
     def execute(self, context):
         paths = [Path(self.directory, item.name) for item in self.files if item.name] or [Path(self.filepath)]
+        paths = [Path(bpy.path.abspath(str(path))) for path in paths]
+        files = [{"name": item.name} for item in self.files]
+        asked = self.ask_folders(
+            "import_file", paths, filepath=self.filepath, directory=self.directory, files=files, root=self.root
+        )
+        if asked is not None:
+            return asked
         opened = 0
-        roots = (Path(self.root),) if self.root else ()
-        for path in [Path(bpy.path.abspath(str(path))) for path in paths]:
+        roots = _further(context.scene, self.root)
+        for path in paths:
             try:
                 launch = _is_launch(path)
-                done = import_launch(path, context.scene) if launch else [import_file(path, context.scene, roots)]
+                done = (
+                    import_launch(path, context.scene, roots=roots)
+                    if launch
+                    else [import_file(path, context.scene, roots)]
+                )
             except (AdfError, OSError) as error:
-                self.report({"ERROR"}, str(error))
+                self.report({"ERROR"}, worded(error))
                 continue
             opened += 1
             for problem in [problem for one in done for problem in one.problems][:20]:
@@ -54,7 +179,7 @@ class ADF_OT_import(bpy.types.Operator):
         return {"FINISHED"} if opened else {"CANCELLED"}
 
 
-class ADF_OT_export(bpy.types.Operator):
+class ADF_OT_export(Asks, bpy.types.Operator):
     """Write the collection to its file: only what changed changes in the text"""
 
     bl_idname = "adf.export_file"
@@ -66,6 +191,7 @@ class ADF_OT_export(bpy.types.Operator):
     collection: bpy.props.StringProperty(
         name="Collection", description="Collection to write; the active one when empty"
     )
+    replace: REPLACE
 
     @classmethod
     def poll(cls, context):
@@ -75,6 +201,7 @@ class ADF_OT_export(bpy.types.Operator):
         return False
 
     def invoke(self, context, event):
+        self.asking = True
         collection = chosen_collection(context, self.collection)
         if collection is not None:
             self.filepath = collection.adf.filepath or f"{collection.name}.yaml"
@@ -91,12 +218,17 @@ class ADF_OT_export(bpy.types.Operator):
             return {"CANCELLED"}
         path = Path(bpy.path.abspath(self.filepath or collection.adf.filepath))
         try:
-            done = export_file(collection, path)
+            if self.by_user():
+                words = {"filepath": str(path), "collection": collection.name}
+                asked = self.ask_replace("export_file", prepared(collection, path), **words)
+                if asked is not None:
+                    return asked
+            done = export_file(collection, path, self.replace)
         except ExportError as error:
             self.report({"ERROR"}, f"{collection.name}: {error}")
             return {"CANCELLED"}
         after_export(collection, path, done.text)
-        for problem in done.problems:
+        for problem in (*done.notes, *done.problems):
             self.report({"WARNING"}, problem)
         self.report({"INFO"}, f"{path.name}: {len(done.written)} files written")
         return {"FINISHED"}
@@ -131,12 +263,14 @@ class ADF_OT_add_variant(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ADF_OT_export_variants(bpy.types.Operator):
+class ADF_OT_export_variants(Asks, bpy.types.Operator):
     """Write all variants of the active model beside it; they share its meshes"""
 
     bl_idname = "adf.export_variants"
     bl_label = "Export Variants"
-    bl_options = {"REGISTER"}
+    bl_options = {"REGISTER", "UNDO"}
+
+    replace: REPLACE
 
     @classmethod
     def poll(cls, context):
@@ -146,12 +280,20 @@ class ADF_OT_export_variants(bpy.types.Operator):
             return False
         return True
 
+    def invoke(self, context, event):
+        self.asking = True
+        return self.execute(context)
+
     def execute(self, context):
         if is_previewing(context.scene):
             self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
             return {"CANCELLED"}
         try:
-            written = export_variants(chosen_collection(context))
+            if self.by_user():
+                asked = self.ask_replace("export_variants", prepared_variants(chosen_collection(context)))
+                if asked is not None:
+                    return asked
+            written = export_variants(chosen_collection(context), self.replace)
         except ExportError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -159,7 +301,7 @@ class ADF_OT_export_variants(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ADF_OT_import_launch(bpy.types.Operator):
+class ADF_OT_import_launch(Asks, bpy.types.Operator):
     """Open a launch file with its world and all its models"""
 
     bl_idname = "adf.import_launch"
@@ -171,20 +313,27 @@ class ADF_OT_import_launch(bpy.types.Operator):
     indices: bpy.props.StringProperty(
         name="Models", description="Indices of the models to open, such as 10,11,6; all when empty"
     )
+    root: FURTHER
 
     def invoke(self, context, event):
+        self.asking = True
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
         try:
             chosen = tuple(int(word) for word in self.indices.replace(",", " ").split()) or None
-            done = import_launch(Path(bpy.path.abspath(self.filepath)), context.scene, chosen)
+            path = Path(bpy.path.abspath(self.filepath))
+            words = {"filepath": str(path), "indices": self.indices, "root": self.root}
+            asked = self.ask_folders("import_launch", [path], **words)
+            if asked is not None:
+                return asked
+            done = import_launch(path, context.scene, chosen, _further(context.scene, self.root))
         except ValueError:
             self.report({"ERROR"}, f"'{self.indices}' are not indices; write them as 10,11,6")
             return {"CANCELLED"}
         except (AdfError, OSError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, worded(error))
             return {"CANCELLED"}
         for problem in [problem for one in done for problem in one.problems][:20]:
             self.report({"WARNING"}, problem)
@@ -192,7 +341,7 @@ class ADF_OT_import_launch(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ADF_OT_export_scene(bpy.types.Operator):
+class ADF_OT_export_scene(Asks, bpy.types.Operator):
     """Write the launch file with its world and models"""
 
     bl_idname = "adf.export_scene"
@@ -201,6 +350,7 @@ class ADF_OT_export_scene(bpy.types.Operator):
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: bpy.props.StringProperty(default="*.yaml", options={"HIDDEN"})
+    replace: REPLACE
 
     @classmethod
     def poll(cls, context):
@@ -210,6 +360,7 @@ class ADF_OT_export_scene(bpy.types.Operator):
         return True
 
     def invoke(self, context, event):
+        self.asking = True
         self.filepath = context.scene.adf.filepath or "launch.yaml"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -219,12 +370,25 @@ class ADF_OT_export_scene(bpy.types.Operator):
             self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
             return {"CANCELLED"}
         try:
-            written = export_scene(context.scene, Path(bpy.path.abspath(self.filepath or context.scene.adf.filepath)))
+            path = Path(bpy.path.abspath(self.filepath or context.scene.adf.filepath))
+            if self.by_user():
+                asked = self.ask_replace("export_scene", prepared_scene(context.scene, path)[0], filepath=str(path))
+                if asked is not None:
+                    return asked
+            written = export_scene(context.scene, path, replace=self.replace)
         except ExportError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.report({"INFO"}, f"{len(written)} files written")
         return {"FINISHED"}
+
+
+def _further(scene, folder):
+    """The folder that the user allows, remembered with the scene."""
+    if not folder:
+        return ()
+    allow_folders(scene, [bpy.path.abspath(folder)])
+    return (Path(bpy.path.abspath(folder)),)
 
 
 def _is_launch(path):
@@ -286,15 +450,24 @@ CLASSES = (
     ADF_OT_export_scene,
     ADF_OT_add_variant,
     ADF_OT_export_variants,
+    ADF_OT_allow_folders,
+    ADF_OT_confirm_export,
     *_file_handlers(),
 )
 
 
+@persistent
+def _loaded(*_):
+    forget_session()
+
+
 def attach() -> None:
+    bpy.app.handlers.load_post.append(_loaded)
     bpy.types.TOPBAR_MT_file_import.append(_import_entry)
     bpy.types.TOPBAR_MT_file_export.append(_export_entry)
 
 
 def detach() -> None:
+    bpy.app.handlers.load_post.remove(_loaded)
     bpy.types.TOPBAR_MT_file_import.remove(_import_entry)
     bpy.types.TOPBAR_MT_file_export.remove(_export_entry)

@@ -8,38 +8,45 @@ from .collecting import Collected, Part
 from .ligature.adf import Element
 from .ligature.adf.nodes import Mapping, parse
 from .ligature.adf.schema import BY_PATH
-from .ligature.adf.update import Item, given_values, new_text, updated
-from .mesh_files import HIGH, LOW
+from .ligature.adf.update import Item, given_values, new_text, unknown_values, updated
+from .mesh_files import NEW_FOLDERS
 from .placed import placed_keys
-from .schema_properties import unheld_paths
-
-NEW_FOLDERS = {HIGH: "./high_res/", LOW: "./low_res/"}
-"""Folders of a new model's meshes."""
+from .schema_properties import unheld_in_lists, unheld_paths
 
 
-def text_of(found: Collected, meshes: dict[str, dict] | None = None) -> str:
-    """The text of the file as it is now; ``meshes`` are mesh keys by the key of their object."""
+def text_of(found: Collected, meshes: dict[str, dict] | None = None, top: dict | None = None) -> str:
+    """The text of the file as it is now.
+
+    ``meshes`` are mesh keys by the key of their object, ``top`` keys of the file itself that differ for this export.
+    """
     if not found.kind:
         return found.source
     root = parse(found.source, Path(found.path or "new.yaml")) if found.source else None
     items = [_item(found, part, root, (meshes or {}).get(part.key, {})) for part in found.parts]
     if root is None:
         folders = NEW_FOLDERS if found.kind == "model" and found.has_meshes else {}
-        return new_text(found.kind, {**folders, **found.top}, items)
-    top = {**unheld_top(found.kind, root), **found.top}
+        return new_text(found.kind, {**folders, **found.top, **(top or {})}, items)
+    top = {**unheld_top(found.kind, root), **found.top, **(top or {})}
     kept = {part.was for part in found.parts}
     removed = [key for key in found.imported_keys if key not in kept]
     return updated(found.source, found.kind, top, items, removed, root)
 
 
 def _item(found: Collected, part: Part, root: Mapping | None, meshes: dict) -> Item:
-    """The object as it is to stand in the file."""
+    """The object as it is to stand in the file; a copy takes from its original what Blender does not hold."""
     kind = part.placed.kind
-    node = root.get(part.was) if root is not None and part.was else None
-    in_file = given_values(Element(kind, part.was, node)) if isinstance(node, Mapping) else {}
+    was = part.was or part.like
+    node = root.get(was) if root is not None and was else None
+    in_file = given_values(Element(kind, was, node)) if isinstance(node, Mapping) else {}
     unheld = {path: in_file[path] for path in unheld_paths(kind) if path in in_file}
-    values = {**unheld, **part.values, **placed_keys(part.placed, part.same, in_file), **meshes}
-    return Item(kind, part.key, values, was=part.was if node is not None else "")
+    before = part.before if isinstance(node, Mapping) else None
+    values = {**unheld, **part.values, **placed_keys(part.placed, before, in_file), **meshes}
+    if part.name and values.get("name") == in_file.get("name"):
+        values["name"] = part.name
+    values = {path: value for path, value in values.items() if value is not None}
+    known = isinstance(node, Mapping)
+    extra = unknown_values(Element(kind, was, node)) if known and not part.was else {}
+    return Item(kind, part.key, values, part.was if node is not None else "", extra, unheld_in_lists(kind))
 
 
 def unheld_top(kind: str, root: Mapping) -> dict:

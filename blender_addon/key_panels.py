@@ -5,7 +5,7 @@ import bpy
 from . import making
 from .ligature.adf.schema import SCHEMA, Type
 from .properties import KIND_OF_ROLE
-from .schema_properties import identifier, keys_of, unset
+from .schema_properties import SHOWN_UNITS, identifier, keys_of, unset
 
 CATEGORIES = {
     "Identity": ("name", "namespace", "passive", "publish frequency"),
@@ -56,13 +56,49 @@ SHOWN = {
 """Keys by kind and sub-panel, worked out once."""
 
 
+SLIDING = ("prismatic", "linear spring")
+SPRINGS = ("linear spring", "torsion spring")
+MOTORS = ("controller", "controller output type", "max motor impulse")
+OF_TYPE = {
+    "joint limits": lambda kind, path: (
+        kind.startswith("six dof") if path.count(".") > 1
+        else kind == "cone twist" if path[-2:] in (".x", ".y", ".z")
+        else kind in ("revolute", "prismatic", *SPRINGS)
+    ),
+    "stiffness": lambda kind, path: kind == "six dof spring" if "." in path else kind in SPRINGS,
+    **{name: lambda kind, path: kind in ("revolute", "prismatic", *SPRINGS) for name in MOTORS},
+}  # fmt: skip
+OF_TYPE["damping"] = OF_TYPE["equilibrium point"] = OF_TYPE["stiffness"]
+"""Whether a joint of a type has a key, by the key's first word."""
+
+
+def has_effect(group, kind, key):
+    """Whether a key does something for a joint of its type; one that the file gives is shown all the same."""
+    name = key.path.split(".")[0]
+    if kind != "joint" or name not in OF_TYPE or group.is_property_set(identifier(key.path)):
+        return True
+    return OF_TYPE[name](group.type, key.path)
+
+
+def unit_of(group, kind, key):
+    """The unit of a number, of a joint by its type and axis; empty where Blender shows it."""
+    units = key.unit.split(", ") if key.unit else []
+    if key.unit in SHOWN_UNITS or not units:
+        return ""
+    if len(units) == 1 or kind != "joint":
+        return key.unit
+    slides = ".linear." in key.path if group.type.startswith("six dof") else group.type in SLIDING
+    turning = [unit for unit in units if "rad" in unit or unit == "N·m·s"]
+    return next((unit for unit in units if (unit in turning) != slides), units[0])
+
+
 def draw_keys(layout, group, kind, keys):
     """Rows of properties; those that the file does not give are dim, those that it gives can be taken out."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     block = ""
-    for key in keys:
-        name = identifier(key.path)
+    for key in [key for key in keys if has_effect(group, kind, key)]:
+        name, unit = identifier(key.path), unit_of(group, kind, key)
         if key.block != block:
             block = key.block
             if block:
@@ -76,7 +112,10 @@ def draw_keys(layout, group, kind, keys):
             given = group.is_property_set(shown)
             body = row.row()
             body.active = given or key.required
-            body.prop(group, shown)
+            if unit:
+                body.prop(group, shown, text=f"{group.bl_rna.properties[shown].name} ({unit})")
+            else:
+                body.prop(group, shown)
             if given and not key.required:
                 operator = row.operator("adf.unset_key", text="", icon="X", emboss=False)
                 operator.name = shown
@@ -177,6 +216,8 @@ class ADF_PT_object(Physics, bpy.types.Panel):
         if making.is_file_object(obj):
             layout.prop(obj.adf, "key")
             layout.prop(obj.adf, "export")
+            if obj.adf.called and obj.adf.called != obj.name:
+                layout.label(text="Renamed: the export writes the new name", icon="INFO")
             self._ends(layout, obj)
         elif obj.adf.role == "SHAPE":
             self._shape(layout, obj.adf.shape)

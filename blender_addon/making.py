@@ -5,7 +5,6 @@ Nothing here selects, hides, renames or moves what the user has; new objects are
 
 from __future__ import annotations
 
-import re
 from math import pi
 
 import bmesh
@@ -17,8 +16,8 @@ from .ligature.authoring.shapes import Shape, shape_mesh
 from .mesh_data import shape_data
 from .placing import hang, place, rest_pose
 from .properties import KIND_OF_ROLE
-from .read_file import SHAPE_COLOUR, set_shape
-from .references import file_of
+from .read_file import SHAPE_COLOUR, set_shape, shape_collection
+from .references import file_of, topic_name
 
 PREFIXES = {
     "BODY": "BODY ", "JOINT": "JOINT ", "GHOST_OBJECT": "GHOST ", "SENSOR": "SENSOR ", "ACTUATOR": "ACTUATOR ",
@@ -26,6 +25,10 @@ PREFIXES = {
 }  # fmt: skip
 HANGING = ("GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SUTURE", "VOLUME")
 """Roles whose objects may hang on a body."""
+
+
+PARTS = ("SHAPE", "HULL", "INERTIAL")
+"""Roles of what belongs to one body."""
 
 
 def new_file(scene: bpy.types.Scene, name: str, kind: str, namespace: str = "/ambf/env/") -> bpy.types.Collection:
@@ -64,20 +67,47 @@ def give_role(obj: bpy.types.Object, role: str, collection: bpy.types.Collection
                 setattr(group, name, value)
 
 
-def topic_name(name: str) -> str:
-    """A name that ROS takes in topics: Blender counts copies behind a dot, which is none of theirs."""
-    return re.sub(r"[^A-Za-z0-9_/ ]", "_", name)
-
-
 def make_own(obj: bpy.types.Object) -> None:
-    """Make a copy of an object of a file an object of its own: identifier, name and mesh files."""
+    """Make a copy of an object of a file an object of its own: identifier, name, and the shapes of its original.
+
+    Its mesh files stay those of the original until the mesh is another one.
+    """
+    original = original_of(obj)
     obj.adf.key = free_key(file_of(obj), obj.adf.role, obj.name)
-    obj.adf.was = obj.adf.imported = obj.adf.mesh_print = ""
+    obj.adf.like, obj.adf.was = obj.adf.was or obj.adf.like, ""
     group = getattr(obj.adf, obj.adf.role.lower())
     group.name = obj.name if obj.adf.role == "JOINT" else topic_name(obj.name)
-    for name in ("mesh", "collision_mesh"):
-        if hasattr(group, name):
-            group.property_unset(name)
+    obj.adf.called = obj.name
+    if original is not None:
+        take_shapes(original, obj)
+
+
+def copied(obj: bpy.types.Object) -> bpy.types.Object:
+    """A copy of an object of a file in the same collections, an object of its own, with the same mesh."""
+    copy = obj.copy()
+    for collection in obj.users_collection:
+        collection.objects.link(copy)
+    make_own(copy)
+    return copy
+
+
+def original_of(copy: bpy.types.Object) -> bpy.types.Object | None:
+    """The object of the same file that has the identifier of a copy."""
+    file = file_of(copy)
+    same = [o for o in file.all_objects if o.adf.key == copy.adf.key and o.adf.role == copy.adf.role] if file else []
+    return next((other for other in same if other is not copy), None)
+
+
+def take_shapes(original: bpy.types.Object, copy: bpy.types.Object) -> None:
+    """Give a copy of a body copies of its primitives, hulls and inertial frame, where it has none."""
+    if any(child.adf.role in PARTS for child in copy.children):
+        return
+    for part in [child for child in original.children if child.adf.role in PARTS]:
+        own = part.copy()
+        for collection in part.users_collection:
+            collection.objects.link(own)
+        own.parent = copy
+        own.matrix_parent_inverse = part.matrix_parent_inverse.copy()
 
 
 def new_object(
@@ -116,7 +146,7 @@ def add_shape(
     body: bpy.types.Object, shape: Shape, use: str = "COLLISION", T_body: np.ndarray | None = None
 ) -> bpy.types.Object:
     """A primitive below a body."""
-    collection = file_of(body) or bpy.context.scene.collection
+    collection = _shapes_of_file(body)
     data = shape_data(*shape_mesh(shape), shape.kind.title())
     obj = bpy.data.objects.new(f"{body.name} {use.lower()}", data)
     collection.objects.link(obj)
@@ -124,6 +154,27 @@ def add_shape(
     set_shape(obj, shape, use, 1 + max((c.adf.shape.order for c in body.children if c.adf.role == "SHAPE"), default=-1))
     hang(obj, body, np.eye(4) if T_body is None else T_body)
     return obj
+
+
+def hang_on(obj: bpy.types.Object, body: bpy.types.Object, T_world: np.ndarray | None = None) -> None:
+    """Parent an object to a body; it stays where it is, or goes to a pose in the world."""
+    T = rest_pose(obj) if T_world is None else T_world
+    hang(obj, body, np.linalg.inv(rest_pose(body)) @ T)
+
+
+def new_part(body: bpy.types.Object, name: str, data: bpy.types.ID | None, role: str) -> bpy.types.Object:
+    """An object that belongs to a body, at the body's origin."""
+    obj = bpy.data.objects.new(name, data)
+    _shapes_of_file(body).objects.link(obj)
+    obj.adf.role = role
+    hang(obj, body, np.eye(4))
+    return obj
+
+
+def _shapes_of_file(body: bpy.types.Object) -> bpy.types.Collection:
+    """Where primitives, hulls and frames of a body belong."""
+    file = file_of(body)
+    return bpy.context.scene.collection if file is None else shape_collection(file)
 
 
 def redraw_shape(obj: bpy.types.Object) -> None:
@@ -136,7 +187,7 @@ def redraw_shape(obj: bpy.types.Object) -> None:
 def add_hull(body: bpy.types.Object, points: np.ndarray, order: int | None = None) -> bpy.types.Object:
     """A convex piece of the body's collision mesh around ``points`` (n, 3) in the body's frame."""
     vertices, faces = hull_of(points)
-    collection = file_of(body) or bpy.context.scene.collection
+    collection = _shapes_of_file(body)
     obj = bpy.data.objects.new(f"{body.name} hull", shape_data(vertices, faces, f"{body.name} hull"))
     collection.objects.link(obj)
     obj.adf.role = "HULL"
@@ -174,7 +225,7 @@ def inertial_of(body: bpy.types.Object, T_body: np.ndarray) -> bpy.types.Object:
     frame = next((c for c in body.children if c.adf.role == "INERTIAL"), None)
     if frame is None:
         frame = bpy.data.objects.new(f"{body.name} inertial", None)
-        (file_of(body) or bpy.context.scene.collection).objects.link(frame)
+        _shapes_of_file(body).objects.link(frame)
         frame.adf.role = "INERTIAL"
         frame.empty_display_type, frame.empty_display_size = "ARROWS", 0.01
     hang(frame, body, T_body)

@@ -1,5 +1,7 @@
 """Menus, the pie menu on Ctrl Alt A, and the preferences."""
 
+from pathlib import Path
+
 import bpy
 
 from .object_operators import OBJECT_ROLES
@@ -29,6 +31,7 @@ class ADF_MT_object(bpy.types.Menu):
         layout = self.layout
         layout.operator_menu_enum("adf.make", "role", text="Make")
         layout.operator_menu_enum("adf.connect", "type", text="Connect")
+        layout.operator("adf.duplicate")
         layout.operator("adf.clear_role")
         layout.operator_menu_enum("adf.fit_shape", "kind", text="Fit Primitive")
         layout.operator("adf.decompose")
@@ -63,6 +66,9 @@ class ADF_Preferences(bpy.types.AddonPreferences):
 
     def draw(self, context):
         self.layout.prop(self, "simulator")
+        guide = Path(__file__).with_name("blender.md")
+        if guide.is_file():
+            self.layout.operator("wm.url_open", text="Documentation", icon="HELP").url = guide.as_uri()
 
 
 def _add_entry(self, context):

@@ -336,7 +336,7 @@ def fingerprint(solid: Solid) -> str:
         digest.update(smooth.tobytes())
         if mesh.uv_layers.active:
             digest.update(_floats(mesh.uv_layers.active.data, "uv", 2).tobytes())
-    digest.update(np.round(solid.scale[:3, :3], 6).tobytes())
+    digest.update((np.round(solid.scale[:3, :3], 6) + 0.0).tobytes())  # a negative zero is none
     for slot in obj.material_slots:
         digest.update(repr(_look(slot.material)).encode())
     return digest.hexdigest()

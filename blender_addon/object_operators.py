@@ -152,6 +152,43 @@ class ADF_OT_add(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ADF_OT_duplicate(bpy.types.Operator):
+    """Copy the selected objects of files with their shapes; each copy gets an identifier and a name of its own"""
+
+    bl_idname = "adf.duplicate"
+    bl_label = "Duplicate with Shapes"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not any(making.is_file_object(obj) for obj in context.selected_objects):
+            cls.poll_message_set("Select objects that are part of a file")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        done = self.execute(context)
+        bpy.ops.transform.translate("INVOKE_DEFAULT")
+        return done
+
+    def execute(self, context):
+        originals = [obj for obj in context.selected_objects if making.is_file_object(obj)]
+        active = context.view_layer.objects.active
+        copies = {obj: making.copied(obj) for obj in originals}
+        for obj, copy in copies.items():
+            for end in ("parent_object", "child_object"):
+                body = getattr(obj.adf, end)
+                if body in copies:
+                    setattr(copy.adf, end, copies[body])
+            if obj.parent in copies:
+                copy.parent = copies[obj.parent]
+            obj.select_set(False)
+            copy.select_set(True)
+        if active in copies:
+            context.view_layer.objects.active = copies[active]
+        return {"FINISHED"}
+
+
 class ADF_OT_connect(bpy.types.Operator):
     """Join the selected bodies to the active one, which becomes the parent"""
 
@@ -288,7 +325,7 @@ def target_file(context, role):
     return collection
 
 
-CLASSES = (ADF_OT_new_file, ADF_OT_make, ADF_OT_clear, ADF_OT_add, ADF_OT_connect, ADF_OT_inertia)
+CLASSES = (ADF_OT_new_file, ADF_OT_make, ADF_OT_clear, ADF_OT_add, ADF_OT_duplicate, ADF_OT_connect, ADF_OT_inertia)
 
 
 def attach() -> None:

@@ -35,12 +35,17 @@ _IMPORT = re.compile(r"^(\s*)from ligature\.(\S+) import ", re.MULTILINE)
 _FIXED_TIME = (2026, 1, 1, 0, 0, 0)
 
 
+GUIDE = HERE.parent / "docs" / "blender.md"
+"""What the button of the preferences opens."""
+
+
 def stage(target: Path, vendored: bool) -> Path:
     """Lay the add-on out below ``target``; ``vendored`` adds pure-Python PyYAML for Blenders without it."""
     addon = target / NAME
     shutil.rmtree(addon, ignore_errors=True)
     ignored = shutil.ignore_patterns("__pycache__", "pack.py", "*.toml")
     shutil.copytree(HERE, addon, ignore=ignored)
+    shutil.copyfile(GUIDE, addon / GUIDE.name)
     (addon / "ligature").mkdir()
     (addon / "ligature" / "__init__.py").write_text(
         '"""The rooms of Ligature that authors need."""\n', encoding="utf-8"

@@ -17,7 +17,7 @@ from .ligature.adf.frames import matrix_quaternion
 from .ligature.authoring.placement import JointKeys, joint_pose, light_pose, matrix_of, rigid, view_pose
 from .ligature.authoring.shapes import Shape
 from .mesh_data import Solid
-from .placed import JointFrames, Placed
+from .placed import JointFrames, Placed, PlacedShape
 from .properties import KIND_OF_ROLE
 from .references import reference
 
@@ -120,12 +120,13 @@ def placed(obj: bpy.types.Object) -> Placed:
         ends = [reference(obj, body, text) if body else text for body, text in zip(bodies, texts, strict=True)]
         return Placed(kind, ends=tuple(ends), frames=None if None in bodies else _joint_frames(obj, *bodies))
     owner, own = owner_of(obj), rest_pose(obj)
+    T = own if owner is None or role == "BODY" else np.linalg.inv(rest_pose(owner)) @ own
     shaped = role in SHAPED
     return Placed(
         kind,
-        parent=reference(obj, owner, obj.adf.parent_text) if owner else obj.adf.parent_text,
-        T_owner=own if owner is None else np.linalg.inv(rest_pose(owner)) @ own,
-        T_world=own,
+        parent=_parent_of(obj, owner),
+        T=T,
+        reach=0.0 if obj.parent is None and not obj.constraints else float(np.abs(T[:3, 3]).max()),
         lens=(obj.data.angle_y, obj.data.clip_start, obj.data.clip_end)
         if (role, obj.type) == ("CAMERA",) * 2
         else None,
@@ -135,8 +136,17 @@ def placed(obj: bpy.types.Object) -> Placed:
     )
 
 
-def _placed_shapes(obj: bpy.types.Object, use: str) -> list[tuple[Shape, np.ndarray]]:
-    return [(shape_of(child), relative_pose(obj, child)) for child in shapes_of(obj, use)]
+def _parent_of(obj: bpy.types.Object, owner: bpy.types.Object | None) -> str:
+    """How the file names the owner; a text that was never found among the open files stays."""
+    if owner is not None:
+        return reference(obj, owner, obj.adf.parent_text)
+    return "" if obj.adf.hung else obj.adf.parent_text
+
+
+def _placed_shapes(obj: bpy.types.Object, use: str) -> list[PlacedShape]:
+    return [
+        PlacedShape(shape_of(child), relative_pose(obj, child), child.adf.shape.order) for child in shapes_of(obj, use)
+    ]
 
 
 def _joint_frames(obj: bpy.types.Object, parent: bpy.types.Object, child: bpy.types.Object) -> JointFrames:
@@ -145,7 +155,8 @@ def _joint_frames(obj: bpy.types.Object, parent: bpy.types.Object, child: bpy.ty
         relative_pose(parent, child),
         (inertial_frame(parent), inertial_frame(child)),
         tuple(body.adf.body.scale or 1.0 for body in (parent, child)),
-        is_prismatic(obj),
+        obj.adf.joint.type,
+        max(float(np.abs(rest_pose(one)[:3, 3]).max()) for one in (obj, parent, child)),
     )
 
 

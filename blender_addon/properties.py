@@ -83,6 +83,9 @@ class ADF_PG_object(bpy.types.PropertyGroup):
     )
     child_object: bpy.props.PointerProperty(type=bpy.types.Object, name="Child", description="Child body of the joint")
     was: bpy.props.StringProperty(options={"HIDDEN"})
+    like: bpy.props.StringProperty(options={"HIDDEN"})
+    called: bpy.props.StringProperty(options={"HIDDEN"})
+    hung: bpy.props.BoolProperty(options={"HIDDEN"})
     imported: bpy.props.StringProperty(options={"HIDDEN"})
     mesh_print: bpy.props.StringProperty(options={"HIDDEN"})
     inertia_factor: bpy.props.FloatProperty(
@@ -112,6 +115,7 @@ class ADF_PG_file(bpy.types.PropertyGroup):
     source: bpy.props.StringProperty(options={"HIDDEN"})
     byte_order_mark: bpy.props.BoolProperty(options={"HIDDEN"})
     imported_keys: bpy.props.StringProperty(options={"HIDDEN"})
+    written: bpy.props.StringProperty(options={"HIDDEN"})
 
 
 class ADF_PG_variant(bpy.types.PropertyGroup):
@@ -147,6 +151,8 @@ class ADF_PG_scene(bpy.types.PropertyGroup):
     filepath: bpy.props.StringProperty(name="Launch File", subtype="FILE_PATH")
     source: bpy.props.StringProperty(options={"HIDDEN"})
     byte_order_mark: bpy.props.BoolProperty(options={"HIDDEN"})
+    written: bpy.props.StringProperty(options={"HIDDEN"})
+    folders: bpy.props.StringProperty(options={"HIDDEN"})
     world: bpy.props.PointerProperty(type=bpy.types.Collection, name="World")
     environment: bpy.props.PointerProperty(
         type=bpy.types.Collection, name="Environment", description="Model that the world names as its surroundings"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,7 +16,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any
+from .folders import allowed_folders, remember_written
+from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any, read_launch
 from .ligature.adf.reader import read_text
 from .ligature.adf.references import find_by_text
 from .ligature.adf.update import Item, given_values, new_text
@@ -52,14 +54,16 @@ def import_file(
 
     ``reader`` is for a file whose kind is known; otherwise its keys show the kind.
     """
-    resolver = Resolver.for_file(path, roots)
+    resolver = Resolver.for_file(path, (*roots, *allowed_folders()))
     document = reader(path, resolver)
     collection = bpy.data.collections.new(path.stem)
     scene.collection.children.link(collection)
     stored = collection.adf
     stored.filepath = str(path)
     stored.source = document.text
-    stored.byte_order_mark = path.read_bytes().startswith(BOM_UTF8)
+    data = path.read_bytes()
+    stored.byte_order_mark = data.startswith(BOM_UTF8)
+    remember_written(stored, {path: data})
     stored.kind = {"model": "MODEL", "world": "WORLD", "input devices": "INPUT_DEVICES"}.get(document.kind, "OTHER")
     done = Import(collection, document, [str(d) for d in document.diagnostics if d.severity >= Severity.ERROR])
     if stored.kind == "OTHER":
@@ -82,6 +86,57 @@ def add_parts(collection: bpy.types.Collection, parts: Parts) -> list[bpy.types.
     for obj in made:
         obj.adf.was = ""
     return made
+
+
+def outside_folders(path: Path, roots: tuple[Path, ...] = ()) -> list[str]:
+    """Folders in which meshes of a scene file, or of the models of a launch file, lie and may not be read.
+
+    Raises `AdfError` when the file cannot be read.
+    """
+    resolver = Resolver.for_file(path, (*roots, *allowed_folders()))
+    document = read_any(path, resolver)
+    if document.kind == "launch":
+        launch = read_launch(path, resolver)
+        models = [reference.path for reference in launch.models if reference.path is not None]
+        found = [folder for model in models for folder in _outside_of(model, (*roots, *resolver.roots))]
+        return list(dict.fromkeys(found))
+    return _outside(document, resolver)
+
+
+def _outside_of(path: Path, roots: tuple[Path, ...]) -> list[str]:
+    resolver = Resolver.for_file(path, (*roots, *allowed_folders()))
+    try:
+        return _outside(read_any(path, resolver), resolver)
+    except AdfError:
+        return []  # opening it reports that
+
+
+def _outside(document: Document, resolver: Resolver) -> list[str]:
+    """The folders of one file; of two beside each other the one around them."""
+    found: dict[Path, None] = {}
+    for element in (e for listed in document.lists.values() for e in listed if e.kind in MESHED):
+        high, low = element.text("mesh"), element.text("collision mesh") or element.text("mesh")
+        for name, key in ((high, "high resolution path"), (low, "low resolution path")):
+            file = Path(os.path.normpath(document.path.parent / document.top.text(key) / element.text(key) / name))
+            try:
+                if name and not resolver.exists(file) and file.is_file():
+                    found[file.resolve().parent] = None
+            except OSError:
+                continue
+    around = [folder.parent for folder in found]
+    wider = {folder if around.count(folder.parent) < 2 else folder.parent: None for folder in found}
+    return [str(folder) for folder in wider]
+
+
+MESHED = ("body", "ghost object", "soft body")
+
+
+def worded(error: Exception) -> str:
+    """An error of a file in the words of this editor: its dialog, not the command line."""
+    return _COMMAND_LINE.sub(r"allow '\1' as Further Folder of the import dialog", str(error))
+
+
+_COMMAND_LINE = re.compile(r"allow it with --root (.+?) or \w+")
 
 
 def _with_free_keys(collection: bpy.types.Collection, items: tuple[Item, ...]) -> list[Item]:
@@ -122,6 +177,7 @@ class _Importer:
         """Make everything, and remember how it stood."""
         made = self.make()
         for obj in made:
+            obj.adf.called = obj.name
             obj.adf.imported = state_text(placed(obj).state())
             if obj.adf.role in SHAPED:
                 obj.adf.mesh_print = mesh_print(solids_of(obj))
@@ -151,8 +207,7 @@ class _Importer:
     def _shape_collection(self) -> bpy.types.Collection:
         """Where primitives, hulls and frames lie, so that one click hides them all."""
         if self.shape_collection is None:
-            self.shape_collection = bpy.data.collections.new(f"{self.collection.name} Shapes")
-            self.collection.children.link(self.shape_collection)
+            self.shape_collection = shape_collection(self.collection)
         return self.shape_collection
 
     def _make(self, element: Element) -> None:
@@ -209,7 +264,7 @@ class _Importer:
                 self.files[path] = load_mesh(path, self.resolver)
             self._report_missing_textures(element, self.files[path])
         except (MeshError, AdfError) as error:
-            self.done.problems.append(f"{element.kind} '{element.key}': {error}")
+            self.done.problems.append(f"{element.kind} '{element.key}': {worded(error)}")
             return None
         return self.files[path]
 
@@ -309,6 +364,17 @@ class _Importer:
         parent = self._find(obj.adf.parent_text, tuple(ROLE_OF_KIND))
         if parent is not None and parent is not obj:
             hang(obj, parent, rest_pose(obj))
+            obj.adf.hung = True
+
+
+def shape_collection(collection: bpy.types.Collection) -> bpy.types.Collection:
+    """The collection of a file's primitives, hulls and frames; made when there is none."""
+    name = f"{collection.name} Shapes"
+    found = next((c for c in collection.children if c.name.startswith(name)), None)
+    if found is None:
+        found = bpy.data.collections.new(name)
+        collection.children.link(found)
+    return found
 
 
 def find_open(text: str, kinds: tuple[str, ...]) -> bpy.types.Object | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import bpy
 
 from .ligature.adf.references import merged
@@ -23,6 +25,11 @@ def qualified(collection: bpy.types.Collection, obj: bpy.types.Object) -> str:
     return merged(_namespace(collection), getattr(own, "namespace", "")) + obj.adf.key
 
 
+def topic_name(name: str) -> str:
+    """A name that ROS takes in topics: Blender counts copies behind a dot, which is none of theirs."""
+    return re.sub(r"[^A-Za-z0-9_/ ]", "_", name)
+
+
 def _namespace(collection: bpy.types.Collection | None) -> str:
     group = None if collection is None else getattr(collection.adf, collection.adf.kind.lower(), None)
     return getattr(group, "namespace", "")
@@ -34,6 +41,8 @@ def reference(obj: bpy.types.Object, other: bpy.types.Object, given: str = "") -
     ``given`` is what the file or the user states; it stays where it means that object and none of the own file.
     """
     here, there = file_of(obj), file_of(other)
+    if there is None and given:  # its file is not open any more
+        return given
     if here is None or there is None or there is here:
         return other.adf.key
     whole = qualified(there, other)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from . import (
+    adopt_operators,
     check_operators,
     collision_operators,
     decompose_operators,
@@ -27,6 +28,7 @@ from . import (
 
 MODULES = (
     file_operators,
+    adopt_operators,
     launch_operators,
     object_operators,
     collision_operators,

@@ -41,6 +41,9 @@ PLACED = {
 _NUMBERS = (Type.NUMBER, Type.NUMBER_OR_MAP)
 _WHOLE = (Type.INTEGER, Type.UNSIGNED)
 _SUBTYPES = {"m": ("DISTANCE", "LENGTH"), "rad": ("ANGLE", "ROTATION"), "kg": ("NONE", "MASS")}
+SHOWN_UNITS = tuple(_SUBTYPES)
+"""Units that Blender shows beside a number by itself."""
+
 _GROUPS: dict[str, type] = {}
 
 
@@ -190,6 +193,17 @@ def unheld_paths(kind: str) -> list[str]:
         for key in SCHEMA[kind]
         if key.path not in held and not any(key.path == p or key.path.startswith(f"{p}.") for p in placed)
     ]
+
+
+@cache
+def unheld_in_lists(kind: str) -> frozenset[str]:
+    """Keys of items of lists that neither properties nor placing hold: they stay as the file has them."""
+    placed = PLACED.get(kind, ())
+    return frozenset(
+        key.path
+        for key in SCHEMA[kind]
+        if "[]" in key.path and not any(key.path.startswith(f"{p}[]") for p in placed) and not _has_property(kind, key)
+    )
 
 
 def unset(group: bpy.types.PropertyGroup, name: str) -> None:

@@ -18,6 +18,17 @@ class Sidebar:
     bl_category = "ADF"
 
 
+def _above(layout, group, name):
+    """A property below its name, which a narrow sidebar would cut beside it; a truth value beside its own."""
+    shown = group.bl_rna.properties[name]
+    if shown.type == "BOOLEAN":
+        layout.prop(group, name)
+        return
+    column = layout.column(align=True)
+    column.label(text=shown.name)
+    column.prop(group, name, text="")
+
+
 class ADF_UL_objects(bpy.types.UIList):
     """Objects of the file, with a search."""
 
@@ -61,13 +72,13 @@ class ADF_PT_file(Sidebar, bpy.types.Panel):
         row.operator("adf.import_launch", text="Import Launch")
         row.operator("adf.export_scene", text="Export Scene")
         layout.operator_menu_enum("adf.new_file", "kind", text="New File", icon="ADD")
+        layout.operator("adf.adopt", icon="IMPORT")
         collection = making.file_of(context.object) or chosen_collection(context)
         if collection is None:
             return
         box = layout.box()
-        box.use_property_split = True
         box.label(text=collection.name, icon="OUTLINER_COLLECTION")
-        box.prop(collection.adf, "filepath")
+        _above(box, collection.adf, "filepath")
         group = getattr(collection.adf, collection.adf.kind.lower(), None)
         for name in (
             "namespace",
@@ -80,7 +91,7 @@ class ADF_PT_file(Sidebar, bpy.types.Panel):
             if group is not None and hasattr(group, name):
                 row = box.column()
                 row.active = group.is_property_set(name)  # what the file does not give is dim
-                row.prop(group, name)
+                _above(row, group, name)
         for index, variant in enumerate(collection.adf.variants):
             row = layout.row(align=True)
             row.prop(variant, "filepath", text=str(index))
@@ -102,11 +113,8 @@ class ADF_PT_launch(Sidebar, bpy.types.Panel):
 
     def draw(self, context):
         layout, stored = self.layout, context.scene.adf
-        layout.use_property_split = True
-        layout.prop(stored, "filepath")
-        layout.prop(stored, "world")
-        layout.prop(stored, "world_path")
-        layout.prop(stored, "environment")
+        for name in ("filepath", "world", "world_path", "environment"):
+            _above(layout, stored, name)
         for index, entry in enumerate(stored.models):
             row = layout.row(align=True)
             row.label(text=str(index))
@@ -126,6 +134,7 @@ class ADF_PT_create(Sidebar, bpy.types.Panel):
         layout.operator_menu_enum("adf.make", "role", text="Make Selected", icon="CHECKMARK")
         layout.operator_menu_enum("adf.add", "role", text="Add Object", icon="ADD")
         layout.operator_menu_enum("adf.connect", "type", text="Connect by Joint", icon="CONSTRAINT")
+        layout.operator("adf.duplicate", icon="DUPLICATE")
         column = layout.column(align=True)
         column.operator("adf.add_needle", icon="CURVE_NCIRCLE")
         column.operator("adf.add_suture", icon="CURVE_DATA")
@@ -160,6 +169,9 @@ class ADF_PT_check(Sidebar, bpy.types.Panel):
     def draw(self, context):
         layout, stored = self.layout, context.scene.adf
         layout.operator("adf.check", icon="VIEWZOOM")
+        collection = chosen_collection(context)
+        if collection is not None and collection.adf.filepath:
+            layout.label(text=f"Export writes {bpy.path.basename(collection.adf.filepath)}", icon="FILE")
         if not len(stored.findings):
             return
         layout.template_list("ADF_UL_findings", "", stored, "findings", stored, "active_finding", rows=5)

@@ -19,7 +19,6 @@ from .read_file import qualified
 from .write_file import ExportError, export_file, members
 
 MOTION = "ADF Motion"
-NESTING = 8
 
 
 def command():
@@ -84,7 +83,7 @@ class ADF_OT_simulate(bpy.types.Operator):
     def _start(self, context):
         self._folder = tempfile.TemporaryDirectory(prefix="adf-simulate-")
         root = Path(self._folder.name)
-        folder = root.joinpath(*["scene"] * NESTING)  # paths that climb stay below the root
+        folder = root / "scene"
         folder.mkdir(parents=True)
         try:
             if len(context.scene.adf.models):
@@ -92,9 +91,8 @@ class ADF_OT_simulate(bpy.types.Operator):
                 export_scene(context.scene, file, remember=False)
             else:
                 file = folder / "model.yaml"
-                export_file(
-                    chosen_collection(context) or next(c for c in bpy.data.collections if c.adf.kind == "MODEL"), file
-                )
+                models = (c for c in bpy.data.collections if c.adf.kind == "MODEL")
+                export_file(chosen_collection(context) or next(models), file, remember=False)
         except ExportError as error:
             self.report({"ERROR"}, str(error))
             return False

@@ -22,6 +22,7 @@ from ligature.ros.arms.services import SERVICES
 from ligature.ros.cameras import PICTURES
 from ligature.ros.reception import COMMANDS as OBJECTS
 from ligature.ros.reception import RESETS
+from ligature.ros.tissue import TOPICS as TISSUE
 
 PACKAGE = Path(__file__).resolve().parents[2] / "simulator" / "ligature"
 
@@ -125,6 +126,14 @@ def topics() -> str:
             ),
             "## Cameras\n\nBelow `<camera>`, and below `<camera>/left` and `<camera>/right` of stereo cameras.\n",
             _table(("topic", "type"), [(f"`{topic}`", _type(type_)) for topic, type_ in PICTURES.items()]),
+            "## Bodies of tissue\n\nBelow the topic of the body.\n",
+            _table(
+                ("topic", "type", "rate", "meaning"),
+                [
+                    (f"`{topic}`", _type(type_), "as State" if rate is None else f"{rate:.0f} Hz", _meaning(template))
+                    for topic, (template, type_, rate) in TISSUE.items()
+                ],
+            ),
             "## Arms: published\n\nBelow the arm's name, such as `/PSM1`.\n",
             _table(("topic", "type", "arms", "rate"), published),
             "## Arms: commands\n",
@@ -133,6 +142,11 @@ def topics() -> str:
             _table(("service", "type"), [(f"`{name}`", _type(type_)) for name, type_ in SERVICES.items()]),
         ]
     )
+
+
+def _meaning(template: type) -> str:
+    """The first line of a docstring, after the type."""
+    return _first(template.__doc__).partition(": ")[2]
 
 
 def _kinds(kinds: Iterable[ArmKind]) -> str:

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from ligature.authoring.save import SaveError, checked_text, save_all
+from ligature.authoring.save import SaveError, checked_text, digests, foreign, save_all
 
 
 def test_only_what_differs_is_written(tmp_path: Path) -> None:
@@ -54,3 +54,39 @@ def test_text_that_cannot_be_read_back_is_refused(tmp_path: Path) -> None:
     assert checked_text("a: 1\n", tmp_path / "m.yaml") == b"a: 1\n"
     with pytest.raises(SaveError, match="'m.yaml' would not be readable"):
         checked_text("a: [1\nb: }", tmp_path / "m.yaml")
+
+
+def test_nothing_is_written_outside_the_roots(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "link").symlink_to(tmp_path)
+    for outside in (tmp_path / "a", tmp_path / "in" / ".." / "a", tmp_path / "in" / "link" / "a"):
+        with pytest.raises(SaveError, match="a' lies outside"):
+            save_all({tmp_path / "in" / "b": b"1", outside: b"1"}, [tmp_path / "in"])
+        assert not (tmp_path / "a").exists() and not (tmp_path / "in" / "b").exists()
+    assert save_all({tmp_path / "in" / "b": b"1"}, [tmp_path / "in"]) == [tmp_path / "in" / "b"]
+
+
+def test_old_files_stay_beside_the_new_until_the_last_is_in_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).write_bytes(b"old " + name.encode())
+    seen: list[set[bytes]] = []
+    replace = os.replace
+
+    def watched(source: str | Path, target: str | Path) -> None:
+        replace(source, target)
+        seen.append({path.read_bytes() for path in tmp_path.iterdir()})
+
+    monkeypatch.setattr(os, "replace", watched)
+    save_all({tmp_path / "a": b"new a", tmp_path / "b": b"new b"})
+    assert b"old a" in seen[-1] and b"old b" in seen[-1]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+
+
+def test_files_that_others_wrote_are_known_by_their_content(tmp_path: Path) -> None:
+    for name in ("own", "other", "same"):
+        (tmp_path / name).write_bytes(b"old")
+    own = digests({tmp_path / "own": b"old", tmp_path / "other": b"as it was written"})
+    files = {tmp_path / name: b"new" for name in ("own", "other", "missing")} | {tmp_path / "same": b"old"}
+    assert foreign(files, own) == [tmp_path / "other"]

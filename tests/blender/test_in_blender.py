@@ -17,3 +17,12 @@ INSIDE = Path(__file__).resolve().parent / "inside"
 def test_the_add_on_holds_in_blender(blender: Callable[..., str], file: str) -> None:
     output = blender(file)
     assert " passed" in output and " failed" not in output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", ["test_changes.py", "test_outside.py"])
+def test_every_real_file_is_changed_and_exported_safely(
+    blender: Callable[..., str], monkeypatch: pytest.MonkeyPatch, file: str
+) -> None:
+    monkeypatch.setenv("LIGATURE_WHOLE_CORPUS", "1")
+    assert " passed" in blender(file)

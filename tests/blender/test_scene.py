@@ -24,12 +24,13 @@ def test_the_script_writes_the_scene_byte_for_byte(scripts: Path, tmp_path: Path
     version = subprocess.run([binary, "--version"], capture_output=True, text=True, timeout=100, check=True).stdout
     if "Blender 3.4" not in version:
         pytest.skip("the scene was written by Blender 3.4; other versions round bevelled edges in another order")
+    for folder in ("suturing_small", "theatre"):  # the arms and the room are named where they lie
+        shutil.copytree(SCENES / folder, tmp_path / folder)
+    script = shutil.copy(SCENES / "author_blender_suturing.py", tmp_path)
     target = tmp_path / "blender_suturing"
-    command = [binary, "-b", "--factory-startup", "--python-exit-code", "1"]
-    command += ["--python", str(SCENES / "author_blender_suturing.py"), "--", str(target)]
+    command = [binary, "-b", "--factory-startup", "--python-exit-code", "1", "--python", str(script), "--", str(target)]
     environment = {**os.environ, "BLENDER_USER_SCRIPTS": str(scripts), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=500, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert contents(target) == contents(SCENES / "blender_suturing")
-    for name, data in contents(tmp_path / "suturing_small").items():  # the arms were opened, and came back
-        assert data == (SCENES / "suturing_small" / name).read_bytes(), name
+    assert contents(tmp_path / "suturing_small") == contents(SCENES / "suturing_small")

@@ -220,3 +220,28 @@ def test_a_file_that_cannot_grow_is_reported_and_leaves_nothing(tmp_path: Path) 
     assert done.returncode == 7, done.stderr[-2000:]
     assert f"cannot write the dataset '{path}'" in done.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+def test_tissue_is_sampled_with_its_punctures_and_forces(tmp_path: Path) -> None:
+    simulation = ligature.Simulation(ligature.load(ROOT / "scenes" / "needle_insertion" / "launch.yaml"))
+    simulation.bodies["Needle"].set_pose([0.03, 0.23, 0.7185, 0.7071068, 0, 0, 0.7071068])
+    truth = []
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), rate=100.0) as writer:
+        for _ in range(10):
+            simulation.step(10)
+            writer.sample()
+            state = simulation.state[0]
+            truth.append({name: state[name].copy() for name in (
+                "tissue_node", "tissue_wrench", "tissue_peak", "puncture_count", "puncture_point", "puncture_normal"
+            )})  # fmt: skip
+    simulation.close()
+    with h5py.File(tmp_path / "a.h5") as file:
+        block = file["episode_0000/tissue/Block"]
+        for name, field in {
+            "points": "tissue_node", "wrench": "tissue_wrench", "peak_force": "tissue_peak",
+            "puncture_count": "puncture_count", "puncture_points": "puncture_point",
+            "puncture_normals": "puncture_normal",
+        }.items():  # fmt: skip
+            expected = np.array([moment[field] if name == "points" else moment[field][0] for moment in truth])
+            np.testing.assert_allclose(block[name][:], expected, rtol=1e-5, atol=1e-6, err_msg=name)
+        assert np.abs(np.diff(block["points"][:], axis=0)).max() > 0.0

@@ -27,7 +27,7 @@ class Element:
         self.key = key
         self.node = node
         self.mark = node.mark
-        self._prefix = prefix
+        self.prefix = prefix
         self._values: dict[str, Any] = {}
 
     def has(self, path: str) -> bool:
@@ -49,7 +49,7 @@ class Element:
         return self._values[path]
 
     def _read(self, path: str) -> Any:
-        key = BY_PATH[self.kind][self._prefix + path]
+        key = BY_PATH[self.kind][self.prefix + path]
         node = self._node(path)
         if node is None:
             return key.default
@@ -96,7 +96,7 @@ class Element:
         """The items of a list of blocks, as elements with paths below ``path[]``."""
         node = self._node(path)
         items = node.items if isinstance(node, Sequence) else []
-        prefix = f"{self._prefix}{path}[]."
+        prefix = f"{self.prefix}{path}[]."
         return tuple(
             Element(self.kind, f"{self.key}.{path}[{i}]", item, prefix)
             for i, item in enumerate(items)

@@ -102,15 +102,39 @@ def remove_key(text: str, owner: Mapping, name: str) -> Edit:
 
 
 def add_item(text: str, items: Sequence, value: Any) -> Edit:
-    """Add ``value`` at the end of a list."""
+    """Add ``value`` at the end of a list, written as the item before it."""
     if items.flow:
         at = len(text[: items.span[1] - 1].rstrip())
         separator = "" if not items.items else " " if text[at - 1] == "," else ", "
         return Edit((at, at), separator + flow_text(value))
     at = _line_end(text, content_end(items))
-    dash = text.rfind("-", 0, items.uses[-1][0])
+    dash = _dash(text, items.uses[-1][0])
+    return Edit((at, at), _lines(text, ["", *_item_lines(text, dash, items.items[-1], value)]))
+
+
+def insert_item(text: str, items: Sequence, index: int, value: Any) -> Edit:
+    """Add ``value`` before the item at ``index``, written as that one."""
+    start = items.uses[index][0]
+    if items.flow:
+        return Edit((start, start), flow_text(value) + ", ")
+    dash = _dash(text, start)
+    begin = text.rfind("\n", 0, dash) + 1
+    if text[begin:dash].strip():
+        raise PatchError(f"the item at {items.items[index].mark} shares its line, so nothing can be put before it")
+    return Edit((begin, begin), _lines(text, [*_item_lines(text, dash, items.items[index], value), ""]))
+
+
+def _item_lines(text: str, dash: int, beside: Node, value: Any) -> list[str]:
+    """The lines of an item of a list in blocks, whose dashes stand below the one at offset ``dash``."""
     column = dash - (text.rfind("\n", 0, dash) + 1)
-    return Edit((at, at), _lines(text, ["", " " * column + "- " + flow_text(value)]))
+    if isinstance(beside, Mapping) and not beside.flow:
+        return _indented(entry_lines("", [value])[1:], column)
+    return [" " * column + "- " + flow_text(value)]
+
+
+def spelled_out(node: Node) -> str:
+    """The text of a value in one line, with all its keys and digits, for a place where an alias stood."""
+    return flow_text(_literal(node))
 
 
 def remove_item(text: str, items: Sequence, index: int) -> Edit:
@@ -119,8 +143,16 @@ def remove_item(text: str, items: Sequence, index: int) -> Edit:
     if items.flow:
         following = items.uses[index + 1][0] if index + 1 < len(items.items) else None
         return Edit(_without_comma(text, (start, end), following, index > 0), "")
-    begin = text.rfind("\n", 0, start) + 1
+    begin = text.rfind("\n", 0, _dash(text, start)) + 1  # the dash may stand on a line of its own
     return Edit((begin, _next_line(text, end)), "")
+
+
+def _dash(text: str, start: int) -> int:
+    """The dash of the item of a list whose value begins at ``start``."""
+    dash = text.rfind("-", 0, start)
+    while dash > 0 and not (text[dash - 1].isspace() and text[dash + 1 : dash + 2].isspace()):
+        dash = text.rfind("-", 0, dash)
+    return max(dash, 0)
 
 
 def rename_key(owner: Mapping, name: str, new: str) -> Edit:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ligature.adf import nodes
+from ligature.adf.align import aligned
 from ligature.adf.document import Document, Element
 from ligature.adf.patch import (
     Edit,
@@ -22,10 +23,12 @@ from ligature.adf.patch import (
     add_key,
     aliases_into,
     apply,
+    insert_item,
     remove_item,
     remove_key,
     rename_key,
     set_value,
+    spelled_out,
 )
 from ligature.adf.schema import BY_PATH, LISTS, PLURALS, SCHEMA, Key, Type
 from ligature.adf.values import BadValue
@@ -52,6 +55,8 @@ class Item:
         Its key in the file that is changed, when that is another one.
     extra
         Keys that the schema does not know, as nested plain values; written for new objects only.
+    unheld
+        Paths of the schema that the editor does not hold, such as ``wheels[].mesh``: they stay as they are.
     """
 
     kind: str
@@ -59,6 +64,7 @@ class Item:
     values: Mapping[str, Any]
     was: str = ""
     extra: Mapping[str, Any] = field(default_factory=dict)
+    unheld: Collection[str] = ()
 
 
 def given_values(element: Element) -> dict[str, Any]:
@@ -153,7 +159,9 @@ def _edits(
     for item in items:
         node = root.get(item.key)
         if isinstance(node, nodes.Mapping):
-            edits += _changes(text, node, Element(item.kind, item.key, node), item.values, behind_alias)
+            edits += _changes(
+                text, node, Element(item.kind, item.key, node), item.values, behind_alias, frozenset(item.unheld)
+            )
     return edits or behind_alias[:1]
 
 
@@ -212,16 +220,26 @@ def _list_entries(node: nodes.Node | None) -> list[tuple[nodes.Span, nodes.Scala
 
 
 def _changes(
-    text: str, owner: nodes.Mapping, element: Element, wanted: Mapping[str, Any], behind_alias: list[Edit]
+    text: str,
+    owner: nodes.Mapping,
+    element: Element,
+    wanted: Mapping[str, Any],
+    behind_alias: list[Edit],
+    unheld: frozenset[str] = frozenset(),
 ) -> Iterator[Edit]:
     """Edits that give ``owner`` the wanted values; those of aliased values go to ``behind_alias``."""
-    old = given_values(element)
+    prefix = element.prefix
+    old = _given(element, prefix)
     known = BY_PATH[element.kind]
     additions: dict[str, dict[str, Any]] = {}
     for path, value in wanted.items():
         if path in old and same(old[path], value):
             continue
-        for inner, part in _pieces(owner, known[path], path, old.get(path), value):
+        key = known[prefix + path]
+        if key.type is Type.MAPS and old.get(path) and value and len(old[path]) == len(_items_at(owner, path)):
+            yield from _list_changes(text, owner, element, path, value, behind_alias, unheld)
+            continue
+        for inner, part in _pieces(owner, key, path, old.get(path), value):
             if _aliased(owner, inner):
                 behind_alias.append(set_value(text, owner, inner, part))
                 continue
@@ -232,7 +250,60 @@ def _changes(
                 _put(additions.setdefault(block, {}), inner[len(block) + 1 :], part)
     for block, values in additions.items():
         yield set_value(text, owner, block, values)
-    yield from _removals(text, owner, element, [path for path in old if path not in wanted])
+    gone = [path for path in old if path not in wanted and prefix + path not in unheld]
+    yield from _removals(text, owner, element, gone)
+
+
+def _items_at(owner: nodes.Mapping, path: str) -> list[nodes.Node]:
+    node: nodes.Node | None = owner
+    for part in path.split("."):
+        node = node.get(part) if isinstance(node, nodes.Mapping) else None
+    return node.items if isinstance(node, nodes.Sequence) else []
+
+
+def _list_changes(
+    text: str,
+    owner: nodes.Mapping,
+    element: Element,
+    path: str,
+    wanted: Sequence[Mapping[str, Any]],
+    behind_alias: list[Edit],
+    unheld: frozenset[str],
+) -> Iterator[Edit]:
+    """Edits of a list of blocks, item by item: what differs in an item, else items that are new, else those that go."""
+    *inner, name = path.split(".")
+    parent = owner
+    for part in inner:
+        if parent.aliased(part):
+            behind_alias.append(Edit(parent.uses[part], spelled_out(parent.entries[part][1])))
+            return
+        parent = parent.entries[part][1]  # type: ignore[assignment]
+    listed = parent.entries[name][1]
+    assert isinstance(listed, nodes.Sequence)
+    if parent.aliased(name):
+        behind_alias.append(Edit(parent.uses[name], spelled_out(listed)))
+        return
+    children = element.children(path)
+    prefix = children[0].prefix
+    held = [{p: v for p, v in _given(child, prefix).items() if prefix + p not in unheld} for child in children]
+    pairs = aligned(held, wanted, same)
+    both = [(i, j) for i, j in pairs if i is not None and j is not None and not same(held[i], wanted[j])]
+    for i, j in both:
+        if listed.uses[i] != listed.items[i].span:
+            behind_alias.append(Edit(listed.uses[i], spelled_out(listed.items[i])))
+            continue
+        yield from _changes(text, children[i].node, children[i], wanted[j], behind_alias, unheld)
+    if both:
+        return
+    new = [(at, j) for at, (i, j) in enumerate(pairs) if i is None and j is not None]
+    for at, j in new:
+        value = _nested(element.kind, wanted[j], prefix)
+        following = next((i for i, _ in pairs[at:] if i is not None), None)
+        yield add_item(text, listed, value) if following is None else insert_item(text, listed, following, value)
+    if new:
+        return
+    gone = [i for i, j in pairs if j is None and i is not None]
+    yield from (remove_item(text, listed, i) for i in (gone[:1] if listed.flow else gone))
 
 
 def _pieces(owner: nodes.Mapping, key: Key, path: str, old: Any, new: Any) -> Iterator[tuple[str, Any]]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -20,43 +22,100 @@ class SaveError(OSError):
     """Files that could not be saved; nothing was changed. The message states which and why."""
 
 
-def save_all(files: Mapping[Path, bytes]) -> list[Path]:
+def save_all(files: Mapping[Path, bytes], roots: Collection[Path] | None = None) -> list[Path]:
     """Write ``files``; those that hold their content already are left alone.
 
-    All are on the disk before the first takes its place, and what took its place goes back when a
-    later one cannot: a full disk or a folder that cannot be written leaves everything as it was, new
-    folders too. Returns the paths that were written. Raises `SaveError`.
+    All are on the disk before the first takes its place, and the files that they replace stay beside them until the
+    last has: a full disk, a folder that cannot be written or a process that is ended leaves what was there. New folders
+    go again too. With ``roots``, links resolved, nothing is written outside these folders. Returns the paths that were
+    written. Raises `SaveError`.
     """
-    files = {path.parent.resolve() / path.name: data for path, data in files.items()}  # 'new/../old' is there already
-    before = {path: _content(path) for path in files}
-    changed = {path: data for path, data in files.items() if before[path] != data}
+    files = {_real(path): data for path, data in files.items()}  # 'new/../old' is there already
+    changed = {path: data for path, data in files.items() if _content(path) != data}
+    refuse_outside(changed, roots)
     folders = [folder for path in changed for folder in (path.parent, *path.parent.parents) if not folder.exists()]
     with ThreadPoolExecutor(WRITERS) as pool:  # most of the time goes to waiting for the disk
         writing = [(pool.submit(_staged, path, data), path) for path, data in changed.items()]
     staged = [(job.result(), path) for job, path in writing if job.exception() is None]
+    kept: dict[Path, str] = {}
     placed: list[Path] = []
     try:
         for job, _ in writing:
             job.result()
         for name, path in staged:
+            if path.is_file():
+                kept[path] = _kept(path)
             os.replace(name, path)
             placed.append(path)
     except OSError as error:
-        _take_back({path: before[path] for path in placed}, [name for name, _ in staged], folders)
+        _take_back(placed, kept, [name for name, _ in staged], folders)
         path = Path(error.filename2 or error.filename or next(iter(changed)))
         raise SaveError(f"'{path}' cannot be written: {error.strerror or error}") from error
+    for old in kept.values():
+        with suppress(OSError):
+            os.unlink(old)
     return list(changed)
 
 
-def _take_back(replaced: Mapping[Path, bytes | None], staged: list[str], folders: list[Path]) -> None:
+def refuse_outside(files: Iterable[Path], roots: Collection[Path] | None) -> None:
+    """Raise `SaveError` when a file lies outside the folders ``roots``, links resolved; None allows all."""
+    if roots is None:
+        return
+    allowed = [root.resolve() for root in roots]
+    for path in files:
+        real = _real(path)
+        if not any(root in real.parents for root in allowed):
+            listed = ", ".join(f"'{root}'" for root in allowed)
+            raise SaveError(f"'{real}' lies outside {listed}, so nothing was written")
+
+
+def foreign(files: Mapping[Path, bytes], own: Mapping[str, str]) -> list[Path]:
+    """The existing files that ``files`` would change and that are not as ``own`` has them: `digest` by path."""
+    found = []
+    for path, data in files.items():
+        before = _content(_real(path))
+        if before is not None and before != data and own.get(str(_real(path))) != digest(before):
+            found.append(_real(path))
+    return found
+
+
+def digest(data: bytes) -> str:
+    """A text that tells contents of files apart."""
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
+
+
+def digests(files: Mapping[Path, bytes]) -> dict[str, str]:
+    """The digest of each file by its real path."""
+    return {str(_real(path)): digest(data) for path, data in files.items()}
+
+
+def _real(path: Path) -> Path:
+    """The path with the links of its folder resolved; a link in its own place is replaced, not followed."""
+    return path.parent.resolve() / path.name
+
+
+def _kept(path: Path) -> str:
+    """A second name of a file, beside it, under which it stays until all files are in their places."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".old")
+    os.close(handle)
+    os.unlink(name)
+    try:
+        os.link(path, name)
+    except OSError:  # a file system without hard links
+        shutil.copy2(path, name)
+    return name
+
+
+def _take_back(placed: list[Path], kept: Mapping[Path, str], staged: list[str], folders: list[Path]) -> None:
     """Put back what was there before, and remove what was added."""
     for name in staged:
         Path(name).unlink(missing_ok=True)
-    for path, data in replaced.items():
-        if data is None:
+    for path in placed:
+        if path not in kept:
             path.unlink(missing_ok=True)
-        else:
-            os.replace(_staged(path, data), path)
+    for path, old in kept.items():
+        os.replace(old, path)  # of two names of one file this leaves both
+        Path(old).unlink(missing_ok=True)
     for folder in sorted(set(folders), key=lambda f: len(f.parts), reverse=True):
         with suppress(OSError):
             folder.rmdir()

@@ -20,7 +20,8 @@ from ligature.camera_simulation import Simulation
 from ligature.datasets.interrupts import uninterrupted
 from ligature.datasets.labels import ACTIVITIES, GESTURES, ActivityWatch
 from ligature.datasets.store import DatasetError, EpisodeStore
-from ligature.model.scene import ArmDescription, ArmKind, JointType
+from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
+from ligature.model.soft import TissueBody
 
 FORMAT = "ligature dataset 2"
 DEPTH_UNIT = 1e-4
@@ -216,6 +217,8 @@ class DatasetWriter:
         for rod in scene.rods[:1]:
             yield "thread/points", state["body_pose"][list(rod.bodies), :3], {"dtype": "f4", "units": "m"}
             yield "thread/tension", state["rod_tension"][list(rod.bodies)], {"dtype": "f4", "units": "N"}
+        for tissue in scene.tissues:
+            yield from _tissue(scene, tissue, state)
         for name, camera in self._cameras.items():
             yield from self._pictures(name, camera)
 
@@ -325,3 +328,16 @@ def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: 
 
 def _unit(kind: JointType) -> str:
     return "m" if kind is JointType.PRISMATIC else "rad"
+
+
+def _tissue(scene: Scene, tissue: TissueBody, state: Any) -> Iterator[Value]:
+    """Nodes, forces and punctures of a body of tissue, in world axes."""
+    names = [scene.bodies[other.body].identity.name for other in scene.tissues]
+    own = names[tissue.index] if names.count(names[tissue.index]) == 1 else f"{names[tissue.index]}{tissue.index}"
+    k, places = tissue.index, {"dtype": "f4", "units": "m"}
+    yield f"tissue/{own}/points", state["tissue_node"][tissue.rows], places
+    yield f"tissue/{own}/wrench", state["tissue_wrench"][k], {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
+    yield f"tissue/{own}/peak_force", state["tissue_peak"][k], {"dtype": "f4", "units": "N"}
+    yield f"tissue/{own}/puncture_count", state["puncture_count"][k], {"dtype": "i4"}
+    yield f"tissue/{own}/puncture_points", state["puncture_point"][k], places
+    yield f"tissue/{own}/puncture_normals", state["puncture_normal"][k], {"dtype": "f4"}

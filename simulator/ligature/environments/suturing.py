@@ -316,7 +316,13 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def _info(self) -> dict[str, Any]:
         assert self._progress is not None
         left, done, lost = self._progress
-        return {"distance": left, "is_success": done, "lost": lost, "sim_time": self._simulation.time}
+        info = {"distance": left, "is_success": done, "lost": lost, "sim_time": self._simulation.time}
+        if self._simulation.scene.tissues:
+            state = self._simulation.state
+            info["tissue_force"] = float(np.linalg.norm(state["tissue_wrench"][0, 0, :3]))
+            info["tissue_peak_force"] = float(state["tissue_peak"][0, 0])
+            info["punctures"] = int(state["puncture_count"][0, 0])
+        return info
 
     def render(self) -> Any:
         """A picture (480, 640, 3) of the camera."""

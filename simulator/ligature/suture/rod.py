@@ -320,28 +320,14 @@ class Rod:
         self._pulled.setdefault(i, (nodes.gravity[i].copy(), float(nodes.mass[i]), nodes.inertia[i].copy()))
         nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = acceleration, mass, inertia
 
-    def add_spring(self, node: int, stiffness: Array, load: Array) -> int:
-        """Let load - stiffness d, (6,) and (6, 6), act on a node in this tick; its row in `springs`, -1 when full."""
-        row = int(self.springs.filled[0])
-        if row == len(self.springs.node):
-            return -1
-        self.springs.node[row], self.springs.K[row], self.springs.load[row] = node, stiffness, load
-        self.springs.filled[0] = row + 1
-        return row
+    @property
+    def spring_table(self) -> NDArray[np.int64]:
+        """The springs for compiled code."""
+        return self._spring_table
 
     def clear_springs(self) -> None:
         """Remove the springs of the last tick."""
         self.springs.filled[0] = 0
-
-    def moved(self, spring: int) -> Array:
-        """Motion (6,) of a spring's node in the tick."""
-        i, nodes = int(self.springs.node[spring]), self._nodes
-        turn = matrix_quaternion(quaternion_matrix(nodes.q[i]) @ quaternion_matrix(self.springs.q[spring]).T)
-        axis, w = (turn[:3], turn[3]) if turn[3] >= 0.0 else (-turn[:3], -turn[3])
-        size = float(np.sqrt(axis @ axis))
-        return np.concatenate(
-            [nodes.x[i] - self.springs.x[spring], 2.0 * np.arctan2(size, w) / max(size, 1e-300) * axis]
-        )
 
     def joint_load(self, body: int) -> Array:
         """Force and moment (6,) of the rod on a partner in the last tick, without those of `springs`."""

@@ -130,6 +130,11 @@ def has_opening():
     select(find("BODY", "base"))
 
 
+def has_rigid_body():
+    bpy.ops.mesh.primitive_cube_add(location=(2.0, 2.0, 2.0))
+    bpy.ops.rigidbody.object_add()
+
+
 def has_finding():
     find("BODY", "phantom").adf.body.property_unset("mass")
     bpy.ops.adf.check()
@@ -164,6 +169,18 @@ RECIPES = {
     "edit_list": [({"name": "array", "index": -1}, add_sensor), ({"name": "array", "index": 0}, add_sensor)],
     "import_file": [({"filepath": str(OUT / "files" / "scene.yaml")}, files)],
     "export_file": [({"filepath": str(OUT / "one.yaml"), "collection": "scene"}, nothing)],
+    "adopt": [({}, has_rigid_body)],
+    "allow_folders": [({"folders": '["/somewhere"]'}, nothing)],
+    "confirm_export": [
+        (
+            {
+                "operator": "export_file",
+                "arguments": json.dumps({"filepath": str(OUT / "asked.yaml"), "collection": "scene"}),
+            },
+            nothing,
+        )
+    ],
+    "duplicate": [({}, on("BODY", "link1"))],
     "import_launch": [({"filepath": str(OUT / "files" / "launch.yaml")}, files)],
     "export_scene": [({"filepath": str(OUT / "all" / "launch.yaml")}, nothing)],
     "add_variant": [({}, lambda: activate("scene"))],

@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+import random
 
 import bpy
 
@@ -50,3 +52,18 @@ def scene_print():
     report.append(sorted((c.name, len(c.objects)) for c in bpy.data.collections))
     report.append([len(bpy.data.meshes), len(bpy.data.materials), len(bpy.data.scenes)])
     return hashlib.sha256(json.dumps(report).encode()).hexdigest()
+
+
+def corpus_files(corpus):
+    """Every real file that opens by itself; a launch file opens with all that it names."""
+    found = [f for f in sorted(corpus.rglob("*.yaml")) if f.name != "compound_example.yaml"]  # which is no YAML
+    return [f for f in found if "multibody configs" not in f.read_text(errors="replace")]
+
+
+def corpus_sample(corpus, count=9):
+    """A few of the real files, drawn once for all; all of them with LIGATURE_WHOLE_CORPUS."""
+    found = corpus_files(corpus)
+    if os.environ.get("LIGATURE_WHOLE_CORPUS"):
+        return found
+    wanted = [f for f in found if f.name in ("blender-psm.yaml", "psm1.yaml", "ghosts.yaml", "parallel_structure.yaml")]
+    return [*wanted, *random.Random(19).sample([f for f in found if f not in wanted], count - len(wanted))]

@@ -11,6 +11,7 @@ from adf_studio.ligature.adf import Resolver, read_any, read_launch
 from adf_studio.ligature.mesh import load_mesh
 from adf_studio.mesh_data import shape_data
 from adf_studio.placing import relative_pose, rest_pose, shape_of
+from adf_studio.write_file import prepared
 
 from .scene import body, model, scene_print, select
 
@@ -287,3 +288,115 @@ def test_files_can_be_dropped_where_blender_takes_them():
     assert handler.bl_file_extensions.split(";") == [".yaml", ".yml", ".ambf"]
     names = bpy.ops.adf.import_file.get_rna_type().properties.keys()
     assert {"filepath", "directory", "files"} <= set(names)  # what Blender hands a dropped file over in
+
+
+def test_an_instance_of_a_collection_is_refused_before_anything_is_written(tmp_path):
+    collection = model()
+    parts = bpy.data.collections.new("parts")
+    instance = bpy.data.objects.new("shown", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", parts
+    bpy.context.scene.collection.objects.link(instance)
+    bpy.context.view_layer.update()
+    select(instance)
+    bpy.ops.adf.make(role="BODY")
+    words = (
+        "'shown' shows the collection 'parts', whose objects are not written; use Object > Apply > Make Instances Real"
+    )
+    with pytest.raises(RuntimeError, match=words):
+        bpy.ops.adf.export_file(filepath=str(tmp_path / "m.yaml"), collection=collection.name)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_body_that_collides_as_a_triangle_mesh_is_reported_before_its_first_export(tmp_path):
+    collection = model()
+    part = body("part")
+    words = "'part' moves and collides as a triangle mesh"
+    assert [note.startswith(words) for note in prepared(collection, tmp_path / "m.yaml").notes] == [True]
+    bpy.ops.adf.check()
+    assert "concave-moving" in {f.rule for f in bpy.context.scene.adf.findings}
+    bpy.ops.adf.fix(everything=True)
+    assert part.adf.body.collision_mesh_type == "CONVEX_HULL" and not prepared(collection, tmp_path / "m.yaml").notes
+
+
+def test_what_hung_on_a_deleted_body_is_reported_and_mended(tmp_path):
+    file = tmp_path / "m.yaml"
+    file.write_text(
+        "bodies: [BODY a, BODY b]\njoints: [JOINT j]\nsensors: [SENSOR s]\n"
+        "BODY a: {name: a, mass: 1.0}\nBODY b: {name: b, mass: 1.0}\n"
+        "JOINT j: {name: j, type: fixed, parent: BODY a, child: BODY b, parent pivot: {x: 0, y: 0, z: 0},\n"
+        "  child pivot: {x: 0, y: 0, z: 0}, parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}}\n"
+        "SENSOR s: {name: s, type: Proximity, parent: BODY b, range: 0.1,\n"
+        "  array: [{offset: {x: 0, y: 0, z: 0}, direction: {x: 1, y: 0, z: 0}}]}\n"
+    )
+    bpy.ops.adf.import_file(filepath=str(file))
+    collection, before = bpy.data.collections["m"], file.read_bytes()
+    select(bpy.data.objects["b"])
+    bpy.ops.object.delete()  # as a user deletes it: joints still point to it
+    with pytest.raises(RuntimeError, match="which was deleted"):
+        bpy.ops.adf.export_file(filepath=str(file), collection=collection.name)
+    assert file.read_bytes() == before
+    bpy.ops.adf.check()
+    assert {f.rule for f in bpy.context.scene.adf.findings} == {"deleted-body"}
+    bpy.ops.adf.fix(everything=True)
+    bpy.ops.adf.export_file(filepath=str(file), collection=collection.name)
+    document = read_any(file, Resolver([tmp_path]))
+    assert [e.key for e in document.elements("bodies")] == ["BODY a"] and not document.elements("joints")
+    assert document.elements("sensors")[0].text("parent") == ""
+
+
+def test_a_copy_of_a_body_takes_its_shapes_along_and_shares_its_mesh_file(tmp_path):
+    collection = model()
+    part = body("part")
+    bpy.ops.adf.fit_shape(kind="BOX")
+    bpy.ops.adf.set_inertia(source="MESH")
+    target = {"filepath": str(tmp_path / "m.yaml"), "collection": collection.name}
+    bpy.ops.adf.export_file(**target)
+    before = {path.name for path in tmp_path.rglob("*")}
+    select(part)
+    assert bpy.ops.adf.duplicate() == {"FINISHED"}
+    copy = bpy.context.object
+    assert copy is not part and sorted(c.adf.role for c in copy.children) == sorted(c.adf.role for c in part.children)
+    copy.location.x = 2.0
+    bpy.ops.adf.export_file(**target)
+    first, second = read_any(tmp_path / "m.yaml", Resolver([tmp_path])).elements("bodies")
+    assert first.text("mesh") == second.text("mesh") and second.text("collision shape") == "BOX"
+    assert second.pose("location")[0] == (2.0, 0.0, 0.0) and second.text("name") == "part_001"
+    assert {path.name for path in tmp_path.rglob("*")} == before
+    assert {c.name for c in bpy.data.collections if c.name.endswith("Shapes")} == {f"{collection.name} Shapes"}
+
+
+def test_a_joint_shows_the_keys_of_its_type_with_their_units():
+    from adf_studio.key_panels import has_effect, unit_of
+    from adf_studio.ligature.adf.schema import BY_PATH
+
+    model()
+    parent, child = body("parent"), body("child", location=(1, 0, 0))
+    select(child, parent)
+    bpy.ops.adf.connect(type="fixed")
+    group = next(o for o in bpy.data.objects if o.adf.role == "JOINT").adf.joint
+    keys = BY_PATH["joint"]
+
+    def shown(*paths):
+        return [has_effect(group, "joint", keys[path]) for path in paths]
+
+    paths = (
+        "joint limits.low",
+        "joint limits.x",
+        "joint limits.linear.low.x",
+        "stiffness",
+        "stiffness.angular.z",
+        "controller.P",
+    )
+    assert shown(*paths) == [False] * 6
+    for kind, expected, unit in (
+        ("revolute", [True, False, False, False, False, True], "rad"),
+        ("prismatic", [True, False, False, False, False, True], "m"),
+        ("torsion spring", [True, False, False, True, False, True], "rad"),
+        ("cone twist", [False, True, False, False, False, False], "rad"),
+        ("six dof spring", [False, False, True, False, True, False], "rad"),
+    ):
+        group.type = kind
+        assert shown(*paths) == expected, kind
+        assert unit_of(group, "joint", keys["joint limits.low"]) == unit, kind
+    group.stiffness = 3.0
+    assert shown("stiffness") == [True]  # the file gives it, so that it can be taken out

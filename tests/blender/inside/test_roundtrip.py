@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from adf_studio.launch_file import prepared_scene
 from adf_studio.ligature.adf import AdfError, Resolver, read_any
 from adf_studio.ligature.authoring.placement import matrix_of
 from adf_studio.placing import rest_pose
@@ -31,8 +32,8 @@ def test_every_real_file_comes_back_byte_for_byte_and_its_bodies_stand_where_it_
         except AdfError as error:
             pytest.fail(str(error))
         kinds.add(done.document.kind)
-        _, written = prepared(done.collection, file)  # what an export in its place would write
-        assert written[file] == file.read_bytes(), file
+        written = prepared(done.collection, file).files  # what an export in its place would write
+        assert written == {file: file.read_bytes()}, file
         worst = max(worst, pose_error(done))
     assert worst <= 1e-6
     assert kinds == {"model", "world", "input devices", "colors"}
@@ -50,8 +51,6 @@ def test_every_launch_file_comes_back_with_all_that_it_names(corpus, tmp_path):
     for number, file in enumerate(found):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         bpy.ops.adf.import_launch(filepath=str(file))
-        target = tmp_path / str(number) / "a" / "b" / "c" / "d" / "launch.yaml"  # paths that climb stay in the folder
-        assert bpy.ops.adf.export_scene(filepath=str(target)) == {"FINISHED"}
         launch = read_any(file, Resolver.for_file(file))
         named = [launch.world, launch.devices, launch.colours, *launch.models]
         here = [r.text for r in named if r is not None and r.path is not None]
@@ -59,8 +58,19 @@ def test_every_launch_file_comes_back_with_all_that_it_names(corpus, tmp_path):
         world = bpy.context.scene.adf.world
         if world is not None and world.adf.world.environment:
             here.append(os.path.join(os.path.dirname(launch.world.text), world.adf.world.environment))
-        for copy, original in [(target, file), *((target.parent / name, file.parent / name) for name in here)]:
-            assert copy.read_bytes() == original.read_bytes(), original
+        done, _ = prepared_scene(bpy.context.scene, file)  # what an export in its place would write
+        assert {path.resolve(): data for path, data in done.files.items()} == {
+            path: path.read_bytes()
+            for path in {(file.parent / name).resolve() for name in (".", *here)} - {file.parent}
+        } | {file: file.read_bytes()}, file
+        target = tmp_path / str(number) / "a" / "launch.yaml"
+        assert bpy.ops.adf.export_scene(filepath=str(target)) == {"FINISHED"}
+        assert all(target.parent in p.parents for p in (tmp_path / str(number)).rglob("*") if p.is_file())
+        for name in here:  # paths that climb end below the folder
+            copy = target.parent / name.replace("../", "")
+            lines = zip(copy.read_text().splitlines(), (file.parent / name).read_text().splitlines(), strict=True)
+            changed = [(a, b) for a, b in lines if a != b]
+            assert all("resolution path" in b or "environment" in b for _, b in changed), (name, changed)
 
 
 def test_a_file_that_is_no_yaml_is_refused_with_its_place(corpus):

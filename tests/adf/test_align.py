@@ -1,0 +1,80 @@
+"""Items of lists are paired in order, so that each is changed where it stands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ligature.adf import Resolver, read_any
+from ligature.adf.align import aligned
+from ligature.adf.nodes import parse, plain
+from ligature.adf.update import Item, given_values, items_of, same, updated
+
+ITEMS = st.lists(st.fixed_dictionaries({"a": st.integers(0, 3), "b": st.integers(0, 3)}), max_size=6)
+
+
+@given(ITEMS, ITEMS)
+def test_every_item_is_paired_once_in_order(old: list, new: list) -> None:
+    pairs = aligned(old, new, same)
+    assert [i for i, _ in pairs if i is not None] == list(range(len(old)))
+    assert [j for _, j in pairs if j is not None] == list(range(len(new)))
+    if old == new:
+        assert all(i == j for i, j in pairs)
+
+
+@given(ITEMS, st.data())
+def test_an_item_that_goes_costs_no_other(old: list, data: st.DataObject) -> None:
+    if not old:
+        return
+    index = data.draw(st.integers(0, len(old) - 1))
+    new = old[:index] + old[index + 1 :]
+    assert sum(i is None or j is None or old[i] != new[j] for i, j in aligned(old, new, same)) == 1
+
+
+HEAD = "bodies: []\njoints: []\nvehicles: [V]\nV:\n  name: v\n  chassis: BODY c\n"
+STYLES = {
+    "blocks": "  wheels:\n  # the first\n  - body: A   # left\n    width: 0.10\n    radius: 0.50\n    mine: {kept: yes}\n"
+    "  - body: B\n    radius: 0.5\n  - body: C\n    radius: 0.5\n",
+    "dashes": "  wheels:\n    -\n      body: A   # left\n      width: 0.10\n      radius: 0.50\n      mine: {kept: yes}\n"
+    "    -\n      body: B\n      radius: 0.5\n    -\n      body: C\n      radius: 0.5\n",
+    "flow": "  wheels: [{body: A, width: 0.10, radius: 0.50, mine: {kept: yes}}, {body: B, radius: 0.5}, {body: C, radius: 0.5}]\n",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("style", STYLES)
+@given(
+    st.lists(
+        st.fixed_dictionaries({"body": st.sampled_from("ABCDE"), "radius": st.sampled_from([0.5, 0.25])}),
+        min_size=1, max_size=5,
+    )
+)  # fmt: skip
+def test_a_list_states_what_is_wanted_and_keeps_what_the_editor_does_not_hold(
+    style: str, tmp_path_factory: pytest.TempPathFactory, wanted: list
+) -> None:
+    folder = tmp_path_factory.mktemp("list")
+    (folder / "m.yaml").write_text(HEAD + STYLES[style])
+    document = read_any(folder / "m.yaml", Resolver([folder]))
+    item = items_of(document)[0]
+    new = Item(item.kind, item.key, {**item.values, "wheels": tuple(wanted)}, unheld=frozenset({"wheels[].width"}))
+    text = updated(document.text, "model", given_values(document.top), [new])
+    wheels = plain(parse(text, Path("m.yaml")))["V"]["wheels"]
+    assert [(w["body"], float(w["radius"])) for w in wheels] == [(w["body"], w["radius"]) for w in wanted]
+    if wanted[0] == {"body": "A", "radius": 0.5}:
+        assert wheels[0]["mine"] == {"kept": "yes"} and wheels[0]["width"] == "0.10" and wheels[0]["radius"] == "0.50"
+
+
+def test_an_aliased_item_is_spelled_out_only_where_it_changes(tmp_path: Path) -> None:
+    wheels = "  wheels:\n  - &w {body: A, radius: 0.50, mine: 1}\n  - *w\n  - *w\n"
+    (tmp_path / "m.yaml").write_text(HEAD + wheels)
+    document = read_any(tmp_path / "m.yaml", Resolver([tmp_path]))
+    item = items_of(document)[0]
+    new = [dict(w) for w in item.values["wheels"]]
+    new[1]["radius"] = 0.25
+    changed = Item(item.kind, item.key, {**item.values, "wheels": tuple(new)})
+    text = updated(document.text, "model", given_values(document.top), [changed])
+    assert (
+        text
+        == HEAD + "  wheels:\n  - &w {body: A, radius: 0.50, mine: 1}\n  - {body: A, radius: 0.25, mine: 1}\n  - *w\n"
+    )
