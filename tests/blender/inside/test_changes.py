@@ -248,12 +248,12 @@ def test_one_change_touches_its_own_keys_and_what_must_follow(corpus, name):
             if same_length:
                 count = sum(a != b for a, b in zip(olds, news))
                 assert count <= len(differing), label
-                lines[str(file.name)] = count
+                lines[str(file.relative_to(corpus))] = count
         comments = [line.strip() for line in source.splitlines() if line.strip().startswith("#")]
         if not edit.gone:
             assert [line.strip() for line in text.splitlines() if line.strip().startswith("#")] == comments, label
         check_motion(edit, name, text, source, label)
-        counts[file.name] += 1
+        counts[str(file)] += 1
     assert sum(counts.values()) >= 3
     if REPORT:
         with open(REPORT, "a") as stream:
