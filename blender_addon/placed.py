@@ -120,6 +120,8 @@ class Placed:
             state: State = {"ends": [*self.ends]}
             if self.frames is not None:
                 state["frames"] = [*_flat(self.frames.T_parent_joint), *_flat(self.frames.T_parent_child)]
+            elif self.T is not None:
+                state["pose"] = _flat(self.T)
             return state
         state = {"pose": _flat(self.T), "parent": [self.parent]}
         if self.lens is not None:

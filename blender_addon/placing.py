@@ -118,7 +118,8 @@ def placed(obj: bpy.types.Object) -> Placed:
     if role == "JOINT":
         bodies, texts = (obj.adf.parent_object, obj.adf.child_object), (obj.adf.parent_text, obj.adf.child_text)
         ends = [reference(obj, body, text) if body else text for body, text in zip(bodies, texts, strict=True)]
-        return Placed(kind, ends=tuple(ends), frames=None if None in bodies else _joint_frames(obj, *bodies))
+        frames = None if None in bodies else _joint_frames(obj, *bodies)
+        return Placed(kind, ends=tuple(ends), T=relative_pose(owner_of(obj), obj), frames=frames)
     owner, own = owner_of(obj), rest_pose(obj)
     T = own if owner is None or role == "BODY" else np.linalg.inv(rest_pose(owner)) @ own
     shaped = role in SHAPED
