@@ -1,12 +1,14 @@
 """Reads a dataset of `ligature.datasets` with h5py alone: what is in it, and batches to learn from.
 
-``python examples/read_dataset.py FILE.h5``
+``python examples/read_dataset.py FILE.h5``; `ligature.datasets` is not needed for it.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -30,7 +32,16 @@ def steps(file: h5py.File, camera: str = "cameraL", arm: str = "PSM1") -> Iterat
 
 def main() -> int:
     """Report what is in a dataset."""
-    with h5py.File(sys.argv[1], "r") as file:
+    arguments = argparse.ArgumentParser(description="Report what is in a dataset.")
+    arguments.add_argument("file", type=Path, help="HDF5 file of DatasetWriter, demo or replay")
+    path = arguments.parse_args().file
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        arguments.error(f"cannot read '{path}': {error}")
+    with file:
+        if "format" not in file.attrs:
+            arguments.error(f"'{path}' is an HDF5 file, but no dataset of Ligature")
         print(f"{file.attrs['format']}, scene '{file.attrs['scene']}', {file.attrs['rate']:g} samples a second")
         for name, episode in file.items():
             if not name.startswith("episode_"):

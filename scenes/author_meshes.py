@@ -28,6 +28,7 @@ MATERIALS = {
     "post": "Kd 0.80 0.80 0.78\nKs 0.2 0.2 0.2\nNs 30\nPr 0.5\n",
     "block": "Kd 0.85 0.45 0.08\nKs 0.15 0.15 0.15\nNs 20\nPr 0.6\n",
     "foam": "Kd 0.80 0.62 0.50\nKs 0.05 0.05 0.05\nNs 8\nPr 0.95\n",
+    "flesh": "Kd 0.60 0.16 0.15\nKs 0.3 0.3 0.3\nNs 60\nPr 0.6\nPc 1\nPcr 0.2\n",
     "skin": "Kd 0.72 0.42 0.34\nKs 0.2 0.2 0.2\nNs 40\nPr 0.55\n",
 }
 """What things are made of, as MTL states it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import ast
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from ligature.ros.arms.services import SERVICES
 from ligature.ros.cameras import PICTURES
 from ligature.ros.reception import COMMANDS as OBJECTS
 from ligature.ros.reception import RESETS
+from ligature.ros.tissue import TOPICS as TISSUE
 
 PACKAGE = Path(__file__).resolve().parents[2] / "simulator" / "ligature"
 
@@ -46,7 +47,7 @@ def commands() -> str:
         "# Commands\n\nGenerated from the command line. [Command line](command_line.md) has the table of all commands and what "
         "they have in common.\n"
     ]
-    text += [_command(name, command) for name, command in group.commands.items()]
+    text += [_command(name, command) for name, command in _leaves(group)]
     parser = ambf_simulator.parser()
     rows = [
         (" ".join(f"`{flag}`" for flag in action.option_strings), _cell(action.help))
@@ -55,6 +56,15 @@ def commands() -> str:
     ]
     text.append(f"## ambf_simulator\n\n{parser.description}\n\n{_table(('flag', 'meaning'), rows)}")
     return "\n".join(text)
+
+
+def _leaves(group: click.Group, before: str = "") -> Iterator[tuple[str, click.Command]]:
+    """The commands of a group and of the groups in it, by all their words."""
+    for name, command in group.commands.items():
+        if isinstance(command, click.Group):
+            yield from _leaves(command, f"{before}{name} ")
+        else:
+            yield f"{before}{name}", command
 
 
 def _command(name: str, command: click.Command) -> str:
@@ -116,6 +126,14 @@ def topics() -> str:
             ),
             "## Cameras\n\nBelow `<camera>`, and below `<camera>/left` and `<camera>/right` of stereo cameras.\n",
             _table(("topic", "type"), [(f"`{topic}`", _type(type_)) for topic, type_ in PICTURES.items()]),
+            "## Bodies of tissue\n\nBelow the topic of the body.\n",
+            _table(
+                ("topic", "type", "rate", "meaning"),
+                [
+                    (f"`{topic}`", _type(type_), "as State" if rate is None else f"{rate:.0f} Hz", _meaning(template))
+                    for topic, (template, type_, rate) in TISSUE.items()
+                ],
+            ),
             "## Arms: published\n\nBelow the arm's name, such as `/PSM1`.\n",
             _table(("topic", "type", "arms", "rate"), published),
             "## Arms: commands\n",
@@ -124,6 +142,11 @@ def topics() -> str:
             _table(("service", "type"), [(f"`{name}`", _type(type_)) for name, type_ in SERVICES.items()]),
         ]
     )
+
+
+def _meaning(template: type) -> str:
+    """The first line of a docstring, after the type."""
+    return _first(template.__doc__).partition(": ")[2]
 
 
 def _kinds(kinds: Iterable[ArmKind]) -> str:

@@ -503,4 +503,7 @@ def _digest(value: Any, update: Callable[[bytes], object]) -> None:
     elif is_dataclass(value):
         _digest([getattr(value, field.name) for field in fields(value)], update)
     else:
-        update(np.ascontiguousarray(value).tobytes())
+        array = np.ascontiguousarray(value)
+        if array.dtype.hasobject:
+            raise TypeError(f"a snapshot holds a {type(value).__name__}, which has no bytes to compare")
+        update(array.tobytes())

@@ -25,7 +25,7 @@ MAX_STEPS = 100
 
 def made(name: str) -> gymnasium.Env:
     assert ligature.environments is not None
-    return gymnasium.make(name, max_steps=MAX_STEPS)
+    return gymnasium.make(name, max_episode_steps=MAX_STEPS)
 
 
 def rate(name: str, processes: int, seconds: float) -> float:

@@ -1,22 +1,30 @@
-"""What a tick of tissue costs, and what its accuracy is, as ratios to the reference of `tests.bench.scenes`.
+"""What a tick of tissue costs, as ratios to the reference of `tests.bench.scenes` in the same run.
 
-``python -m tests.bench.tissue`` prints, for pads of about 500, 1000 and 1500 nodes with 12 passages of needles, thread
-CPU times of a tick: of the three ticks in which the nodes rest, of the fourth in which they move, and of all.
+``python -m tests.bench.tissue`` prints thread CPU times. First for scenes, a pad of about 500, 1000 and 1500 nodes that
+two tools press, with and without a needle in 12 nodes of its path, and with its thread in them instead: all that
+tissue adds to a tick. Then for the numerics alone: of the three ticks in which the nodes rest, of the fourth in which
+they move, and of all.
 """
 
 from __future__ import annotations
 
 import statistics
 import sys
+import tempfile
 import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from ligature import Simulation
 from ligature.mesh.grid import Cut, build_grid
 from ligature.model.material import TissueMaterial
 from ligature.tissue.block import TissueBlock
 from ligature.tissue.elastic import ElasticGrid
 
+from tests.bench import ledger
 from tests.bench.scenes import chain_step_us
+from tests.soft import conftest as kit
 from tests.tissue.conftest import SprungNeedle
 
 PADS = {"0.5k": (12, 9, 3), "1k": (17, 9, 4), "1.5k": (20, 12, 4)}
@@ -24,6 +32,12 @@ PADS = {"0.5k": (12, 9, 3), "1k": (17, 9, 4), "1.5k": (20, 12, 4)}
 
 PASSAGES = 12
 TICKS = 800
+
+SCENES = {"0.5k": 0.06, "1k": 0.12, "1.5k": 0.19}
+"""Lengths in metres of pads of 60 x 10 mm across, with cells of 5 mm."""
+
+INSIDE = {"no needle": 0, "needle": 800, "thread": 1500}
+"""What is in the tissue, and ticks that it takes to get there."""
 
 
 def pad(cells: tuple[int, int, int], **options) -> TissueBlock:
@@ -34,6 +48,53 @@ def pad(cells: tuple[int, int, int], **options) -> TissueBlock:
     grid = build_grid(axes, cuts=[Cut(1, cells[1] // 2, mask)])
     rim = (grid.site[:, :2] == 0) | (grid.site[:, :2] == np.array(cells[:2]))
     return TissueBlock(grid, [TissueMaterial(1e5)], rim.any(axis=1), **options)
+
+
+def scene_us(length: float, inside: str, folder: Path) -> dict[str, Any]:
+    """Thread CPU time in microseconds that tissue adds to a tick of a scene, beside two tools that press it."""
+    tools = [
+        kit.body(name, "shape: CAPSULE, geometry: {radius: 0.003, height: 0.03, axis: Z}", (x, 0.015, 0.1205), 0.1)
+        for name, x in (("Left", -0.022), ("Right", 0.022))
+    ]
+    pad_ = kit.pad("    fixed: [-z]\n", size=(length, 0.06, 0.01), cell=0.005)
+    blocks = [pad_, *tools, *([kit.needle()] if inside != "no needle" else [])]
+    simulation = Simulation(kit.load(folder, *blocks, *([kit.THREAD] if inside == "thread" else [])))
+    (piece,) = simulation.tissues.pieces
+    for name in ("Left", "Right"):
+        simulation.bodies[f"BODY {name}"].command_twist([0] * 6)
+    bite = kit.Bite(simulation, depth=0.0048) if inside != "no needle" else None
+    simulation.step(INSIDE[inside])
+    if bite is not None:
+        bite.turn(2e-3)
+    for name in ("Left", "Right"):
+        simulation.bodies[f"BODY {name}"].command_twist([0, 0, -0.02, 0, 0, 0])
+    simulation.step(100)
+    for name in ("Left", "Right"):
+        simulation.bodies[f"BODY {name}"].command_twist([1e-3, 0, 0, 0, 0, 0])
+    times = []
+    for part in (piece.begin, piece.end):
+        setattr(piece, part.__name__, _timed(part, times))
+    simulation.step(TICKS)
+    ticks = np.array(times).reshape(-1, 2).sum(axis=1) / 1e3
+    passages = int(bite.inside.passages) if bite else 0
+    return {
+        "nodes": len(piece.block.elastic.x), "passages": passages,
+        "thread": int(sum(thread.inside.engaged.sum() for thread in piece.threads)),
+        "points": len(piece.contacts.forces) and int(piece.contacts._touching.used.sum()),
+        "median": float(np.median(ticks)), "mean": float(ticks.mean()), "p99": float(np.quantile(ticks, 0.99)),
+        "max": float(ticks.max()),
+    }  # fmt: skip
+
+
+def _timed(work, times: list[int]):
+    """``work``, which appends its nanoseconds of thread CPU time to ``times``."""
+
+    def measured() -> None:
+        begin = time.thread_time_ns()
+        work()
+        times.append(time.thread_time_ns() - begin)
+
+    return measured
 
 
 def tick_us(cells: tuple[int, int, int]) -> dict[str, float]:
@@ -93,6 +154,20 @@ def main() -> int:
     """Entry point."""
     reference = statistics.median(chain_step_us() for _ in range(3))
     sys.stdout.write(f"reference, 40 Bullet bodies with point joints: {reference:.0f} us a step\n")
+    found: dict[str, dict[str, Any]] = {}
+    for name, length in SCENES.items():
+        for inside in INSIDE:
+            with tempfile.TemporaryDirectory() as folder:
+                figures = scene_us(length, inside, Path(folder))
+            found[f"{name}, {inside}"] = {**figures, "reference_us": reference, "ratio": figures["median"] / reference}
+            sys.stdout.write(
+                f"{name}, {inside}: {figures['nodes']} nodes, {figures['points']} points of contact with two tools, "
+                f"needle in {figures['passages']} nodes, thread in {figures['thread']}: tissue adds a median of "
+                f"{figures['median']:.0f} us to a tick, {figures['median'] / reference:.2f} of the reference (mean "
+                f"{figures['mean']:.0f}, p99 {figures['p99']:.0f}, most {figures['max']:.0f})\n"
+            )
+            sys.stdout.flush()
+    ledger.note("tissue", found)
     for name, cells in PADS.items():
         figures, solver = tick_us(cells), solver_us(cells)
         sys.stdout.write(

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from ligature.bus.record import Header, Record, RecordWriter
 from ligature.cli.options import RunOptions
-from ligature.cli.replay import replay
+from ligature.cli.replay import Sampled, replay
+from ligature.cli.sampling import Sampling
 from ligature.robots.commands import VERBS, PlaceJp, ServoJp
 from rich.console import Console
 
@@ -54,13 +55,32 @@ def test_a_record_ends_in_the_same_bits(recorded: Path) -> None:
 
 def test_a_record_becomes_a_dataset_of_the_run(recorded: Path, tmp_path: Path) -> None:
     console = Console(file=io.StringIO(), soft_wrap=True)
-    assert replay(recorded, None, "", 1.0, console, tmp_path / "run.h5") == 0, console.file.getvalue()  # type: ignore[attr-defined]
+    assert replay(recorded, None, "", 1.0, console, Sampled(tmp_path / "run.h5")) == 0, console.file.getvalue()  # type: ignore[attr-defined]
+    assert "the episode is not judged: say with '--task'" in console.file.getvalue()  # type: ignore[attr-defined]
     with h5py.File(tmp_path / "run.h5") as file:
         episode = file["episode_0000"]
+        assert not episode.attrs["judged"] and file.attrs["source"] == "recorded run"
         assert episode["time"][:] == pytest.approx([0.002, 0.102])
         placed = [[0.0] * 6, [0.1, 0.1, 0.12, 0.0, 0.0, 0.0]]
         assert episode["arms/PSM2/measured_js"][:, 0] == pytest.approx(np.array(placed), abs=1e-4)
         assert episode["cameras/cameraL/rgb"][:].std() > 1.0
+
+
+@pytest.mark.parametrize("success", [True, False])
+def test_the_operator_says_how_a_run_went(recorded: Path, tmp_path: Path, success: bool) -> None:
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    dataset = Sampled(
+        tmp_path / "run.h5", Sampling(500.0, (64, 48), ("cameraR",)), success=success, text="move the arm"
+    )
+    assert replay(recorded, None, "", 1.0, console, dataset) == 0
+    with h5py.File(tmp_path / "run.h5") as file:
+        episode = file["episode_0000"]
+        assert episode.attrs["judged"] and episode.attrs["success"] == success
+        assert episode.attrs["task"] == "move the arm"
+        assert list(episode["cameras"]) == ["cameraR"]
+        assert episode["cameras/cameraR/rgb"].shape == (episode.attrs["samples"], 48, 64, 3)
+        phases = [file.attrs["phases"][k] for k in episode["phase"][:]]
+        assert set(phases) == {"idle"}, "an arm that was put somewhere, and is not homed, does not move"
 
 
 def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) -> None:

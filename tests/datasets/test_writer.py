@@ -1,4 +1,4 @@
-"""Datasets: what is sampled is what was there, and a file has its name only when it is whole."""
+"""Datasets: what is sampled is what was there, with units, labels and what the scene is."""
 
 from __future__ import annotations
 
@@ -29,17 +29,19 @@ def written(simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFa
     """Two episodes, and beside them what was really there at each sample."""
     folder = tmp_path_factory.mktemp("dataset")
     path, truth = folder / "data.h5", []
-    with DatasetWriter(path, simulation, size=(64, 48), rate=50.0, phases=("wait", "work")) as writer:
+    with DatasetWriter(
+        path, simulation, size=(64, 48), rate=50.0, phases=("wait", "work"), task="wait and work", gestures={"work": "G3"},
+        remarks={"source": "test"},
+    ) as writer:  # fmt: skip
         for success in (True, False):
             for k in range(12):
                 simulation.step(10)
-                if writer.sample("work" if k > 5 else "wait"):
+                if writer.sample("work" if k > 5 else "wait", ["PSM2"]):
                     truth.append(
                         (simulation.time, simulation.bodies["Needle"].pose, simulation.arms["PSM1"].measured_js())
                     )
                     picture = simulation.cameras["cameraR"].capture((64, 48))
             writer.end_episode(success, seed=3)
-        assert not path.exists(), "half a dataset has the final name"
     np.savez(folder / "truth.npz", time=[t for t, *_ in truth], needle=[n for _, n, _ in truth],
              joints=[j.position for *_, j in truth], rgb=picture.rgb, depth=picture.depth, ids=picture.ids)  # fmt: skip
     return path
@@ -80,6 +82,56 @@ def test_pictures_are_those_of_the_camera(written: Path) -> None:
         assert camera["intrinsics"].shape == (6, 3, 3)
 
 
+def test_a_dataset_says_what_it_is_of(written: Path, simulation: ligature.Simulation) -> None:
+    with h5py.File(written) as file:
+        attributes = file.attrs
+        assert attributes["scene"] == "suturing_small"
+        assert (attributes["task"], attributes["source"]) == ("wait and work", "test")
+        assert list(attributes["gestures"]) == ["", "", "G3"]
+        for name, arm in file["arms"].items():
+            robot, description = simulation.arms[name], next(a for a in simulation.scene.arms if a.name == name)
+            assert arm.attrs["tool"] == robot.tool_type
+            assert list(arm.attrs["joint_names"]) == list(robot.joints.names)
+            assert list(arm.attrs["joint_units"]) == ["rad", "rad", "m", "rad", "rad", "rad"]
+            assert arm.attrs["base_pose"] == pytest.approx(simulation.state["body_pose"][0, description.base])
+        for name in ("episode_0000", "episode_0001"):
+            assert file[name].attrs["task"] == "wait and work"
+            assert file[name]["arms/PSM1/measured_js"].attrs["units"] == "rad, rad, m, rad, rad, rad"
+        assert set(file["arms"]) == {"PSM1", "PSM2"}
+
+
+def test_all_numbers_have_units(written: Path) -> None:
+    bare = {"phase", "activity", "rgb", "ids"}
+    with h5py.File(written) as file:
+        missing = []
+        file["episode_0000"].visititems(
+            lambda name, item: missing.append(name)
+            if isinstance(item, h5py.Dataset) and name.split("/")[-1] not in bare and "units" not in item.attrs
+            else None
+        )
+    assert not missing
+
+
+def test_the_action_of_a_sample_is_the_next_set_point(written: Path) -> None:
+    with h5py.File(written) as file:
+        for arm in file["episode_0001/arms"].values():
+            for setpoint, action in (
+                (arm["setpoint_js"][:, 0], arm["action_js"][:]),
+                (arm["local_setpoint_cp"][:], arm["local_action_cp"][:]),
+                (arm["jaw/setpoint_js"][:, 0], arm["jaw/action_js"][:]),
+            ):
+                assert (action[:-1] == setpoint[1:]).all() and (action[-1] == setpoint[-1]).all()
+
+
+def test_labels_name_the_arm_that_works(written: Path) -> None:
+    with h5py.File(written) as file:
+        arms, phases = file["episode_0000/arms"], list(file.attrs["phases"])
+        assert [phases[k] for k in arms["PSM2/phase"][:]] == ["wait"] * 3 + ["work"] * 3
+        assert set(arms["PSM1/phase"][:]) == {0}
+        activities = list(file.attrs["activities"])
+        assert {activities[k] for k in arms["PSM1/activity"][:]} <= {"idle", "moves"}
+
+
 def test_the_reader_of_the_examples_reads_it(written: Path) -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "examples" / "read_dataset.py", written], capture_output=True, text=True, timeout=60
@@ -93,6 +145,32 @@ def test_an_error_leaves_nothing_behind(simulation: ligature.Simulation, tmp_pat
     with pytest.raises(ZeroDivisionError), DatasetWriter(tmp_path / "a.h5", simulation, cameras=()) as writer:
         writer.sample()
         raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [[], ["missing.h5"], [__file__]])
+def test_the_reader_of_the_examples_says_what_it_wants(words: list[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "examples" / "read_dataset.py", *words], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 2 and "usage: read_dataset.py" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"rate": 0.0}, "rate is samples per simulated second"),
+        ({"size": (0, 48)}, "size is a width and a height"),
+        ({"gestures": {"work": "G3"}}, "'work' is no phase"),
+        ({"phases": ("work",), "gestures": {"work": "G99"}}, "'G99' none of the gestures G1, G2"),
+    ],
+)
+def test_what_no_dataset_can_have_is_refused(
+    simulation: ligature.Simulation, tmp_path: Path, wrong: dict, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        DatasetWriter(tmp_path / "a.h5", simulation, **wrong)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -142,3 +220,28 @@ def test_a_file_that_cannot_grow_is_reported_and_leaves_nothing(tmp_path: Path) 
     assert done.returncode == 7, done.stderr[-2000:]
     assert f"cannot write the dataset '{path}'" in done.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+def test_tissue_is_sampled_with_its_punctures_and_forces(tmp_path: Path) -> None:
+    simulation = ligature.Simulation(ligature.load(ROOT / "scenes" / "needle_insertion" / "launch.yaml"))
+    simulation.bodies["Needle"].set_pose([0.03, 0.23, 0.7185, 0.7071068, 0, 0, 0.7071068])
+    truth = []
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), rate=100.0) as writer:
+        for _ in range(10):
+            simulation.step(10)
+            writer.sample()
+            state = simulation.state[0]
+            truth.append({name: state[name].copy() for name in (
+                "tissue_node", "tissue_wrench", "tissue_peak", "puncture_count", "puncture_point", "puncture_normal"
+            )})  # fmt: skip
+    simulation.close()
+    with h5py.File(tmp_path / "a.h5") as file:
+        block = file["episode_0000/tissue/Block"]
+        for name, field in {
+            "points": "tissue_node", "wrench": "tissue_wrench", "peak_force": "tissue_peak",
+            "puncture_count": "puncture_count", "puncture_points": "puncture_point",
+            "puncture_normals": "puncture_normal",
+        }.items():  # fmt: skip
+            expected = np.array([moment[field] if name == "points" else moment[field][0] for moment in truth])
+            np.testing.assert_allclose(block[name][:], expected, rtol=1e-5, atol=1e-6, err_msg=name)
+        assert np.abs(np.diff(block["points"][:], axis=0)).max() > 0.0

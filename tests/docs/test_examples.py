@@ -95,11 +95,15 @@ def test_commands_of_a_page_are_understood(page: Path) -> None:
         if words[0] == "ambf_simulator":
             ambf_simulator.parser().parse_args(words[1:])
             continue
-        command = GROUP.commands.get(words[1])
-        assert command is not None, f"{page.name}:{number}: there is no command '{words[1]}'"
+        command: click.Command | None = GROUP
+        given = words[1:]
+        while isinstance(command, click.Group):
+            name, given = given[0], given[1:]
+            command = command.commands.get(name)
+            assert command is not None, f"{page.name}:{number}: there is no command '{name}'"
         try:
-            context = click.Context(command, info_name=words[1])
-            _, rest, _ = command.make_parser(context).parse_args(words[2:])
+            context = click.Context(command, info_name=name)
+            _, rest, _ = command.make_parser(context).parse_args(given)
         except click.UsageError as error:
             raise AssertionError(f"{page.name}:{number}: {line}: {error.format_message()}") from None
         assert rest == [], f"{page.name}:{number}: {line}: {rest} is too much"

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import copy
+import pickle  # noqa: TID251 (what processes exchange)
+from collections.abc import Iterator
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from ligature.environments import SuturingEnv, make_vec
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ligature.environments import MAX_STEPS, SuturingEnv, make_vec
+from ligature.environments.suturing import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGTH
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.robots.poses import rotation_vector
 
@@ -82,7 +89,7 @@ def test_turning_the_needle_along_its_arc_inserts_it(task: str) -> None:
     goal, first, total, done, angle = env.goal, info["distance"], 0.0, False, -0.4
     base = frame(env.base_rotation, env.base_position)
     T_arc_tool = inverse(pose7_matrix(observation[14:21]) @ goal.arc.T_body_arc) @ base @ pose7_matrix(env.setpoint)
-    for _ in range(150):
+    for _ in range(190):
         wanted = inverse(base) @ goal.throw.arc_at(angle, goal.arc) @ T_arc_tool
         now = pose7_matrix(env.setpoint)
         action = np.zeros(7)
@@ -117,7 +124,7 @@ def test_both_kinds_of_observation_come_together() -> None:
     env.close()
     assert env.observation_space.contains(observation)
     assert observation["image"].shape == (24, 32, 3)
-    assert observation["state"].shape == (34,)
+    assert observation["state"].shape == (52,)
 
 
 def test_what_the_arm_refuses_is_reported_and_the_episode_goes_on() -> None:
@@ -148,7 +155,7 @@ def test_wrong_options_are_reported_with_the_right_ones(wrong: dict[str, str], m
 def test_environments_run_side_by_side_in_processes() -> None:
     envs = gymnasium.vector.AsyncVectorEnv([lambda: SuturingEnv("reach")] * 2)
     observations, _ = envs.reset(seed=[1, 2])
-    assert observations.shape == (2, 34)
+    assert observations.shape == (2, 52)
     observations, *_ = envs.step(np.zeros((2, 7), dtype=np.float32))
     envs.close()
     assert np.isfinite(observations).all()
@@ -178,3 +185,150 @@ def test_an_environment_simulates_the_arm_of_its_task_alone() -> None:
     assert [arm.name for arm in scene.arms] == ["PSM1"]
     assert not any("psm2" in body.identity.identifier for body in scene.bodies)
     assert scene.rods, "the needle has its thread"
+
+
+# --- set-points -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def soft() -> Iterator[SuturingEnv]:
+    """A needle in hand above soft tissue: something to press into."""
+    env = SuturingEnv("puncture", max_steps=None)
+    yield env
+    env.close()
+
+
+def ahead_of(env: SuturingEnv) -> tuple[float, float]:
+    """How far the set-point is ahead of the tip: metres and radians."""
+    ahead = inverse(pose7_matrix(env._arm.local_measured_cp())) @ pose7_matrix(env.setpoint)
+    return float(np.linalg.norm(ahead[:3, 3])), float(np.linalg.norm(rotation_vector(ahead[:3, :3])))
+
+
+WAYS = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)
+
+
+@settings(max_examples=12)
+@given(way=WAYS)
+def test_no_push_winds_the_set_point_up(soft: SuturingEnv, way: list[float]) -> None:
+    """Whatever way an arm pushes for a second: its set-point stays where the arm can be seen to follow."""
+    soft.reset(seed=3)
+    for _ in range(50):
+        soft.step(np.array([*way, 0.0], dtype=np.float32))
+        length, angle = ahead_of(soft)
+        # between the bound and the reading the arm moves on, at most as far as an action goes
+        assert length <= AHEAD_LENGTH + 0.002 and angle <= AHEAD_ANGLE + 0.1
+
+
+def test_pressing_into_tissue_is_bounded_and_reported(soft: SuturingEnv) -> None:
+    observation, _ = soft.reset(seed=3)
+    down = np.append(soft.base_rotation.T @ np.array([0.0, 0.0, -1.0]), np.zeros(4)).astype(np.float32)
+    infos = []
+    for _ in range(60):
+        observation, *_, info = soft.step(down)
+        infos.append(info["bounded"])
+    assert not infos[0] and infos[-1]
+    assert ahead_of(soft)[0] < AHEAD_LENGTH + 0.002
+    for _ in range(12):
+        observation, *_, info = soft.step(-down)
+    assert not info["bounded"], "the way back begins at once"
+
+
+def test_joint_actions_are_bounded_too() -> None:
+    env = SuturingEnv("puncture", action="joint", max_steps=None)
+    env.reset(seed=3)
+    for _ in range(60):
+        env.step(np.array([0, 0, 1, 0, 0, 0, 0], dtype=np.float32))
+        ahead = np.abs(env._arm.setpoint_js().position - env._arm.measured_js().position)
+        assert (ahead <= 1.5 * AHEAD_JOINTS).all()
+    env.close()
+
+
+def test_the_set_point_is_observed(soft: SuturingEnv) -> None:
+    soft.reset(seed=3)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        observation, *_ = soft.step(rng.uniform(-1, 1, 7).astype(np.float32))
+        assert (observation[41:48] == soft.setpoint).all()
+        assert observation[48] == soft._arm.jaw.setpoint_js().position[0]
+        assert (observation[34:40] == soft._arm.measured_js().velocity).all()
+
+
+# --- keeping a moment -----------------------------------------------------------------------
+
+ACTIONS = np.random.default_rng(6).uniform(-1, 1, (12, 7)).astype(np.float32)
+
+
+def rolled(env: gymnasium.Env) -> np.ndarray:
+    """Observations and rewards of the same actions, and the start of the episode after them."""
+    seen = [np.append(*env.step(action)[:2]) for action in ACTIONS]
+    return np.array([*seen, np.append(env.reset()[0], 0.0)])
+
+
+@pytest.mark.parametrize("task", ["reach", "pick", "insert", "puncture"])
+def test_what_was_saved_goes_on_to_the_bit_here_and_in_copies(task: str) -> None:
+    env = SuturingEnv(task)
+    env.reset(seed=4)
+    for action in ACTIONS:
+        env.step(action)
+    state = env.save()
+    first = rolled(env)
+    env.restore(state)
+    copied, pickled = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
+    for other in (env, copied, pickled):
+        assert (rolled(other) == first).all()
+        other.close()
+
+
+def test_a_copy_of_a_made_environment_steps() -> None:
+    env = gymnasium.make("ligature/Reach-v0")
+    env.reset(seed=1)
+    env.step(ACTIONS[0])
+    other = copy.deepcopy(env)
+    a, b = env.step(ACTIONS[1])[0], other.step(ACTIONS[1])[0]
+    env.close()
+    other.close()
+    assert np.isfinite(b).all()
+    assert a == pytest.approx(b, abs=1e-6)
+
+
+def test_a_shallow_copy_is_refused_with_what_to_do() -> None:
+    env = SuturingEnv("reach")
+    with pytest.raises(TypeError, match=r"use copy\.deepcopy, or save and restore"):
+        copy.copy(env)
+    env.close()
+
+
+def test_a_state_of_another_task_is_refused() -> None:
+    reach, pick = SuturingEnv("reach"), SuturingEnv("pick")
+    reach.reset(seed=1)
+    with pytest.raises(ValueError, match="the state has task='reach', not 'pick'"):
+        pick.restore(reach.save())
+    with pytest.raises(RuntimeError, match="save comes after reset"):
+        pick.save()
+    with pytest.raises(RuntimeError, match="step comes after reset"):
+        pick.step(ACTIONS[0])
+    reach.close()
+    pick.close()
+
+
+def test_options_of_reset_are_refused() -> None:
+    env = SuturingEnv("reach")
+    with pytest.raises(ValueError, match="reset has no options, not 'difficulty'"):
+        env.reset(options={"difficulty": 3})
+    env.reset(options={})
+    env.close()
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_the_specification_has_the_length_of_episodes(name: str) -> None:
+    assert gymnasium.spec(name).max_episode_steps == MAX_STEPS
+
+
+def test_episodes_of_made_environments_are_cut_where_the_specification_has_it() -> None:
+    env = gymnasium.make("ligature/Reach-v0", max_episode_steps=3)
+    assert env.spec is not None and env.spec.max_episode_steps == 3
+    env.reset(seed=1)
+    assert [env.step(np.zeros(7, dtype=np.float32))[3] for _ in range(3)] == [False, False, True]
+    env.close()
+    with pytest.raises(ValueError, match="gymnasium.make has 'max_episode_steps'"):
+        gymnasium.make("ligature/Reach-v0", max_steps=3)

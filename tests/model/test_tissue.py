@@ -81,7 +81,7 @@ def test_a_flat_slit_makes_lips_and_a_box_takes_tissue_away(tmp_path: Path) -> N
     flat = "    slits: [{from: {x: -0.0123, y: 0.003, z: 0.001}, to: {x: 0.0121, y: 0.003, z: 0.005}}]\n"
     whole, cut = load(tmp_path, PAD).tissues[0].form, load(tmp_path, PAD.replace(LINE, LINE + flat)).tissues[0].form
     nodes = cut.grid.nodes[cut.grid.lips]
-    assert cut.cut and not whole.cut and not len(whole.grid.lips)
+    assert len(cut.slits) == 1 and not whole.slits and not len(whole.grid.lips)
     assert (nodes[..., 1] == 0.003).all()
     assert nodes[..., 0].min() > -0.0123 - 1e-12 and nodes[..., 0].max() < 0.0121 + 1e-12
     assert cut.cell_masses.sum() == pytest.approx(whole.cell_masses.sum())

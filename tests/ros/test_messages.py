@@ -108,6 +108,7 @@ def rows(module: str, text: str) -> list[tuple[str, str, str]]:
         *rows("std_srvs.srv", "Trigger 937c9679a518e3a18d831e57125ea522"),
         *rows("diagnostic_msgs.msg", "KeyValue cf57fdc6617a881a88c16e768132149c"),
         *rows("tf2_msgs.msg", "TFMessage 94810edda583a504dfda3829e70d7eec"),
+        *rows("visualization_msgs.msg", "Marker 4048c9de2a16f4ae8e0538085ebf1b97"),
         *rows("rosgraph_msgs.msg", "Clock a9c97c1d230cfc112e270351a944ee47"),
     ],
 )

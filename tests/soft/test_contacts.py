@@ -39,6 +39,19 @@ def test_a_ball_presses_with_its_weight(kit):
     assert np.mean(presses[100:]) == pytest.approx(0.01 * 9.8, rel=0.15)
 
 
+@pytest.mark.parametrize("at", [(0.001, 0.002), (0.0037, -0.0041)])
+def test_a_ball_comes_to_rest_where_it_was_put(kit, at):
+    ball = kit.body("Ball", "shape: SPHERE, geometry: {radius: 0.004}", (*at, 0.1095), 0.01)
+    simulation = kit.run(kit.pad(SOFT), ball)
+    ball = simulation.bodies["BODY Ball"]
+    simulation.step(1200)
+    before = ball.pose[:3]
+    assert np.linalg.norm(before[:2] - at) < 4e-3  # less than the edge of a cell
+    simulation.step(500)
+    np.testing.assert_allclose(ball.pose[:3], before, atol=1e-5)
+    assert simulation.state["tissue_wrench"][0, 0, 2] == pytest.approx(-0.01 * 9.8, rel=0.01)
+
+
 @pytest.mark.parametrize(("slope", "slides"), [(0.2, False), (0.8, True)])
 def test_friction_holds_a_peg_on_a_slope_up_to_its_coefficient(kit, slope, slides):
     g = 9.8 * np.array([np.sin(slope), 0.0, -np.cos(slope)])

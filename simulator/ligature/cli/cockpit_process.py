@@ -32,7 +32,7 @@ def _serve(run: Run) -> None:
             scene, run.block, pictures, address, os.environ.get(TOKEN_VARIABLE, ""),
             lambda text: report("warning", text),
             _on_ros(options.prefix) if options.ros else None,
-            f"{Path(options.scene).resolve().parent.name}/{scene.name}", options.task,
+            f"{Path(options.scene).resolve().parent.name}/{Path(options.scene).stem}", options.task,
         )  # fmt: skip
     except AddressError as error:
         run.fail(error)

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import FrameType
 
 from rich.console import Console
 
 from ligature.bundle import EXAMPLES
+from ligature.cli.sampling import Sampling
 from ligature.process import end_with_parent
 
 EXAMPLE = EXAMPLES / "suture.py"
 
 
-def demo(throws: int, seed: int, out: Path, dataset: Path | None, console: Console) -> int:
+def demo(
+    throws: int, seed: int, out: Path, dataset: Path | None, console: Console, episodes: int = 1,
+    sampling: Sampling | None = None,
+) -> int:  # fmt: skip
     """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status."""
     if not EXAMPLE.is_file():
         console.print(f"the demonstration '{EXAMPLE}' is missing; install Ligature again")
@@ -22,6 +28,24 @@ def demo(throws: int, seed: int, out: Path, dataset: Path | None, console: Conso
     if dataset is None:
         command = [sys.executable, str(EXAMPLE), "--throws", str(throws), "--seed", str(seed), "--out", str(out)]
     else:
-        words = [str(dataset), "--throws", str(throws), "--seed", str(seed)]
+        words = [str(dataset), "--throws", str(throws), "--seed", str(seed), "--episodes", str(episodes)]
+        words += (sampling or Sampling()).words()
         command = [sys.executable, str(EXAMPLE.with_name("record_dataset.py")), *words]
-    return subprocess.run(command, check=False, preexec_fn=end_with_parent).returncode
+    return _wait(command)
+
+
+def _wait(command: list[str]) -> int:
+    """Run a program to its end; signals go to it, so that it ends in order."""
+    process: subprocess.Popen[bytes] | None = None
+
+    def forward(number: int, frame: FrameType | None) -> None:
+        if process is not None:
+            process.send_signal(number)
+
+    before = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        process = subprocess.Popen(command, preexec_fn=end_with_parent)
+        return process.wait()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -14,6 +14,7 @@ from rich.console import Console
 from ligature.bundle import launch_file, scene_names
 from ligature.cli.missing import remedy
 from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
+from ligature.cli.sampling import Sampling, picture_size
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import Softening
 
@@ -23,6 +24,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Simulator for robot-assisted suturing.",
 )
+
+
+dataset_app = typer.Typer(no_args_is_help=True, help="Datasets to learn from: what is in them, and LeRobot's formats.")
+app.add_typer(dataset_app, name="dataset")
 
 
 def _launch_files(paths: list[Path] | None) -> list[Path]:
@@ -40,6 +45,19 @@ Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody
 Roots = Annotated[
     list[Path] | None, typer.Option("--root", help="Additional folder that scene files may be read from.")
 ]  # noqa: UP045
+
+Rate = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--rate", help="For a dataset: samples per simulated second, 10 by default.", min=0.1, max=1000),
+]
+Size = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--size", help="For a dataset: width x height of its pictures, 320x240 by default."),
+]
+Cameras = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option("--camera", help="For a dataset: a camera, or 'none'; repeatable. By default cameraL and cameraR."),
+]
 
 Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies the scene gets.")]  # noqa: UP045
 
@@ -60,6 +78,21 @@ def indices(text: str | None) -> tuple[int, ...] | None:
         return model_indices(text)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+
+
+def _sampling(dataset: Path | None, rate: float | None, size: str | None, cameras: list[str] | None) -> Sampling:
+    """How a dataset is sampled; its options without one are an error."""
+    if dataset is None:
+        if (rate, size, cameras or None) != (None, None, None):
+            raise typer.BadParameter("--rate, --size and --camera are for '--dataset'")
+        return Sampling()
+    default = Sampling()
+    try:
+        pixels = default.size if size is None else picture_size(size)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    names = default.cameras if not cameras else tuple(name for name in cameras if name != "none")
+    return Sampling(rate or default.rate, pixels, names)
 
 
 def task_name(text: str) -> str:
@@ -346,11 +379,16 @@ def demo(
     seed: Annotated[int, typer.Option(help="Seed of the needle's pose; 0 keeps the pose of the scene.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
     dataset: Annotated[Optional[Path], typer.Option(help="HDF5 dataset to write instead of pictures.")] = None,  # noqa: UP045
+    episodes: Annotated[int, typer.Option(help="For a dataset: sutures, with one seed after the other.", min=1)] = 1,
+    rate: Rate = None,
+    size: Size = None,
+    camera: Cameras = None,
 ) -> None:
     """Let two arms suture autonomously; prints the score, writes pictures."""
     from ligature.cli.demo import demo as run_demo
 
-    raise typer.Exit(run_demo(throws, seed, out, dataset, Console(highlight=False, soft_wrap=True)))
+    sampling = _sampling(dataset, rate, size, camera)
+    raise typer.Exit(run_demo(throws, seed, out, dataset, Console(highlight=False, soft_wrap=True), episodes, sampling))
 
 
 @app.command()
@@ -376,13 +414,32 @@ def replay(
         Optional[Path],  # noqa: UP045
         typer.Option(help="For a record: HDF5 file to write pictures and motion to."),
     ] = None,
+    rate: Rate = None,
+    size: Size = None,
+    camera: Cameras = None,
+    task: Annotated[
+        str,
+        typer.Option(
+            help="For a dataset: judge insertion or suture; by default the task of the run.", callback=task_name
+        ),
+    ] = "",
+    success: Annotated[
+        Optional[bool],  # noqa: UP045
+        typer.Option("--success/--failure", help="For a dataset: how the run went, where nothing judges it."),
+    ] = None,
+    text: Annotated[str, typer.Option(help="For a dataset: the task as an instruction in words.")] = "",
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
+    from ligature.cli.replay import Sampled
     from ligature.cli.replay import replay as run_replay
 
     if joints not in ("", "measured", "setpoint"):
         raise typer.BadParameter(f"--joints is 'measured' or 'setpoint', not '{joints}'")
-    raise typer.Exit(run_replay(file, scene, joints, speed, Console(highlight=False, soft_wrap=True), dataset))
+    sampling = _sampling(dataset, rate, size, camera)
+    if dataset is None and (task or text or success is not None):
+        raise typer.BadParameter("--task, --success and --text are for '--dataset'")
+    sampled = None if dataset is None else Sampled(dataset, sampling, task, success, text)
+    raise typer.Exit(run_replay(file, scene, joints, speed, Console(highlight=False, soft_wrap=True), sampled))
 
 
 @app.command()
@@ -425,6 +482,39 @@ def teleop(
 
     console = Console(highlight=False, soft_wrap=True)
     raise typer.Exit(run_teleop(config, record, replay, calibrate, check, indices(devices), console))
+
+
+DatasetFile = Annotated[Path, typer.Argument(help="HDF5 dataset of demo, replay or DatasetWriter.")]
+
+
+@dataset_app.command("info")
+def dataset_info(file: DatasetFile) -> None:
+    """List the episodes of a dataset, with outcome and phases."""
+    from ligature.cli.dataset import info
+
+    raise typer.Exit(info(file, Console(highlight=False, soft_wrap=True)))
+
+
+@dataset_app.command("join")
+def dataset_join(file: DatasetFile) -> None:
+    """Make one file of a dataset whose writer was killed before it could."""
+    from ligature.cli.dataset import join_episodes
+
+    raise typer.Exit(join_episodes(file, Console(highlight=False, soft_wrap=True)))
+
+
+@dataset_app.command("export")
+def dataset_export(
+    file: DatasetFile,
+    out: Annotated[Path, typer.Argument(help="Folder to write, which must not exist.")],
+    format: Annotated[str, typer.Option(help="lerobot-3.0, or lerobot-2.1 as Open-H asks for.")] = "lerobot-3.0",
+    codec: Annotated[str, typer.Option(help="Of the videos: h264, or av1, which is smaller and slower.")] = "h264",
+    license: Annotated[str, typer.Option(help="Licence of the data for its card, such as cc-by-4.0.")] = "",
+) -> None:
+    """Write a dataset in a format of LeRobot: Parquet, videos, statistics, splits, a card."""
+    from ligature.cli.dataset import export
+
+    raise typer.Exit(export(file, out, format, codec, license, Console(highlight=False, soft_wrap=True)))
 
 
 def main() -> None:

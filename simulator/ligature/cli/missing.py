@@ -11,6 +11,8 @@ EXTRAS: Mapping[str, str] = {
     "h5py": "learn",
     "viser": "cockpit",
     "websockets": "cockpit",
+    "pyarrow": "lerobot",
+    "av": "lerobot",
     "yourdfpy": "convert",
     "mujoco": "convert",
 }

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -15,6 +14,7 @@ import ligature
 from ligature.bus.record import Record, is_record
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.cli.options import RunOptions
+from ligature.cli.sampling import Sampling
 
 TICK = 1e-3
 
@@ -63,8 +63,23 @@ def resimulate(
     return simulation
 
 
+@dataclass(frozen=True)
+class Sampled:
+    """A dataset that a record is written to, and what is known of how the run went.
+
+    ``task`` is judged by the simulation, by default that of the recorded run; ``success`` is what the operator found;
+    ``text`` is the instruction.
+    """
+
+    path: Path
+    sampling: Sampling = Sampling()
+    task: str = ""
+    success: bool | None = None
+    text: str = ""
+
+
 def replay(
-    file: Path, scene: Path | None, joints: str, speed: float, console: Console, dataset: Path | None = None
+    file: Path, scene: Path | None, joints: str, speed: float, console: Console, dataset: Sampled | None = None
 ) -> int:
     """Replay ``file``, a record into ``dataset`` too; the exit status is 1 when a run did not repeat bit for bit."""
     try:
@@ -83,10 +98,15 @@ def replay(
     return 1
 
 
-def _again(record: Record, scene: Path | None, dataset: Path | None, console: Console) -> int:
+def _again(record: Record, scene: Path | None, dataset: Sampled | None, console: Console) -> int:
     clock = time.perf_counter()
-    with ExitStack() as files:
-        simulation = resimulate(record, scene, _sampling(dataset, files) if dataset else lambda _: None)
+    if dataset is None:
+        simulation = resimulate(record, scene)
+    else:
+        from ligature.cli.replay_dataset import sampled
+
+        simulation, outcome = sampled(record, scene, dataset)
+        console.print(outcome, markup=False)
     took, found = time.perf_counter() - clock, simulation.state_hash()
     console.print(f"{len(record.commands)} commands, {simulation.time:.3f} s simulated in {took:.1f} s", markup=False)
     if record.begun:
@@ -98,20 +118,6 @@ def _again(record: Record, scene: Path | None, dataset: Path | None, console: Co
         return 1
     console.print(f"the same bits: {found}", markup=False)
     return 0
-
-
-def _sampling(dataset: Path, files: ExitStack) -> Callable[[ligature.Simulation], None]:
-    """What samples a simulation into ``dataset``, which ``files`` closes."""
-    from ligature.datasets import DatasetWriter
-
-    writers: list[DatasetWriter] = []
-
-    def sample(simulation: ligature.Simulation) -> None:
-        if not writers:
-            writers.append(files.enter_context(DatasetWriter(dataset, simulation)))
-        writers[0].sample()
-
-    return sample
 
 
 def _play(file: Path, joints: str, speed: float, console: Console) -> int:

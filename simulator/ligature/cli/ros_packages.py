@@ -20,6 +20,7 @@ PACKAGES: Mapping[str, str] = {
     "std_msgs": "python3-std-msgs",
     "std_srvs": "python3-std-srvs",
     "tf2_msgs": "python3-tf2-msgs",
+    "visualization_msgs": "python3-visualization-msgs",
 }
 """Modules that a run on ROS imports, and the package of Debian 12 and Ubuntu 22.04 that brings each."""
 

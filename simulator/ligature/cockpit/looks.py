@@ -30,11 +30,12 @@ METAL_SHEEN = 0.6
 
 
 def body_looks(scene: Scene) -> dict[int, bytes]:
-    """Binary glTF of every drawn body and ghost by owner: bodies, then ghosts, counted through."""
+    """Binary glTF of every drawn rigid body and ghost by owner: bodies, then ghosts, counted through."""
     loader = VisualLoader()
     owners: dict[int, list[Piece]] = {}
+    soft = {tissue.body for tissue in scene.tissues}
     for piece in loader.of_scene(scene):
-        if np.ptp(piece.triangles.positions, axis=0).max() < GROUND:
+        if piece.owner not in soft and np.ptp(piece.triangles.positions, axis=0).max() < GROUND:
             owners.setdefault(piece.owner, []).append(piece)
     materials: dict[Surface, PBRMaterial] = {}
     return {owner: _packed(_chosen(pieces), materials) for owner, pieces in owners.items()}
@@ -47,6 +48,15 @@ def thread_colour(scene: Scene, body: int) -> tuple[int, int, int]:
     visual = scene.bodies[body].visual
     r, g, b = surface_of(visual.colour, VisualLoader().material(visual)).colour.diffuse
     return round(255 * r), round(255 * g), round(255 * b)
+
+
+def mean_colour(surface: Surface) -> tuple[int, int, int]:
+    """Colour of a surface without its texture's details, 0..255."""
+    picture, colour = _picture(surface), np.asarray(surface.colour.diffuse)
+    if picture is not None:
+        colour = colour * np.asarray(picture, dtype=float).mean(axis=(0, 1)) / 255.0
+    r, g, b = np.round(255.0 * np.clip(colour, 0.0, 1.0)).astype(int).tolist()
+    return r, g, b
 
 
 def _chosen(pieces: Sequence[Piece]) -> list[Piece]:

@@ -1,4 +1,4 @@
-"""The scene in 3D: looks are sent once, then only the poses of what moved, and threads as tubes. World axes, metres."""
+"""The scene in 3D: looks are sent once, then poses of what moved, threads as tubes and tissue. World axes, metres."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from viser import ViserServer
 
 from ligature.cockpit.looks import body_looks, thread_colour
+from ligature.cockpit.tissue import TissueStage
 from ligature.model.frames import pose7_matrix
 from ligature.model.poses import pose7_matrices
 from ligature.model.scene import ArmKind, Scene
@@ -51,6 +52,7 @@ class Stage:
                     color=thread_colour(scene, rod.bodies[0]), side="double", cast_shadow=False,
                 )
             )  # fmt: skip
+        self._tissues = TissueStage(server, scene)
         self._rod_poses = [np.full((len(rod.bodies), 7), np.inf) for rod in scene.rods]
         self.sent = 0
 
@@ -60,6 +62,7 @@ class Stage:
         with self._server.atomic():
             self._move(poses[self._owners])
             self._bend(poses)
+            self.sent += self._tissues.update(state)
 
     def _move(self, poses: Array) -> None:
         moved = (np.abs(poses[:, :3] - self._shown[:, :3]).max(axis=1) > STILL) | (

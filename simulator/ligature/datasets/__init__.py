@@ -1,5 +1,6 @@
-"""Datasets to learn from: pictures, depth, ids, motion and phases of simulated work, in one HDF5 file."""
+"""Datasets to learn from: pictures, depth, ids, motion and phases of simulated work, as HDF5 and for LeRobot."""
 
-from ligature.datasets.writer import DatasetError, DatasetWriter
+from ligature.datasets.store import DatasetError
+from ligature.datasets.writer import DatasetWriter
 
 __all__ = ["DatasetError", "DatasetWriter"]

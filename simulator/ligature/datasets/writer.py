@@ -1,14 +1,13 @@
-"""Writes a simulation that goes on into an HDF5 file, episode by episode; docs/learning.md shows the layout.
+"""Writes a simulation that goes on into an HDF5 dataset, episode by episode; docs/learning.md shows the layout.
 
-Metres, radians, seconds, newtons; poses are x y z qx qy qz qw in world axes unless a name sets otherwise. Until the
-dataset is closed, its file is called ``NAME.part``.
+Metres, radians, seconds, newtons; poses are x y z qx qy qz qw in world axes unless a name sets otherwise. An episode
+that has ended is on the disk (`ligature.datasets.store`), whatever interrupts the next one.
 """
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -18,47 +17,28 @@ import numpy as np
 
 import ligature
 from ligature.camera_simulation import Simulation
-from ligature.model.scene import ArmDescription, ArmKind
+from ligature.datasets.interrupts import uninterrupted
+from ligature.datasets.labels import ACTIVITIES, GESTURES, ActivityWatch
+from ligature.datasets.store import DatasetError, EpisodeStore
+from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
+from ligature.model.soft import TissueBody
 
-FORMAT = "ligature dataset 1"
+FORMAT = "ligature dataset 2"
 DEPTH_UNIT = 1e-4
 """Metres of one step of depth: 0.1 mm, so that two bytes reach 6.5 m. 0 is where nothing is."""
 
 EARLY = 1e-6
 """Seconds before its time at which a sample is taken, for the rounding of simulated time."""
 
+JOINT_ROWS, POSE, TWIST, WRENCH = "position, velocity, effort", "x y z qx qy qz qw", "v w", "f t"
+_PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 
-class DatasetError(RuntimeError):
-    """A dataset that cannot be written; the message gives the reason."""
-
-
-class _Disk(io.FileIO):
-    """A file that keeps the first ``error`` of writing to itself: HDF5 crashes when its disk is full."""
-
-    error: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        """Write all of ``data``."""
-        view = memoryview(data).cast("B")
-        try:
-            at = 0
-            while at < len(view) and self.error is None:
-                at += super().write(view[at:])
-        except OSError as error:
-            self.error = error
-        return len(view)
-
-    def truncate(self, size: int | None = None) -> int:
-        """Make the file as long as HDF5 wants it."""
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.error = self.error or error
-            return size or 0
+Value = tuple[str, Any, dict[str, Any]]
+"""Name, value and storage of what one sample has; ``units`` and ``axes`` of the storage become attributes."""
 
 
 class DatasetWriter:
-    """Samples ``simulation`` into the file ``path``; a context, which removes what was written when it fails.
+    """Samples ``simulation`` into the dataset ``path``; a context, which drops an unfinished episode when it fails.
 
     Parameters
     ----------
@@ -74,11 +54,19 @@ class DatasetWriter:
         Samples per simulated second.
     phases
         Names that `sample` takes.
+    task
+        What is done, as an instruction in words; `end_episode` may set another.
+    gestures
+        Gestures of JIGSAWS (`ligature.datasets.labels.GESTURES`) that phases are, by the name of the phase.
+    remarks
+        Further attributes of the whole dataset, such as ``operator`` or ``source``.
 
     Raises
     ------
     DatasetError
         When the file exists, or cannot be written, also while it grows.
+    ValueError
+        For a rate, a size, a phase or a gesture that cannot be.
     """
 
     def __init__(
@@ -89,37 +77,62 @@ class DatasetWriter:
         size: tuple[int, int] = (320, 240),
         rate: float = 10.0,
         phases: Sequence[str] = (),
+        task: str = "",
+        gestures: Mapping[str, str] | None = None,
+        remarks: Mapping[str, float | int | str] | None = None,
     ) -> None:
-        if path.exists():
-            raise DatasetError(f"'{path}' exists already; choose another name")
-        self._path, self._part = path, path.with_name(f"{path.name}.part")
-        self._simulation, self._size, self._period = simulation, size, 1.0 / rate
+        _check(rate, size, phases, gestures or {})
+        self._path, self._simulation = path, simulation
+        self._size, self._rate, self._period = size, rate, 1.0 / rate
         self._cameras = {name: simulation.cameras[name] for name in cameras}
-        self._phases = ("", *phases)
-        self._episode: h5py.Group | None = None
-        self._count = self._samples = 0
-        self._due = 0.0
-        self._ended = False
-        with self._writing():
-            self._disk = _Disk(self._part, "w+")
-            self._file = h5py.File(self._disk, "w")
-            self._describe(rate)
+        self._phases, self._task = ("", *phases), task
+        self._gestures, self._remarks = dict(gestures or {}), dict(remarks or {})
+        self._watch = ActivityWatch(simulation.scene)
+        self._episode: h5py.File | None = None
+        self._samples, self._due, self._ended = 0, 0.0, False
+        try:
+            self._store = EpisodeStore(path, self._describe)
+        except OSError as error:
+            raise DatasetError(f"cannot write the dataset '{path}': {error}") from error
 
-    def _describe(self, rate: float) -> None:
+    def _describe(self, file: h5py.File) -> None:
         """What holds for all episodes."""
-        scene, attributes = self._simulation.scene, self._file.attrs
+        scene, attributes = self._simulation.scene, file.attrs
         attributes["format"], attributes["version"] = FORMAT, ligature.__version__
-        attributes["scene"], attributes["rate"] = scene.name, rate
-        attributes["phases"], attributes["depth_unit"] = list(self._phases), DEPTH_UNIT
+        attributes["scene"], attributes["rate"], attributes["task"] = scene.name, self._rate, self._task
+        attributes["phases"], attributes["activities"] = list(self._phases), list(ACTIVITIES)
+        attributes["gestures"] = [self._gestures.get(phase, "") for phase in self._phases]
+        attributes["depth_unit"] = DEPTH_UNIT
+        for name, value in self._remarks.items():
+            attributes[name] = value
         names = [body.identity.topic for body in scene.bodies] + [ghost.identity.topic for ghost in scene.ghosts]
-        self._file["id_names"] = np.array(["", *names], dtype=h5py.string_dtype())
+        file["id_names"] = np.array(["", *names], dtype=h5py.string_dtype())
+        for arm in scene.arms:
+            if arm.joints:
+                self._describe_arm(arm, file.create_group(f"arms/{arm.name}").attrs)
+
+    def _describe_arm(self, arm: ArmDescription, attributes: Any) -> None:
+        scene, robot = self._simulation.scene, self._simulation.arms[arm.name]
+        attributes["kind"], attributes["tool"] = arm.kind.value, getattr(robot, "tool_type", "")
+        attributes["joint_names"] = list(robot.joints.names)
+        attributes["joint_units"] = [_unit(scene.joints[joint].type) for joint in arm.joints]
+        if arm.base >= 0:
+            attributes["base_pose"] = self._simulation.state["body_pose"][0, arm.base]
 
     # --- episodes ---------------------------------------------------------------------------
 
-    def sample(self, phase: str = "") -> bool:
+    @property
+    def count(self) -> int:
+        """Episodes that have ended."""
+        return self._store.count
+
+    def sample(
+        self, phase: str = "", arms: Collection[str] | None = None, extra: Mapping[str, Any] | None = None
+    ) -> bool:
         """Take a sample if one is due, which begins an episode if none goes on; returns whether it did.
 
-        Raises ValueError for a phase that was not announced.
+        ``arms`` are those that do what ``phase`` names, by default all; ``extra`` are further numbers by name, such as
+        an environment's observation. Raises ValueError for a phase that was not announced.
         """
         if phase not in self._phases:
             raise ValueError(f"no phase is called '{phase}'; there are {', '.join(self._phases[1:]) or 'none'}")
@@ -128,54 +141,114 @@ class DatasetWriter:
             return False
         with self._writing():
             if self._episode is None:
-                self._episode = self._file.create_group(f"episode_{self._count:04d}")
-                self._count, self._samples, self._due = self._count + 1, 0, time
-            for name, value, options in self._values(phase):
+                self._episode = self._store.begin()
+                self._samples, self._due = 0, time
+            for name, value, options in self._values(phase, arms):
                 self._append(name, value, options)
+            for name, value in (extra or {}).items():
+                self._append(f"extra/{name}", np.asarray(value, dtype=float), {"dtype": "f4", "units": "the caller's"})
+            self._store.check()
         self._samples += 1
         self._due += self._period
         return True
 
     def end_episode(self, success: bool, **remarks: float | int | str) -> None:
-        """End the episode, with ``success`` and ``remarks`` as its attributes.
+        """End the episode, with ``success`` and ``remarks`` as its attributes; from now on it is on the disk.
 
-        Without a sample there is none to end.
+        ``task`` among the remarks replaces that of the dataset. Without a sample there is none to end.
         """
         if self._episode is None:
             return
         with self._writing():
-            self._episode.attrs["success"], self._episode.attrs["samples"] = success, self._samples
+            attributes = self._episode.attrs
+            attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
             for name, value in remarks.items():
-                self._episode.attrs[name] = value
-            self._file.flush()
-        self._episode = None
+                attributes[name] = value
+            self._add_actions()
+            self._episode = None
+            self._store.finish()
 
-    def _values(self, phase: str) -> Iterator[tuple[str, Any, dict[str, Any]]]:
-        """Names, values and storage of one sample."""
+    def drop_episode(self) -> None:
+        """Forget the episode that goes on."""
+        self._episode = None
+        self._store.drop()
+
+    def _add_actions(self) -> None:
+        """The action of a sample is the set-point of the next one; that of the last is its own."""
+        assert self._episode is not None
+        for arm in self._episode["arms"].values() if "arms" in self._episode else ():
+            for source, name in (("setpoint_js", "action_js"), ("local_setpoint_cp", "local_action_cp")):
+                values = arm[source][:]
+                values = values[:, 0] if source == "setpoint_js" else values
+                arm.create_dataset(name, data=np.concatenate([values[1:], values[-1:]])).attrs["units"] = arm[
+                    source
+                ].attrs["units"]
+            if "jaw" in arm:
+                values = arm["jaw/setpoint_js"][:, 0]
+                arm.create_dataset("jaw/action_js", data=np.concatenate([values[1:], values[-1:]])).attrs["units"] = (
+                    "rad"
+                )
+
+    def _values(self, phase: str, doers: Collection[str] | None) -> Iterator[Value]:
+        """All of one sample."""
         simulation, state = self._simulation, self._simulation.state[0]
-        scene = simulation.scene
-        yield "time", simulation.time, {"dtype": "f8"}
-        yield "phase", self._phases.index(phase), {"dtype": "u1"}
-        for arm, record in zip(scene.arms, state["arm"], strict=True):
-            yield from _motion(arm, record)
+        scene, label = simulation.scene, self._phases.index(phase)
+        yield "time", simulation.time, {"dtype": "f8", "units": "s"}
+        yield "phase", label, {"dtype": "u1"}
+        activities = self._watch.activities(state)
+        for arm, record, activity in zip(scene.arms, state["arm"], activities, strict=True):
+            if arm.joints:
+                yield from self._motion(arm, record)
+                yield f"arms/{arm.name}/phase", label if doers is None or arm.name in doers else 0, {"dtype": "u1"}
+                yield f"arms/{arm.name}/activity", activity, {"dtype": "u1"}
+        for index, jaw in enumerate(scene.jaws):
+            if jaw.name in simulation.arms:
+                yield f"arms/{jaw.name}/jaw/force", state["jaw_force"][index], {"dtype": "f4", "units": "N"}
         for needle in scene.needles[:1]:
-            yield "needle/pose", state["body_pose"][needle.body], {"dtype": "f4"}
-            yield "needle/twist", state["body_twist"][needle.body], {"dtype": "f4"}
+            yield "needle/pose", state["body_pose"][needle.body], {"dtype": "f4", "units": "m", "axes": POSE}
+            yield (
+                "needle/twist",
+                state["body_twist"][needle.body],
+                {"dtype": "f4", "units": "m/s, rad/s", "axes": TWIST},
+            )
+            n = int(state["insertion_count"])
+            force = state["insertion_force"][:n][state["insertion_body"][:n] == needle.body].sum(axis=0)
+            yield "needle/tissue_force", force, {"dtype": "f4", "units": "N"}
         for rod in scene.rods[:1]:
-            yield "thread/points", state["body_pose"][list(rod.bodies), :3], {"dtype": "f4"}
-            yield "thread/tension", state["rod_tension"][list(rod.bodies)], {"dtype": "f4"}
+            yield "thread/points", state["body_pose"][list(rod.bodies), :3], {"dtype": "f4", "units": "m"}
+            yield "thread/tension", state["rod_tension"][list(rod.bodies)], {"dtype": "f4", "units": "N"}
+        for tissue in scene.tissues:
+            yield from _tissue(scene, tissue, state)
         for name, camera in self._cameras.items():
             yield from self._pictures(name, camera)
 
-    def _pictures(self, name: str, camera: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
+    def _motion(self, arm: ArmDescription, record: Any) -> Iterator[Value]:
+        """Joints (position, velocity, effort by joint), tip and its wrench in the arm's base, and jaw of an arm."""
+        joints, units = len(arm.joints), ", ".join(_unit(self._simulation.scene.joints[j].type) for j in arm.joints)
+        rows = {"dtype": "f4", "units": units, "axes": JOINT_ROWS}
+        pose = {"dtype": "f4", "units": "m", "axes": POSE}
+        for what in ("measured", "setpoint"):
+            yield f"arms/{arm.name}/{what}_js", record[f"{what}_js"][:, :joints], rows
+            yield f"arms/{arm.name}/local_{what}_cp", record[f"local_{what}_cp"], pose
+            if arm.kind is ArmKind.PSM:
+                jaw = {"dtype": "f4", "units": "rad", "axes": JOINT_ROWS}
+                yield f"arms/{arm.name}/jaw/{what}_js", record[f"jaw_{what}_js"], jaw
+        wrench = {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
+        yield f"arms/{arm.name}/spatial_measured_cf", record["spatial_measured_cf"], wrench
+
+    def _pictures(self, name: str, camera: Any) -> Iterator[Value]:
         """Colour, depth and ids of a camera, each picture compressed alone so that readers take any."""
-        picture, packed = camera.capture(self._size), {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+        picture = camera.capture(self._size)
         steps = np.where(np.isfinite(picture.depth), picture.depth / DEPTH_UNIT, 0.0)
-        yield f"cameras/{name}/rgb", picture.rgb, {"dtype": "u1", **packed}
-        yield f"cameras/{name}/depth", np.minimum(steps.round(), 65535.0), {"dtype": "u2", **packed}
-        yield f"cameras/{name}/ids", picture.ids, {"dtype": "u2", **packed}
-        yield f"cameras/{name}/pose", camera.pose, {"dtype": "f8"}
-        yield f"cameras/{name}/intrinsics", camera.view(self._size).intrinsics, {"dtype": "f8"}
+        yield f"cameras/{name}/rgb", picture.rgb, {"dtype": "u1", **_PACKED}
+        yield (
+            f"cameras/{name}/depth",
+            np.minimum(steps.round(), 65535.0),
+            {"dtype": "u2", "units": "depth_unit", **_PACKED},
+        )
+        yield f"cameras/{name}/ids", picture.ids, {"dtype": "u2", **_PACKED}
+        yield f"cameras/{name}/pose", camera.pose, {"dtype": "f8", "units": "m", "axes": POSE}
+        yield f"cameras/{name}/intrinsics", camera.view(self._size).intrinsics, {"dtype": "f8", "units": "px"}
 
     def _append(self, name: str, value: Any, options: dict[str, Any]) -> None:
         """Add a row to a dataset of the episode."""
@@ -183,7 +256,12 @@ class DatasetWriter:
         shape = np.shape(value)
         if name not in self._episode:
             rows = 1 if len(shape) > 1 and "compression" in options else 256
-            self._episode.create_dataset(name, (0, *shape), maxshape=(None, *shape), chunks=(rows, *shape), **options)
+            notes = {key: options[key] for key in ("units", "axes") if key in options}
+            storage = {key: value for key, value in options.items() if key not in notes}
+            made = self._episode.create_dataset(
+                name, (0, *shape), maxshape=(None, *shape), chunks=(rows, *shape), **storage
+            )
+            made.attrs.update(notes)
         data = self._episode[name]
         data.resize(self._samples + 1, axis=0)
         data[self._samples] = value
@@ -191,35 +269,37 @@ class DatasetWriter:
     # --- the end ----------------------------------------------------------------------------
 
     def close(self) -> None:
-        """End the dataset and give the file its name; a second time does nothing."""
+        """End the dataset and make one file of it; a second time does nothing.
+
+        An episode that goes on counts as failed.
+        """
         if self._ended:
             return
         self.end_episode(False)
         with self._writing():
-            self._file.close()
-            self._disk.close()
-        self._part.replace(self._path)
+            self._store.close(empty=True)
         self._ended = True
 
     def abandon(self) -> None:
-        """Remove what was written."""
+        """End the dataset without the episode that goes on; without any other, nothing stays."""
         if not self._ended:
-            self._ended = True
-            with suppress(OSError, RuntimeError, AttributeError):
-                self._file.close()
-                self._disk.close()
-            self._part.unlink(missing_ok=True)
+            self._ended, self._episode = True, None
+            self._store.close(empty=False)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Reports in one way what may go wrong with a disk, and leaves nothing behind then."""
+        """Reports in one way what may go wrong with a disk, and drops the episode that goes on then."""
         try:
-            yield
-            if self._disk.error is not None:
-                raise self._disk.error
+            with uninterrupted():
+                yield
         except (OSError, RuntimeError) as error:
-            self.abandon()
-            raise DatasetError(f"cannot write the dataset '{self._path}': {error}") from error
+            self._ended, self._episode = True, None
+            kept = f"; {self.count} episodes are whole" if self.count else ""
+            try:
+                self._store.close(empty=False)
+            except (OSError, RuntimeError) as second:
+                kept += f" ({second})" if self.count else ""
+            raise DatasetError(f"cannot write the dataset '{self._path}': {error}{kept}") from error
 
     def __enter__(self) -> DatasetWriter:
         return self
@@ -233,13 +313,31 @@ class DatasetWriter:
             self.abandon()
 
 
-def _motion(arm: ArmDescription, record: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
-    """Joints (position, velocity, effort by joint), tip in the arm's base, and jaw of an arm."""
-    single, joints = {"dtype": "f4"}, len(arm.joints)
-    if not joints:
-        return
-    for what in ("measured", "setpoint"):
-        yield f"arms/{arm.name}/{what}_js", record[f"{what}_js"][:, :joints], single
-        yield f"arms/{arm.name}/local_{what}_cp", record[f"local_{what}_cp"], single
-        if arm.kind is ArmKind.PSM:
-            yield f"arms/{arm.name}/jaw/{what}_js", record[f"jaw_{what}_js"], single
+def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: Mapping[str, str]) -> None:
+    """Raise ValueError for what no dataset can have."""
+    if not 0.0 < rate <= 1000.0:
+        raise ValueError(f"rate is samples per simulated second, above 0 and at most 1000, not {rate:g}")
+    if min(size) < 1:
+        raise ValueError(f"size is a width and a height in pixels, at least 1 each, not {size}")
+    if len(phases) > 255:
+        raise ValueError(f"there can be 255 phases, not {len(phases)}")
+    for phase, gesture in gestures.items():
+        if phase not in phases or gesture not in GESTURES:
+            raise ValueError(f"'{phase}' is no phase, or '{gesture}' none of the gestures {', '.join(GESTURES)}")
+
+
+def _unit(kind: JointType) -> str:
+    return "m" if kind is JointType.PRISMATIC else "rad"
+
+
+def _tissue(scene: Scene, tissue: TissueBody, state: Any) -> Iterator[Value]:
+    """Nodes, forces and punctures of a body of tissue, in world axes."""
+    names = [scene.bodies[other.body].identity.name for other in scene.tissues]
+    own = names[tissue.index] if names.count(names[tissue.index]) == 1 else f"{names[tissue.index]}{tissue.index}"
+    k, places = tissue.index, {"dtype": "f4", "units": "m"}
+    yield f"tissue/{own}/points", state["tissue_node"][tissue.rows], places
+    yield f"tissue/{own}/wrench", state["tissue_wrench"][k], {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
+    yield f"tissue/{own}/peak_force", state["tissue_peak"][k], {"dtype": "f4", "units": "N"}
+    yield f"tissue/{own}/puncture_count", state["puncture_count"][k], {"dtype": "i4"}
+    yield f"tissue/{own}/puncture_points", state["puncture_point"][k], places
+    yield f"tissue/{own}/puncture_normals", state["puncture_normal"][k], {"dtype": "f4"}

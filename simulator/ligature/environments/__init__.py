@@ -5,14 +5,29 @@ from typing import Any
 
 import gymnasium
 
-from ligature.environments.suturing import SuturingEnv
+from ligature.environments.goals import GOALS
+from ligature.environments.suturing import EnvState, SuturingEnv
 
-__all__ = ["SuturingEnv", "make_vec"]
+__all__ = ["EnvState", "SuturingEnv", "make_vec", "registered"]
 
-for _task in ("reach", "pick", "insert", "puncture"):
+MAX_STEPS = 200
+"""Actions until an episode of a registered environment is cut; ``gymnasium.make`` has ``max_episode_steps``."""
+
+
+def registered(task: str, **options: Any) -> SuturingEnv:
+    """What ``gymnasium.make`` calls: an environment whose episodes are cut by Gymnasium's own wrapper."""
+    if "max_steps" in options:
+        raise ValueError("gymnasium.make has 'max_episode_steps' for what SuturingEnv calls 'max_steps'")
+    return SuturingEnv(task, **options, max_steps=None)
+
+
+registered.metadata = SuturingEnv.metadata  # type: ignore[attr-defined]
+
+for _task in GOALS:
     gymnasium.register(
         id=f"ligature/{_task.capitalize()}-v0",
-        entry_point="ligature.environments.suturing:SuturingEnv",
+        entry_point="ligature.environments:registered",
+        max_episode_steps=MAX_STEPS,
         kwargs={"task": _task},
     )
 

@@ -1,8 +1,13 @@
-"""What an agent is to do in an environment: where episodes begin, what is seen, rewarded and done. Metres, radians."""
+"""What an agent is to do in an environment: where episodes begin, what is seen, rewarded, done and lost.
+
+Metres, radians, simulated seconds. A task is done when the deed is: tests try to get the reward without it
+(`tests/environments/cheats.py`).
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+from copy import deepcopy
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +17,7 @@ from ligature.robots.psm_arm import PsmArm
 from ligature.simulation import Simulation
 from ligature.tasks.passages import PassageWatch
 from ligature.tasks.scenery import Scenery
-from ligature.tasks.scores import RECOMMENDED_AXIAL, judge_insertion
+from ligature.tasks.scores import RECOMMENDED_AXIAL, holes_of, judge_insertion, passed_in_order
 from ligature.tasks.throws import UP, NeedleArc, Throw, best_grasp
 
 Array = NDArray[np.float64]
@@ -20,39 +25,115 @@ Array = NDArray[np.float64]
 START = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 """Joint values with which an episode begins, where nothing is in hand."""
 
+EARLY = 1e-9
+"""Seconds that a time may fall short of what is wanted, for the rounding of simulated time."""
+
 UNDONE = 1e-6
 """Metres that are left while a task is not done, wherever the needle is."""
 
 
-class Goal(Protocol):
-    """A task of an environment."""
+HOLD = 0.5
+"""Seconds for which jaws must hold the needle without a break before a task with it counts as done."""
 
-    holes: int
-    """Pairs of holes that a scene must have."""
+REST = 0.2
+"""Seconds for which a tool must stay at a place to have reached it."""
 
+LOST = 0.1
+"""Seconds without a grasp after which a needle counts as dropped."""
+
+REGRASP = 2.0
+"""The same where tissue has the needle, so that the hand may grasp it anew."""
+
+
+class Progress(NamedTuple):
+    """How a task stands: metres that are ``left``, whether it is ``done``, why it is ``lost`` (empty: it is not)."""
+
+    left: float
+    done: bool = False
+    lost: str = ""
+
+
+class Dwell:
+    """For how long something has been so without a break, in simulated seconds."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def observe(self, so: bool, now: float) -> float:
+        """Take what is so ``now``; returns the seconds that it has been so."""
+        if not so:
+            self._since = None
+            return 0.0
+        self._since = now if self._since is None else self._since
+        return now - self._since
+
+
+class Goal:
+    """A task of an environment; `Progress` is taken once after each action, since tasks count time.
+
+    Attributes
+    ----------
+    holes
+        Pairs of holes that a scene must have.
+    scene
+        Folder of the scene of ours that the task is made for.
+    models
+        Models of its launch file that the task needs: one arm, where all of them are simulated for nothing.
+    thread
+        Whether the task needs the needle's thread.
+    arm
+        Name of the arm that does it.
+    text
+        The task in words, for policies that take language and for datasets.
+    """
+
+    holes: int = 0
     scene: str
-    """Folder of the scene of ours that the task is made for."""
-
     models: tuple[int, ...]
-    """Models of its launch file that the task needs: one arm, where all of them are simulated for nothing."""
-
     thread: bool
-    """Whether the task needs the needle's thread."""
-
     arm: str
-    """Name of the arm that does it."""
+    text: str
+
+    _KEPT: tuple[str, ...] = ()
+    """Attributes that last from action to action."""
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
         """Bring the scene to where all episodes begin from; raises ValueError where that cannot be done."""
+        raise NotImplementedError
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
         """Set an episode up."""
+        raise NotImplementedError
 
     def target(self) -> Array:
         """Where something is wanted (3,), world axes."""
+        raise NotImplementedError
 
-    def distance(self, simulation: Simulation, arm: PsmArm) -> float:
-        """How far there is to go, in metres; zero when done."""
+    def observe(self, simulation: Simulation, arm: PsmArm) -> Progress:
+        """Look at the scene after an action."""
+        raise NotImplementedError
+
+    def marks(self) -> Array:
+        """What `observe` goes by beside the scene (3,), 0 to 1 each.
+
+        Whether the arm's jaws hold the needle; the share of the time for which something must be so; the stage.
+        """
+        raise NotImplementedError
+
+    def snapshot(self) -> dict[str, Any]:
+        """What lasts from action to action."""
+        return {name: deepcopy(getattr(self, name)) for name in self._KEPT if hasattr(self, name)}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Continue from `snapshot`, of this goal or of another one of its kind in an equal scene."""
+        for name, value in deepcopy(snapshot).items():
+            setattr(self, name, value)
+
+
+def holds(simulation: Simulation, arm: PsmArm, body: int) -> bool:
+    """Whether the jaws of ``arm``, and no others, hold ``body`` between their pads."""
+    found = simulation.grasps[arm.name]
+    return found is not None and found.body == body
 
 
 def tip_position(simulation: Simulation, arm: PsmArm) -> Array:
@@ -65,6 +146,13 @@ def _base_of(simulation: Simulation, arm: PsmArm) -> int:
     return next(description.base for description in simulation.scene.arms if description.name == arm.name)
 
 
+def _holes_at(simulation: Simulation, *places: Array) -> set[int]:
+    """Holes of the scene that are the nearest to ``places``, (3,) each, in world axes."""
+    scene, poses = simulation.scene, simulation.state["body_pose"][0]
+    at = np.array([(pose7_matrix(poses[hole.body]) @ hole.T_body_hole)[:3, 3] for hole in scene.holes])
+    return {int(np.argmin(np.linalg.norm(at - place, axis=1))) for place in places} if len(at) else set()
+
+
 def _stand_ready(simulation: Simulation, arm: PsmArm) -> None:
     """The arm above the work, the needle at rest."""
     arm.place_jp(START)
@@ -72,13 +160,14 @@ def _stand_ready(simulation: Simulation, arm: PsmArm) -> None:
     simulation.step(200)
 
 
-class Reach:
-    """Bring the tool's control point to within 2 mm of a random place above the work."""
+class Reach(Goal):
+    """Bring the tool's control point to within 2 mm of a random place above the work, and keep it there for 0.2 s."""
 
-    holes = 0
     scene, arm, models, thread = "suturing_small", "PSM1", (0, 1, 2), False
+    text = "move the tip of the instrument to the target and stop there"
     WITHIN = 0.002
     REACH = np.array([0.025, 0.025, 0.012])
+    _KEPT = ("_target", "_there", "_rested")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
         """The arm above the work."""
@@ -87,26 +176,40 @@ class Reach:
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
         """A target in a box around where the tool is."""
         self._target = tip_position(simulation, arm) + rng.uniform(-1.0, 1.0, 3) * self.REACH
+        self._there, self._rested = Dwell(), 0.0
 
     def target(self) -> Array:
         """The place."""
         return self._target
 
-    def distance(self, simulation: Simulation, arm: PsmArm) -> float:
+    def observe(self, simulation: Simulation, arm: PsmArm) -> Progress:
         """Distance beyond `WITHIN`."""
-        return max(float(np.linalg.norm(tip_position(simulation, arm) - self._target)) - self.WITHIN, 0.0)
+        distance = float(np.linalg.norm(tip_position(simulation, arm) - self._target)) - self.WITHIN
+        self._rested = self._there.observe(distance <= 0.0, simulation.time)
+        done = self._rested >= REST - EARLY
+        return Progress(0.0 if done else max(distance, 0.0) + UNDONE, done)
+
+    def marks(self) -> Array:
+        """No grasp, the share of the rest, no stage."""
+        return np.array([0.0, min(self._rested / REST, 1.0), 0.0])
 
 
-class Pick:
-    """Grasp the needle, which lies somewhere on the pad, and lift it by 20 mm."""
+class Pick(Goal):
+    """Grasp the needle, which lies somewhere on the pad, lift all of it by 20 mm, and hold it there for 0.5 s.
 
-    holes = 0
+    Height counts while the arm's own jaws hold the needle. The episode is lost when the needle falls after it was
+    lifted by half of that, or off the pad.
+    """
+
     scene, arm, models, thread = "suturing_small", "PSM1", (0, 1, 2), True
+    text = "pick up the needle and hold it above the pad"
     HEIGHT = 0.02
     SPREAD = 0.012
+    _KEPT = ("_rest", "_at", "_held", "_high", "_up", "_lifted", "_free")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
         """The arm above the work."""
+        self._scenery = scenery
         _stand_ready(simulation, arm)
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
@@ -119,37 +222,54 @@ class Pick:
         placed = frame(turn @ T[:3, :3], turn @ (T[:3, 3] - middle) + middle + shift)
         simulation.set_pose(body, matrix_pose7(placed))
         simulation.step(100)
-        self._needle = body
-        self._height = float(simulation.state["body_pose"][0, body, 2]) + self.HEIGHT
-        self._middle = scenery.points[1]
-        self._at = pose7_matrix(simulation.state["body_pose"][0, body])[:3, 3]
+        points = scenery.needle_points(simulation.state["body_pose"][0])
+        self._rest, self._at = float(points[:, 2].min()), points[1]
+        self._held, self._high = False, False
+        self._up, self._lifted, self._free = Dwell(), 0.0, Dwell()
 
     def target(self) -> Array:
         """The needle's place at the height wanted."""
-        return np.append(self._at[:2], self._height)
+        return np.append(self._at[:2], self._rest + self.HEIGHT)
 
-    def distance(self, simulation: Simulation, arm: PsmArm) -> float:
-        """How much higher the needle must be, and how far the tool is from it."""
-        pose = simulation.state["body_pose"][0, self._needle]
-        self._at = pose7_matrix(pose)[:3, :3] @ self._middle + pose[:3]
-        missing = max(self._height - float(pose[2]), 0.0)
-        return missing + 0.2 * float(np.linalg.norm(tip_position(simulation, arm) - self._at)) * (missing > 0.0)
+    def observe(self, simulation: Simulation, arm: PsmArm) -> Progress:
+        """How much higher the needle must be; before it is held, how far the tool is from it too."""
+        points, now = self._scenery.needle_points(simulation.state["body_pose"][0]), simulation.time
+        self._at, height = points[1], float(points[:, 2].min()) - self._rest
+        self._held = holds(simulation, arm, self._scenery.needle)
+        self._high = self._high or (self._held and height >= 0.5 * self.HEIGHT)
+        self._lifted = self._up.observe(self._held and height >= self.HEIGHT, now)
+        free = self._free.observe(not self._held, now)
+        if self._lifted >= HOLD - EARLY:
+            return Progress(0.0, True)
+        if self._held:
+            return Progress(max(self.HEIGHT - height, 0.0) + UNDONE)
+        left = self.HEIGHT + 0.2 * float(np.linalg.norm(tip_position(simulation, arm) - self._at)) + UNDONE
+        if self._high and free >= LOST - EARLY:
+            return Progress(left, lost="the needle was dropped")
+        return Progress(left, lost="the needle fell off the pad" if height < -self.HEIGHT else "")
+
+    def marks(self) -> Array:
+        """Whether the needle is held, the share of the time that it is up, whether a fall ends the episode."""
+        return np.array([self._held, min(self._lifted / HOLD, 1.0), self._high], dtype=float)
 
 
-class Insert:
+class Insert(Goal):
     """Drive the needle, which is in hand before the entry of the first pair of holes, in there and out at the exit.
 
     Its tip shall go along the circle of its radius through both holes. Done when the tip has gone through the entry
-    and then the exit, and is 5 mm beyond.
+    and then the exit, is 5 mm beyond, the needle is in both, and the arm's jaws have held it for the last 0.5 s. Lost
+    when they drop it, after 2 s where tissue has it.
     """
 
     holes = 1
+    text = "drive the needle in at the first entry and out at its exit"
     scene, arm, thread = "suturing", "PSM2", True
     models: tuple[int, ...] = (0, 1, 4, 5)
     DEPTHS = (0.020, 0.0205, 0.021)
     BEFORE, MORE, LOOK = 0.4, 0.1, 0.15
     SHIFT, TURN = 0.002, 0.08
     OPEN, SHUT = 0.8, -0.35
+    _KEPT = ("_watch", "_grasped", "_held", "_kept", "_free", "_stage")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
         """The needle between the jaws, its tip before the entry."""
@@ -157,8 +277,9 @@ class Insert:
         self._body = scene.bodies[scenery.needle]
         self.arc = NeedleArc.of(scene.needles[0], self._body)
         poses = simulation.state["body_pose"][0]
-        entry, exit = self._ends()
+        entry, exit = self._places = self._ends()
         self.throw = Throw.through(entry, exit, self.arc.radius, UP)
+        self._pair = _holes_at(simulation, entry, exit) if self.holes else set()
         self._last = self.throw.towards_exit + RECOMMENDED_AXIAL / self.arc.radius + self.MORE
         T_base = pose7_matrix(poses[_base_of(simulation, arm)])
         way = [self.throw.arc_at(a, self.arc) for a in np.linspace(-self.BEFORE, self._last, 12)]
@@ -196,7 +317,8 @@ class Insert:
         R = axis_rotation(turn / np.linalg.norm(turn), float(rng.uniform(0.0, self.TURN)))
         arm.servo_cp(frame(R @ T[:3, :3], T[:3, 3] + rng.uniform(-self.SHIFT, self.SHIFT, 3)))
         simulation.step(150)
-        self._watch, self._done = PassageWatch(scenery), False
+        self._watch = PassageWatch(scenery)
+        self._grasped, self._held, self._kept, self._free, self._stage = Dwell(), True, 0.0, Dwell(), 0.0
 
     def _tip(self) -> tuple[Array, float]:
         """The needle's tip (3,), and its angle past the entry on the circle."""
@@ -204,11 +326,17 @@ class Insert:
         local = self.throw.axes.T @ (tip - self.throw.centre)
         return tip, float(np.arctan2(local[1], local[0]))
 
-    def _is_through(self) -> bool:
-        poses = self._simulation.state["body_pose"][0]
-        self._watch.observe(self._simulation.time, poses)
-        score = judge_insertion(self._scenery, poses, self._watch.passages, self._simulation.time)
-        return score.success and score.pair == 1 and bool(score.axial >= RECOMMENDED_AXIAL)
+    def _look(self) -> tuple[bool, bool, float]:
+        """Whether the needle went where it should, whether tissue has it, and the share of the way that it went."""
+        state = self._simulation.state
+        poses, time = state["body_pose"][0], self._simulation.time
+        self._watch.observe(time, poses)
+        score = judge_insertion(self._scenery, poses, self._watch.passages, time)
+        n = int(state["insertion_count"][0])
+        filled = set(state["insertion_hole"][0, :n][state["insertion_body"][0, :n] == self._scenery.needle].tolist())
+        through = score.success and score.pair == 1 and bool(score.axial >= RECOMMENDED_AXIAL)
+        entered = passed_in_order(self._watch.passages, holes_of([1])) / 2.0
+        return through and self._pair <= filled, bool(filled), entered
 
     def _on_circle(self, angle: float) -> Array:
         local = self.arc.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -219,25 +347,37 @@ class Insert:
         _, angle = self._tip()
         return self._on_circle(float(np.clip(angle + self.LOOK, -self.BEFORE, self._last)))
 
-    def distance(self, simulation: Simulation, arm: PsmArm) -> float:
+    def observe(self, simulation: Simulation, arm: PsmArm) -> Progress:
         """Way of the tip along the circle that is left, and how far it is beside it."""
-        self._done = self._done or self._is_through()
-        if self._done:
-            return 0.0
+        through, inside, self._stage = self._look()
+        self._held = holds(simulation, arm, self._scenery.needle)
+        self._kept = self._grasped.observe(self._held, simulation.time)
+        free = self._free.observe(not self._held, simulation.time)
+        if through and self._kept >= HOLD - EARLY:
+            return Progress(0.0, True)
         tip, angle = self._tip()
         near = float(np.clip(angle, -2.0 * self.BEFORE, self._last))
         beside = float(np.linalg.norm(tip - self._on_circle(near)))
-        return self.arc.radius * (self._last - near) + beside + UNDONE
+        left = self.arc.radius * (self._last - near) + beside + UNDONE
+        dropped = free >= (REGRASP if inside else LOST) - EARLY
+        return Progress(left, lost="the needle was dropped" if dropped else "")
+
+    def marks(self) -> Array:
+        """Whether the needle is held, the share of the time that it must be, the share of the holes passed."""
+        return np.array([self._held, min(self._kept / HOLD, 1.0), self._stage], dtype=float)
 
 
 class Puncture(Insert):
     """Drive the needle, which is in hand above a block of soft tissue, in at one place of its top and out at another.
 
     Its tip shall go along the circle of its radius through both. Done when the needle is in the tissue, has punctured
-    its surface twice, and the tip is 5 mm beyond the second place.
+    its top within 4 mm of each of them, its tip is out of the tissue and 5 mm beyond the second, and the arm's jaws
+    have held it for the last 0.5 s.
     """
 
     holes = 0
+    text = "drive the needle in at the top of the tissue and out again beside it"
+    NEAR = 0.004
     scene, arm = "needle_insertion", "PSM2"
     models, thread = (0, 1, 2), True
     CHORD = 0.014
@@ -251,14 +391,17 @@ class Puncture(Insert):
         aside = np.array([0.5 * self.CHORD, 0.0, 0.0])
         return middle - aside, middle + aside
 
-    def _is_through(self) -> bool:
+    def _look(self) -> tuple[bool, bool, float]:
         state = self._simulation.state
         n = int(state["insertion_count"][0])
-        inside = (state["insertion_hole"][0, :n] == -1) & (state["insertion_body"][0, :n] == self._scenery.needle)
-        _, angle = self._tip()
+        in_tissue = (state["insertion_hole"][0, :n] == -1) & (state["insertion_body"][0, :n] == self._scenery.needle)
+        places = state["puncture_point"][0, 0, : int(state["puncture_count"][0, 0])]
+        near = [bool((np.linalg.norm(places - wanted, axis=1) < self.NEAR).any()) for wanted in self._places]
+        tip, angle = self._tip()
         beyond = self.throw.towards_exit + RECOMMENDED_AXIAL / self.arc.radius
-        return bool(inside.any() and state["puncture_count"][0, 0] >= 2 and beyond < angle < np.pi)
+        out = beyond < angle < np.pi and float(tip[2]) > float(self._places[1][2])
+        return bool(in_tissue.any() and all(near) and out), bool(in_tissue.any()), sum(near) / 2.0
 
 
-GOALS: dict[str, type] = {"reach": Reach, "pick": Pick, "insert": Insert, "puncture": Puncture}
+GOALS: dict[str, type[Goal]] = {"reach": Reach, "pick": Pick, "insert": Insert, "puncture": Puncture}
 """Tasks by name."""

@@ -5,7 +5,9 @@ Metres, radians, world axes.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +18,14 @@ from numpy.typing import NDArray
 
 from ligature.bundle import SCENES
 from ligature.camera_simulation import Simulation
-from ligature.environments.goals import GOALS, Goal, tip_position
+from ligature.environments.goals import GOALS, Goal, Progress, tip_position
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.load import load
 from ligature.model.scene import Scene
 from ligature.robots.operating_state import Rejected
+from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
+from ligature.simulation import Snapshot
 from ligature.tasks.scenery import Scenery
 
 Array = NDArray[np.float64]
@@ -35,6 +39,24 @@ STEP_LENGTH, STEP_ANGLE, STEP_JAW = 0.001, 0.05, 0.1
 STEP_JOINTS = np.array([0.01, 0.01, 0.001, 0.08, 0.06, 0.06])
 SUCCESS_REWARD = 1.0
 
+AHEAD_LENGTH, AHEAD_ANGLE, AHEAD_JOINTS = 0.005, 0.25, 5.0 * STEP_JOINTS
+"""How far a set-point may be ahead of what is measured: an arm that something stops does not wind up."""
+
+STATE = 52
+"""Numbers of a state observation."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnvState:
+    """Where an environment is in an episode: opaque, made by `SuturingEnv.save`; for the same task and options."""
+
+    options: Mapping[str, Any]
+    snapshot: Snapshot
+    goal: Mapping[str, Any]
+    progress: Progress
+    count: int
+    random: Mapping[str, Any]
+
 
 class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     """One PSM before a pad with a needle.
@@ -47,7 +69,10 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 3 to 5 | rotation vector about the tip's axes, 1 is 0.05 rad | roll (0.08 rad), wrist pitch, yaw (0.06 rad) |
     | 6 | jaw, 1 opens by 0.1 rad | the same |
 
-    **Observations** with ``observation="state"``, `Box(-inf, inf, (34,))`:
+    An action moves the set-point, which stays within 5 mm and 0.25 rad of what is measured (joints: five actions): an
+    arm that something stops does not wind up.
+
+    **Observations** with ``observation="state"``, `Box(-inf, inf, (52,))`:
 
     | numbers | what | unit |
     |---|---|---|
@@ -59,14 +84,24 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 27 to 29 | the tool's control point | m |
     | 30 to 32 | the target | m |
     | 33 | how far there is to go | m |
+    | 34 to 40 | joint velocities, that of the jaw last | rad/s, m/s |
+    | 41 to 47 | set-point of the tip in the arm's base | m |
+    | 48 | set-point of the jaw | rad |
+    | 49 | 1 while the arm's jaws hold the needle | |
+    | 50 | share of the time for which something must be so until the task is done | |
+    | 51 | stage: the needle was lifted by half (``pick``), share of the holes passed (``insert``, ``puncture``) | |
+
+    What the next state and reward depend on is among these but for the shapes of thread and tissue.
 
     With ``observation="image"`` they are pictures of ``camera``, `Box(0, 255, (height, width, 3), uint8)`; with
     ``"both"``, a `Dict` of ``image`` and ``state``.
 
     **Reward** ``"dense"``: metres gained in an action, times 100, and 1 at the end; ``"sparse"``: 1 at the end, else 0.
 
-    **Episodes** end when the task is done, and are cut after ``max_steps`` actions. The same seed and actions give the
-    same bits.
+    **Episodes** end when the task is done or the needle is dropped (``info["lost"]`` has the reason), and are cut after
+    ``max_steps`` actions. The same seed and actions give the same bits.
+
+    `save` and `restore` keep and take up any moment; copies (``copy.deepcopy``) and pickles go on alike.
 
     Parameters
     ----------
@@ -82,7 +117,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     camera, size
         Name of the camera, and width and height of its pictures in pixels.
     max_steps
-        Actions until an episode is cut.
+        Actions until an episode is cut, None for no end; ``gymnasium.make`` has ``max_episode_steps`` for this.
     render_mode
         ``rgb_array`` to draw with `render`, or None.
     """
@@ -99,9 +134,10 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         reward: str = "dense",
         camera: str = "cameraL",
         size: tuple[int, int] = (84, 84),
-        max_steps: int = 200,
+        max_steps: int | None = 200,
         render_mode: str | None = None,
     ) -> None:
+        self._options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         for name, value, allowed in (
             ("task", task, tuple(GOALS)), ("action", action, ("cartesian", "joint")),
             ("observation", observation, ("state", "image", "both")), ("reward", reward, ("dense", "sparse")),
@@ -121,18 +157,34 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
         image = spaces.Box(0, 255, (size[1], size[0], 3), np.uint8)
-        state = spaces.Box(-np.inf, np.inf, (34,), np.float64)
+        state = spaces.Box(-np.inf, np.inf, (STATE,), np.float64)
         both = spaces.Dict({"image": image, "state": state})
         self.observation_space: spaces.Space[Any] = {"image": image, "state": state, "both": both}[observation]
         self._ticks = round(CONTROL / self._simulation.dt)
         self._goal.prepare(self._simulation, self._scenery, self._arm)
         self._settled = self._simulation.snapshot()
-        self._count, self._before, self._closed = 0, 0.0, False
+        self._count, self._closed = 0, False
+        self._progress: Progress | None = None
 
     @property
     def goal(self) -> Goal:
         """What is to be done."""
         return self._goal
+
+    @property
+    def simulation(self) -> Simulation:
+        """What is simulated: the ground truth, for scripted experts and for datasets."""
+        return self._simulation
+
+    @property
+    def arm(self) -> PsmArm:
+        """The arm that acts."""
+        return self._arm
+
+    @property
+    def needle(self) -> int:
+        """The body of the needle."""
+        return self._scenery.needle
 
     @property
     def base_rotation(self) -> Array:
@@ -152,40 +204,96 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self._arm.local_setpoint_cp()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; ``seed`` begins another series of random starts, ``options`` has no keys."""
+        """Begin an episode; ``seed`` begins another series of random starts.
+
+        Raises ValueError for any of ``options``: there are none.
+        """
+        if options:
+            raise ValueError(
+                f"reset has no options, not {', '.join(map(repr, options))}; options are given to the class"
+            )
         super().reset(seed=seed)
         self._simulation.restore(self._settled)
         self._goal.begin(self._simulation, self._scenery, self._arm, self.np_random)
         self._count = 0
-        self._before = self._goal.distance(self._simulation, self._arm)
-        return self._observe(), self._info(self._before)
+        self._progress = self._goal.observe(self._simulation, self._arm)
+        return self._observe(), self._info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for 20 ms."""
+        if self._progress is None:
+            raise RuntimeError("step comes after reset: no episode has begun")
         wanted = np.clip(np.nan_to_num(np.asarray(action, dtype=float)), -1.0, 1.0)
-        rejected = self._act(wanted)
+        rejected, bounded = self._act(wanted)
         self._simulation.step(self._ticks)
         self._count += 1
-        distance = self._goal.distance(self._simulation, self._arm)
-        done = distance <= 0.0
-        reward = SUCCESS_REWARD * done + (100.0 * (self._before - distance) if self._dense else 0.0)
-        self._before = distance
-        info = {**self._info(distance), "refused": rejected}
-        return self._observe(), float(reward), done, self._count >= self._most, info
+        before, self._progress = self._progress, self._goal.observe(self._simulation, self._arm)
+        left, done, lost = self._progress
+        reward = SUCCESS_REWARD * done + (100.0 * (before.left - left) if self._dense else 0.0)
+        cut = self._most is not None and self._count >= self._most
+        return self._observe(), float(reward), done or bool(lost), cut, {
+            **self._info(), "refused": rejected, "bounded": bounded,
+        }  # fmt: skip
 
-    def _act(self, action: Array) -> str:
-        """Command the arm; what it rejects is logged, and it stays."""
-        arm = self._arm
+    def _act(self, action: Array) -> tuple[str, bool]:
+        """Command the arm; what it rejects is logged, and it stays. Also whether the set-point was held back."""
+        arm, bounded = self._arm, False
         try:
             if self._action == "joint":
-                arm.servo_jr(action[:6] * STEP_JOINTS)
+                bounded = self._act_on_joints(action[:6] * STEP_JOINTS)
             else:
-                arm.servo_cp(_stepped(arm, action))
+                T, bounded = _bounded(pose7_matrix(arm.local_measured_cp()), _stepped(arm, action))
+                arm.servo_cp(T)
             if arm.jaw is not None:
                 arm.jaw.servo_jp(arm.jaw.setpoint_js().position + STEP_JAW * action[6])
         except Rejected as rejection:
-            return str(rejection)
-        return ""
+            return str(rejection), bounded
+        return "", bounded
+
+    def _act_on_joints(self, step: Array) -> bool:
+        measured, wanted = self._arm.measured_js().position, self._arm.setpoint_js().position + step
+        near = np.clip(wanted, measured - AHEAD_JOINTS, measured + AHEAD_JOINTS)
+        self._arm.servo_jp(near)
+        return bool((near != wanted).any())
+
+    # --- keeping a moment -------------------------------------------------------------------
+
+    def save(self) -> EnvState:
+        """Where the environment is, with its random numbers, for `restore` here or in another one like it.
+
+        Bullet keeps contacts that nobody can read; this drops them here too, so that an episode goes on with the same
+        last bits as all that are restored from it, and with others than one that was never saved.
+        """
+        if self._progress is None:
+            raise RuntimeError("save comes after reset: no episode has begun")
+        return EnvState(
+            self._options, self._simulation.snapshot(), self._goal.snapshot(), self._progress, self._count,
+            deepcopy(self.np_random.bit_generator.state),
+        )  # fmt: skip
+
+    def restore(self, state: EnvState) -> Any:
+        """Go on from where `save` was called; returns the observation there.
+
+        Raises ValueError for a state of another task, scene or arm.
+        """
+        for name in ("task", "scene", "arm"):
+            if state.options[name] != self._options[name]:
+                raise ValueError(f"the state has {name}={state.options[name]!r}, not {self._options[name]!r}")
+        self._simulation.restore(state.snapshot)
+        self._goal.restore(dict(state.goal))
+        self._progress, self._count = state.progress, state.count
+        self.np_random.bit_generator.state = deepcopy(dict(state.random))
+        return self._observe()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> SuturingEnv:
+        """Another simulation that goes on as this one does."""
+        return _made(self._options, None if self._progress is None else self.save())
+
+    def __copy__(self) -> SuturingEnv:
+        raise TypeError("two environments cannot share one simulation: use copy.deepcopy, or save and restore")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made, (self._options, None if self._progress is None else self.save())
 
     def _observe(self) -> Any:
         if self._observation == "both":
@@ -194,16 +302,27 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def _numbers(self) -> Array:
         """The state, as the table of the class has it."""
-        state, arm = self._simulation.state, self._arm
-        jaw = np.zeros(1) if arm.jaw is None else arm.jaw.measured_js().position
+        state, arm, none = self._simulation.state, self._arm, np.zeros(1)
+        now, jaw = arm.measured_js(), None if arm.jaw is None else arm.jaw.measured_js()
         needle = self._scenery.needle
+        assert self._progress is not None
         return np.concatenate([
-            arm.measured_js().position, jaw, arm.local_measured_cp(), state["body_pose"][0, needle],
-            state["body_twist"][0, needle], tip_position(self._simulation, arm), self._goal.target(), [self._before],
+            now.position, none if jaw is None else jaw.position, arm.local_measured_cp(), state["body_pose"][0, needle],
+            state["body_twist"][0, needle], tip_position(self._simulation, arm), self._goal.target(),
+            [self._progress.left], now.velocity, none if jaw is None else jaw.velocity, arm.local_setpoint_cp(),
+            none if arm.jaw is None else arm.jaw.setpoint_js().position, self._goal.marks(),
         ])  # fmt: skip
 
-    def _info(self, distance: float) -> dict[str, Any]:
-        return {"distance": distance, "is_success": distance <= 0.0, "sim_time": self._simulation.time}
+    def _info(self) -> dict[str, Any]:
+        assert self._progress is not None
+        left, done, lost = self._progress
+        info = {"distance": left, "is_success": done, "lost": lost, "sim_time": self._simulation.time}
+        if self._simulation.scene.tissues:
+            state = self._simulation.state
+            info["tissue_force"] = float(np.linalg.norm(state["tissue_wrench"][0, 0, :3]))
+            info["tissue_peak_force"] = float(state["tissue_peak"][0, 0])
+            info["punctures"] = int(state["puncture_count"][0, 0])
+        return info
 
     def render(self) -> Any:
         """A picture (480, 640, 3) of the camera."""
@@ -240,3 +359,26 @@ def _stepped(arm: PsmArm, action: Array) -> Array:
     if angle > 0.0:
         T[:3, :3] = T[:3, :3] @ axis_rotation(turn / angle, angle)
     return T
+
+
+def _bounded(T_measured: Array, T: Array) -> tuple[Array, bool]:
+    """A set-point (4, 4) no farther from what is measured than `AHEAD_LENGTH` and `AHEAD_ANGLE`, and whether it was."""
+    ahead = T[:3, 3] - T_measured[:3, 3]
+    turn = rotation_vector(T_measured[:3, :3].T @ T[:3, :3])
+    length, angle = float(np.linalg.norm(ahead)), float(np.linalg.norm(turn))
+    if length <= AHEAD_LENGTH and angle <= AHEAD_ANGLE:
+        return T, False
+    found = T.copy()
+    if length > AHEAD_LENGTH:
+        found[:3, 3] = T_measured[:3, 3] + ahead * (AHEAD_LENGTH / length)
+    if angle > AHEAD_ANGLE:
+        found[:3, :3] = T_measured[:3, :3] @ axis_rotation(turn / angle, AHEAD_ANGLE)
+    return found, True
+
+
+def _made(options: Mapping[str, Any], state: EnvState | None) -> SuturingEnv:
+    """An environment of ``options`` that goes on from ``state``."""
+    env = SuturingEnv(**options)
+    if state is not None:
+        env.restore(state)
+    return env

@@ -147,14 +147,38 @@ def _filling(triangles: Array, axes: Sequence[Array]) -> Array:
     return inside.reshape(split).mean(axis=(1, 3, 5))
 
 
-def embed(grid: Grid, points: Array) -> Embedding:
-    """Bind points (v, 3) to the cells that contain them, or to the nearest ones."""
+def embed(grid: Grid, points: Array, beside: Array | None = None) -> Embedding:
+    """Bind points to the cells that contain them, or to the nearest ones.
+
+    Parameters
+    ----------
+    grid
+        The cells.
+    points
+        Places at rest, (v, 3) m.
+    beside
+        Places (v, 3) m that choose the cells instead, for points on a slit: those off it, on the side that is meant.
+    """
     low, high = grid.nodes[grid.cells[:, 0]], grid.nodes[grid.cells[:, 7]]
     corner = np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)], dtype=bool)
-    nearest = np.zeros(len(points), dtype=np.int64)
-    for begin in range(0, len(points), CHUNK):
-        part = points[begin : begin + CHUNK, None]
+    places = points if beside is None else beside
+    nearest = _containing(grid, places)
+    rest = np.flatnonzero(nearest < 0)
+    for begin in range(0, len(rest), CHUNK):
+        chunk = rest[begin : begin + CHUNK]
+        part = places[chunk, None]
         outside = np.maximum(np.maximum(low - part, part - high), 0.0)
-        nearest[begin : begin + CHUNK] = np.argmin((outside**2).sum(axis=2), axis=1)
+        nearest[chunk] = np.argmin((outside**2).sum(axis=2), axis=1)
     at = ((points - low[nearest]) / (high - low)[nearest])[:, None]
     return Embedding(grid.cells[nearest], np.where(corner, at, 1.0 - at).prod(axis=2))
+
+
+def _containing(grid: Grid, places: Array) -> Integers:
+    """The cells that contain places (v, 3), (v,); -1 for none."""
+    shape = tuple(len(axis) - 1 for axis in grid.axes)
+    number = np.full(shape, -1, dtype=np.int64)
+    number[tuple(grid.cell_site.T)] = np.arange(len(grid.cells))
+    site = [np.searchsorted(axis, places[:, a], side="right") - 1 for a, axis in enumerate(grid.axes)]
+    inside = np.all([(k >= 0) & (k < n) for k, n in zip(site, shape, strict=True)], axis=0)
+    cell = number[tuple(np.clip(k, 0, n - 1) for k, n in zip(site, shape, strict=True))]
+    return np.where(inside, cell, -1)

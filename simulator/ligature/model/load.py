@@ -101,6 +101,11 @@ def load(
     return prefixed(scene, namespace_prefix)
 
 
+def _name_of(path: Path) -> str:
+    """A scene in ``suturing/launch.yaml`` is called ``suturing``; another launch file names its scene itself."""
+    return path.resolve().parent.name if path.stem == "launch" else path.stem
+
+
 def _load_models(
     documents: Sequence[Document],
     files: Sequence[str | Path],
@@ -138,7 +143,9 @@ def _load_launch(
     found = list(launch.diagnostics)
     world = _world_document(launch, resolver, found)
     shaders = None if world is None else shader_files(world.top, "shaders", world.path.parent)
-    builder = SceneBuilder(launch.path.stem, resolver, _with_arms(_settings(world, shaders, launch), arms), softening)
+    builder = SceneBuilder(
+        _name_of(launch.path), resolver, _with_arms(_settings(world, shaders, launch), arms), softening
+    )
     builder.diagnostics += found
     if world is not None:
         _add_environment(world, builder, resolver)

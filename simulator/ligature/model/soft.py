@@ -36,8 +36,8 @@ class TissueForm:
         Text that names the body that carries this one; empty for none.
     own_density
         Whether the file gives the density, or a material that has one.
-    cut
-        Whether slits cut the visual mesh, so that the grid's own surface is to be drawn.
+    slits
+        Boxes (2, 3) from corner to corner at rest in B, m, that cut the body; one that is flat along an axis is a slit.
     """
 
     grid: Grid
@@ -45,7 +45,7 @@ class TissueForm:
     fixed: NDArray[np.bool_]
     support: str = ""
     own_density: bool = False
-    cut: bool = False
+    slits: tuple[Array, ...] = ()
 
     @property
     def cell_masses(self) -> Array:
@@ -65,9 +65,9 @@ class TissueForm:
         scale = mass / float(self.cell_masses.sum())
         return replace(self, materials=tuple(replace(m, density=scale * m.density) for m in self.materials))
 
-    def embed(self, points: Array) -> Embedding:
-        """Bind points (v, 3) at rest in the body frame to the nodes."""
-        return embed(self.grid, points)
+    def embed(self, points: Array, beside: Array | None = None) -> Embedding:
+        """Bind points (v, 3) at rest in the body frame to the nodes, as `ligature.mesh.voxels.embed` does."""
+        return embed(self.grid, points, beside)
 
 
 @dataclass(frozen=True, eq=False)

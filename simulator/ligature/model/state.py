@@ -79,7 +79,8 @@ def state_dtype(scene: Scene) -> StateDtype:
     it beyond the hole, where it passes and the force on it there, in world axes. In the body of tissue k the hole is
     -1 - k, the depth is the length inside, and the place is where it went in. ``tissue_node`` are the nodes of all
     bodies of tissue, in rows `TissueBody.rows`. ``tissue_wrench`` is all that needles, threads and bodies do to a
-    body of tissue, about the origin of its frame B; ``tissue_peak`` the largest force at one point of it. Of
+    body of tissue, about the origin of its frame B; ``tissue_peak`` the largest force at one point of it,
+    ``tissue_contacts`` at how many points something pushes or rubs it, on its surface and inside. Of
     ``puncture_*`` the first ``puncture_count`` rows of a body count: places on its surface where needles went in or
     out, and the outward normals there.
     ``jaw_body`` is what each jaw holds by friction or -1; ``jaw_force`` presses its fingers together, ``jaw_wrench``
@@ -134,6 +135,7 @@ def state_dtype(scene: Scene) -> StateDtype:
             ("tissue_node", "f8", (scene.tissues[-1].rows.stop if scene.tissues else 0, 3)),
             ("tissue_wrench", "f8", (len(scene.tissues), 6)),
             ("tissue_peak", "f8", (len(scene.tissues),)),
+            ("tissue_contacts", "i4", (len(scene.tissues),)),
             ("puncture_count", "i4", (len(scene.tissues),)),
             ("puncture_point", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),
             ("puncture_normal", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),

@@ -70,7 +70,7 @@ def tissue_of(
                      f"at most {MOST_NODES} are simulated; use larger cells than {cell:g} m")  # fmt: skip
     fixed = _fixed(element, grid)
     stated = element.has("ligature tissue.density") or element.has("ligature tissue.material")
-    return TissueForm(grid, materials, fixed, element.text("ligature tissue.carried by"), stated, bool(slits))
+    return TissueForm(grid, materials, fixed, element.text("ligature tissue.carried by"), stated, tuple(slits))
 
 
 def inertial_of(form: TissueForm, mass: float, T_body_inertial: Array | None) -> tuple[Array, Array]:

@@ -50,6 +50,7 @@ class Masses:
         self._hold_counts: dict[int, int] = {}
         self._grasp_counts: dict[int, int] = {}
         self._attached_loads: dict[int, tuple[Placement, Array]] = {}
+        self._scaled: dict[tuple[float, int], tuple[float, Array]] = {}
 
     def set_held(self, body: int, held: bool, grasped: bool = False) -> None:
         """Count one more holder of ``body``, or one less; a body that pads have ``grasped`` gets added mass.
@@ -77,11 +78,11 @@ class Masses:
         """What holds a body, and pulls at it in the coming tick: mass, inertia (3,), and commanded wrench (6,)."""
         if self._commands.driven(body):
             return IMMOVABLE, np.full(3, IMMOVABLE), np.zeros(6)
-        own, (held_mass, held_inertia) = self._engine.scene.bodies[body], self.mass_of(body)
-        palms = [self._engine.scene.bodies[palm] for palm in self._welds.parents(body)]
-        mass = held_mass - own.mass + sum(palm.mass for palm in palms)
-        inertia = held_inertia - inertia_of(own)
-        inertia += sum((np.full(3, inertia_of(palm).max()) for palm in palms), np.zeros(3))
+        (own_mass, own_inertia), (held_mass, held_inertia) = self._at_least(0.0, body), self.mass_of(body)
+        mass, inertia = held_mass - own_mass, held_inertia - own_inertia
+        for palm in self._welds.parents(body):
+            palm_mass, palm_inertia = self._at_least(0.0, palm)
+            mass, inertia = mass + palm_mass, inertia + palm_inertia.max()
         return mass, inertia, self._commands.wrench(body)
 
     def carry(self, body: int, wrench: Array) -> None:
@@ -119,9 +120,14 @@ class Masses:
 
     def _at_least(self, mass: float, body: int) -> tuple[float, Array]:
         """Mass and principal moments (3,) of a body, scaled up to ``mass``."""
-        described = self._engine.scene.bodies[body]
-        scale = mass / described.mass if mass > described.mass else 1.0
-        return scale * described.mass, scale * inertia_of(described)
+        known = self._scaled.get((mass, body))
+        if known is None:
+            described = self._engine.scene.bodies[body]
+            scale = mass / described.mass if mass > described.mass else 1.0
+            known = scale * described.mass, scale * inertia_of(described)
+            known[1].flags.writeable = False
+            self._scaled[mass, body] = known
+        return known
 
     def restart(self) -> None:
         """Begin anew: only welds hold bodies."""

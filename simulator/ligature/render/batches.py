@@ -35,6 +35,9 @@ class Batch:
         self.closed = pieces[0].closed
         self.shaders = pieces[0].shaders
         self.primitive = pieces[0].primitive
+        self.deforms = pieces[0].deforms
+        self.marks: Array | None = None
+        """Dark places of the surface in world axes, (n, 8) as `Marks.of` has them; None where there never are any."""
         self.rows = slice(first, first + len(pieces))
         self._tangents = surface.normal_map is not None
         self._instances = context.buffer(reserve=len(pieces) * INSTANCE.itemsize, dynamic=True)
@@ -42,6 +45,7 @@ class Batch:
         self._arrays: dict[Program, moderngl.VertexArray] = {}
         self._indices: moderngl.Buffer | None = None
         self._legacy: LegacyBuffers | None = None
+        self._past: moderngl.Buffer | None = None
         self.load(pieces[0].triangles)
 
     def load(self, triangles: Triangles) -> None:
@@ -55,6 +59,14 @@ class Batch:
             self._vertices.write(data)
             if self._legacy is not None:
                 self._legacy.load(triangles)
+
+    def load_past(self, positions: Array) -> None:
+        """Put where the vertices (n, 3) were in the picture before in a buffer of their own."""
+        data = positions.astype("f4").tobytes()
+        if self._past is None:
+            self._past = self._context.buffer(data, dynamic=True)
+        else:
+            self._past.write(data)
 
     def draw(self, program: Program, instances: NDArray[np.void], before: NDArray[np.float32] | None = None) -> None:
         """Draw ``instances`` (n,) of `INSTANCE`; ``before`` (n, 4, 4) are their matrices one frame ago."""
@@ -82,6 +94,8 @@ class Batch:
             ]
             if "iBefore" in known:
                 content.append((self._before, "16f/i", "iBefore"))
+            if "aBefore" in known and self._past is not None:
+                content.append((self._past, "3f", "aBefore"))
             linked = program.linked
             self._arrays[program] = self._context.vertex_array(linked, content, index_buffer=self._indices)
         return self._arrays[program]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ligature.adf import AdfError, Resolver
 from ligature.model.scene import ShaderFiles
+from ligature.model.state import MAX_PUNCTURES
 from ligature.render import legacy
 from ligature.render.batches import Batch, Seen
 from ligature.render.camera import CameraView
@@ -17,6 +18,8 @@ from ligature.render.lights import Lights
 from ligature.render.programs import Program, Programs
 from ligature.render.surface import Surface
 from ligature.render.textures import Textures
+
+Array = NDArray[np.float64]
 
 
 class Brushes:
@@ -56,6 +59,10 @@ class Brushes:
         defines = {f"PASS_{name.upper()}": place for place, name in enumerate(passes)} | {"LIGHTS": 1}
         if "rgb" in passes:
             defines |= self.lights.defines | dict.fromkeys(batch.surface.defines, 1)
+            if batch.marks is not None:
+                defines["MARKS"] = MAX_PUNCTURES
+        if batch.deforms and "flow" in passes:
+            defines["DEFORMS"] = 1
         if batch.primitive is not None and list(passes) != ["rgb"]:
             defines["ANALYTIC"] = batch.primitive[0]
         return self._programs.get("surface", defines)
@@ -128,6 +135,8 @@ class Painter:
         if "rgb" in passes:
             program.set("uClosed", int(batch.closed))
             bind_surface(program, batch.surface, self._brushes.textures)
+            if batch.marks is not None:
+                bind_marks(program, batch.marks, self._view.view)
         batch.draw(program, self._seen.instances[rows], None if self._before is None else self._before[rows])
 
     def _bind_picture(self, program: Program, passes: Sequence[str]) -> None:
@@ -150,6 +159,18 @@ class Painter:
             model_view = self._seen.instances["model_view"][row].T.astype(float)
             legacy.bind_object(program, model_view, view.projection)
             batch.legacy(program).render()
+
+
+def bind_marks(program: Program, marks: Array, view: Array) -> None:
+    """Fill the uniforms of dark places (n, 8) in world axes, as seen through ``view`` (4, 4)."""
+    places, axes = np.zeros((2, MAX_PUNCTURES, 4))
+    count = len(marks)
+    places[:count] = marks[:, :4]
+    places[:count, :3] = marks[:, :3] @ view[:3, :3].T + view[:3, 3]
+    axes[:count, :3], axes[:count, 3] = marks[:, 4:7] @ view[:3, :3].T, marks[:, 7]
+    program.set("uMarkCount", count)
+    program.set("uMarks", [tuple(row) for row in places.tolist()])
+    program.set("uMarkAxes", [tuple(row) for row in axes.tolist()])
 
 
 def bind_surface(program: Program, surface: Surface, textures: Textures) -> None:

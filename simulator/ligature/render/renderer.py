@@ -31,6 +31,7 @@ from ligature.render.surface import Physical, Surface, surface_of
 from ligature.render.target import PASSES, Frame, Target
 from ligature.render.textures import Textures
 from ligature.render.thread import Tube
+from ligature.render.tissue import Marks, tissue_surfaces
 from ligature.render.visuals import Piece, VisualLoader
 
 Array = NDArray[np.float64]
@@ -48,7 +49,7 @@ THREAD = Physical(roughness=0.45)
 MAX_TARGETS = 16
 """Frame buffers, one for each size and choice of passes, that are kept for the next picture."""
 
-PLACES = ("body_pose", "ghost_world", "light_world")
+PLACES = ("body_pose", "ghost_world", "light_world", "tissue_node")
 """What of a state moves things and their shadows, wherever it is looked at from."""
 
 LARGE = 2.0
@@ -89,9 +90,17 @@ class Renderer:
         self._targets: dict[tuple[int, int, tuple[str, ...], int], Target] = {}
         self._lights = Lights(self._context, scene)
         pieces = loader.of_scene(scene)
+        self._tissues = tissue_surfaces(scene, pieces)
+        self._marks = [Marks(scene, tissue) for tissue in scene.tissues]
         self._tubes = [Tube(scene, rod) for rod in scene.rods]
-        rods = self._rod_pieces(loader)
-        self._batches, ordered = self._batched(pieces, rods)
+        self._in_world = [t.body for t in scene.tissues] + [rod.bodies[0] for rod in scene.rods]
+        soft = {tissue.body for tissue in scene.tissues}
+        rigid = [piece for piece in pieces if piece.owner not in soft]
+        deforming = [*(surface.piece for surface in self._tissues), *self._rod_pieces(loader)]
+        self._batches, ordered = self._batched([*rigid, *deforming])
+        self._deforming = self._batches[len(self._batches) - len(deforming) :]
+        for batch in self._deforming[: len(self._tissues)]:
+            batch.marks = np.zeros((0, 8))
         self._instances = Instances(ordered)
         self.drawn_triangles = 0
         """Triangles of the last picture, what lies outside it and what is drawn coarsely taken off."""
@@ -144,7 +153,7 @@ class Renderer:
         if "rgb" in target.passes:
             self._cast_shadows(seen, view, b"".join(state[name].tobytes() for name in PLACES))
         target.clear(BACKGROUND)
-        before = self._movement.before(self._instances, view) if "flow" in target.passes else None
+        before = self._movement.before(self._instances, view, self._deforming) if "flow" in target.passes else None
         painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
         self.drawn_triangles = painter.triangles
         sky = self._sky if shaders is None else None
@@ -188,13 +197,15 @@ class Renderer:
             surface = surface_of(visual.colour, loader.material(visual))
             surface = Surface(surface.colour, physical=surface.physical or THREAD)
             triangles = tube.triangles(T_world_body)
-            pieces.append(Piece(id(rod), triangles, surface, rod.bodies[0], np.eye(4), True, None, visual.shaders))
+            pieces.append(
+                Piece(id(rod), triangles, surface, rod.bodies[0], np.eye(4), True, None, visual.shaders, deforms=True)
+            )
         return pieces
 
-    def _batched(self, pieces: list[Piece], rods: list[Piece]) -> tuple[list[Batch], list[Piece]]:
-        """Pieces grouped into batches, and in the order of the groups; rods come last."""
+    def _batched(self, pieces: list[Piece]) -> tuple[list[Batch], list[Piece]]:
+        """Pieces grouped into batches, and in the order of the groups; what deforms is alone in its group."""
         groups: dict[Hashable, list[Piece]] = {}
-        for piece in [*pieces, *rods]:
+        for piece in pieces:
             key = (piece.geometry, piece.surface, piece.closed, piece.coarse, piece.shaders)
             groups.setdefault(key, []).append(piece)
         batches: list[Batch] = []
@@ -222,13 +233,16 @@ class Renderer:
     def _place(self, state: NDArray[np.void], view: Array) -> None:
         """Move everything to where ``state`` has it."""
         T = pose7_matrices(np.concatenate([state[name][0] for name in PLACES[:2]]))
-        tubes = [tube.triangles(T) for tube in self._tubes]
-        for rod in self._scene.rods:
-            T[rod.bodies[0]] = np.eye(4)  # tubes stand in world axes
+        nodes = state["tissue_node"][0]
+        surfaces = [*(s.triangles(nodes) for s in self._tissues), *(tube.triangles(T) for tube in self._tubes)]
+        T[self._in_world] = np.eye(4)  # what deforms stands in world axes
         self._instances.place(T)
-        for batch, tube in zip(self._batches[len(self._batches) - len(tubes) :], tubes, strict=True):
-            batch.load(tube)
-            self._instances.reach(batch.rows.start, batch.triangles)
+        for batch, surface in zip(self._deforming, surfaces, strict=True):
+            if surface is not batch.triangles:
+                batch.load(surface)
+                self._instances.reach(batch.rows.start, surface)
+        for batch, drawn in zip(self._deforming, self._tissues, strict=False):
+            batch.marks = self._marks[drawn.index].of(state)
         self._lights.place(pose7_matrices(state["light_world"][0]), view)
 
     def _cast_shadows(self, seen: Seen, view: CameraView, moment: bytes) -> None:

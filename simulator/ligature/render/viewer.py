@@ -19,7 +19,7 @@ from ligature.bus.pacing import Throttle
 from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release, Reset, WatchContacts
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.optics import stereo_partners
-from ligature.model.scene import Colour, Scene, Visual
+from ligature.model.scene import Collider, Colour, Scene, TriMesh, Visual
 from ligature.render import overlay
 from ligature.render.camera import CameraView, perspective, view_matrix, view_of
 from ligature.render.renderer import Renderer
@@ -149,8 +149,16 @@ class Viewer:
     def _collision_renderer(self) -> Renderer:
         """Draws collision shapes in place of visual meshes; made when it is wanted first."""
         if self._shapes is None:
+            grids = {tissue.body: tissue.form for tissue in self.scene.tissues}
+            surfaces = {
+                body: (Collider(TriMesh(form.grid.nodes, form.triangles.astype(np.int32)), np.eye(4)),)
+                for body, form in grids.items()
+            }
             bodies = tuple(
-                replace(body, visual=Visual(shapes=body.colliders, colour=_tint(body.index)))
+                replace(
+                    body,
+                    visual=Visual(shapes=surfaces.get(body.index, body.colliders), colour=_tint(body.index)),
+                )
                 for body in self.scene.bodies
             )
             self._shapes = Renderer(replace(self.scene, bodies=bodies), context=self._context)

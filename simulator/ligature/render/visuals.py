@@ -55,6 +55,8 @@ class Piece:
     shaders: ShaderFiles | None = None
     primitive: tuple[int, float, float] | None = None
     """Kind of an exactly drawn primitive as in ``analytic.glsl``, its radius and half height."""
+    deforms: bool = False
+    """Whether its vertices move, in world axes, from picture to picture."""
 
 
 class VisualLoader:

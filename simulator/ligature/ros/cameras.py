@@ -24,10 +24,8 @@ from ligature.model.optics import EYES, R_CAMERA_OPTICAL, Calibration, eye_offse
 from ligature.model.scene import Camera, Scene
 from ligature.ros import pictures
 from ligature.ros.master import node_name, require_free
+from ligature.ros.names import WORLD_FRAME
 from ligature.ros.start import start_node
-
-WORLD = "world"
-"""The frame that world poses are in, after the prefix of the scene."""
 
 PICTURES = {
     "ImageData": Image,
@@ -138,7 +136,7 @@ class CameraNode:
             for c in shown
             for eye in ("", *(EYES if c.stereo else ()))
         ]
-        self._frames, self._world = frames, prefix + WORLD
+        self._frames, self._world = frames, prefix + WORLD_FRAME
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         self._static.publish(TFMessage([t for topics in self.topics for t in self._fixed(topics)]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
@@ -19,11 +21,11 @@ SLOW = 0.95
 class Diagnostics:
     """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take.
 
-    ``faults`` are the arms in FAULT, each with the reason.
+    ``faults`` are the arms in FAULT, each with the reason; ``more`` adds statuses of other parts.
     """
 
-    def __init__(self, block: Block) -> None:
-        self._block = block
+    def __init__(self, block: Block, more: Callable[[], Sequence[DiagnosticStatus]] = tuple) -> None:
+        self._block, self._more = block, more
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
         self._next = 0.0
         self.missed = 0
@@ -69,7 +71,7 @@ class Diagnostics:
             )
             for arm, why in self.faults.items()
         ]
-        array = DiagnosticArray(status=[status, self._findings(now), *faults])
+        array = DiagnosticArray(status=[status, self._findings(now), *faults, *self._more()])
         array.header.stamp = rospy.Time.now()
         self._publisher.publish(array)
 

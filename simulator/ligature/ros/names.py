@@ -14,6 +14,9 @@ from ligature.model.scene import Identity
 
 POLICIES = ("ambf", "src")
 
+WORLD_FRAME = "world"
+"""The frame that world poses are in, after the prefix of the scene."""
+
 _AT_THE_TOP = ("Needle", "CameraFrame")
 _HOLE = re.compile(r"(Entry|Exit)\d+\Z")
 _LOOKED_UP = ("Needle", "CameraFrame", "Entry", "Exit")

@@ -20,7 +20,7 @@ from ligature.bus.stop import Stop
 from ligature.model.commands import ParentCommand
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
-from ligature.ros import conversion, names
+from ligature.ros import conversion, names, tissue
 from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
 from ligature.ros.intake import oversized
@@ -55,14 +55,15 @@ class Node:
         self._world = conversion.WorldTemplate()
         self._publishers: list[Publisher] = []
         outlets = self._advertise(min_hz, max_hz, policy)
-        self._schedule = Schedule(outlets, self._reception.commanded)
+        tissues = self._advertise_tissues(outlets)
+        self._schedule = Schedule([*outlets, *tissues], self._reception.commanded)
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
         self._arms = ArmsNode(scene, self._block, self._outbox, challenge)
         arms = ", ".join(arm.name for arm in scene.arms) or "none"
-        self.summary = f"{2 * len(outlets)} topics of objects; arms: {arms}"
-        self._diagnostics = Diagnostics(self._block)
+        self.summary = f"{2 * len(outlets) + len(tissues)} topics of objects; arms: {arms}"
+        self._diagnostics = Diagnostics(self._block, lambda: tissue.statuses(scene, self._state[0]))
         self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
         self._master = MasterWatch(Parameters(scene, self._adopt).poll)
 
@@ -91,7 +92,7 @@ class Node:
     def _advertise(self, min_hz: int | None, max_hz: int | None, policy: str) -> list[Outlet]:
         """An outlet for the world and one for every object that the name policy lets be seen."""
         low, high = min_hz or DEFAULT_LOW, max_hz or DEFAULT_HIGH
-        outlets = [self._outlet(self._world, self._scene.world.topic, low, high)]
+        outlets = [self._outlet(self._world, self._scene.world.topic, "State", low, high)]
         templates = conversion.templates(self._scene)
         objects = [(template.kind, template.identity) for template in templates]
         hidden = []
@@ -105,13 +106,26 @@ class Node:
                 )
             else:
                 low, high = min_hz or max(identity.publish_low, 1), max_hz or max(identity.publish_high, 1)
-                outlets.append(self._outlet(template, topic, low, high))
+                outlets.append(self._outlet(template, topic, "State", low, high))
         if hidden:
             rospy.loginfo(f"not advertised under the name policy '{policy}': {', '.join(hidden)}")
         return outlets
 
-    def _outlet(self, template: Any, topic: str, low: float, high: float) -> Outlet:
-        publisher = Publisher(f"{topic}/State", type(template.message))
+    def _advertise_tissues(self, outlets: list[Outlet]) -> list[Outlet]:
+        """Outlets for the bodies of tissue below those of their rigid bodies."""
+        bodies = {outlet.key[1]: outlet for outlet in outlets if outlet.key[0] == "body"}
+        found = []
+        for body in self._scene.tissues:
+            own = bodies.get(body.body)
+            if own is None:
+                continue
+            for name, (template, _, rate) in tissue.TOPICS.items():
+                low, high = rate or own.low, rate or own.high
+                found.append(self._outlet(template(self._scene, body), own.topic, name, low, high))
+        return found
+
+    def _outlet(self, template: Any, topic: str, name: str, low: float, high: float) -> Outlet:
+        publisher = Publisher(f"{topic}/{name}", type(template.message))
         self._publishers.append(publisher)
         return Outlet(template, topic, publisher, low, high)
 

@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.frames import inverse, matrix_quaternion, quaternion_matrix
+from ligature.kernels import inlined, kernel
+from ligature.model.frames import inverse
 from ligature.model.scene import Scene
-from ligature.soft.frame import Frame
+from ligature.soft.frame import Frame, FrameArrays, into, open_frame, velocity_at
 from ligature.soft.needle import ScenePiercer
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.colliders import shape_arrays
+from ligature.suture.rotations import matrix_of, rotate, rotate_back
+from ligature.tables import opener, table_of
 from ligature.tissue import contact
 from ligature.tissue.block import TissueBlock
+from ligature.tissue.contact import REACH, Contacts, open_contacts, touch
+from ligature.tissue.layout import open_tissue
 
 Array = NDArray[np.float64]
-
-FINE = 0.1e-3
-"""How exact the place of a point of contact is found, m."""
-
-REACH = 1.5e-3
-"""Distance in metres at which a point of contact is let go."""
-
-MEET = 0.5e-3
-"""Distance in metres at which one begins, beside what the body moves in a tick."""
-
-DEEPER = 0.2e-3
-"""Depth in metres by which another place of a face must be deeper for the point of contact to move there."""
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 MAX_APPROACH = 1.0
 """Speed in m/s of bodies between two looks at them."""
@@ -36,14 +32,34 @@ MAX_APPROACH = 1.0
 MAX_WAIT = 64
 """Most ticks between two looks."""
 
-RECOVERY = 4e-5
-"""Depth in metres out of which a body is pushed in a tick."""
 
-SWEEPS = 12
-"""Sweeps of projected Gauss–Seidel in a tick, from the forces of the last one."""
+class Around(NamedTuple):
+    """B bodies around a block as they were last read, in world axes; row 0 is the block's own rigid body."""
 
-TIP = 4e-3
-"""Length of a needle from its tip, m, that does not touch the surface as a body, for it punctures it."""
+    pose: Array  # (B, 7) of the inertial frame
+    twist: Array  # (B, 6)
+    light: Array  # (B,) 1 / kg
+    moments: Array  # (B, 3) principal
+    radius: Array  # (B,) of its parts about the centre of mass
+    due: Integers  # (B,) ticks until it is looked at
+    kept: Flags  # (B,) touches the tissue
+    inside: Flags  # (B,) a needle that is in the tissue
+    read: Integers  # (B,) rows that are to be read in this tick
+    turn: Array  # (2, 3, 3) scratch
+
+
+def _around(bodies: int) -> Around:
+    B, z = bodies, np.zeros
+    i = lambda: np.zeros(B, np.int64)  # noqa: E731
+    around = Around(
+        z((B, 7)), z((B, 6)), z(B), np.ones((B, 3)), z(B), i(), np.zeros(B, np.bool_), np.zeros(B, np.bool_), i(),
+        z((2, 3, 3)),
+    )  # fmt: skip
+    around.pose[:, 6] = 1.0
+    return around
+
+
+open_around = opener(_around(1))
 
 
 class BodyContacts:
@@ -64,197 +80,84 @@ class BodyContacts:
         excluded = scene.bodies[own].no_collision_with | {own}
         placed = {link.body for tree in scene.articulations for link in tree.links} - excluded
         self.listed = [b.index for b in scene.bodies if b.colliders and b.index in placed]
-        self._piercers = {p.body.index: p for p in piercers}
-        n = len(self.listed) + 1
-        self._partners = contact.Partners(np.zeros((n, 7)), np.zeros((n, 6)), np.zeros(n), np.zeros((n, 3, 3)))
-        self._partners.pose[:, 6] = 1.0
-        self._parts, self._radius = self._gather(scene)
-        self._touching, self._work = contact.touching(), contact.scratch(len(block.interface.points.status))
+        self._piercers = [(self.listed.index(p.body.index) + 1, p) for p in piercers if p.body.index in self.listed]
+        self._around = _around(len(self.listed) + 1)
         grid, fixed = block.elastic.grid, block.elastic.row < 0
-        self._looked_at = ~fixed[grid.faces].all(axis=1)
-        self._found = np.zeros((4 * contact.CAPACITY, 2), np.int64)
-        self._values = np.zeros((4 * contact.CAPACITY, 6))
-        self._scratch = np.zeros((15, 3))
-        self._due = np.zeros(len(self.listed), np.int64)
+        self._contacts = Contacts(
+            contact.touching(), contact.partners(len(self.listed) + 1), self._gather(scene), contact.scratch(),
+            ~fixed[grid.faces].all(axis=1), np.zeros(1, np.int64),
+        )  # fmt: skip
+        self._touching = self._contacts.touching
+        self._contacts.partners.friction[1:] = [
+            scene.bodies[own].friction * scene.bodies[b].friction for b in self.listed
+        ]
+        self._tables = (block.interface.table, table_of(self._contacts), table_of(self._around))
         own_body = scene.bodies[own]
         self._own_free = not own_body.static and any(
             [link.body for link in tree.links] == [own] for tree in scene.articulations
         )
-        self.overflow = False
 
-    def _gather(self, scene: Scene) -> tuple[contact.Parts, Array]:
-        """The parts of all bodies, and the radius of each about its centre of mass."""
-        body, local, kind, size, planes, corners = [], [], [], [], [], []
-        radius = np.zeros(len(self.listed))
-        for row, index in enumerate(self.listed):
-            to_inertial = inverse(scene.bodies[index].T_body_inertial)
-            for part in scene.bodies[index].colliders:
-                shape_kind, shape_size, shape_planes, box = shape_arrays(part.shape)
-                T = to_inertial @ part.T_body_shape
-                body.append(row + 1)
-                local.append(T)
-                kind.append(shape_kind)
-                size.append(shape_size)
-                planes.append(shape_planes)
-                corners.append(box)
-                far = np.abs(box).max(axis=0)
-                radius[row] = max(radius[row], float(np.linalg.norm(T[:3, 3]) + np.linalg.norm(far)))
-        ends = np.cumsum([0] + [len(p) for p in planes])
-        n = len(body)
-        parts = contact.Parts(
-            np.array(body, dtype=np.int64), np.array(local).reshape(n, 4, 4), np.array(kind, dtype=np.int64),
-            np.array(size).reshape(n, 3), np.vstack(planes) if planes else np.zeros((0, 4)),
-            np.column_stack([ends[:-1], ends[1:]]).astype(np.int64), np.array(corners).reshape(n, 2, 3),
-            np.zeros(n, dtype=np.bool_),
-        )  # fmt: skip
-        return parts, radius
+    @property
+    def overflow(self) -> bool:
+        """Whether there was no room for a point of contact."""
+        return bool(self._contacts.overflow[0])
+
+    def _gather(self, scene: Scene) -> contact.Parts:
+        """The parts of all bodies; their radius about the centre of mass goes to `Around`."""
+        rows = [
+            (row + 1, inverse(scene.bodies[index].T_body_inertial) @ part.T_body_shape, *shape_arrays(part.shape))
+            for row, index in enumerate(self.listed)
+            for part in scene.bodies[index].colliders
+        ]
+        ends = np.cumsum([0, *(len(planes) for _, _, _, _, planes, _ in rows)])
+        parts = contact.parts(len(rows), int(ends[-1]))
+        for k, (body, T, kind, size, planes, box) in enumerate(rows):
+            parts.body[k], parts.local[k], parts.kind[k], parts.size[k] = body, T, kind, size
+            parts.plane_range[k] = ends[k], ends[k + 1]
+            parts.planes[ends[k] : ends[k + 1]] = planes
+            parts.middle[k], parts.half[k] = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0])
+            reach = float(np.linalg.norm(T[:3, 3]) + np.linalg.norm(np.abs(box).max(axis=0)))
+            self._around.radius[body] = max(self._around.radius[body], reach)
+        return parts
 
     # --- the tick -----------------------------------------------------------------------------
 
-    def step(self, frame: Frame, box: Array) -> None:
-        """Find points of contact and push tissue and bodies; ``box`` (2, 3) surrounds the tissue in B."""
-        used = self._touching.used.astype(bool)
-        live = self._look(frame, box, used)
-        if not live and not used.any():
+    def step(self, frame: Frame) -> None:
+        """Find points of contact and push tissue and bodies."""
+        tissue, contacts, around = self._tables
+        count = choose(contacts, around)
+        if not count:
             return
-        self._place_own(frame)
-        block, points = self._block, self._block.interface.points
-        contact.measure_contacts(self._touching, points, self._parts, self._partners, self._scratch)
-        count = contact.find_contacts(
-            block.elastic.x, block.elastic.grid.faces, self._looked_at, self._parts, self._partners, REACH, FINE,
-            self._found, self._values, self._scratch,
-        )  # fmt: skip
-        self._match(count)
-        n = contact.press(
-            self._touching, self._work, points, self._partners, block.interface.fraction, self._dt, SWEEPS, RECOVERY
-        )
-        if n:
-            self._push(frame)
+        self._read(self._around.read[:count].tolist())
+        if meet(tissue, contacts, around, frame.table, count, self._dt):
+            self._push()
 
-    def _look(self, frame: Frame, box: Array, used: NDArray[np.bool_]) -> bool:
-        """Read the motion of the bodies that are near; whether any is."""
-        middle, half = 0.5 * (box[0] + box[1]), 0.5 * float(np.linalg.norm(box[1] - box[0]))
-        kept = set(self._touching.body[used].tolist())
-        self._parts.live[:] = False
-        any_live = False
-        for k, index in enumerate(self.listed):
-            if self._due[k] > 0 and k + 1 not in kept:
-                self._due[k] -= 1
-                continue
-            pose, twist = self._bodies.motion(index)
-            centre = frame.into(pose[:3])
-            gap = float(np.linalg.norm(centre - middle)) - half - float(self._radius[k]) - REACH
-            if gap > 0.0 and k + 1 not in kept:
-                self._due[k] = min(int(gap / (MAX_APPROACH * self._dt)), MAX_WAIT)
-                continue
-            any_live = True
-            self._place(k + 1, index, frame, pose, twist, centre)
-            piercer = self._piercers.get(index)
-            if piercer is None or not piercer.engaged:
-                self._parts.live[self._parts.body == k + 1] = True
-        return any_live
+    def _read(self, rows: list[int]) -> None:
+        """Read the motion of the bodies that are looked at, and how light they are."""
+        around, bodies = self._around, self._bodies
+        for row, piercer in self._piercers:
+            self._contacts.partners.tip[row], around.inside[row] = piercer.tip, piercer.engaged
+        for row in rows:
+            index = self.listed[row - 1]
+            around.pose[row], around.twist[row] = bodies.motion(index)
+            if self._scene.bodies[index].static or bodies.driven(index):
+                around.light[row] = 0.0
+            else:
+                mass, around.moments[row] = bodies.masses.mass_of(index)
+                around.light[row] = 1.0 / mass
+        # The tissue's own rigid body recoils where nothing but gravity holds it.
+        if self._own_free:
+            around.pose[0], around.twist[0] = bodies.motion(self._own)
+            mass, around.moments[0] = bodies.masses.mass_of(self._own)
+            around.light[0] = 0.0 if bodies.driven(self._own) else 1.0 / mass
 
-    def _place(self, row: int, index: int, frame: Frame, pose: Array, twist: Array, centre: Array) -> None:
-        p = self._partners
-        R = frame.R.T @ quaternion_matrix(pose[3:])
-        p.pose[row, :3], p.pose[row, 3:] = centre, matrix_quaternion(R)
-        p.twist[row, :3], p.twist[row, 3:] = frame.R.T @ twist[:3], frame.R.T @ twist[3:]
-        if frame.moves:
-            p.twist[row] -= frame.drift(centre, 1.0)
-        if self._scene.bodies[index].static or self._bodies.driven(index):
-            p.light[row], p.spin[row] = 0.0, 0.0
-        else:
-            mass, inertia = self._bodies.masses.mass_of(index)
-            p.light[row] = 1.0 / mass
-            p.spin[row] = (R / inertia) @ R.T
-
-    def _place_own(self, frame: Frame) -> None:
-        """The tissue's own rigid body recoils where nothing but gravity holds it."""
-        p = self._partners
-        if self._own_free and not self._bodies.driven(self._own):
-            pose, _ = self._bodies.motion(self._own)
-            mass, inertia = self._bodies.masses.mass_of(self._own)
-            R = frame.R.T @ quaternion_matrix(pose[3:])
-            p.pose[0, :3], p.light[0], p.spin[0] = frame.into(pose[:3]), 1.0 / mass, (R / inertia) @ R.T
-        else:
-            p.pose[0, :3], p.light[0], p.spin[0] = 0.0, 0.0, 0.0
-
-    def _match(self, count: int) -> None:
-        """Keep, begin, move and end points of contact after what was found."""
-        t, dt = self._touching, self._dt
-        known = {(int(t.part[r]), int(t.face[r])): r for r in np.flatnonzero(t.used).tolist()}
-        order = np.argsort(self._values[:count, 0], kind="stable").tolist()
-        for i in order:
-            part, face = self._found[i].tolist()
-            distance, normal = float(self._values[i, 0]), self._values[i, 1:4]
-            weights = contact.face_weights(*self._values[i, 4:].tolist())
-            row = known.pop((part, face), -1)
-            if row >= 0:
-                if distance < t.distance[row] - DEEPER:
-                    self._move(row, face, weights, distance, normal)
-                continue
-            body = int(self._parts.body[part])
-            closing = float(normal @ self._partners.twist[body, :3])
-            if distance <= MEET + max(closing, 0.0) * dt:
-                self._begin(part, face, weights, body, distance, normal)
-        for row in known.values():
-            self._end(row)
-
-    def _begin(self, part: int, face: int, weights: Array, body: int, distance: float, normal: Array) -> None:
-        t, grid = self._touching, self._block.elastic.grid
-        piercer = self._piercers.get(self.listed[body - 1])
-        if piercer is not None:
-            at = weights @ self._block.elastic.x[grid.faces[face]]
-            if ((at - piercer.tip) ** 2).sum() < TIP**2:
-                return
-        free = np.flatnonzero(t.used == 0)
-        if not len(free) or not self._block.has_room():
-            self.overflow = True
-            return
-        row = int(free[0])
-        t.used[row], t.part[row], t.face[row], t.body[row] = 1, part, face, body
-        t.point[row] = self._block.interface.add(grid.faces[face], weights)
-        t.force[row] = 0.0
-        own = self._scene.bodies[self._own].friction
-        t.friction[row] = own * self._scene.bodies[self.listed[body - 1]].friction
-        self._anchor(row, distance, normal)
-
-    def _move(self, row: int, face: int, weights: Array, distance: float, normal: Array) -> None:
-        """Move a point of contact to a deeper place of its face."""
-        interface = self._block.interface
-        i, p = int(self._touching.point[row]), interface.points
-        interface.place(i, self._block.elastic.grid.faces[face], weights)
-        p.at[i] = p.start[i] + (interface.tick / interface.ticks) * p.move[i]
-        self._anchor(row, distance, normal)
-
-    def _anchor(self, row: int, distance: float, normal: Array) -> None:
-        """Let friction go on from where the point is, with the force that it has."""
-        t, pose = self._touching, self._partners.pose[self._touching.body[row]]
-        t.distance[row], t.normal[row] = distance, normal
-        rubbing = t.force[row] - (t.force[row] @ normal) * normal
-        at = self._block.interface.points.at[t.point[row]] + contact.SOFT * rubbing
-        t.anchor[row] = quaternion_matrix(pose[3:]).T @ (at - pose[:3])
-
-    def _end(self, row: int) -> None:
-        self._block.interface.release(int(self._touching.point[row]))
-        self._touching.used[row] = 0
-        self._touching.force[row] = 0.0
-
-    def _push(self, frame: Frame) -> None:
+    def _push(self) -> None:
         """Push the bodies by what the tissue does to them."""
-        t = self._touching
-        rows = np.flatnonzero(t.used)
-        for body in np.unique(t.body[rows]).tolist():
-            mine = rows[t.body[rows] == body]
-            forces = -t.force[mine]
-            if not forces.any():
-                continue
-            x, y, z = (self._block.interface.points.at[t.point[mine]] - self._partners.pose[body, :3]).T
-            fx, fy, fz = forces.T
-            moments = np.array([(y * fz - z * fy).sum(), (z * fx - x * fz).sum(), (x * fy - y * fx).sum()])
-            impulse = self._dt * (frame.R @ forces.sum(axis=0))
-            moment = self._dt * (frame.R @ moments)
-            self._bodies.apply_impulse(self.listed[body - 1], impulse, moment)
+        push = self._contacts.partners.push
+        for row in np.flatnonzero(push.any(axis=1)).tolist():
+            impulse, body = self._dt * push[row], self.listed[row - 1] if row else self._own
+            if row or not self._scene.bodies[body].static:
+                self._bodies.apply_impulse(body, impulse[:3], impulse[3:])
 
     # --- state --------------------------------------------------------------------------------
 
@@ -271,15 +174,108 @@ class BodyContacts:
         """As at the start: nothing touches the tissue."""
         for array in self._touching:
             array[:] = 0
-        self._due[:] = 0
+        self._around.due[:] = 0
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
         rows = {name: array.copy() for name, array in zip(self._touching._fields, self._touching, strict=True)}
-        return {"touching": rows, "due": self._due.copy()}
+        return {"touching": rows, "due": self._around.due.copy()}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
         for name, array in zip(self._touching._fields, self._touching, strict=True):
             array[:] = snapshot["touching"][name]
-        self._due[:] = snapshot["due"]
+        self._around.due[:] = snapshot["due"]
+
+
+@kernel
+def choose(contact_table: Integers, around_table: Integers) -> int:
+    """How many bodies are to be read in this tick; ``Around.read`` has their rows."""
+    touching, around = open_contacts(contact_table).touching, open_around(around_table)
+    for b in range(around.kept.shape[0]):
+        around.kept[b] = False
+    for r in range(touching.used.shape[0]):
+        if touching.used[r]:
+            around.kept[touching.body[r]] = True
+    count = 0
+    for b in range(1, around.due.shape[0]):
+        if around.due[b] > 0 and not around.kept[b]:
+            around.due[b] -= 1
+        else:
+            around.read[count] = b
+            count += 1
+    return count
+
+
+@kernel
+def meet(
+    tissue: Integers, contact_table: Integers, around_table: Integers, frame_table: Integers, count: int, dt: float
+) -> bool:
+    """A tick of the bodies that were read: True where any touches the tissue, with `Partners.push` in world axes."""
+    t, contacts, around, f = (
+        open_tissue(tissue), open_contacts(contact_table), open_around(around_table), open_frame(frame_table),
+    )  # fmt: skip
+    parts, partners, field = contacts.parts, contacts.partners, t.field
+    mx, my, mz = _middle(field.box, 0), _middle(field.box, 1), _middle(field.box, 2)
+    hx, hy, hz = field.box[1, 0] - mx, field.box[1, 1] - my, field.box[1, 2] - mz
+    half = math.sqrt(hx * hx + hy * hy + hz * hz)
+    for c in range(parts.live.shape[0]):
+        parts.live[c] = False
+    near = False
+    for k in range(count):
+        b = around.read[k]
+        x, y, z = into(f, around.pose[b, 0], around.pose[b, 1], around.pose[b, 2])
+        gap = math.sqrt((x - mx) ** 2 + (y - my) ** 2 + (z - mz) ** 2) - half - around.radius[b] - REACH
+        if gap > 0.0 and not around.kept[b]:
+            around.due[b] = min(int(gap / (MAX_APPROACH * dt)), MAX_WAIT)
+            continue
+        near = True
+        _place(contacts, around, f, b)
+        if not around.inside[b]:
+            for c in range(parts.live.shape[0]):
+                if parts.body[c] == b:
+                    parts.live[c] = True
+    if not near:
+        return False
+    if around.light[0] > 0.0:
+        _place(contacts, around, f, 0)
+    else:
+        partners.light[0] = 0.0
+    if not touch(field, t.points, contacts, dt):
+        return False
+    for b in range(partners.push.shape[0]):
+        p = partners.push[b]
+        p[0], p[1], p[2] = rotate(f.R, p[0], p[1], p[2])
+        p[3], p[4], p[5] = rotate(f.R, p[3], p[4], p[5])
+    return True
+
+
+@inlined
+def _middle(box: Array, a: int) -> float:
+    return 0.5 * (box[0, a] + box[1, a])
+
+
+@inlined
+def _place(contacts: Contacts, around: Around, f: FrameArrays, b: int) -> None:
+    """Where a body is and how it moves, in the frame of the tissue."""
+    partners, pose, twist = contacts.partners, around.pose[b], around.twist[b]
+    Q, R, c, v = around.turn[0], partners.R[b], partners.centre[b], partners.twist[b]
+    matrix_of(pose[3], pose[4], pose[5], pose[6], Q)
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = f.R[0, i] * Q[0, j] + f.R[1, i] * Q[1, j] + f.R[2, i] * Q[2, j]
+    c[0], c[1], c[2] = into(f, pose[0], pose[1], pose[2])
+    v[0], v[1], v[2] = rotate_back(f.R, twist[0], twist[1], twist[2])
+    v[3], v[4], v[5] = rotate_back(f.R, twist[3], twist[4], twist[5])
+    x, y, z = velocity_at(f, c[0], c[1], c[2])
+    v[0], v[1], v[2] = v[0] - x, v[1] - y, v[2] - z
+    v[3], v[4], v[5] = v[3] - f.w[0], v[4] - f.w[1], v[5] - f.w[2]
+    partners.light[b] = around.light[b]
+    if around.light[b] > 0.0:
+        m = around.moments[b]
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for k in range(3):
+                    total += R[i, k] / m[k] * R[j, k]
+                partners.spin[b, i, j] = total

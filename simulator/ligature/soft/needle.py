@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.frames import quaternion_matrix
+from ligature.kernels import kernel
 from ligature.model.piercing import Needle
 from ligature.model.scene import Body, Box, Capsule, Cone, Cylinder, Scene, Sphere
-from ligature.soft.frame import Frame
+from ligature.soft.frame import Frame, into, open_frame, turn_six, velocity_at
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.rod import Rod
+from ligature.suture.rotations import matrix_of, multiply, rotate, rotate_back, rotation_vector
+from ligature.suture.springs import open_springs
+from ligature.suture.tracking import open_nodes
+from ligature.tables import opener, table_of
 from ligature.tissue.block import TissueBlock
-from ligature.tissue.needle import OUTSIDE
+from ligature.tissue.layout import open_tissue
+from ligature.tissue.needle import OUTSIDE, open_needle
 
 Array = NDArray[np.float64]
-
-Equations = tuple[Array, Array, Array, Array, Array, Array]
-"""Tip, tangent, normal and centre of a needle, and its own H and g, as `NeedleInTissue.couple` takes them."""
+Integers = NDArray[np.int64]
 
 THINNEST, THICKEST = 0.05e-3, 1e-3
 """Radii of wire in metres that are taken from collision shapes; thicker shapes are hulls around a thin needle."""
@@ -44,101 +47,111 @@ def wire_radius(body: Body) -> float:
     return min(fitting) if fitting else USUAL_RADIUS
 
 
+class Mount(NamedTuple):
+    """A needle as a rigid body, as it was last read; world axes where nothing else is said."""
+
+    local: Array  # (3, 3) tip, tangent and normal of the arc as columns, in its inertial frame
+    pose: Array  # (7,)
+    twist: Array  # (6,)
+    mass: Array  # (1,) kg, with what holds it
+    inertia: Array  # (3,) principal moments, with what holds it
+    pull: Array  # (6,) force and moment on it
+    drift: Array  # (6,) motion in a tick of what moves with the tissue's frame where the needle is, in B
+    tip: Array  # (3,) in B
+    wrench: Array  # (6,) of the tissue on it
+    turn: Array  # (2, 3, 3) scratch
+    six: Array  # (6,)
+
+
+def _mount(local: Array) -> Mount:
+    z = np.zeros
+    return Mount(
+        np.ascontiguousarray(local), z(7), z(6), z(1), z(3), z(6), z(6), np.full(3, np.inf), z(6), z((2, 3, 3)), z(6)
+    )
+
+
+open_mount = opener(_mount(np.eye(3)))
+
+
 class ScenePiercer:
     """One needle and one body of tissue.
 
     ``rod`` is the thread that carries the needle as a node of its own solve, None for a needle without one.
+    ``tip`` (3,) is where its tip is in B, infinite while it is far from the tissue; ``wrench`` (6,) what the tissue
+    does to it, in world axes.
     """
 
     def __init__(self, scene: Scene, needle: Needle, block: TissueBlock, rod: Rod | None, dt: float) -> None:
         arc, self.body = needle.arc, scene.bodies[needle.body]
         self.rod, self._dt = rod, dt
         tip, c, s = arc.point(0.0), np.cos(arc.end), np.sin(arc.end)
-        self._local = np.stack([tip, c * arc.y - s * arc.x, (arc.centre - tip) / arc.radius], axis=1)
+        self._mount = _mount(np.stack([tip, c * arc.y - s * arc.x, (arc.centre - tip) / arc.radius], axis=1))
+        self.tip, self.wrench = self._mount.tip, self._mount.wrench
         self.inside = block.add_needle(1.0 / arc.radius, arc.length, wire_radius(self.body))
-        self._size = arc.length + float(np.linalg.norm(tip))
-        self._R6 = np.zeros((6, 6))
+        self._tables = (block.interface.table, self.inside.table, table_of(self._mount))
+        self._nodes = None if rod is None else table_of(rod.nodes)
+        self._reach = NEAR + arc.length + float(np.linalg.norm(tip))
+        self._weight = self.body.mass * self.body.gravity
         self._joint_load = np.zeros(6)
-        self.wrench = np.zeros(6)
-        self.tip = np.full(3, np.inf)
-        self.drift = np.zeros(6)
-        self.centre = np.zeros(3)
         self.spring = -1
 
     @property
     def engaged(self) -> bool:
         """Whether the tissue touches the needle."""
-        return self.inside.where != OUTSIDE or self.inside.passages > 0
+        return self.inside.where != OUTSIDE or bool(self.inside.engaged.any())
 
-    def approach(self, bodies: HeldBodies, frame: Frame, box: Array) -> Equations | None:
-        """The needle's shape and equations in B for `NeedleInTissue`; None while it is far from ``box`` (2, 3)."""
-        pose, twist = bodies.motion(self.body.index)
-        centre = frame.into(pose[:3])
-        reach = NEAR + self._size
-        if not self.engaged and ((centre < box[0] - reach).any() or (centre > box[1] + reach).any()):
+    def approach(self, bodies: HeldBodies, frame: Frame) -> bool:
+        """Fill the needle's shape and equations in B; False while it is far from the tissue."""
+        m = self._mount
+        m.pose[:], m.twist[:] = bodies.motion(self.body.index)
+        engaged = self.engaged
+        if not engaged and is_far(self._tables[0], frame.table, m.pose, self._reach):
             self.inside.forget()
             self.wrench[:] = 0.0
             self.tip[:] = np.inf
-            return None
-        R = frame.R.T @ quaternion_matrix(pose[3:])
-        shape = R @ self._local
-        self.centre = centre
-        self.tip = centre + shape[:, 0]
+            return False
         extra, extra_inertia, pull = bodies.attached_load(self.body.index)
-        mass, inertia = self.body.mass + extra, self.body.inertia + extra_inertia
-        dt = self._dt
-        H, g = np.zeros((6, 6)), np.zeros(6)
-        H[0, 0] = H[1, 1] = H[2, 2] = mass / dt**2
-        moments = (R * inertia) @ R.T
-        H[3:, 3:] = moments / dt**2
-        v, w = frame.R.T @ twist[:3], frame.R.T @ twist[3:]
-        force = pull[:3] + self.body.mass * self.body.gravity + self._joint_load[:3]
-        moment = pull[3:] + self._joint_load[3:]
-        g[:3] = mass / dt * v + frame.R.T @ force
-        g[3:] = moments @ w / dt + frame.R.T @ moment
-        self.drift = frame.drift(centre, dt) if frame.moves else np.zeros(6)
-        g -= H @ self.drift
-        if self.rod is not None and self.engaged:
-            fall = (pull[:3] + self.body.mass * self.body.gravity) / mass
-            self.rod.pull_partner(self.body.index, fall, mass, inertia)
-        return self.tip, shape[:, 1], shape[:, 2], centre, H, g
+        m.mass[0], m.inertia[:] = self.body.mass + extra, self.body.inertia + extra_inertia
+        force = pull[:3] + self._weight
+        m.pull[:3], m.pull[3:] = force, pull[3:]
+        m.pull[:] += self._joint_load
+        equations(*self._tables[1:], frame.table, self._dt)
+        if self.rod is not None and engaged:
+            self.rod.pull_partner(self.body.index, force / m.mass[0], float(m.mass[0]), m.inertia)
+        return True
 
     # --- with a thread ------------------------------------------------------------------------
 
-    def begin(self, bodies: HeldBodies, frame: Frame, box: Array) -> None:
+    def begin(self, bodies: HeldBodies, frame: Frame) -> None:
         """Hand the rod what the tissue does to the needle."""
         self.spring = -1
         assert self.rod is not None
-        equations = self.approach(bodies, frame, box)
-        if equations is None:
+        if not self.approach(bodies, frame):
             return
-        K, load = self.inside.begin(*equations, dt=self._dt)
-        R6 = self._R6
-        R6[:3, :3] = R6[3:, 3:] = frame.R
-        self.spring = self.rod.add_spring(
-            self.rod.node_of[self.body.index], R6 @ K @ R6.T, R6 @ (load + K @ self.drift)
-        )
+        self.inside.prepare(self._dt)
+        _, needle, mount = self._tables
+        self.spring = hand_over(needle, mount, frame.table, self.rod.spring_table, self.rod.node_of[self.body.index])
 
     def end(self, frame: Frame) -> None:
         """Conclude with the motion that the rod's solve found."""
-        assert self.rod is not None
-        self._joint_load = self.rod.joint_load(self.body.index)
+        assert self.rod is not None and self._nodes is not None
+        self._joint_load[:] = self.rod.joint_load(self.body.index)
         if self.spring < 0:
             return
-        moved = self.rod.moved(self.spring)
-        delta = np.concatenate([frame.R.T @ moved[:3], frame.R.T @ moved[3:]]) - self.drift
-        self.wrench = frame.turned(self.inside.end(delta))
+        _, needle, mount = self._tables
+        take_motion(needle, mount, frame.table, self.rod.spring_table, self._nodes, self.spring)
+        self.inside.finish()
+        turn_wrench(needle, mount, frame.table)
 
     # --- alone --------------------------------------------------------------------------------
 
-    def couple(self, bodies: HeldBodies, frame: Frame, box: Array) -> None:
+    def couple(self, bodies: HeldBodies, frame: Frame) -> None:
         """Solve with the tissue alone, and push the needle."""
-        equations = self.approach(bodies, frame, box)
-        if equations is None:
+        if not self.approach(bodies, frame):
             return
-        _, wrench = self.inside.couple(*equations, dt=self._dt)
-        self.wrench = frame.turned(wrench)
-        if wrench.any():
+        self.inside.solve(self._dt)
+        _, needle, mount = self._tables
+        if turn_wrench(needle, mount, frame.table):
             bodies.apply_impulse(self.body.index, self._dt * self.wrench[:3], self._dt * self.wrench[3:])
 
     # --- state --------------------------------------------------------------------------------
@@ -155,8 +168,111 @@ class ScenePiercer:
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
         for name in _KEPT:
-            setattr(self, name, snapshot[name].copy())
+            getattr(self, name)[:] = snapshot[name]
 
 
 _KEPT = ("wrench", "tip", "_joint_load")
 """Attributes that last from tick to tick."""
+
+
+@kernel
+def is_far(tissue: Integers, frame: Integers, pose: Array, reach: float) -> bool:
+    """Whether a place (7,) of W is further than ``reach`` from the box around the tissue."""
+    box, f = open_tissue(tissue).field.box, open_frame(frame)
+    x, y, z = into(f, pose[0], pose[1], pose[2])
+    low = x < box[0, 0] - reach or y < box[0, 1] - reach or z < box[0, 2] - reach
+    return low or x > box[1, 0] + reach or y > box[1, 1] + reach or z > box[1, 2] + reach
+
+
+@kernel
+def equations(needle: Integers, mount: Integers, frame: Integers, dt: float) -> None:
+    """A needle's shape and own equations H δ = g in B, for its motion relative to the tissue's frame."""
+    n, m, f = open_needle(needle), open_mount(mount), open_frame(frame)
+    Q, R, shape, H, g = m.turn[0], m.turn[1], n.shape, n.H, n.g
+    matrix_of(m.pose[3], m.pose[4], m.pose[5], m.pose[6], Q)
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = f.R[0, i] * Q[0, j] + f.R[1, i] * Q[1, j] + f.R[2, i] * Q[2, j]
+    shape[11], shape[12], shape[13] = into(f, m.pose[0], m.pose[1], m.pose[2])
+    for column in range(3):
+        x, y, z = rotate(R, m.local[0, column], m.local[1, column], m.local[2, column])
+        shape[3 * column], shape[3 * column + 1], shape[3 * column + 2] = x, y, z
+    for a in range(3):
+        shape[a] += shape[11 + a]
+        m.tip[a] = shape[a]
+    for i in range(6):
+        for j in range(6):
+            H[i, j] = 0.0
+    square = dt * dt
+    for i in range(3):
+        H[i, i] = m.mass[0] / square
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                total += R[i, k] * m.inertia[k] * R[j, k]
+            H[3 + i, 3 + j] = total / square
+    vx, vy, vz = rotate_back(f.R, m.twist[0], m.twist[1], m.twist[2])
+    wx, wy, wz = rotate_back(f.R, m.twist[3], m.twist[4], m.twist[5])
+    g[0], g[1], g[2] = rotate_back(f.R, m.pull[0], m.pull[1], m.pull[2])
+    g[3], g[4], g[5] = rotate_back(f.R, m.pull[3], m.pull[4], m.pull[5])
+    x, y, z = velocity_at(f, shape[11], shape[12], shape[13])
+    d = m.drift
+    d[0], d[1], d[2] = dt * x, dt * y, dt * z
+    d[3], d[4], d[5] = dt * f.w[0], dt * f.w[1], dt * f.w[2]
+    # What the needle would do by itself, less what the frame does.
+    x, y, z = dt * vx - d[0], dt * vy - d[1], dt * vz - d[2]
+    g[0], g[1], g[2] = g[0] + H[0, 0] * x, g[1] + H[1, 1] * y, g[2] + H[2, 2] * z
+    x, y, z = dt * wx - d[3], dt * wy - d[4], dt * wz - d[5]
+    for i in range(3):
+        g[3 + i] += H[3 + i, 3] * x + H[3 + i, 4] * y + H[3 + i, 5] * z
+
+
+@kernel
+def turn_wrench(needle: Integers, mount: Integers, frame: Integers) -> bool:
+    """Force and moment of the tissue on the needle in world axes; whether there are any."""
+    n, m, f = open_needle(needle), open_mount(mount), open_frame(frame)
+    w, out = n.wrench, m.wrench
+    out[0], out[1], out[2] = rotate(f.R, w[0], w[1], w[2])
+    out[3], out[4], out[5] = rotate(f.R, w[3], w[4], w[5])
+    any_ = False
+    for a in range(6):
+        any_ = any_ or w[a] != 0.0
+    return any_
+
+
+@kernel
+def hand_over(needle: Integers, mount: Integers, frame: Integers, springs: Integers, node: int) -> int:
+    """Make a spring of what the tissue does to a needle that is a node of a rod; its row, -1 where there is no room."""
+    n, m, f, s = open_needle(needle), open_mount(mount), open_frame(frame), open_springs(springs)
+    row = s.filled[0]
+    if row == s.node.shape[0]:
+        return -1
+    s.filled[0], s.node[row] = row + 1, node
+    K, load = n.rows.K, m.six
+    turn_six(f.R, K, s.K[row])
+    for i in range(6):
+        load[i] = n.rows.load[i]
+        for j in range(6):
+            load[i] += K[i, j] * m.drift[j]
+    out = s.load[row]
+    out[0], out[1], out[2] = rotate(f.R, load[0], load[1], load[2])
+    out[3], out[4], out[5] = rotate(f.R, load[3], load[4], load[5])
+    return row
+
+
+@kernel
+def take_motion(
+    needle: Integers, mount: Integers, frame: Integers, springs: Integers, nodes: Integers, row: int
+) -> None:
+    """The needle's motion in B, relative to the frame, as the rod's solve found it."""
+    n, m, f, s, nodes_ = (
+        open_needle(needle), open_mount(mount), open_frame(frame), open_springs(springs), open_nodes(nodes),
+    )  # fmt: skip
+    i, d = s.node[row], n.delta
+    x, q, b = nodes_.x[i], nodes_.q[i], s.q[row]
+    d[0], d[1], d[2] = rotate_back(f.R, x[0] - s.x[row, 0], x[1] - s.x[row, 1], x[2] - s.x[row, 2])
+    tx, ty, tz, tw = multiply(q[0], q[1], q[2], q[3], -b[0], -b[1], -b[2], b[3])
+    rx, ry, rz = rotation_vector(tx, ty, tz, tw)
+    d[3], d[4], d[5] = rotate_back(f.R, rx, ry, rz)
+    for a in range(6):
+        d[a] -= m.drift[a]

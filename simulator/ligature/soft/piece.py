@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.kernels import kernel
 from ligature.model.scene import Scene
 from ligature.model.soft import TissueBody
 from ligature.model.state import MAX_INSERTIONS, MAX_PUNCTURES, StateRecord
 from ligature.soft.contacts import BodyContacts
-from ligature.soft.frame import Frame
+from ligature.soft.frame import Frame, open_frame
 from ligature.soft.needle import ScenePiercer
 from ligature.soft.thread import SceneThread
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.rod import Rod
+from ligature.suture.rotations import cross, rotate
 from ligature.tissue.block import TissueBlock
+from ligature.tissue.layout import open_tissue
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class Piece:
@@ -49,27 +54,21 @@ class Piece:
         self._alone = [p for p in self.piercers if p.rod is None]
         self.threads = [SceneThread(p.rod, p, self.block) for p in self._carried if p.rod is not None]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
-        self._box = np.zeros((2, 3))
         self.wrench, self.peak = np.zeros(6), np.zeros(1)
-        self._measure()
         self._read()
         self.frame.restart()
 
     def _read(self) -> None:
         self.frame.read(*self._bodies.motion(self._body.index))
 
-    def _measure(self) -> None:
-        x = self.block.positions
-        self._box[0], self._box[1] = x.min(axis=0), x.max(axis=0)
-
     # --- the tick -----------------------------------------------------------------------------
 
     def begin(self) -> None:
         """What comes before the rods' own step: bodies push the tissue, rods get its springs."""
         self._read()
-        self.contacts.step(self.frame, self._box)
+        self.contacts.step(self.frame)
         for piercer in self._carried:
-            piercer.begin(self._bodies, self.frame, self._box)
+            piercer.begin(self._bodies, self.frame)
         for thread in self.threads:
             thread.begin(self.frame, self._dt)
 
@@ -80,28 +79,18 @@ class Piece:
         for thread in self.threads:
             thread.end(self.frame, self._dt)
         for piercer in self._alone:
-            piercer.couple(self._bodies, self.frame, self._box)
+            piercer.couple(self._bodies, self.frame)
         self._react()
         frame, block = self.frame, self.block
         if block.interface.tick + 1 == block.interface.ticks:
             frame.end_step(block.elastic.h)
             block.elastic.gravity[:] = (self._body.gravity - frame.acceleration) @ frame.R
         block.step()
-        if block.interface.tick == 0:
-            self._measure()
 
     def _react(self) -> None:
         """Add up what acts on the tissue; its rigid body moves by that."""
-        p = self.block.interface.points
-        f, at = p.force, p.at
-        if not f.any():
-            self.wrench[:], self.peak[:] = 0.0, 0.0
-            return
-        (x, y, z), (fx, fy, fz) = at.T, f.T
-        about = [(y * fz - z * fy).sum(), (z * fx - x * fz).sum(), (x * fy - y * fx).sum()]
-        self.wrench[:] = self.frame.turned(np.array([*f.sum(axis=0), *about]))
-        self.peak[0] = np.sqrt((f**2).sum(axis=1).max())
-        if self._body.static or not self.wrench.any():
+        acts = add_up(self.block.interface.table, self.frame.table, self.wrench, self.peak)
+        if not acts or self._body.static:
             return
         centre = self._bodies.motion(self._body.index)[0][:3] - self.frame.p
         moment = self.wrench[3:] - np.cross(centre, self.wrench[:3])
@@ -115,35 +104,22 @@ class Piece:
         R, p, k = self.frame.R, self.frame.p, self.tissue.index
         state["tissue_node"][0, self.tissue.rows] = self.block.positions @ R.T + p
         state["tissue_wrench"][0, k], state["tissue_peak"][0, k] = self.wrench, self.peak[0]
-        self._write_punctures(state, k, R, p)
+        self._write_punctures(state, k)
         self._write_insertions(state, k, R, p)
 
-    def _write_punctures(self, state: StateRecord, k: int, R: Array, p: Array) -> None:
-        paths, points, x = self.block.paths, self.block.interface.points, self.block.positions
+    def _write_punctures(self, state: StateRecord, k: int) -> None:
+        paths, place = self.block.paths, np.zeros((2, 3))
         count = 0
+        point, normal = state["puncture_point"][0, k], state["puncture_normal"][0, k]
         for path in np.flatnonzero(paths.count).tolist():
             ends = [0, int(paths.count[path]) - 1] if np.isfinite(paths.length[path]) else [0]
-            for end in ends:
-                if count == MAX_PUNCTURES:
-                    break
-                i = int(paths.node[path, end])
-                at = points.weights[i] @ x[points.nodes[i]]
-                corners = x[self._face_at(points.nodes[i], points.weights[i], at)]
-                across = np.cross(corners[2] - corners[0], corners[3] - corners[1])
-                state["puncture_point"][0, k, count] = R @ at + p
-                state["puncture_normal"][0, k, count] = R @ across / max(float(np.linalg.norm(across)), 1e-12)
+            for end in ends[: MAX_PUNCTURES - count]:
+                see_puncture(self.block.interface.table, self.frame.table, int(paths.node[path, end]), place)
+                point[count], normal[count] = place
                 count += 1
-        state["puncture_point"][0, k, count:] = 0.0
-        state["puncture_normal"][0, k, count:] = 0.0
+        point[count:] = 0.0
+        normal[count:] = 0.0
         state["puncture_count"][0, k] = count
-
-    def _face_at(self, nodes: NDArray[np.int64], weights: Array, at: Array) -> NDArray[np.int64]:
-        """Corners (4,) of the face that a point lies on, the nearest one for a point just below the surface."""
-        if not weights[4:].any():
-            return nodes[:4]
-        faces = self.block.elastic.grid.faces
-        away = ((self.block.positions[faces].mean(axis=1) - at) ** 2).sum(axis=1)
-        return np.asarray(faces[int(np.argmin(away))])
 
     def _write_insertions(self, state: StateRecord, k: int, R: Array, p: Array) -> None:
         points, paths = self.block.interface.points, self.block.paths
@@ -187,7 +163,6 @@ class Piece:
         for piercer in self.piercers:
             piercer.reset()
         self.wrench[:], self.peak[:] = 0.0, 0.0
-        self._measure()
         self._read()
         self.frame.restart()
 
@@ -208,5 +183,57 @@ class Piece:
             piercer.restore(kept)
         self.block.elastic.gravity[:] = snapshot["gravity"]
         self.wrench[:], self.peak[:] = snapshot["wrench"], snapshot["peak"]
-        self._measure()
         self._read()
+
+
+@kernel
+def add_up(tissue: Integers, frame: Integers, wrench: Array, peak: Array) -> bool:
+    """Force and moment (6,) on the tissue in world axes, about the origin of its frame, and the largest force (1,).
+
+    Returns whether any acts.
+    """
+    points, f = open_tissue(tissue).points, open_frame(frame)
+    x, y, z, mx, my, mz, most = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for u in range(points.filled[0]):
+        i = points.used[u]
+        fx, fy, fz = points.force[i, 0], points.force[i, 1], points.force[i, 2]
+        lx, ly, lz = cross(points.at[i, 0], points.at[i, 1], points.at[i, 2], fx, fy, fz)
+        x, y, z, mx, my, mz = x + fx, y + fy, z + fz, mx + lx, my + ly, mz + lz
+        most = max(most, fx * fx + fy * fy + fz * fz)
+    wrench[0], wrench[1], wrench[2] = rotate(f.R, x, y, z)
+    wrench[3], wrench[4], wrench[5] = rotate(f.R, mx, my, mz)
+    peak[0] = math.sqrt(most)
+    return most > 0.0
+
+
+@kernel
+def see_puncture(tissue: Integers, frame: Integers, i: int, out: Array) -> None:
+    """Place of a point in world axes, and the normal of the surface there, (2, 3).
+
+    It lies on the face of its nodes, or just below the surface: then the nearest face counts.
+    """
+    t, f = open_tissue(tissue), open_frame(frame)
+    x, nodes, weights = t.field.x, t.points.nodes[i], t.points.weights[i]
+    px, py, pz = 0.0, 0.0, 0.0
+    for n in range(8):
+        w, k = weights[n], nodes[n]
+        px, py, pz = px + w * x[k, 0], py + w * x[k, 1], pz + w * x[k, 2]
+    a, b, c, d = nodes[0], nodes[1], nodes[2], nodes[3]
+    if weights[4] != 0.0 or weights[5] != 0.0 or weights[6] != 0.0 or weights[7] != 0.0:
+        nearest = math.inf
+        for q in range(t.field.faces.shape[0]):
+            corner, away = t.field.faces[q], 0.0
+            for m in range(3):
+                middle = x[corner[0], m] + x[corner[1], m] + x[corner[2], m] + x[corner[3], m]
+                away += (0.25 * middle - (px if m == 0 else (py if m == 1 else pz))) ** 2
+            if away < nearest:
+                nearest, a, b, c, d = away, corner[0], corner[1], corner[2], corner[3]
+    nx, ny, nz = cross(
+        x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2], x[d, 0] - x[b, 0], x[d, 1] - x[b, 1],
+        x[d, 2] - x[b, 2],
+    )  # fmt: skip
+    size = max(math.sqrt(nx * nx + ny * ny + nz * nz), 1e-12)
+    nx, ny, nz = rotate(f.R, nx / size, ny / size, nz / size)
+    out[1, 0], out[1, 1], out[1, 2] = nx, ny, nz
+    px, py, pz = rotate(f.R, px, py, pz)
+    out[0, 0], out[0, 1], out[0, 2] = px + f.p[0], py + f.p[1], pz + f.p[2]

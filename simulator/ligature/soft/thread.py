@@ -2,16 +2,46 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.frames import quaternion_matrix
-from ligature.soft.frame import Frame
+from ligature.kernels import inlined, kernel
+from ligature.soft.frame import Frame, FrameArrays, into, open_frame, turn_six, velocity_at
 from ligature.soft.needle import ScenePiercer
+from ligature.suture.layout import Nodes
 from ligature.suture.rod import Rod
+from ligature.suture.rotations import matrix_of, rotate, rotate_back
+from ligature.suture.springs import CAPACITY, open_springs
+from ligature.suture.tracking import open_nodes
+from ligature.tables import opener, table_of
 from ligature.tissue.block import TissueBlock
+from ligature.tissue.layout import open_tissue
+from ligature.tissue.strand import finish, open_strand, prepare
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Run(NamedTuple):
+    """A rod of n elements as a chain of points from the needle on."""
+
+    line: Array  # (n + 1, 3) in B
+    springs: Integers  # (S + 1,) how many nodes hold it, and their springs of the rod, -1 for those without room
+    chain: Integers  # (2,) node of the first element, and 1 where the needle is at the last
+    K: Array  # (6, 6) scratch, and so on
+    turn: Array  # (3, 3)
+
+
+def _run(elements: int, first: int, turned: bool) -> Run:
+    z = np.zeros
+    return Run(
+        z((elements + 1, 3)), np.zeros(CAPACITY + 1, np.int64), np.array([first, int(turned)]), z((6, 6)), z((3, 3))
+    )
+
+
+open_run = opener(_run(1, 0, False))
 
 
 class SceneThread:
@@ -23,8 +53,9 @@ class SceneThread:
         first = next(a for a in rod.description.attachments if a.body == piercer.body.index)
         # The thread's first point is at the needle's tail.
         self._turned = first.element > 0
-        self._springs: list[int] = []
-        self._moves = np.zeros((0, 3))
+        self._run = _run(len(rod.description.mass), rod.first, self._turned)
+        self._tables = (block.interface.table, self.inside.table, table_of(self._run), table_of(rod.nodes))
+        self._holds = False
 
     @property
     def engaged(self) -> bool:
@@ -35,48 +66,112 @@ class SceneThread:
         """Element of the rod that a segment of the thread is."""
         return len(self.rod.description.mass) - 1 - segment if self._turned else segment
 
-    def _points(self, frame: Frame) -> Array:
-        """Ends of the elements from the needle on, (n + 1, 3) in B."""
-        rod = self.rod
-        ends = np.array([
-            x + e @ quaternion_matrix(q).T
-            for x, q, e in zip(rod.positions, rod.orientations, rod.description.ends, strict=True)
-        ])  # fmt: skip
-        points = np.concatenate([ends[:1, 0], 0.5 * (ends[:-1, 1] + ends[1:, 0]), ends[-1:, 1]])
-        points = (points - frame.p) @ frame.R
-        return np.ascontiguousarray(points[::-1] if self._turned else points)
-
     def begin(self, frame: Frame, dt: float) -> None:
         """Hand the rod what the tissue does to it."""
         self.inside.draw_in(self._piercer.inside)
-        self._springs = []
-        if not self.engaged:
-            return
-        springs = self.inside.springs(self._points(frame))
-        rod, R = self.rod, frame.R
-        self._moves = np.zeros((len(springs.segment), 3))
-        for row, (segment, k, bias, start) in enumerate(
-            zip(springs.segment.tolist(), springs.stiffness, springs.bias, springs.start, strict=True)
-        ):
-            node = rod.first + self.element(segment)
-            if frame.moves:
-                self._moves[row] = frame.drift(start, dt)[:3]
-            arm = R @ start + frame.p - rod.nodes.x[node]
-            cross = np.array([[0.0, -arm[2], arm[1]], [arm[2], 0.0, -arm[0]], [-arm[1], arm[0], 0.0]])
-            J = np.concatenate([np.eye(3), -cross], axis=1)
-            K = R @ k @ R.T
-            self._springs.append(rod.add_spring(node, J.T @ K @ J, J.T @ (R @ (bias + k @ self._moves[row]))))
+        self._holds = self.engaged
+        if self._holds:
+            hold(*self._tables, self.rod.spring_table, frame.table, dt)
 
     def end(self, frame: Frame, dt: float) -> None:
         """Conclude with the motion that the rod's solve found."""
-        kept = [s for s in self._springs if s >= 0]
-        if not kept:
-            return
-        forces = np.zeros((len(self._springs), 3))
-        for row, spring in enumerate(self._springs):
-            if spring >= 0:
-                forces[row] = -frame.R.T @ (self.rod.springs.impulse[spring, :3] / dt)
-        points = self._points(frame)
-        if frame.moves:
-            points = points - dt * (frame.v + np.cross(frame.w, points))
-        self.inside.conclude(points, forces)
+        if self._holds:
+            let_settle(*self._tables, self.rod.spring_table, frame.table, dt)
+
+
+@inlined
+def _lay_out(run: Run, nodes: Nodes, f: FrameArrays) -> None:
+    """Ends of the elements from the needle on; between two elements the middle of both."""
+    line, R, n = run.line, run.turn, run.line.shape[0] - 1
+    for k in range(n + 1):
+        line[k, 0], line[k, 1], line[k, 2] = 0.0, 0.0, 0.0
+    for e in range(n):
+        i = run.chain[0] + e
+        x, q = nodes.x[i], nodes.q[i]
+        matrix_of(q[0], q[1], q[2], q[3], R)
+        for side in range(2):
+            k = n - e - side if run.chain[1] else e + side
+            weight = 1.0 if e + side == 0 or e + side == n else 0.5
+            end = nodes.axis[i, side]
+            ax, ay, az = rotate(R, end[0], end[1], end[2])
+            ax, ay, az = into(f, x[0] + ax, x[1] + ay, x[2] + az)
+            line[k, 0] += weight * ax
+            line[k, 1] += weight * ay
+            line[k, 2] += weight * az
+
+
+@kernel
+def hold(
+    tissue: Integers, thread: Integers, run_: Integers, nodes_: Integers, springs: Integers, frame: Integers, dt: float
+) -> None:
+    """Find the nodes that hold a rod as its tick begins, and make springs of them."""
+    t, strand, run, nodes, s, f = (
+        open_tissue(tissue), open_strand(thread), open_run(run_), open_nodes(nodes_), open_springs(springs),
+        open_frame(frame),
+    )  # fmt: skip
+    _lay_out(run, nodes, f)
+    prepare(t.points, t.paths, strand, run.line, (t.field.clock[0] + 1) / t.field.clock[1])
+    rows, K = strand.rows, run.K
+    count = min(rows.filled[0], run.springs.shape[0] - 1)
+    run.springs[0] = count
+    n = run.line.shape[0] - 1
+    for r in range(count):
+        row = s.filled[0]
+        if row == s.node.shape[0]:
+            run.springs[1 + r] = -1
+            continue
+        e = n - 1 - rows.segment[r] if run.chain[1] else rows.segment[r]
+        node = run.chain[0] + e
+        s.filled[0], s.node[row], run.springs[1 + r] = row + 1, node, row
+        start, k = rows.start[r], rows.stiffness[r]
+        vx, vy, vz = velocity_at(f, start[0], start[1], start[2])
+        vx, vy, vz = dt * vx, dt * vy, dt * vz
+        fx = rows.bias[r, 0] + k[0, 0] * vx + k[0, 1] * vy + k[0, 2] * vz
+        fy = rows.bias[r, 1] + k[1, 0] * vx + k[1, 1] * vy + k[1, 2] * vz
+        fz = rows.bias[r, 2] + k[2, 0] * vx + k[2, 1] * vy + k[2, 2] * vz
+        # About the centre of the element: J = [1, -arm ×], all in B.
+        cx, cy, cz = into(f, nodes.x[node, 0], nodes.x[node, 1], nodes.x[node, 2])
+        x, y, z = start[0] - cx, start[1] - cy, start[2] - cz
+        _spread(k, x, y, z, K)
+        turn_six(f.R, K, s.K[row])
+        load = s.load[row]
+        load[0], load[1], load[2] = rotate(f.R, fx, fy, fz)
+        load[3], load[4], load[5] = rotate(f.R, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+
+
+@inlined
+def _spread(k: Array, x: float, y: float, z: float, K: Array) -> None:
+    """K (6, 6) = Jᵀ k J for J = [1, -arm ×] with the arm (x, y, z)."""
+    for a in range(3):
+        p, q, r = k[a, 0], k[a, 1], k[a, 2]
+        K[a, 0], K[a, 1], K[a, 2] = p, q, r
+        # Rows of k times -arm ×.
+        K[a, 3], K[a, 4], K[a, 5] = y * r - z * q, z * p - x * r, x * q - y * p
+    for b in range(6):
+        p, q, r = K[0, b], K[1, b], K[2, b]
+        K[3, b], K[4, b], K[5, b] = y * r - z * q, z * p - x * r, x * q - y * p
+
+
+@kernel
+def let_settle(
+    tissue: Integers, thread: Integers, run_: Integers, nodes_: Integers, springs: Integers, frame: Integers, dt: float
+) -> None:
+    """End a tick with the forces of the springs as the rod's solve found them."""
+    t, strand, run, nodes, s, f = (
+        open_tissue(tissue), open_strand(thread), open_run(run_), open_nodes(nodes_), open_springs(springs),
+        open_frame(frame),
+    )  # fmt: skip
+    rows, line = strand.rows, run.line
+    for r in range(rows.filled[0]):
+        row = run.springs[1 + r] if r < run.springs[0] else -1
+        force = rows.force[r]
+        force[0], force[1], force[2] = 0.0, 0.0, 0.0
+        if row >= 0:
+            push = s.impulse[row]
+            x, y, z = rotate_back(f.R, push[0], push[1], push[2])
+            force[0], force[1], force[2] = -x / dt, -y / dt, -z / dt
+    _lay_out(run, nodes, f)
+    for k in range(line.shape[0]):
+        x, y, z = velocity_at(f, line[k, 0], line[k, 1], line[k, 2])
+        line[k, 0], line[k, 1], line[k, 2] = line[k, 0] - dt * x, line[k, 1] - dt * y, line[k, 2] - dt * z
+    finish(t.points, strand, line)

@@ -49,6 +49,8 @@ class Tissues(Subsystem):
         """Write nodes, forces, punctures and insertions; those in holes are written before."""
         for piece in self.pieces:
             piece.write_state(state)
+            pushed = piece.block.interface.points.force.any(axis=1)
+            state["tissue_contacts"][0, piece.tissue.index] = int(pushed.sum())
 
     def reset(self) -> None:
         """Whole, at rest and without needles."""

@@ -90,6 +90,10 @@ class Colliders:
         """The rows of a body's parts in `shapes`; empty for a body without any."""
         return self._slices.get(body, slice(0, 0))
 
+    def body_of(self, part: int) -> int:
+        """The body of a row in `shapes`."""
+        return next(body for body, rows in self._slices.items() if rows.start <= part < rows.stop)
+
     def update(self, bodies: Bodies, corners: Array) -> list[int]:
         """Bring the motion of bodies near the box ``corners`` (2, 3) up to date; returns those bodies.
 

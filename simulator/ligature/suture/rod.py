@@ -227,7 +227,6 @@ class Rod:
             **{name: getattr(self.joints, name) for name in JOINTS_KEPT},
             **{f"touch_{name}": np.array(getattr(touches, name)[:n]) for name in TOUCHES_KEPT},
             **kept(self, _KEPT),
-            "skip": self.skip,
         }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
@@ -242,7 +241,6 @@ class Rod:
         for name in TOUCHES_KEPT:
             getattr(touches, name)[:n] = snapshot[f"touch_{name}"]
         put_back(self, {name: snapshot[name] for name in _KEPT})
-        self.skip[:] = snapshot["skip"]
         self._near = None
         self._constraint_rows = self._gather_constraints()
 
@@ -322,28 +320,14 @@ class Rod:
         self._pulled.setdefault(i, (nodes.gravity[i].copy(), float(nodes.mass[i]), nodes.inertia[i].copy()))
         nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = acceleration, mass, inertia
 
-    def add_spring(self, node: int, stiffness: Array, load: Array) -> int:
-        """Let load - stiffness d, (6,) and (6, 6), act on a node in this tick; its row in `springs`, -1 when full."""
-        row = int(self.springs.filled[0])
-        if row == len(self.springs.node):
-            return -1
-        self.springs.node[row], self.springs.K[row], self.springs.load[row] = node, stiffness, load
-        self.springs.filled[0] = row + 1
-        return row
+    @property
+    def spring_table(self) -> NDArray[np.int64]:
+        """The springs for compiled code."""
+        return self._spring_table
 
     def clear_springs(self) -> None:
         """Remove the springs of the last tick."""
         self.springs.filled[0] = 0
-
-    def moved(self, spring: int) -> Array:
-        """Motion (6,) of a spring's node in the tick."""
-        i, nodes = int(self.springs.node[spring]), self._nodes
-        turn = matrix_quaternion(quaternion_matrix(nodes.q[i]) @ quaternion_matrix(self.springs.q[spring]).T)
-        axis, w = (turn[:3], turn[3]) if turn[3] >= 0.0 else (-turn[:3], -turn[3])
-        size = float(np.sqrt(axis @ axis))
-        return np.concatenate(
-            [nodes.x[i] - self.springs.x[spring], 2.0 * np.arctan2(size, w) / max(size, 1e-300) * axis]
-        )
 
     def joint_load(self, body: int) -> Array:
         """Force and moment (6,) of the rod on a partner in the last tick, without those of `springs`."""
@@ -370,11 +354,6 @@ class Rod:
         poses = np.empty_like(own)
         compose_rows(own, self._inertial_to_body, np.arange(len(own)), poses)
         return poses
-
-    @property
-    def skip(self) -> NDArray[np.bool_]:
-        """Pairs of parts of bodies and elements that do not collide, (parts, n)."""
-        return self._shapes.skip
 
     @property
     def contacts(self) -> layout.Touches:

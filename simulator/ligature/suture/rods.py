@@ -17,6 +17,7 @@ from ligature.model.state import StateRecord
 from ligature.suture.bodies import Bodies, Masses
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, from_chain
+from ligature.suture.exclusions import Exclusions
 from ligature.suture.rod import Partner, Rod
 
 Array = NDArray[np.float64]
@@ -41,9 +42,11 @@ class Rods:
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
         self._colliders = Colliders(scene, dt)
+        self._exclusions: list[Exclusions] = []
         self.rods = [self._rod(scene, from_chain(scene, chain), dt) for chain in scene.rods]
-        self._skip = [rod.skip.copy() for rod in self.rods]
+        self._names = [body.identity.identifier for body in scene.bodies]
         self.problems: list[Diagnostic] = []
+        self._reported = [False] * len(self.rods)
         self._of_body = {body: (rod, e) for rod in self.rods for e, body in enumerate(rod.description.bodies)}
 
     def _rod(self, scene: Scene, description: RodDescription, dt: float) -> Rod:
@@ -59,6 +62,7 @@ class Rods:
         for e, element in enumerate(description.bodies):
             for other in scene.bodies[element].no_collision_with:
                 shapes.skip[self._colliders.parts_of(other), e] = True
+        self._exclusions.append(Exclusions(rod, shapes))
         return rod
 
     def step(self, bodies: Bodies) -> None:
@@ -70,8 +74,9 @@ class Rods:
             other = rod.box()
             box = np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
         near = self._colliders.update(bodies, box)
-        for rod in self.rods:
+        for number, rod in enumerate(self.rods):
             rod.meet(self._colliders, near, bodies)
+            self._report_inside(number, self._exclusions[number].step())
             rod.step()
             for body, impulse in rod.pushes():
                 bodies.apply_impulse(body, impulse[:3], impulse[3:])
@@ -115,11 +120,10 @@ class Rods:
 
     def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
         """Disable collision of ``bodies`` with the elements around ``element`` of a rod; None enables it again."""
-        rod = self.rods[number]
-        beside = np.abs(np.arange(len(rod.positions)) - element) < NEXT_TO_PADS if element is not None else False
+        places = np.arange(len(self.rods[number].positions))
+        beside = np.abs(places - element) < NEXT_TO_PADS if element is not None else None
         for body in bodies:
-            parts = self._colliders.parts_of(body)
-            rod.skip[parts] = self._skip[number][parts] | beside
+            self._exclusions[number].between_pads(self._colliders.parts_of(body), beside)
 
     def update_masses(self, masses: Masses) -> None:
         """Read mass and inertia of the bodies that may meet a rod, and whether they are held or fall."""
@@ -142,15 +146,31 @@ class Rods:
 
     def reset(self) -> None:
         """Put every rod back to its initial shape, at rest."""
-        for rod, skip in zip(self.rods, self._skip, strict=True):
+        for rod, exclusions in zip(self.rods, self._exclusions, strict=True):
             rod.reset()
-            rod.skip[:] = skip
+            exclusions.restart()
         self._colliders.reset()
 
     def take_problems(self) -> list[Diagnostic]:
         """Problems since the last call."""
         found, self.problems = self.problems, []
         return found
+
+    def _report_inside(self, number: int, found: list[tuple[int, int, float]]) -> None:
+        """Report the deepest of the overlaps in which an attached rod starts, once."""
+        if not found or self._reported[number]:
+            return
+        self._reported[number] = True
+        part, element, depth = max(found, key=lambda overlap: overlap[2])
+        one, other = (
+            self._names[self.rods[number].description.bodies[element]],
+            self._names[self._colliders.body_of(part)],
+        )
+        message = (
+            f"'{one}' of an attached rod starts {1e3 * depth:.3g} mm inside '{other}'; such elements do not collide "
+            "with it until they have parted"
+        )
+        self.problems.append(Diagnostic(Severity.WARNING, message, None, "move the rod or the body", "overlap"))
 
     def _heal(self, rod: Rod) -> None:
         """Put a rod that diverged back to its initial shape, and report it."""
@@ -160,13 +180,21 @@ class Rods:
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
-        return {"rods": [rod.snapshot() for rod in self.rods], "colliders": self._colliders.snapshot()}
+        return {
+            "rods": [rod.snapshot() for rod in self.rods],
+            "exclusions": [exclusions.snapshot() for exclusions in self._exclusions],
+            "colliders": self._colliders.snapshot(),
+            "reported": list(self._reported),
+        }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
         for rod, state in zip(self.rods, snapshot["rods"], strict=True):
             rod.restore(state)
+        for exclusions, state in zip(self._exclusions, snapshot["exclusions"], strict=True):
+            exclusions.restore(state)
         self._colliders.restore(snapshot["colliders"])
+        self._reported = list(snapshot["reported"])
 
 
 def _partner(scene: Scene, index: int, free: bool) -> Partner:

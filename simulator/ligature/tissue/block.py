@@ -9,19 +9,17 @@ from numpy.typing import NDArray
 
 from ligature.mesh.grid import Grid
 from ligature.model.material import TissueMaterial
+from ligature.tissue import layout
+from ligature.tissue.contact import RESERVED
 from ligature.tissue.elastic import STEP, ElasticGrid
-from ligature.tissue.interface import UNUSED, Interface
+from ligature.tissue.interface import Interface
 from ligature.tissue.lips import Lips
 from ligature.tissue.location import locate
-from ligature.tissue.paths import begin_path, extend_path, paths
+from ligature.tissue.paths import begin_path, extend_path
 from ligature.tissue.puncture import NeedleInTissue
 from ligature.tissue.thread import ThreadInTissue
 
 Array = NDArray[np.float64]
-
-
-RESERVED = 40
-"""Points that needles find unused at least, as far as ways that nothing is in can be closed for them."""
 
 
 class TissueBlock:
@@ -57,8 +55,8 @@ class TissueBlock:
     ) -> None:
         self.elastic = ElasticGrid(grid, materials, fixed, gravity, dt * ticks)
         self.lips = Lips(self.elastic)
-        self.interface = Interface(self.elastic, ticks)
-        self.paths = paths()
+        self.paths = layout.paths()
+        self.interface = Interface(self.elastic, ticks, self.paths)
         self.ages = np.zeros(len(self.paths.count), dtype=np.int64)
         self.needles: list[NeedleInTissue] = []
         self.threads: list[ThreadInTissue] = []
@@ -76,18 +74,19 @@ class TissueBlock:
         self.threads.append(thread)
         return thread
 
-    def has_room(self) -> bool:
-        """Whether a body may touch one more point: paths of needles keep a part for themselves."""
-        return int((self.interface.points.status == UNUSED).sum()) > RESERVED
-
     def make_room(self) -> None:
         """Close the oldest ways that nothing is in, where there is too little room for new ones."""
-        status, paths = self.interface.points.status, self.paths
+        paths = self.paths
         used = np.flatnonzero(paths.count)
+        if not len(used):
+            self.ages[:] = 0
+            return
         self.ages[used] += 1
         self.ages[paths.count == 0] = 0
+        if self.interface.unused >= RESERVED and len(used) < len(paths.count):
+            return
         for path in used[np.argsort(-self.ages[used], kind="stable")].tolist():
-            if (status == UNUSED).sum() >= RESERVED and (paths.count == 0).any():
+            if self.interface.unused >= RESERVED and (paths.count == 0).any():
                 return
             nodes = paths.node[path, : paths.count[path]]
             inside = [needle.is_in(path) for needle in self.needles]

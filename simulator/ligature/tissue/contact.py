@@ -8,7 +8,7 @@ solved at once by projected Gauss–Seidel on ::
     f_n ≥ 0, u_n + c f_n ≥ 0, one of them zero; ‖f_t‖ ≤ μ f_n, u_t + c f_t = 0 unless it slips
 
 with u the gap along the normal and the stretch across it at the end of the tick (Coulomb friction by bristles of
-compliance c).
+compliance c). Axes are those of the block.
 """
 
 from __future__ import annotations
@@ -21,12 +21,19 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
+from ligature.tables import opener
+from ligature.tissue.interface import add_point, place_point, settle_point
+from ligature.tissue.layout import LEAVING, MOST_POINTS, Field, Points
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 CAPACITY = 64
 """Most points of contact of a block with bodies."""
+
+RESERVED = 40
+"""Points that needles find unused at least, as far as ways that nothing is in can be closed for them."""
 
 FACING = -0.2
 """Cosine between the surface's outward normal and a contact's above which a body is not before that face."""
@@ -34,15 +41,39 @@ FACING = -0.2
 COARSE = 3
 """Points along an edge of a face from the best of which the search for the deepest begins."""
 
+FINE = 0.1e-3
+"""How exact the place of a point of contact is found, m."""
+
 LEVEL = 1e-7
 """Depth in metres by which a further place must be deeper: flat contacts keep theirs."""
+
+REACH = 1.5e-3
+"""Distance in metres at which a point of contact is let go."""
+
+MEET = 0.5e-3
+"""Distance in metres at which one begins, beside what the body moves in a tick."""
+
+DEEPER = 0.2e-3
+"""Depth in metres by which another place of a face must be deeper for the point of contact to move there."""
+
+RECOVERY = 4e-5
+"""Depth in metres out of which a body is pushed in a tick."""
+
+SWEEPS = 12
+"""Sweeps of projected Gauss–Seidel in a tick, from the forces of the last one."""
 
 SOFT = 1e-5
 """Compliance of a bristle, m/N."""
 
+ROLLING = 0.3e-3
+"""Lever in metres by which the tissue's push on a body that rolls lies before its middle."""
+
+TIP = 4e-3
+"""Length of a needle from its tip, m, that does not touch the surface as a body, for it punctures it."""
+
 
 class Touching(NamedTuple):
-    """K points of contact of a block; axes of the block."""
+    """K points of contact of a block."""
 
     used: Integers  # (K,)
     part: Integers  # (K,)
@@ -56,25 +87,17 @@ class Touching(NamedTuple):
     friction: Array  # (K,) Coulomb coefficient
 
 
-class Solve(NamedTuple):
-    """Scratch of a tick."""
-
-    rows: Integers  # (K,)
-    w: Array  # (K, 3)
-    u: Array  # (K, 3)
-    lever: Array  # (K, 3) from the body's centre of mass
-    own: Array  # (K, 3) from the centre of mass of the block's own body
-    D: Array  # (K, K, 3, 3)
-    own_point: NDArray[np.bool_]  # (N,) points of the interface that are these
-
-
 class Partners(NamedTuple):
-    """B bodies, in the axes of the block; row 0 is the block's own rigid body."""
+    """B bodies; row 0 is the block's own rigid body."""
 
-    pose: Array  # (B, 7) of the inertial frame
+    R: Array  # (B, 3, 3) of the inertial frame
+    centre: Array  # (B, 3)
     twist: Array  # (B, 6) relative to the block, linear part at the centre of mass
     light: Array  # (B,) 1 / kg; 0 for what no force moves
     spin: Array  # (B, 3, 3) inverse of the inertia
+    friction: Array  # (B,) coefficient with the block
+    tip: Array  # (B, 3) of a needle that punctures; infinite for other bodies
+    push: Array  # (B, 6) force and moment of the block on it in this tick
 
 
 class Parts(NamedTuple):
@@ -86,8 +109,41 @@ class Parts(NamedTuple):
     size: Array  # (P, 3)
     planes: Array  # (Q, 4)
     plane_range: Integers  # (P, 2)
-    corners: Array  # (P, 2, 3) box in its own frame
-    live: NDArray[np.bool_]  # (P,) looked at in this tick
+    middle: Array  # (P, 3) of its box, in its own frame
+    half: Array  # (P, 3) size of that
+    live: Flags  # (P,) looked at in this tick
+    R: Array  # (P, 3, 3) where it is in this tick
+    centre: Array  # (P, 3)
+
+
+class Solve(NamedTuple):
+    """Scratch of a tick."""
+
+    rows: Integers  # (K,)
+    w: Array  # (K, 3)
+    u: Array  # (K, 3)
+    lever: Array  # (K, 3) from the body's centre of mass
+    own: Array  # (K, 3) from the centre of mass of the block's own body
+    D: Array  # (K, K, 3, 3)
+    own_point: Flags  # (N,) points of the interface that are these
+    change: Array  # (N, 3) forces on the points without those of bodies, over those of the last step
+    found: Integers  # (F, 2) part and face
+    values: Array  # (F, 6) distance, normal towards the tissue, place on the face
+    order: Integers  # (F,) the nearest first
+    known: Flags  # (K,) points of contact that were not found yet
+    vectors: Array  # (5, 3)
+    weights: Array  # (4,)
+
+
+class Contacts(NamedTuple):
+    """All that a tick of the bodies at one block works on."""
+
+    touching: Touching
+    partners: Partners
+    parts: Parts
+    solve: Solve
+    looked_at: Flags  # (q,) faces that move
+    overflow: Integers  # (1,) points of contact for which there was no room
 
 
 def touching(capacity: int = CAPACITY) -> Touching:
@@ -97,64 +153,84 @@ def touching(capacity: int = CAPACITY) -> Touching:
     return Touching(i(), i(), i(), i(), i(), z((K, 3)), z(K), z((K, 3)), z((K, 3)), z(K))
 
 
-def scratch(points: int, capacity: int = CAPACITY) -> Solve:
+def partners(bodies: int) -> Partners:
+    """``bodies`` that nothing moves, and no needles."""
+    B, z = bodies, np.zeros
+    return Partners(z((B, 3, 3)), z((B, 3)), z((B, 6)), z(B), z((B, 3, 3)), z(B), np.full((B, 3), np.inf), z((B, 6)))
+
+
+def parts(number: int, planes: int) -> Parts:
+    """Room for ``number`` parts with ``planes`` in all."""
+    P, z = number, np.zeros
+    return Parts(
+        np.zeros(P, np.int64), z((P, 4, 4)), np.zeros(P, np.int64), z((P, 3)), z((planes, 4)),
+        np.zeros((P, 2), np.int64), z((P, 3)), z((P, 3)), np.zeros(P, np.bool_), z((P, 3, 3)), z((P, 3)),
+    )  # fmt: skip
+
+
+def scratch(points: int = MOST_POINTS, capacity: int = CAPACITY) -> Solve:
     """Scratch for ``capacity`` points of contact among ``points`` of the interface."""
-    K, z = capacity, np.zeros
+    K, F, z = capacity, 4 * capacity, np.zeros
     return Solve(
-        np.zeros(K, np.int64), z((K, 3)), z((K, 3)), z((K, 3)), z((K, 3)), z((K, K, 3, 3)), np.zeros(points, np.bool_)
-    )
+        np.zeros(K, np.int64), z((K, 3)), z((K, 3)), z((K, 3)), z((K, 3)), z((K, K, 3, 3)), np.zeros(points, np.bool_),
+        z((points, 3)), np.zeros((F, 2), np.int64), z((F, 6)), np.zeros(F, np.int64), np.zeros(K, np.bool_),
+        z((5, 3)), z(4),
+    )  # fmt: skip
 
 
-def face_weights(u: float, v: float) -> Array:
-    """Weights (4,) of a face's corners at a place of it, both 0 … 1."""
-    return np.array([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v])
+open_contacts = opener(
+    Contacts(touching(1), partners(1), parts(1, 1), scratch(1, 1), np.zeros(1, np.bool_), np.zeros(1, np.int64))
+)
 
 
-@inlined
-def _turn(q, v, out):
-    """out = rotation of the quaternion ``q`` (4,) times v (3,)."""
-    x, y, z, w = q[0], q[1], q[2], q[3]
-    tx = 2.0 * (y * v[2] - z * v[1])
-    ty = 2.0 * (z * v[0] - x * v[2])
-    tz = 2.0 * (x * v[1] - y * v[0])
-    out[0] = v[0] + w * tx + y * tz - z * ty
-    out[1] = v[1] + w * ty + z * tx - x * tz
-    out[2] = v[2] + w * tz + x * ty - y * tx
+# --- small vectors ----------------------------------------------------------------------------
 
 
 @inlined
-def _turn_back(q, v, out):
-    x, y, z, w = -q[0], -q[1], -q[2], q[3]
-    tx = 2.0 * (y * v[2] - z * v[1])
-    ty = 2.0 * (z * v[0] - x * v[2])
-    tz = 2.0 * (x * v[1] - y * v[0])
-    out[0] = v[0] + w * tx + y * tz - z * ty
-    out[1] = v[1] + w * ty + z * tx - x * tz
-    out[2] = v[2] + w * tz + x * ty - y * tx
-
-
-@inlined
-def _distance_to(parts, partners, c, p, a, b, normal):
-    """Signed distance of ``p`` (3,) to part ``c``, outward ``normal`` in the axes of the block; a, b are scratch."""
-    pose = partners.pose[parts.body[c]]
+def _times(R: Array, v: Array, out: Array) -> None:
+    """out = R v."""
+    x, y, z = v[0], v[1], v[2]
     for k in range(3):
-        a[k] = p[k] - pose[k]
-    _turn_back(pose[3:7], a, b)
-    T = parts.local[c]
+        out[k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z
+
+
+@inlined
+def _times_transposed(R: Array, v: Array, out: Array) -> None:
+    """out = Rᵀ v."""
+    x, y, z = v[0], v[1], v[2]
     for k in range(3):
-        a[k] = 0.0
+        out[k] = R[0, k] * x + R[1, k] * y + R[2, k] * z
+
+
+# --- finding contacts -------------------------------------------------------------------------
+
+
+@inlined
+def _place_part(parts: Parts, partners: Partners, c: int) -> None:
+    """Where part ``c`` is in this tick."""
+    T, Q, o, b = parts.local[c], parts.R[c], parts.centre[c], parts.body[c]
+    R = partners.R[b]
+    for k in range(3):
         for m in range(3):
-            a[k] += T[m, k] * (b[m] - T[m, 3])
+            Q[k, m] = R[k, 0] * T[0, m] + R[k, 1] * T[1, m] + R[k, 2] * T[2, m]
+        o[k] = partners.centre[b, k] + R[k, 0] * T[0, 3] + R[k, 1] * T[1, 3] + R[k, 2] * T[2, 3]
+
+
+@inlined
+def _distance_to(parts: Parts, c: int, p: Array, a: Array, b: Array, normal: Array) -> float:
+    """Signed distance of ``p`` (3,) to part ``c``, and its outward ``normal`` there; a, b are scratch."""
+    R, o = parts.R[c], parts.centre[c]
+    for k in range(3):
+        b[k] = p[k] - o[k]
+    _times_transposed(R, b, a)
     first, last = parts.plane_range[c, 0], parts.plane_range[c, 1]
     d = signed_distance(parts.kind[c], parts.size[c], parts.planes[first:last], a, b)
-    for k in range(3):
-        a[k] = T[k, 0] * b[0] + T[k, 1] * b[1] + T[k, 2] * b[2]
-    _turn(pose[3:7], a, normal)
+    _times(R, b, normal)
     return d
 
 
 @inlined
-def _at(x, faces, q, u, v, p):
+def _at(x: Array, faces: Integers, q: int, u: float, v: float, p: Array) -> None:
     """Point of face ``q`` at u, v to p (3,)."""
     i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
     for m in range(3):
@@ -163,94 +239,194 @@ def _at(x, faces, q, u, v, p):
         p[m] = low + v * (high - low)
 
 
-@kernel
-def find_contacts(x, faces, looked_at, parts, partners, reach, fine, found, values, scratch3):
-    """Deepest point of each face for each part nearer than ``reach``, to ``fine`` metres; returns how many.
+@inlined
+def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count: int) -> int:
+    """Add the deepest point of face ``q`` for part ``c``, if it is near, to what was found; returns how many are."""
+    x, faces, vectors = field.x, field.faces, work.vectors
+    p, a, b, normal, best_normal = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
+    best, u, v = math.inf, 0.5, 0.5
+    for s in range(COARSE * COARSE):
+        su, sv = (s % COARSE + 0.5) / COARSE, (s // COARSE + 0.5) / COARSE
+        _at(x, faces, q, su, sv, p)
+        d = _distance_to(parts, c, p, a, b, normal)
+        if d < best:
+            best, u, v = d, su, sv
+            best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+    i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
+    for m in range(3):
+        a[m], b[m] = x[k, m] - x[i, m], x[h, m] - x[j, m]
+    nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    edge = math.sqrt(size)
+    if best > REACH + edge / COARSE:
+        return count
+    step = 0.5 / COARSE
+    while step * edge > FINE:
+        moved = False
+        for way in range(4):
+            su = min(max(u + (step if way == 0 else -step if way == 1 else 0.0), 0.0), 1.0)
+            sv = min(max(v + (step if way == 2 else -step if way == 3 else 0.0), 0.0), 1.0)
+            _at(x, faces, q, su, sv, p)
+            d = _distance_to(parts, c, p, a, b, normal)
+            if d < best - LEVEL:
+                best, u, v, moved = d, su, sv, True
+                best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+        if not moved:
+            step *= 0.5
+    facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
+    if best > REACH or facing > FACING * size:
+        return count
+    work.found[count, 0], work.found[count, 1] = c, q
+    work.values[count, 0], work.values[count, 4], work.values[count, 5] = best, u, v
+    for m in range(3):
+        work.values[count, 1 + m] = best_normal[m]
+    return count + 1
 
-    ``found`` (F, 2) receives part and face, ``values`` (F, 6) distance, normal towards the tissue, and place.
-    """
+
+@kernel
+def find_contacts(field: Field, parts: Parts, work: Solve, looked_at: Flags) -> int:
+    """Deepest point of each face for each part that is near; returns how many there are in ``work``."""
     count = 0
-    corners, low, high = scratch3[0:8], scratch3[8], scratch3[9]
-    p, a, b, normal, best_normal = scratch3[10], scratch3[11], scratch3[12], scratch3[13], scratch3[14]
+    low, high = work.vectors[0], work.vectors[1]
     for c in range(parts.kind.shape[0]):
         if not parts.live[c]:
             continue
-        pose, T, box = partners.pose[parts.body[c]], parts.local[c], parts.corners[c]
-        for k in range(8):
-            for m in range(3):
-                p[m] = box[k >> m & 1, m]
-            for m in range(3):
-                a[m] = T[m, 3] + T[m, 0] * p[0] + T[m, 1] * p[1] + T[m, 2] * p[2]
-            _turn(pose[3:7], a, corners[k])
+        R, o = parts.R[c], parts.centre[c]
+        outside = False
         for m in range(3):
-            low[m], high[m] = math.inf, -math.inf
-            for k in range(8):
-                low[m] = min(low[m], corners[k, m] + pose[m] - reach)
-                high[m] = max(high[m], corners[k, m] + pose[m] + reach)
-        for q in range(faces.shape[0]):
-            if not looked_at[q] or count == found.shape[0]:
+            middle, reach = o[m], REACH
+            for k in range(3):
+                middle += R[m, k] * parts.middle[c, k]
+                reach += abs(R[m, k]) * parts.half[c, k]
+            low[m], high[m] = middle - reach, middle + reach
+            outside = outside or low[m] > field.box[1, m] or high[m] < field.box[0, m]
+        if outside:
+            continue
+        lx, ly, lz, hx, hy, hz = low[0], low[1], low[2], high[0], high[1], high[2]
+        for q in range(field.faces.shape[0]):
+            if not looked_at[q] or count == work.found.shape[0]:
                 continue
-            i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
-            outside = False
-            for m in range(3):
-                least = min(x[i, m], x[j, m], x[k, m], x[h, m])
-                most = max(x[i, m], x[j, m], x[k, m], x[h, m])
-                outside = outside or least > high[m] or most < low[m]
-            if outside:
+            box = field.face_box[q]
+            if box[0, 0] > hx or box[1, 0] < lx or box[0, 1] > hy or box[1, 1] < ly or box[0, 2] > hz or box[1, 2] < lz:
                 continue
-            best, u, v = math.inf, 0.5, 0.5
-            for s in range(COARSE * COARSE):
-                su, sv = (s % COARSE + 0.5) / COARSE, (s // COARSE + 0.5) / COARSE
-                _at(x, faces, q, su, sv, p)
-                d = _distance_to(parts, partners, c, p, a, b, normal)
-                if d < best:
-                    best, u, v = d, su, sv
-                    best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
-            for m in range(3):
-                a[m], b[m] = x[k, m] - x[i, m], x[h, m] - x[j, m]
-            nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-            size = math.sqrt(nx * nx + ny * ny + nz * nz)
-            edge = math.sqrt(size)
-            if best > reach + edge / COARSE:
-                continue
-            step = 0.5 / COARSE
-            while step * edge > fine:
-                moved = False
-                for way in range(4):
-                    su = min(max(u + (step if way == 0 else -step if way == 1 else 0.0), 0.0), 1.0)
-                    sv = min(max(v + (step if way == 2 else -step if way == 3 else 0.0), 0.0), 1.0)
-                    _at(x, faces, q, su, sv, p)
-                    d = _distance_to(parts, partners, c, p, a, b, normal)
-                    if d < best - LEVEL:
-                        best, u, v, moved = d, su, sv, True
-                        best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
-                if not moved:
-                    step *= 0.5
-            facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
-            if best > reach or facing > FACING * size:
-                continue
-            found[count, 0], found[count, 1] = c, q
-            values[count, 0], values[count, 4], values[count, 5] = best, u, v
-            for m in range(3):
-                values[count, 1 + m] = best_normal[m]
-            count += 1
+            count = _search_face(field, parts, work, c, q, count)
     return count
 
 
 @kernel
-def measure_contacts(touching, points, parts, partners, scratch3):
+def measure_contacts(touching: Touching, points: Points, parts: Parts, partners: Partners, vectors: Array) -> None:
     """Distance and normal of every point of contact as the tick begins."""
-    a, b, normal = scratch3[0], scratch3[1], scratch3[2]
+    a, b = vectors[0], vectors[1]
     for r in range(touching.used.shape[0]):
         if touching.used[r]:
-            at = points.at[touching.point[r]]
-            touching.distance[r] = _distance_to(parts, partners, touching.part[r], at, a, b, normal)
-            for m in range(3):
-                touching.normal[r, m] = normal[m]
+            c, at = touching.part[r], points.at[touching.point[r]]
+            if not parts.live[c]:
+                _place_part(parts, partners, c)
+            touching.distance[r] = _distance_to(parts, c, at, a, b, touching.normal[r])
+
+
+# --- which contacts there are -----------------------------------------------------------------
 
 
 @inlined
-def _add_recoil(D, light, spin, first, second, h2):
+def _sort(work: Solve, count: int) -> None:
+    """The order of what was found, the nearest first, by insertion: it is short, and stays as it is for equals."""
+    for n in range(count):
+        k = n
+        while k > 0 and work.values[work.order[k - 1], 0] > work.values[n, 0]:
+            work.order[k] = work.order[k - 1]
+            k -= 1
+        work.order[k] = n
+
+
+@inlined
+def _anchor(contacts: Contacts, points: Points, r: int, found: int) -> None:
+    """Let friction go on from where the point is, with the force that it has."""
+    t, partners, value = contacts.touching, contacts.partners, contacts.solve.values[found]
+    t.distance[r] = value[0]
+    n, f = t.normal[r], t.force[r]
+    n[0], n[1], n[2] = value[1], value[2], value[3]
+    along = f[0] * n[0] + f[1] * n[1] + f[2] * n[2]
+    away = contacts.solve.vectors[0]
+    for k in range(3):
+        away[k] = points.at[t.point[r], k] + SOFT * (f[k] - along * n[k]) - partners.centre[t.body[r], k]
+    _times_transposed(partners.R[t.body[r]], away, t.anchor[r])
+
+
+@inlined
+def _set_weights(work: Solve, found: int) -> None:
+    """Weights of a face's corners at a place that was found."""
+    u, v = work.values[found, 4], work.values[found, 5]
+    w = work.weights
+    w[0], w[1], w[2], w[3] = (1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v
+
+
+@inlined
+def _begin(field: Field, points: Points, contacts: Contacts, found: int) -> None:
+    """Let a body touch the tissue at one more point, if there is room."""
+    t, work, partners = contacts.touching, contacts.solve, contacts.partners
+    part, q = work.found[found, 0], work.found[found, 1]
+    body = contacts.parts.body[part]
+    _set_weights(work, found)
+    away = 0.0
+    for k in range(3):
+        at = 0.0
+        for c in range(4):
+            at += work.weights[c] * field.x[field.faces[q, c], k]
+        away += (at - partners.tip[body, k]) ** 2
+    if away < TIP * TIP:
+        return
+    r = 0
+    while r < t.used.shape[0] and t.used[r]:
+        r += 1
+    if r == t.used.shape[0] or points.status.shape[0] - points.filled[0] <= RESERVED:
+        contacts.overflow[0] += 1
+        return
+    t.used[r], t.part[r], t.face[r], t.body[r] = 1, part, q, body
+    t.point[r] = add_point(field, points, field.faces[q], work.weights)
+    t.force[r, 0], t.force[r, 1], t.force[r, 2] = 0.0, 0.0, 0.0
+    t.friction[r] = partners.friction[body]
+    _anchor(contacts, points, r, found)
+
+
+@kernel
+def match_contacts(field: Field, points: Points, contacts: Contacts, count: int, dt: float) -> None:
+    """Keep, begin, move and end points of contact after the ``count`` that were found."""
+    t, work, partners = contacts.touching, contacts.solve, contacts.partners
+    for r in range(t.used.shape[0]):
+        work.known[r] = t.used[r] != 0
+    _sort(work, count)
+    for n in range(count):
+        f = work.order[n]
+        part, q, value = work.found[f, 0], work.found[f, 1], work.values[f]
+        row = -1
+        for r in range(t.used.shape[0]):
+            if work.known[r] and t.part[r] == part and t.face[r] == q:
+                row = r
+        if row >= 0:
+            work.known[row] = False
+            if value[0] < t.distance[row] - DEEPER:
+                _set_weights(work, f)
+                place_point(field, points, t.point[row], field.faces[q], work.weights)
+                settle_point(field, points, t.point[row])
+                _anchor(contacts, points, row, f)
+            continue
+        twist = partners.twist[contacts.parts.body[part]]
+        closing = value[1] * twist[0] + value[2] * twist[1] + value[3] * twist[2]
+        if value[0] <= MEET + max(closing, 0.0) * dt:
+            _begin(field, points, contacts, f)
+    for r in range(t.used.shape[0]):
+        if work.known[r]:
+            points.status[t.point[r]] = LEAVING
+            t.used[r] = 0
+            t.force[r, 0], t.force[r, 1], t.force[r, 2] = 0.0, 0.0, 0.0
+
+
+# --- forces -----------------------------------------------------------------------------------
+
+
+@inlined
+def _add_recoil(D: Array, light: float, spin: Array, first: Array, second: Array, h2: float) -> None:
     """Add to D (3, 3) the motion of a body at a lever ``first`` for a force at ``second``, times h²."""
     for b in range(3):
         ex, ey, ez = (1.0 if b == 0 else 0.0), (1.0 if b == 1 else 0.0), (1.0 if b == 2 else 0.0)
@@ -267,52 +443,53 @@ def _add_recoil(D, light, spin, first, second, h2):
 
 
 @kernel
-def press(touching, work, points, partners, s, dt, sweeps, recovery):
+def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
     """Forces of all points of contact in this tick, and where friction anchors; returns how many there are."""
-    n = 0
+    touching, work, partners = contacts.touching, contacts.solve, contacts.partners
+    n, used = 0, points.filled[0]
     for r in range(touching.used.shape[0]):
         if touching.used[r]:
             work.rows[n] = r
             n += 1
-    N = points.status.shape[0]
-    for j in range(N):
-        work.own_point[j] = False
+    if n == 0:
+        return 0
+    for k in range(used):
+        work.own_point[points.used[k]] = False
     for a in range(n):
         work.own_point[touching.point[work.rows[a]]] = True
+    for k in range(used):
+        j = points.used[k]
+        for m in range(3):
+            work.change[j, m] = (0.0 if work.own_point[j] else points.force[j, m]) - points.mean[j, m]
     for a in range(n):
         r = work.rows[a]
         i, b = touching.point[r], touching.body[r]
-        pose, twist, normal = partners.pose[b], partners.twist[b], touching.normal[r]
-        at, u, w = points.at[i], work.u[a], work.w[a]
+        centre, twist, normal = partners.centre[b], partners.twist[b], touching.normal[r]
+        at, u, w, arm = points.at[i], work.u[a], work.w[a], work.lever[a]
         for k in range(3):
-            work.lever[a, k] = at[k] - pose[k]
-            work.own[a, k] = at[k] - partners.pose[0, k]
+            arm[k] = at[k] - centre[k]
+            work.own[a, k] = at[k] - partners.centre[0, k]
         # Where friction anchors, at the end of the tick.
-        _turn(pose[3:7], touching.anchor[r], u)
+        _times(partners.R[b], touching.anchor[r], u)
         lx, ly, lz = u[0], u[1], u[2]
-        u[0] += pose[0] + dt * (twist[0] + twist[4] * lz - twist[5] * ly)
-        u[1] += pose[1] + dt * (twist[1] + twist[5] * lx - twist[3] * lz)
-        u[2] += pose[2] + dt * (twist[2] + twist[3] * ly - twist[4] * lx)
-        along, moved = 0.0, 0.0
-        arm = work.lever[a]
+        u[0] += centre[0] + dt * (twist[0] + twist[4] * lz - twist[5] * ly)
+        u[1] += centre[1] + dt * (twist[1] + twist[5] * lx - twist[3] * lz)
+        u[2] += centre[2] + dt * (twist[2] + twist[3] * ly - twist[4] * lx)
+        x, y, z = points.start[i, 0], points.start[i, 1], points.start[i, 2]
+        x, y, z = x + s * points.move[i, 0], y + s * points.move[i, 1], z + s * points.move[i, 2]
+        for k in range(used):
+            j = points.used[k]
+            C = points.C[i, j]
+            for m in range(3):
+                f = work.change[j, m]
+                x, y, z = x + C[0, m] * f, y + C[1, m] * f, z + C[2, m] * f
+        w[0], w[1], w[2] = x - u[0], y - u[1], z - u[2]
+        along = w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2]
         vx = dt * (twist[0] + twist[4] * arm[2] - twist[5] * arm[1])
         vy = dt * (twist[1] + twist[5] * arm[0] - twist[3] * arm[2])
         vz = dt * (twist[2] + twist[3] * arm[1] - twist[4] * arm[0])
-        for k in range(3):
-            y = points.start[i, k] + s * points.move[i, k]
-            for j in range(N):
-                if points.status[j] == 0:
-                    continue
-                for m in range(3):
-                    f = -points.mean[j, m] if work.own_point[j] else points.force[j, m] - points.mean[j, m]
-                    y += points.C[i, j, k, m] * f
-            w[k] = y - u[k]
-            along += w[k] * normal[k]
-            moved += normal[k] * (y - at[k] - (vx if k == 0 else (vy if k == 1 else vz)))
-        gap = touching.distance[r]
-        if gap < -recovery:
-            gap = -recovery
-        gap += moved
+        gap = max(touching.distance[r], -RECOVERY)
+        gap += normal[0] * (x - at[0] - vx) + normal[1] * (y - at[1] - vy) + normal[2] * (z - at[2] - vz)
         for k in range(3):
             w[k] += (gap - along) * normal[k]
     for a in range(n):
@@ -323,8 +500,9 @@ def press(touching, work, points, partners, s, dt, sweeps, recovery):
             for k in range(3):
                 for m in range(3):
                     D[k, m] = points.C[i, j, k, m]
-            _add_recoil(D, partners.light[0], partners.spin[0], work.own[a], work.own[c], dt * dt)
-            if touching.body[work.rows[c]] == b:
+            if partners.light[0] > 0.0:
+                _add_recoil(D, partners.light[0], partners.spin[0], work.own[a], work.own[c], dt * dt)
+            if partners.light[b] > 0.0 and touching.body[work.rows[c]] == b:
                 _add_recoil(D, partners.light[b], partners.spin[b], work.lever[a], work.lever[c], dt * dt)
     for a in range(n):
         for k in range(3):
@@ -333,7 +511,7 @@ def press(touching, work, points, partners, s, dt, sweeps, recovery):
                 f = touching.force[work.rows[c]]
                 D = work.D[a, c]
                 work.u[a, k] += D[k, 0] * f[0] + D[k, 1] * f[1] + D[k, 2] * f[2]
-    for _ in range(sweeps):
+    for _ in range(SWEEPS):
         for a in range(n):
             _relax(touching, work, n, a)
     for a in range(n):
@@ -346,15 +524,14 @@ def press(touching, work, points, partners, s, dt, sweeps, recovery):
         for k in range(3):
             points.force[i, k] = f[k]
             work.w[a, k] = u[k] - along_u * normal[k] + SOFT * (f[k] - along_f * normal[k])
-        pose = partners.pose[touching.body[r]]
-        _turn_back(pose[3:7], work.w[a], work.u[a])
+        _times_transposed(partners.R[touching.body[r]], work.w[a], work.u[a])
         for k in range(3):
             touching.anchor[r, k] += work.u[a, k]
     return n
 
 
 @inlined
-def _relax(touching, work, n, a):
+def _relax(touching: Touching, work: Solve, n: int, a: int) -> None:
     """One point: its normal force, then friction within the cone."""
     r = work.rows[a]
     f, normal, D, u = touching.force[r], touching.normal[r], work.D[a, a], work.u[a]
@@ -386,3 +563,58 @@ def _relax(touching, work, n, a):
         v[0] += E[0, 0] * cx + E[0, 1] * cy + E[0, 2] * cz
         v[1] += E[1, 0] * cx + E[1, 1] * cy + E[1, 2] * cz
         v[2] += E[2, 0] * cx + E[2, 1] * cy + E[2, 2] * cz
+
+
+@kernel
+def touch(field: Field, points: Points, contacts: Contacts, dt: float) -> bool:
+    """A tick of all bodies whose parts are ``live``: True where any touches the tissue, with `Partners.push` then."""
+    t, parts, partners, work = contacts.touching, contacts.parts, contacts.partners, contacts.solve
+    for c in range(parts.kind.shape[0]):
+        if parts.live[c]:
+            _place_part(parts, partners, c)
+    measure_contacts(t, points, parts, partners, work.vectors)
+    count = find_contacts(field, parts, work, contacts.looked_at)
+    match_contacts(field, points, contacts, count, dt)
+    n = press(contacts, points, (field.clock[0] + 1) / field.clock[1], dt)
+    for b in range(partners.push.shape[0]):
+        for k in range(6):
+            partners.push[b, k] = 0.0
+    for a in range(n):
+        r = work.rows[a]
+        f, at, push, centre = t.force[r], points.at[t.point[r]], partners.push[t.body[r]], partners.centre[t.body[r]]
+        x, y, z = at[0] - centre[0], at[1] - centre[1], at[2] - centre[2]
+        push[0], push[1], push[2] = push[0] - f[0], push[1] - f[1], push[2] - f[2]
+        push[3] -= y * f[2] - z * f[1]
+        push[4] -= z * f[0] - x * f[2]
+        push[5] -= x * f[1] - y * f[0]
+    if n > 0:
+        _resist_rolling(contacts, n, dt)
+    return n > 0
+
+
+@inlined
+def _resist_rolling(contacts: Contacts, n: int, dt: float) -> None:
+    """Let bodies that turn on the tissue feel a moment against it, at most `ROLLING` times the force that presses them.
+
+    What turns slowly is braked in proportion, so that a tick never turns it back.
+    """
+    t, partners, work = contacts.touching, contacts.partners, contacts.solve
+    for b in range(1, partners.push.shape[0]):
+        if partners.light[b] == 0.0:
+            continue
+        pressed = 0.0
+        for a in range(n):
+            r = work.rows[a]
+            if t.body[r] == b:
+                f, m = t.force[r], t.normal[r]
+                pressed += f[0] * m[0] + f[1] * m[1] + f[2] * m[2]
+        if pressed <= 0.0:
+            continue
+        w, spin = partners.twist[b, 3:6], partners.spin[b]
+        speed = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        limit = ROLLING * pressed
+        slow = limit * dt * (spin[0, 0] + spin[1, 1] + spin[2, 2])
+        for k in range(3):
+            moment = limit * w[k] / max(speed, slow)
+            partners.push[b, 3 + k] -= moment
+            partners.push[0, 3 + k] += moment

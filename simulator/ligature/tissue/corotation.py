@@ -9,7 +9,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import inlined, kernel
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 MOST_TURNS = 8
 """Iterations of a frame at most; from the last step's frame one to three suffice."""
@@ -19,7 +25,7 @@ SMALL_TURN = 1e-9
 
 
 @inlined
-def set_rotation(q, R):
+def set_rotation(q: Array, R: Array) -> None:
     """R (3, 3) of the quaternion ``q`` (4,)."""
     x, y, z, w = q[0], q[1], q[2], q[3]
     R[0, 0], R[0, 1], R[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
@@ -28,7 +34,7 @@ def set_rotation(q, R):
 
 
 @inlined
-def turn_towards(F, q, R):
+def turn_towards(F: Array, q: Array, R: Array) -> None:
     """Turn ``q`` (4,) and ``R`` (3, 3) to the rotation nearest to ``F`` (3, 3), from where they are."""
     for _ in range(MOST_TURNS):
         set_rotation(q, R)
@@ -57,7 +63,10 @@ def turn_towards(F, q, R):
 
 
 @kernel
-def add_elastic_forces(cells, kind, K, size, rest, x, q, f, R, F, y, g):
+def add_elastic_forces(
+    cells: Integers, kind: Integers, K: Array, size: Array, rest: Array, x: Array, q: Array, f: Array, R: Array,
+    F: Array, y: Array, g: Array,
+) -> float:  # fmt: skip
     """f -= the elastic forces on all nodes; returns the elastic energy in J.
 
     Parameters: nodes of the cells (m, 8), their kind (m,), stiffness (kinds, 24, 24) and edges (kinds, 3) of a

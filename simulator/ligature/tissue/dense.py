@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import kernel
+
+Array = NDArray[np.float64]
 
 
 @kernel
-def cholesky(A, n):
+def cholesky(A: Array, n: int) -> bool:
     """Replace the lower triangle of the leading ``n`` rows of ``A`` by its factor L, A = L Lᵀ.
 
     Returns False, with ``A`` partly overwritten, where A is not positive definite.
@@ -29,7 +34,7 @@ def cholesky(A, n):
 
 
 @kernel
-def solve_cholesky(L, n, b):
+def solve_cholesky(L: Array, n: int, b: Array) -> None:
     """Replace the leading ``n`` values of ``b`` by the solution of L Lᵀ x = b."""
     for i in range(n):
         s = b[i]
@@ -44,7 +49,7 @@ def solve_cholesky(L, n, b):
 
 
 @kernel
-def invert(A, inverse):
+def invert(A: Array, inverse: Array) -> bool:
     """Invert the symmetric positive definite ``A`` (n, n), whose lower triangle is used up.
 
     Returns False where A is not positive definite. Rows are updated whole, so that the inner loops are vectors.
@@ -89,7 +94,7 @@ def invert(A, inverse):
 
 
 @kernel
-def subtract_product(U, V, out):
+def subtract_product(U: Array, V: Array, out: Array) -> None:
     """out -= U V for U (m, w), V (w, n): four rows of V at a time."""
     m, w = U.shape
     n = V.shape[1]

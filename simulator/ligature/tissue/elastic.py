@@ -13,16 +13,20 @@ one solve of `predict`, to which contacts add their forces times their `response
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 
+from ligature.kernels import kernel
 from ligature.mesh.grid import Grid
 from ligature.model.material import TissueMaterial
+from ligature.tables import opener, table_of
 from ligature.tissue import elements
 from ligature.tissue.corotation import add_elastic_forces
-from ligature.tissue.factorisation import Factor
+from ligature.tissue.factorisation import Factor, solve_in_place
+from ligature.tissue.layout import Elimination
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,6 +39,42 @@ ROTATION_RESISTANCE = 1.0
 
 TABLE_NODES = 1500
 """Free nodes up to which the whole compliance is tabulated."""
+
+
+class Bulk(NamedTuple):
+    """A grid of n nodes (f of them free) and m cells of c kinds, for compiled code."""
+
+    cells: Integers  # (m, 8)
+    kind: Integers  # (m,)
+    K: Array  # (c, 24, 24) stiffness, N/m
+    size: Array  # (c, 3) edges, m
+    rest: Array  # (n, 3) nodes at rest
+    x: Array  # (n, 3)
+    v: Array  # (n, 3)
+    frames: Array  # (m, 4)
+    mass: Array  # (n,)
+    gravity: Array  # (3,)
+    free: Integers  # (f,)
+    factor: Elimination
+    force: Array  # (n, 3) scratch, and so on
+    load: Array  # (3 f,)
+    R: Array  # (3, 3)
+    F: Array  # (3, 3)
+    y: Array  # (24,)
+    g: Array  # (24,)
+
+
+def _bulk_example() -> Bulk:
+    """The smallest one: what counts is the types of its arrays."""
+    z = np.zeros
+    i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
+    return Bulk(
+        i(1, 8), i(1), z((1, 24, 24)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 4)), z(1), z(3), i(1),
+        Elimination(i(1, 2), i(1), z(1), z(1), z(1)), z((1, 3)), z(3), z((3, 3)), z((3, 3)), z(24), z(24),
+    )  # fmt: skip
+
+
+open_bulk = opener(_bulk_example())
 
 
 class ElasticGrid:
@@ -78,15 +118,21 @@ class ElasticGrid:
         self.free: Integers = np.flatnonzero(~np.asarray(fixed, dtype=bool))
         self.row = np.full(n, -1)
         self.row[self.free] = np.arange(len(self.free))
-        self.gravity = np.asarray(gravity, dtype=np.float64)
+        self.gravity = np.array(gravity, dtype=np.float64)
         self._kinds()
         self.mass = np.zeros(n)
         np.add.at(self.mass, grid.cells, (self._cell_mass / 8.0)[:, None])
         self._factor = Factor(self._matrix(), grid.site[self.free])
-        self._table: Array | None = None
-        self._scratch = (np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(24), np.zeros(24))
+        self._responses: Array | None = None
         self.x, self.v = grid.nodes.copy(), np.zeros((n, 3))
         self.frames = np.zeros((len(grid.cells), 4))
+        cells, rest, n_free = np.ascontiguousarray(grid.cells), np.ascontiguousarray(grid.nodes), len(self.free)
+        self._bulk = Bulk(
+            cells, self._kind, self._K, self._size, rest, self.x, self.v, self.frames, self.mass, self.gravity,
+            self.free, self._factor.arrays, np.zeros((n, 3)), np.zeros(3 * n_free), np.zeros((3, 3)),
+            np.zeros((3, 3)), np.zeros(24), np.zeros(24),
+        )  # fmt: skip
+        self._bulk_table = table_of(self._bulk)
         self.reset()
 
     def _kinds(self) -> None:
@@ -125,12 +171,8 @@ class ElasticGrid:
 
         ``external`` (n, 3) are forces beside gravity; what contacts add is found by superposition of `response`.
         """
-        f = self.mass[:, None] * (self.v / self.h + self.gravity)
-        if external is not None:
-            f += external
-        self._elastic_forces(f)
-        d = np.zeros_like(self.x)
-        d[self.free] = self._factor.solve(f[self.free].reshape(-1)).reshape(-1, 3)
+        d = np.zeros_like(self.x) if external is None else np.array(external, dtype=np.float64)
+        predict(self._bulk_table, self.h, d)
         return d
 
     def advance(self, d: Array) -> None:
@@ -139,9 +181,7 @@ class ElasticGrid:
         np.divide(d, self.h, out=self.v)
 
     def _elastic_forces(self, f: Array) -> float:
-        return add_elastic_forces(
-            self.grid.cells, self._kind, self._K, self._size, self.grid.nodes, self.x, self.frames, f, *self._scratch
-        )
+        return float(elastic_forces(self._bulk_table, f))
 
     def elastic_forces(self) -> Array:
         """Elastic forces on all nodes, those of supports included, (n, 3) N."""
@@ -163,12 +203,11 @@ class ElasticGrid:
         The point is the mean of ``nodes`` (k,) with ``weights`` (k,).
         """
         out = np.zeros((3, *self.x.shape))
-        if self._table is None and len(self.free) <= TABLE_NODES:
-            self._table = self._tabulate()
-        if self._table is not None:
+        table = self.responses
+        if len(table):
             for node, weight in zip(self.row[nodes].tolist(), weights.tolist(), strict=True):
                 if node >= 0 and weight != 0.0:
-                    out += weight * self._table[node]
+                    out += weight * table[node]
             return out
         for axis in range(3):
             load = np.zeros((len(self.free), 3))
@@ -178,17 +217,22 @@ class ElasticGrid:
             out[axis, self.free] = self._factor.solve(load.reshape(-1)).reshape(-1, 3)
         return out
 
-    def _tabulate(self) -> Array:
-        """Responses of all free nodes, (f, 3, n, 3)."""
-        f = len(self.free)
-        table = np.zeros((f, 3, *self.x.shape))
-        unit = np.zeros(3 * f)
-        for node in range(f):
-            for axis in range(3):
-                unit[3 * node + axis] = 1.0
-                table[node, axis, self.free] = self._factor.solve(unit).reshape(-1, 3)
-                unit[3 * node + axis] = 0.0
-        return table
+    @property
+    def factor(self) -> Elimination:
+        """The factor of A over the free unknowns."""
+        return self._factor.arrays
+
+    @property
+    def responses(self) -> Array:
+        """Displacements of all nodes for 1 N along x, y, z on each free node, (f, 3, n, 3) m/N.
+
+        Made when it is first asked for; (0, 3, n, 3) for a grid that is too large for it.
+        """
+        if self._responses is None:
+            f = len(self.free) if len(self.free) <= TABLE_NODES else 0
+            self._responses = np.zeros((f, 3, *self.x.shape))
+            tabulate(self._bulk_table, self._responses)
+        return self._responses
 
     # --- state --------------------------------------------------------------------------------
 
@@ -196,3 +240,43 @@ class ElasticGrid:
         """Return to rest."""
         self.x[:], self.v[:] = self.grid.nodes, 0.0
         self.frames[:] = [0.0, 0.0, 0.0, 1.0]
+
+
+@kernel
+def elastic_forces(table: Integers, f: Array) -> float:
+    """f (n, 3) -= the elastic forces on all nodes; returns the elastic energy in J."""
+    b = open_bulk(table)
+    return add_elastic_forces(b.cells, b.kind, b.K, b.size, b.rest, b.x, b.frames, f, b.R, b.F, b.y, b.g)
+
+
+@kernel
+def predict(table: Integers, h: float, d: Array) -> None:
+    """Replace the external forces ``d`` (n, 3) by the displacements in a step of ``h`` seconds."""
+    b = open_bulk(table)
+    for i in range(b.x.shape[0]):
+        for a in range(3):
+            b.force[i, a] = b.mass[i] * (b.v[i, a] / h + b.gravity[a]) + d[i, a]
+            d[i, a] = 0.0
+    add_elastic_forces(b.cells, b.kind, b.K, b.size, b.rest, b.x, b.frames, b.force, b.R, b.F, b.y, b.g)
+    for k in range(b.free.shape[0]):
+        for a in range(3):
+            b.load[3 * k + a] = b.force[b.free[k], a]
+    solve_in_place(b.factor, b.load)
+    for k in range(b.free.shape[0]):
+        for a in range(3):
+            d[b.free[k], a] = b.load[3 * k + a]
+
+
+@kernel
+def tabulate(table: Integers, responses: Array) -> None:
+    """Fill ``responses`` (f, 3, n, 3) with the displacements for unit forces on each free node."""
+    b = open_bulk(table)
+    for node in range(responses.shape[0]):
+        for axis in range(3):
+            for k in range(b.load.shape[0]):
+                b.load[k] = 0.0
+            b.load[3 * node + axis] = 1.0
+            solve_in_place(b.factor, b.load)
+            for k in range(b.free.shape[0]):
+                for a in range(3):
+                    responses[node, axis, b.free[k], a] = b.load[3 * k + a]

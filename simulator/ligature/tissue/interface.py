@@ -11,59 +11,43 @@ force that lasts moves a point in a tick as far as in a step.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.kernels import kernel
+from ligature.kernels import inlined, kernel
 from ligature.model.material import TissueMaterial
+from ligature.tables import table_of
+from ligature.tissue import layout
 from ligature.tissue.elastic import ElasticGrid
+from ligature.tissue.factorisation import solve_in_place
+from ligature.tissue.layout import (
+    CUTTING,
+    EXIT,
+    FRICTION,
+    LEAVING,
+    MOST_POINTS,
+    PUNCTURE,
+    SHEAR,
+    STRENGTH,
+    UNUSED,
+    USED,
+    Field,
+    Paths,
+    Points,
+    Tissue,
+    open_tissue,
+)
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-CAPACITY = 160
-"""Most points at one time."""
 
 SPACING = 1.6e-3
 """Length of a path between its nodes, m."""
 
 HARD = 1e-5
 """Least compliance of a bristle, m/N."""
-
-UNUSED, USED, LEAVING = 0, 1, 2
-"""A point that leaves has forces of this step to hand over, and pushes no more."""
-
-
-class Points(NamedTuple):
-    """N points, in world axes and SI units."""
-
-    status: Integers  # (N,)
-    nodes: Integers  # (N, 8)
-    weights: Array  # (N, 8)
-    start: Array  # (N, 3) p above
-    move: Array  # (N, 3) u above
-    force: Array  # (N, 3) on the tissue in this tick
-    mean: Array  # (N, 3) over the last step
-    total: Array  # (N, 3) over the ticks of this step
-    at: Array  # (N, 3) at the end of the last tick
-    C: Array  # (N, N, 3, 3) m/N
-    soft: Array  # (N,) local compliance of the bristle, m/N
-    friction: Array  # (N,) N for each metre of needle
-    strength: Array  # (N,) N for each metre of needle or thread
-    puncture: Array  # (N,) force at which a tip enters, N
-    cutting: Array  # (N,) and gets further
-    exit: Array  # (N,) beyond that, and leaves
-
-
-def points(capacity: int = CAPACITY) -> Points:
-    """Room for ``capacity`` points, none yet."""
-    N, z = capacity, np.zeros
-    return Points(
-        np.zeros(N, np.int64), np.zeros((N, 8), np.int64), z((N, 8)), z((N, 3)), z((N, 3)), z((N, 3)), z((N, 3)),
-        z((N, 3)), z((N, 3)), z((N, N, 3, 3)), z(N), z(N), z(N), z(N), z(N), z(N),
-    )  # fmt: skip
 
 
 class Interface:
@@ -75,20 +59,35 @@ class Interface:
         The tissue.
     ticks
         Ticks of a step.
+
+    Attributes
+    ----------
+    table
+        The grid, its points and ``paths`` for compiled code, see `ligature.tissue.layout.open_tissue`.
     """
 
-    def __init__(self, elastic: ElasticGrid, ticks: int, capacity: int = CAPACITY) -> None:
+    def __init__(self, elastic: ElasticGrid, ticks: int, paths: Paths) -> None:
         self.elastic, self.ticks = elastic, ticks
-        self.points = points(capacity)
-        self.expected = np.zeros_like(elastic.x)
-        self.tick = 0
-        self.cell_of = np.zeros(capacity, np.int64)
-        self._response = np.zeros((capacity, 3, *elastic.x.shape))
+        self.points = layout.points()
+        self.field = _field(elastic, ticks)
+        self.expected = self.field.expected
+        self._tissue = Tissue(self.field, self.points, paths)
+        self.table = table_of(self._tissue)
+
+    @property
+    def tick(self) -> int:
+        """Ticks of this step that are over."""
+        return int(self.field.clock[0])
 
     @property
     def fraction(self) -> float:
         """Share of the step that has passed when this tick ends."""
         return (self.tick + 1) / self.ticks
+
+    @property
+    def unused(self) -> int:
+        """Points that are left."""
+        return MOST_POINTS - int(self.points.filled[0])
 
     # --- points -------------------------------------------------------------------------------
 
@@ -100,85 +99,40 @@ class Interface:
         RuntimeError
             When all points are in use.
         """
-        unused = np.flatnonzero(self.points.status == UNUSED)
-        if not len(unused):
-            raise RuntimeError(f"all {len(self.points.status)} points of contact with tissue are in use")
-        i = int(unused[0])
-        p = self.points
-        p.status[i] = USED
-        for array in (p.force, p.mean, p.total):
-            array[i] = 0.0
-        self.place(i, nodes, weights)
-        p.at[i] = p.start[i] + (self.tick / self.ticks) * p.move[i]
+        i = int(add(self.table, nodes, weights))
+        if i < 0:
+            raise RuntimeError(f"all {MOST_POINTS} points of contact with tissue are in use")
         return i
 
     def place(self, i: int, nodes: Integers, weights: Array) -> None:
         """Move a point to another place in the material."""
-        p = self.points
-        p.nodes[i], p.weights[i] = nodes[0], 0.0
-        p.nodes[i, : len(nodes)], p.weights[i, : len(nodes)] = nodes, weights
-        self._couple(i)
-        p.start[i] = p.weights[i] @ self.elastic.x[p.nodes[i]]
-        p.move[i] = p.weights[i] @ self.expected[p.nodes[i]]
-        for j in np.flatnonzero(p.status):
-            p.move[i] += p.C[i, j] @ p.mean[j]
-
-    def _couple(self, i: int) -> None:
-        """Compliance between a point and all others."""
-        p = self.points
-        self._response[i] = self.elastic.response(p.nodes[i], p.weights[i])
-        used = np.flatnonzero(p.status)
-        # Displacement of the others along a (last axis) for forces on this one along b (first).
-        block = np.einsum("jk,bjka->jab", p.weights[used], self._response[i][:, p.nodes[used]])
-        p.C[used, i] = block
-        p.C[i, used] = block.transpose(0, 2, 1)
+        place(self.table, i, nodes, weights)
 
     def release(self, i: int) -> None:
         """Let a point go when this tick ends; what it pushed in this step still counts."""
         self.points.status[i] = LEAVING
 
     def equip(self, i: int, cell: int, radius: float) -> None:
-        """Give a point the strength of its cell's material, for a needle or thread of ``radius`` metres.
-
-        Around a slender inclusion of radius r tissue yields by (ln(d / r) + 0.19) / (4 π G d) under a force on a
-        length d, Kelvin's solution integrated along it; the grid has a part of it, the bristle has the rest.
-        """
-        self.cell_of[i] = cell
-        material, p = self.material_of(i), self.points
-        p.friction[i], p.strength[i] = material.friction, material.strength
-        p.puncture[i], p.cutting[i], p.exit[i] = material.puncture_force, material.cutting_force, material.exit_force
-        target = (np.log(SPACING / radius) + 0.19) / (4.0 * np.pi * material.shear * SPACING)
-        p.soft[i] = max(target - float(np.trace(p.C[i, i])) / 3.0, HARD)
+        """Give a point the strength of its cell's material, for a needle or thread of ``radius`` metres."""
+        equip(self.table, i, cell, radius)
 
     def material_of(self, i: int) -> TissueMaterial:
         """What the tissue around a point is made of."""
-        return self.elastic.materials[int(self.elastic.grid.layer[self.cell_of[i]])]
+        return self.elastic.materials[int(self.field.layer[self.points.cell[i]])]
 
     # --- the tick -----------------------------------------------------------------------------
 
     def count(self) -> bool:
         """End a tick: add its forces up; True when the step is complete."""
-        place_points(self.points, self.fraction)
-        self.points.force[self.points.status == LEAVING] = 0.0
-        self.tick += 1
-        return self.tick == self.ticks
+        return bool(end_tick(self.table))
 
     def push(self, d: Array) -> None:
         """Add to a step's displacements ``d`` (n, 3) what the points' mean forces do, and forget those that left."""
-        p = self.points
-        self.tick = 0
-        used = np.flatnonzero(p.status)
-        push_nodes(used, p.total, self._response, 1.0 / self.ticks, d)
-        p.mean[:] = p.total / self.ticks
-        p.total[:] = 0.0
-        left = p.status == LEAVING
-        p.status[left] = UNUSED
-        p.mean[left] = 0.0
+        push(self.table, d)
 
     def begin(self, expected: Array) -> None:
         """Begin a step in which the nodes move by ``expected`` (n, 3) without forces on the points."""
-        self.expected[:] = expected
-        begin_points(self.points, self.elastic.x, expected)
+        begin(self.table, expected)
 
     # --- state --------------------------------------------------------------------------------
 
@@ -187,78 +141,279 @@ class Interface:
         for array in self.points:
             array[:] = 0
         self.expected[:] = 0.0
-        self.cell_of[:] = 0
-        self.tick = 0
+        self.field.clock[0] = 0
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick."""
         return {
             "tick": np.array([self.tick]),
             "expected": self.expected.copy(),
-            "cell_of": self.cell_of.copy(),
             **{name: array.copy() for name, array in zip(self.points._fields, self.points, strict=True)},
         }
 
     def restore(self, snapshot: dict[str, Array]) -> None:
         """Continue from `snapshot`."""
-        self.tick = int(snapshot["tick"][0])
+        self.field.clock[0] = snapshot["tick"][0]
         self.expected[:] = snapshot["expected"]
-        self.cell_of[:] = snapshot["cell_of"]
         for name, array in zip(self.points._fields, self.points, strict=True):
             array[:] = snapshot[name]
-        for i in np.flatnonzero(self.points.status):
-            self._response[i] = self.elastic.response(self.points.nodes[i], self.points.weights[i])
+        refresh(self.table)
+
+
+def _field(elastic: ElasticGrid, ticks: int) -> Field:
+    grid, n = elastic.grid, len(elastic.x)
+    material = np.zeros((len(elastic.materials), 6))
+    for row, m in zip(material, elastic.materials, strict=True):
+        row[FRICTION], row[STRENGTH], row[SHEAR] = m.friction, m.strength, m.shear
+        row[PUNCTURE], row[CUTTING], row[EXIT] = m.puncture_force, m.cutting_force, m.exit_force
+    cells, layers, faces, face_cell = (
+        np.ascontiguousarray(a, dtype=np.int64) for a in (grid.cells, grid.layer, grid.faces, grid.face_cell)
+    )
+    return Field(
+        elastic.x, np.zeros((n, 3)), cells, layers, faces, face_cell, np.zeros((len(faces), 2, 3)), np.zeros((2, 3)),
+        elastic.free, elastic.row, elastic.responses, elastic.factor, np.zeros(3 * len(elastic.free)),
+        np.zeros((MOST_POINTS, 3, n, 3)), material, np.array([0, ticks]),
+    )  # fmt: skip
+
+
+# --- points -----------------------------------------------------------------------------------
+
+
+@inlined
+def _list_used(points: Points) -> None:
+    n = 0
+    for i in range(points.status.shape[0]):
+        if points.status[i] != UNUSED:
+            points.used[n] = i
+            n += 1
+    points.filled[0] = n
 
 
 @kernel
-def place_points(points, s):
-    """Where all points are at the share ``s`` of the step, and the sums of their forces."""
-    for i in range(points.status.shape[0]):
-        if points.status[i] == 0:
-            continue
+def respond(field: Field, points: Points, i: int) -> None:
+    """Fill ``field.response[i]`` with the displacements of all nodes for unit forces on the point."""
+    R, n = field.response[i], field.x.shape[0]
+    for a in range(3):
+        for k in range(n):
+            R[a, k, 0], R[a, k, 1], R[a, k, 2] = 0.0, 0.0, 0.0
+    if field.table.shape[0] == 0:
         for a in range(3):
-            points.at[i, a] = points.start[i, a] + s * points.move[i, a]
-            points.total[i, a] += points.force[i, a]
-        for j in range(points.status.shape[0]):
-            if points.status[j] == 0:
-                continue
+            for k in range(field.load.shape[0]):
+                field.load[k] = 0.0
+            for c in range(8):
+                node = field.row[points.nodes[i, c]]
+                if node >= 0:
+                    field.load[3 * node + a] += points.weights[i, c]
+            solve_in_place(field.factor, field.load)
+            for k in range(field.free.shape[0]):
+                for b in range(3):
+                    R[a, field.free[k], b] = field.load[3 * k + b]
+        return
+    for c in range(8):
+        node, weight = field.row[points.nodes[i, c]], points.weights[i, c]
+        if node >= 0 and weight != 0.0:
+            T = field.table[node]
+            for a in range(3):
+                for k in range(n):
+                    R[a, k, 0] += weight * T[a, k, 0]
+                    R[a, k, 1] += weight * T[a, k, 1]
+                    R[a, k, 2] += weight * T[a, k, 2]
+
+
+@inlined
+def _couple(field: Field, points: Points, i: int) -> None:
+    """Compliance between a point and all others."""
+    R = field.response[i]
+    for u in range(points.filled[0]):
+        j = points.used[u]
+        for b in range(3):
+            for a in range(3):
+                moved = 0.0
+                for c in range(8):
+                    moved += points.weights[j, c] * R[b, points.nodes[j, c], a]
+                points.C[j, i, a, b] = moved
+                points.C[i, j, b, a] = moved
+
+
+@kernel
+def place_point(field: Field, points: Points, i: int, nodes: Integers, weights: Array) -> None:
+    """Move a point to the mean of ``nodes`` (k ≤ 8,) with ``weights`` (k,)."""
+    for c in range(8):
+        inside = c < nodes.shape[0]
+        points.nodes[i, c], points.weights[i, c] = nodes[c] if inside else nodes[0], weights[c] if inside else 0.0
+    respond(field, points, i)
+    _couple(field, points, i)
+    _locate_point(field, points, i)
+
+
+@inlined
+def _locate_point(field: Field, points: Points, i: int) -> None:
+    """Place of a point at the start of the step, and where it would go under the last step's forces."""
+    for a in range(3):
+        p, u = 0.0, 0.0
+        for c in range(8):
+            p += points.weights[i, c] * field.x[points.nodes[i, c], a]
+            u += points.weights[i, c] * field.expected[points.nodes[i, c], a]
+        points.start[i, a], points.move[i, a] = p, u
+    for k in range(points.filled[0]):
+        j = points.used[k]
+        for a in range(3):
+            for b in range(3):
+                points.move[i, a] += points.C[i, j, a, b] * points.mean[j, b]
+
+
+@kernel
+def add_point(field: Field, points: Points, nodes: Integers, weights: Array) -> int:
+    """Use one more point; -1 when there is none."""
+    i = 0
+    while i < points.status.shape[0] and points.status[i] != UNUSED:
+        i += 1
+    if i == points.status.shape[0]:
+        return -1
+    points.status[i] = USED
+    _list_used(points)
+    for a in range(3):
+        points.force[i, a], points.mean[i, a], points.total[i, a] = 0.0, 0.0, 0.0
+    place_point(field, points, i, nodes, weights)
+    settle_point(field, points, i)
+    return i
+
+
+@inlined
+def settle_point(field: Field, points: Points, i: int) -> None:
+    """Let a point that was placed anew stand where it is at this time of the step."""
+    s = field.clock[0] / field.clock[1]
+    for a in range(3):
+        points.at[i, a] = points.start[i, a] + s * points.move[i, a]
+
+
+@kernel
+def equip_point(field: Field, points: Points, i: int, cell: int, radius: float) -> None:
+    """Give a point the strength of its cell's material, for a needle or thread of ``radius`` metres.
+
+    Around a slender inclusion of radius r tissue yields by (ln(d / r) + 0.19) / (4 π G d) under a force on a length d,
+    Kelvin's solution integrated along it; the grid has a part of it, the bristle has the rest.
+    """
+    points.cell[i] = cell
+    m = field.material[field.layer[cell]]
+    points.friction[i], points.strength[i] = m[FRICTION], m[STRENGTH]
+    points.puncture[i], points.cutting[i], points.exit[i] = m[PUNCTURE], m[CUTTING], m[EXIT]
+    target = (math.log(SPACING / radius) + 0.19) / (4.0 * math.pi * m[SHEAR] * SPACING)
+    C = points.C[i, i]
+    points.soft[i] = max(target - (C[0, 0] + C[1, 1] + C[2, 2]) / 3.0, HARD)
+
+
+@kernel
+def add(table: Integers, nodes: Integers, weights: Array) -> int:
+    """`add_point` for Python."""
+    t = open_tissue(table)
+    return add_point(t.field, t.points, nodes, weights)
+
+
+@kernel
+def place(table: Integers, i: int, nodes: Integers, weights: Array) -> None:
+    """`place_point` for Python."""
+    t = open_tissue(table)
+    place_point(t.field, t.points, i, nodes, weights)
+
+
+@kernel
+def equip(table: Integers, i: int, cell: int, radius: float) -> None:
+    """`equip_point` for Python."""
+    t = open_tissue(table)
+    equip_point(t.field, t.points, i, cell, radius)
+
+
+# --- the tick ---------------------------------------------------------------------------------
+
+
+@kernel
+def end_tick(table: Integers) -> bool:
+    """Where all points are when a tick ends, and the sums of their forces; True when the step is complete."""
+    t = open_tissue(table)
+    points, clock = t.points, t.field.clock
+    s, n = (clock[0] + 1) / clock[1], points.filled[0]
+    for k in range(n):
+        i = points.used[k]
+        x, y, z = points.start[i, 0], points.start[i, 1], points.start[i, 2]
+        x, y, z = x + s * points.move[i, 0], y + s * points.move[i, 1], z + s * points.move[i, 2]
+        for m in range(n):
+            j = points.used[m]
             C = points.C[i, j]
             for b in range(3):
                 change = points.force[j, b] - points.mean[j, b]
-                for a in range(3):
-                    points.at[i, a] += C[a, b] * change
+                x, y, z = x + C[0, b] * change, y + C[1, b] * change, z + C[2, b] * change
+        points.at[i, 0], points.at[i, 1], points.at[i, 2] = x, y, z
+        for a in range(3):
+            points.total[i, a] += points.force[i, a]
+    for k in range(n):
+        i = points.used[k]
+        if points.status[i] == LEAVING:
+            points.force[i, 0], points.force[i, 1], points.force[i, 2] = 0.0, 0.0, 0.0
+    clock[0] += 1
+    return clock[0] == clock[1]
 
 
 @kernel
-def push_nodes(used, total, response, scale, d):
-    """d += the nodes' displacements for the points' forces ``total`` times ``scale``."""
-    for i in used:
+def push(table: Integers, d: Array) -> None:
+    """d (n, 3) += what the mean forces of the points do in the step, which ends; points that left are unused again."""
+    t = open_tissue(table)
+    field, points = t.field, t.points
+    scale = 1.0 / field.clock[1]
+    for u in range(points.filled[0]):
+        i = points.used[u]
         for a in range(3):
-            f = scale * total[i, a]
+            f = scale * points.total[i, a]
             if f != 0.0:
-                R = response[i, a]
+                R = field.response[i, a]
                 for k in range(d.shape[0]):
                     d[k, 0] += f * R[k, 0]
                     d[k, 1] += f * R[k, 1]
                     d[k, 2] += f * R[k, 2]
+    for u in range(points.filled[0]):
+        i = points.used[u]
+        left = points.status[i] == LEAVING
+        for a in range(3):
+            points.mean[i, a] = 0.0 if left else points.total[i, a] / field.clock[1]
+            points.total[i, a] = 0.0
+        if left:
+            points.status[i] = UNUSED
+    _list_used(points)
+    field.clock[0] = 0
 
 
 @kernel
-def begin_points(points, x, expected):
-    """Places of all points at the start of a step, and where it would take them under the last step's forces."""
-    n = points.status.shape[0]
-    for i in range(n):
-        if points.status[i] == 0:
-            continue
+def begin(table: Integers, expected: Array) -> None:
+    """Where all points are at the start of a step, and the boxes around faces and nodes."""
+    t = open_tissue(table)
+    field, points = t.field, t.points
+    for k in range(expected.shape[0]):
         for a in range(3):
-            p, u = 0.0, 0.0
-            for k in range(8):
-                p += points.weights[i, k] * x[points.nodes[i, k], a]
-                u += points.weights[i, k] * expected[points.nodes[i, k], a]
-            points.start[i, a], points.move[i, a] = p, u
-        for j in range(n):
-            if points.status[j] == 0:
-                continue
-            for a in range(3):
-                for b in range(3):
-                    points.move[i, a] += points.C[i, j, a, b] * points.mean[j, b]
+            field.expected[k, a] = expected[k, a]
+    for k in range(points.filled[0]):
+        _locate_point(field, points, points.used[k])
+    _box(field)
+
+
+@kernel
+def refresh(table: Integers) -> None:
+    """Find again what follows from a restored state."""
+    t = open_tissue(table)
+    for k in range(t.points.filled[0]):
+        respond(t.field, t.points, t.points.used[k])
+    _box(t.field)
+
+
+@inlined
+def _box(field: Field) -> None:
+    x = field.x
+    for a in range(3):
+        field.box[0, a], field.box[1, a] = math.inf, -math.inf
+    for k in range(x.shape[0]):
+        for a in range(3):
+            field.box[0, a], field.box[1, a] = min(field.box[0, a], x[k, a]), max(field.box[1, a], x[k, a])
+    for q in range(field.faces.shape[0]):
+        i, j, k, h = field.faces[q, 0], field.faces[q, 1], field.faces[q, 2], field.faces[q, 3]
+        for a in range(3):
+            field.face_box[q, 0, a] = min(x[i, a], x[j, a], x[k, a], x[h, a])
+            field.face_box[q, 1, a] = max(x[i, a], x[j, a], x[k, a], x[h, a])

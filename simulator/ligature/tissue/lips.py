@@ -9,6 +9,7 @@ from ligature.kernels import kernel
 from ligature.tissue.elastic import ElasticGrid
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 SWEEPS = 10
 """Gauss–Seidel sweeps of a step, from the pressures of the last one."""
@@ -79,7 +80,10 @@ class Lips:
 
 
 @kernel
-def relax(x, d, pairs, axis, B, margin, far, sweeps, near, gap, force):
+def relax(
+    x: Array, d: Array, pairs: Integers, axis: Integers, B: Array, margin: float, far: float, sweeps: int,
+    near: NDArray[np.bool_], gap: Array, force: Array,
+) -> None:  # fmt: skip
     """Projected Gauss–Seidel: the forces (p,) of the pairs after displacements ``d`` that hold the old forces' part."""
     n = pairs.shape[0]
     for i in range(n):
@@ -111,7 +115,7 @@ def relax(x, d, pairs, axis, B, margin, far, sweeps, near, gap, force):
 
 
 @kernel
-def add_responses(force, response, d):
+def add_responses(force: Array, response: Array, d: Array) -> None:
     """d += the displacements that the forces (p,) make by their responses (p, n, 3)."""
     for i in range(force.shape[0]):
         f = force[i]

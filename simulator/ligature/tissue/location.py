@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.kernels import kernel
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 NEWTON = 12
 """Iterations for the place within a cell; three suffice in cells near their shape at rest."""
 
 
 @kernel
-def locate(x, cells, p, slack, weights):
+def locate(x: Array, cells: Integers, p: Array, slack: float, weights: Array) -> int:
     """Cell that contains the position ``p`` (3,), or -1; fills its corners' ``weights`` (8,).
 
     ``slack`` is how far outside the unit cell still counts, in edges.
@@ -31,7 +37,7 @@ def locate(x, cells, p, slack, weights):
 
 
 @kernel
-def _place(x, cell, p, slack, weights):
+def _place(x: Array, cell: Integers, p: Array, slack: float, weights: Array) -> bool:
     """Newton's method for the place of ``p`` in a cell; True if it lies inside."""
     u, v, w = 0.5, 0.5, 0.5
     for _ in range(NEWTON):
@@ -68,7 +74,9 @@ def _place(x, cell, p, slack, weights):
 
 
 @kernel
-def cross_surface(x, faces, p, t, reach, side, weights, normal):
+def cross_surface(
+    x: Array, faces: Integers, p: Array, t: Array, reach: float, side: float, weights: Array, normal: Array
+) -> tuple[int, float]:
     """First face that the line p + s t, 0 ≤ s ≤ reach, crosses: (face, s), or (-1, 0).
 
     ``side`` is 1 for leaving tissue and -1 for entering it. Fills the ``weights`` (4,) of the face's corners and its

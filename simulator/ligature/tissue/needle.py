@@ -20,7 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.tables import opener
 from ligature.tissue.dense import cholesky, solve_cholesky
+from ligature.tissue.layout import MOST_PATHS, MOST_POINTS, Paths, Points, open_tissue
+from ligature.tissue.location import cross_surface
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -49,6 +52,12 @@ LEAST_SHARE = 8e-4
 CAPTURE = 1e-3
 """Distance in metres from an old path, or from its opening, at which a tip follows it."""
 
+DROP = 6e-3
+"""Time in seconds in which the force of a tip that got through falls to what resists it next."""
+
+TIP_FRICTION = 0.2
+"""Coulomb coefficient of a tip that slides over the surface."""
+
 
 class Rows(NamedTuple):
     """Scratch of a needle's tick: up to M rows."""
@@ -71,6 +80,8 @@ class Rows(NamedTuple):
     g: Array  # (6,)
     K: Array  # (6, 6) stiffness of the rows that are elastic, as the needle sees it
     load: Array  # (6,) force and moment of all rows on the needle where it does not move
+    change: Array  # (N, 3) forces on points of the interface without the needle's own, over those of the last step
+    base: Array  # (N, 3) where they would put its points at the end of the tick
 
 
 class Held(NamedTuple):
@@ -95,13 +106,32 @@ class Held(NamedTuple):
     load: Array  # (4,) forces along the needle: of the tip, of friction; across, in all; length inside
 
 
-def rows(capacity: int = MOST_ROWS) -> Rows:
+class NeedleArrays(NamedTuple):
+    """All that a tick of a needle works on."""
+
+    held: Held
+    rows: Rows
+    shape: Array  # (14,) tip, tangent, normal to the centre of its arc, curvature, length, centre of mass
+    H: Array  # (6, 6) of its own equations H δ = g
+    g: Array  # (6,)
+    delta: Array  # (6,) its motion in the tick, that of the centre of mass first
+    wrench: Array  # (6,) of the tissue on it
+    way: Array  # (3,) scratch
+
+
+def needle_arrays(points: int = MOST_POINTS, paths: int = MOST_PATHS, capacity: int = MOST_ROWS) -> NeedleArrays:
+    """A needle that is outside, at the origin."""
+    z = np.zeros
+    return NeedleArrays(held(points, paths), rows(points, capacity), z(14), z((6, 6)), z(6), z(6), z(6), z(3))
+
+
+def rows(points: int, capacity: int) -> Rows:
     """Scratch for ``capacity`` rows."""
     M, z = capacity, np.zeros
     i = lambda: np.zeros(M, np.int64)  # noqa: E731
     return Rows(
         i(), i(), z((M, 3)), z((M, 6)), z(M), z(M), z(M), z(M), i(), z(M), z((M, M)), z((M, M)), z((7, M)), i(),
-        z((6, 6)), z(6), z((6, 6)), z(6),
+        z((6, 6)), z(6), z((6, 6)), z(6), z((points, 3)), z((points, 3)),
     )  # fmt: skip
 
 
@@ -115,11 +145,14 @@ def held(capacity: int, paths: int) -> Held:
     )  # fmt: skip
 
 
+open_needle = opener(needle_arrays(1, 1, 1))
+
+
 @inlined
-def _along(shape, sigma):
+def _along(shape: Array, sigma: float) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Point, tangent towards the tip and normal of the needle, ``sigma`` behind its tip: nine numbers.
 
-    ``shape`` is tip (3), tangent (3), normal to the centre of its arc (3), curvature, length, centre of mass (3).
+    ``shape`` is that of `NeedleArrays`.
     """
     k = shape[9]
     angle = k * sigma
@@ -138,7 +171,7 @@ def _along(shape, sigma):
 
 
 @inlined
-def _behind(shape, x, y, z):
+def _behind(shape: Array, x: float, y: float, z: float) -> float:
     """Length from the tip back to the point of the needle nearest to (x, y, z)."""
     k = shape[9]
     rx, ry, rz = x - shape[0], y - shape[1], z - shape[2]
@@ -154,7 +187,7 @@ def _behind(shape, x, y, z):
 
 
 @kernel
-def engage(points, paths, held, shape):
+def engage(points: Points, paths: Paths, held: Held, shape: Array) -> None:
     """Which nodes of its paths hold the needle, and for how much of its length."""
     inside = 0.0
     for p in range(paths.count.shape[0]):
@@ -206,13 +239,13 @@ def engage(points, paths, held, shape):
 
 
 @inlined
-def _end_of(paths, held, p):
+def _end_of(paths: Paths, held: Held, p: int) -> int:
     """Node of a path that the needle's tip passes last."""
     return paths.node[p, paths.count[p] - 1 if held.passing[p] > 0 else 0]
 
 
 @kernel
-def follow_tip(points, paths, held, dt, drop):
+def follow_tip(points: Points, paths: Paths, held: Held, dt: float) -> int:
     """Where the tip is after `engage`, and the force at which it gets further; the path that it has left, or -1."""
     for p in range(paths.count.shape[0]):
         if held.passing[p] == 0:
@@ -243,9 +276,9 @@ def follow_tip(points, paths, held, dt, drop):
             held.tip[0] = TENTS
         resists = points.cutting[front] + (points.exit[front] if held.tip[0] == TENTS else 0.0)
         # Or what is left of what the tip has just broken.
-        held.limit[0] = max(resists, held.limit[0] * math.exp(-dt / drop))
+        held.limit[0] = max(resists, held.limit[0] * math.exp(-dt / DROP))
     elif where == LEAVES:
-        held.limit[0] *= math.exp(-dt / drop)
+        held.limit[0] *= math.exp(-dt / DROP)
         if held.limit[0] < LEFT:
             held.tip[0] = OUTSIDE
             return p
@@ -256,7 +289,9 @@ def follow_tip(points, paths, held, dt, drop):
 
 
 @inlined
-def _set_row(rows, m, kind, point, ex, ey, ez, rx, ry, rz):
+def _set_row(
+    rows: Rows, m: int, kind: int, point: int, ex: float, ey: float, ez: float, rx: float, ry: float, rz: float
+) -> None:
     e, J = rows.e[m], rows.J[m]
     e[0], e[1], e[2] = ex, ey, ez
     J[0], J[1], J[2] = ex, ey, ez
@@ -265,32 +300,42 @@ def _set_row(rows, m, kind, point, ex, ey, ez, rx, ry, rz):
 
 
 @inlined
-def _base(points, held, own_contact, i, s, a):
-    """Coordinate ``a`` of point ``i`` at the end of this tick without the needle's own forces."""
-    y = points.start[i, a] + s * points.move[i, a]
-    for j in range(points.status.shape[0]):
-        if points.status[j] == 0:
-            continue
-        mine = held.engaged[j] == 1 or j == own_contact
+def _find_bases(points: Points, held: Held, rows: Rows, s: float) -> None:
+    """Where the needle's points would be at the end of this tick without its own forces."""
+    contact, n = held.tip[2], points.filled[0]
+    for u in range(n):
+        j = points.used[u]
+        mine = held.engaged[j] == 1 or j == contact
         for b in range(3):
-            f = -points.mean[j, b] if mine else points.force[j, b] - points.mean[j, b]
-            y += points.C[i, j, a, b] * f
-    return y
+            rows.change[j, b] = -points.mean[j, b] if mine else points.force[j, b] - points.mean[j, b]
+    for u in range(n):
+        i = points.used[u]
+        if held.engaged[i] == 0 and i != contact:
+            continue
+        x, y, z = points.start[i, 0], points.start[i, 1], points.start[i, 2]
+        x, y, z = x + s * points.move[i, 0], y + s * points.move[i, 1], z + s * points.move[i, 2]
+        for m in range(n):
+            j = points.used[m]
+            C = points.C[i, j]
+            for b in range(3):
+                f = rows.change[j, b]
+                x, y, z = x + C[0, b] * f, y + C[1, b] * f, z + C[2, b] * f
+        rows.base[i, 0], rows.base[i, 1], rows.base[i, 2] = x, y, z
 
 
 @kernel
-def gather(points, paths, held, rows, shape, tip_friction, s):
+def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s: float) -> int:
     """Make the rows of a tick; returns how many."""
     m = 0
     where, tip_path, contact = held.tip[0], held.tip[1], held.tip[2]
-    for i in range(points.status.shape[0]):
+    _find_bases(points, held, rows, s)
+    for u in range(points.filled[0]):
+        i = points.used[u]
         if held.engaged[i] == 0:
             continue
         qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, held.sigma[i])
         rx, ry, rz = qx - shape[11], qy - shape[12], qz - shape[13]
-        bx = _base(points, held, contact, i, s, 0)
-        by = _base(points, held, contact, i, s, 1)
-        bz = _base(points, held, contact, i, s, 2)
+        bx, by, bz = rows.base[i, 0], rows.base[i, 1], rows.base[i, 2]
         dx, dy, dz = qx - bx, qy - by, qz - bz
         # Along: what friction holds, and how the tissue moves by itself.
         at = points.at[i]
@@ -332,21 +377,19 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
             _set_row(rows, m, TIP, i, tx, ty, tz, rx, ry, rz)
             slid = 0.0
             for a in range(3):
-                slid += shape[3 + a] * (at[a] - _base(points, held, contact, i, s, a))
+                slid += shape[3 + a] * (at[a] - rows.base[i, a])
             rows.rest[m] = paths.s[tip_path, front] + held.sigma[i] - paths.cut[tip_path] + slid
             rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = 0.0, held.limit[0], points.soft[i], held.tip_side[0]
             m += 1
     elif where in (TOUCHES, SLIDES):
         i = contact
-        dx = shape[0] - _base(points, held, contact, i, s, 0)
-        dy = shape[1] - _base(points, held, contact, i, s, 1)
-        dz = shape[2] - _base(points, held, contact, i, s, 2)
+        dx, dy, dz = shape[0] - rows.base[i, 0], shape[1] - rows.base[i, 1], shape[2] - rows.base[i, 2]
         kind, other = ENTRY, ENTRY_ACROSS
         low, high, bound = 0.0, held.limit[0], held.limit[0]
         if where == SLIDES:
             kind, other = SLIDE, RUB
             tx, ty, tz = -held.normal[0], -held.normal[1], -held.normal[2]
-            high, bound = 1e9, tip_friction * held.pressed[0]
+            high, bound = 1e9, TIP_FRICTION * held.pressed[0]
             # Across the normal: along the tip's way, and the third.
             along = shape[3] * tx + shape[4] * ty + shape[5] * tz
             nx, ny, nz = shape[3] - along * tx, shape[4] - along * ty, shape[5] - along * tz
@@ -378,7 +421,7 @@ def gather(points, paths, held, rows, shape, tip_friction, s):
 
 
 @inlined
-def _reduce(rows, m):
+def _reduce(rows: Rows, m: int) -> int:
     """Stiffness and load of the rows on the needle for the limits as they are; elastic rows, -1 where it failed."""
     n = 0
     for a in range(m):
@@ -428,7 +471,7 @@ def _reduce(rows, m):
 
 
 @inlined
-def _expand(rows, n, delta):
+def _expand(rows: Rows, n: int, delta: Array) -> None:
     """Forces of the ``n`` elastic rows after `_reduce` for a motion ``delta`` (6,) of the needle."""
     for p in range(n - 1, -1, -1):
         total = rows.X[6, p]
@@ -440,8 +483,11 @@ def _expand(rows, n, delta):
 
 
 @kernel
-def solve_rows(rows, m, H, g, delta):
-    """Forces of the rows and motion ``delta`` (6,) of the needle; returns the repetitions, negative where it failed."""
+def solve_rows(rows: Rows, m: int, H: Array, g: Array, delta: Array) -> int:
+    """Forces of the rows and motion ``delta`` (6,) of the needle.
+
+    Returns 1 when `_reduce` has seen the limits as they are now, 0 when they changed last, -1 where it failed.
+    """
     for turn in range(MOST_PASSES):
         n = _reduce(rows, m)
         if n < 0:
@@ -468,12 +514,12 @@ def solve_rows(rows, m, H, g, delta):
                 if (side > 0 and bristle < rows.high[a]) or (side < 0 and bristle > rows.low[a]):
                     rows.side[a], changed = 0, True
         if not changed:
-            return turn + 1
-    return MOST_PASSES
+            return 1
+    return 0
 
 
 @inlined
-def _stretch(rows, m, a, delta):
+def _stretch(rows: Rows, m: int, a: int, delta: Array) -> float:
     stretch = rows.rest[a]
     for i in range(6):
         stretch += rows.J[a, i] * delta[i]
@@ -483,11 +529,12 @@ def _stretch(rows, m, a, delta):
 
 
 @kernel
-def conclude(points, paths, held, rows, m, delta, clip):
+def conclude(points: Points, paths: Paths, held: Held, rows: Rows, m: int, delta: Array, clip: bool) -> bool:
     """Keep what the rows leave: forces on the tissue, anchors, tears, what was cut; True if the tip got through."""
     through = False
     held.load[0], held.load[1], held.load[2] = 0.0, 0.0, 0.0
-    for i in range(points.status.shape[0]):
+    for u in range(points.filled[0]):
+        i = points.used[u]
         if held.engaged[i] or i == held.tip[2]:
             for a in range(3):
                 points.force[i, a], held.across[i, a] = 0.0, 0.0
@@ -535,51 +582,74 @@ def conclude(points, paths, held, rows, m, delta, clip):
     return through
 
 
-@kernel
-def couple(points, paths, held, rows, shape, tip_friction, s, dt, drop, H, g, delta, wrench):
-    """A needle's tick: (path that the tip has left or -1, what became of it: 1 got through, 0 stayed, -1 failed)."""
-    engage(points, paths, held, shape)
-    left = follow_tip(points, paths, held, dt, drop)
-    m = gather(points, paths, held, rows, shape, tip_friction, s)
-    if solve_rows(rows, m, H, g, delta) < 0:
-        return left, -1
-    through = conclude(points, paths, held, rows, m, delta, True)
+@inlined
+def _sum_up(rows: Rows, m: int, wrench: Array) -> None:
+    """Force and moment of all rows on the needle."""
     for i in range(6):
         wrench[i] = 0.0
         for a in range(m):
             wrench[i] -= rows.force[a] * rows.J[a, i]
+
+
+@kernel
+def couple(tissue: Integers, needle: Integers, dt: float) -> tuple[int, int]:
+    """A needle's tick: (path that the tip has left or -1, what became of it: 1 got through, 0 stayed, -1 failed)."""
+    t, n = open_tissue(tissue), open_needle(needle)
+    points, paths, held, rows = t.points, t.paths, n.held, n.rows
+    engage(points, paths, held, n.shape)
+    left = follow_tip(points, paths, held, dt)
+    m = gather(points, paths, held, rows, n.shape, (t.field.clock[0] + 1) / t.field.clock[1])
+    if solve_rows(rows, m, n.H, n.g, n.delta) < 0:
+        return left, -1
+    through = conclude(points, paths, held, rows, m, n.delta, True)
+    _sum_up(rows, m, n.wrench)
     return left, (1 if through else 0)
 
 
 @kernel
-def begin_coupling(points, paths, held, rows, shape, tip_friction, s, dt, drop, H, g, delta):
+def begin_coupling(tissue: Integers, needle: Integers, dt: float) -> tuple[int, int]:
     """A tick of a needle whose motion another solver finds: (path that the tip has left or -1, rows or -1).
 
-    ``H``, ``g`` are the equations as far as they are known before; they decide which rows are at their limits.
+    The needle's equations are as far as they are known before; they decide which rows are at their limits.
     ``rows.K`` and ``rows.load`` are then what that solver is to include.
     """
-    engage(points, paths, held, shape)
-    left = follow_tip(points, paths, held, dt, drop)
-    m = gather(points, paths, held, rows, shape, tip_friction, s)
-    if solve_rows(rows, m, H, g, delta) < 0 or _reduce(rows, m) < 0:
+    t, n = open_tissue(tissue), open_needle(needle)
+    points, paths, held, rows = t.points, t.paths, n.held, n.rows
+    engage(points, paths, held, n.shape)
+    left = follow_tip(points, paths, held, dt)
+    m = gather(points, paths, held, rows, n.shape, (t.field.clock[0] + 1) / t.field.clock[1])
+    found = solve_rows(rows, m, n.H, n.g, n.delta)
+    if found < 0 or (found == 0 and _reduce(rows, m) < 0):
         return left, -1
     return left, m
 
 
 @kernel
-def end_coupling(points, paths, held, rows, m, delta, wrench):
-    """End what `begin_coupling` began, the needle having moved by ``delta`` (6,): True if the tip got through.
+def end_coupling(tissue: Integers, needle: Integers, m: int) -> bool:
+    """End what `begin_coupling` began, the needle having moved by ``delta``: True if the tip got through.
 
     Rows keep to the limits that it assumed: where a force goes beyond its limit, it does so for this tick alone.
     """
-    n = 0
+    t, n = open_tissue(tissue), open_needle(needle)
+    elastic = 0
     for a in range(m):
-        if rows.side[a] == 0:
-            n += 1
-    _expand(rows, n, delta)
-    through = conclude(points, paths, held, rows, m, delta, False)
-    for i in range(6):
-        wrench[i] = 0.0
-        for a in range(m):
-            wrench[i] -= rows.force[a] * rows.J[a, i]
+        if n.rows.side[a] == 0:
+            elastic += 1
+    _expand(n.rows, elastic, n.delta)
+    through = conclude(t.points, t.paths, n.held, n.rows, m, n.delta, False)
+    _sum_up(n.rows, m, n.wrench)
     return through
+
+
+@kernel
+def look_for_surface(tissue: Integers, needle: Integers, before: Array, weights: Array, normal: Array) -> int:
+    """Face that the tip has come through since it was ``before`` (3,), or -1; see `cross_surface` for what it fills."""
+    field, n = open_tissue(tissue).field, open_needle(needle)
+    shape, way = n.shape, n.way
+    x, y, z = shape[0] - before[0], shape[1] - before[1], shape[2] - before[2]
+    size = math.sqrt(x * x + y * y + z * z)
+    if not (size > 0.0 and x * shape[3] + y * shape[4] + z * shape[5] > 0.0):
+        return -1
+    way[0], way[1], way[2] = x / size, y / size, z / size
+    face, _ = cross_surface(field.x, field.faces, before, way, size, -1.0, weights, normal)
+    return face

@@ -6,32 +6,9 @@ up to where the path was cut.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-MOST_PATHS, MOST_NODES = 16, 32
-"""Paths of a block, and nodes of a path, at most."""
-
-
-class Paths(NamedTuple):
-    """P paths of up to K nodes."""
-
-    count: Integers  # type: ignore[assignment]  # (P,) nodes; 0 for a path that is not in use
-    node: Integers  # (P, K) points of the interface, in order from the entry
-    s: Array  # (P, K) length of the path up to the node, m
-    cut: Array  # (P,) length up to which it is cut
-    length: Array  # (P,) length to the exit; infinite before there is one
-
-
-def paths() -> Paths:
-    """Room for paths, none yet."""
-    P, K = MOST_PATHS, MOST_NODES
-    return Paths(np.zeros(P, np.int64), np.zeros((P, K), np.int64), np.zeros((P, K)), np.zeros(P), np.full(P, np.inf))
+from ligature.tissue.layout import Paths
 
 
 def begin_path(paths: Paths, point: int) -> int:

@@ -13,11 +13,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.tables import table_of
 from ligature.tissue import needle as states
-from ligature.tissue.interface import HARD, SPACING, USED, Interface
+from ligature.tissue.interface import HARD, SPACING, Interface
+from ligature.tissue.layout import MOST_NODES, USED, Paths
 from ligature.tissue.location import cross_surface, locate
-from ligature.tissue.needle import begin_coupling, couple, end_coupling, held, rows
-from ligature.tissue.paths import MOST_NODES, MOST_PATHS, Paths, begin_path, extend_path
+from ligature.tissue.needle import begin_coupling, couple, end_coupling, look_for_surface, needle_arrays
+from ligature.tissue.paths import begin_path, extend_path
 from ligature.tissue.tearing import tear
 
 Array = NDArray[np.float64]
@@ -25,14 +27,8 @@ Array = NDArray[np.float64]
 FADE = 0.05
 """Time in seconds in which tissue takes the shape of a needle that passes beside a node."""
 
-DROP = 6e-3
-"""Time in seconds in which the force of a tip that got through falls to what resists it next."""
-
 AROUND = 5e-3
 """Distance in metres within which the surface says at which angle a tip meets it, not the dent that the tip makes."""
-
-TIP_FRICTION = 0.2
-"""Coulomb coefficient of a tip that slides over the surface."""
 
 
 class NeedleInTissue:
@@ -50,17 +46,21 @@ class NeedleInTissue:
         Of the needle from tip to tail, m.
     radius
         Of its wire, m.
+
+    Attributes
+    ----------
+    arrays
+        Where it is, what holds it and its own equations, for compiled code; ``table`` has their addresses.
     """
 
     def __init__(self, interface: Interface, paths: Paths, curvature: float, length: float, radius: float) -> None:
         if not (length > 0.0 and radius > 0.0 and curvature >= 0.0):
             raise ValueError(f"needle of length {length}, radius {radius}, curvature {curvature} is impossible")
         self._interface, self._paths, self.radius = interface, paths, radius
-        self._held = held(len(interface.points.status), MOST_PATHS)
-        self._rows = rows()
-        self._shape = np.zeros(14)
+        self.arrays = needle_arrays()
+        self.table = table_of(self.arrays)
+        self._held, self._rows, self._shape = self.arrays.held, self.arrays.rows, self.arrays.shape
         self._shape[9], self._shape[10] = curvature, length
-        self._delta, self._wrench = np.zeros(6), np.zeros(6)
         self._weights8, self._weights4, self._normal = np.zeros(8), np.zeros(4), np.zeros(3)
         self._before = np.full(3, np.nan)
         self._left, self._count = -1, 0
@@ -94,15 +94,18 @@ class NeedleInTissue:
         FloatingPointError
             When the needle's equations are singular or not finite.
         """
-        self._place(tip, tangent, normal, centre)
-        left, fate = couple(
-            self._interface.points, self._paths, self._held, self._rows, self._shape, TIP_FRICTION,
-            self._interface.fraction, dt, DROP, H, g, self._delta, self._wrench,
-        )  # fmt: skip
-        if fate < 0 or not math.isfinite(self._delta.sum()):
+        self._take(tip, tangent, normal, centre, H, g)
+        self.solve(dt)
+        return self.arrays.delta.copy(), self.arrays.wrench.copy()
+
+    def solve(self, dt: float) -> None:
+        """`couple` with what `arrays` hold: shape and equations; they have motion and wrench then."""
+        if self._held.tip[0] == states.OUTSIDE:
+            self._look_for_surface()
+        left, fate = couple(self._interface.table, self.table, dt)
+        if fate < 0 or not math.isfinite(self.arrays.delta.sum()):
             raise FloatingPointError("the equations of the needle in tissue have no finite solution")
         self._conclude(left, fate > 0)
-        return self._delta.copy(), self._wrench.copy()
 
     def begin(
         self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array, dt: float = 1e-3
@@ -118,32 +121,35 @@ class NeedleInTissue:
         FloatingPointError
             When the needle's equations are singular or not finite.
         """
-        self._place(tip, tangent, normal, centre)
-        self._left, self._count = begin_coupling(
-            self._interface.points, self._paths, self._held, self._rows, self._shape, TIP_FRICTION,
-            self._interface.fraction, dt, DROP, H, g, self._delta,
-        )  # fmt: skip
-        if self._count < 0 or not math.isfinite(self._delta.sum()):
-            raise FloatingPointError("the equations of the needle in tissue have no finite solution")
+        self._take(tip, tangent, normal, centre, H, g)
+        self.prepare(dt)
         return self._rows.K.copy(), self._rows.load.copy()
+
+    def prepare(self, dt: float) -> None:
+        """`begin` with what `arrays` hold: shape and equations; their rows have stiffness and load then."""
+        if self._held.tip[0] == states.OUTSIDE:
+            self._look_for_surface()
+        self._left, self._count = begin_coupling(self._interface.table, self.table, dt)
+        if self._count < 0 or not math.isfinite(self.arrays.delta.sum()):
+            raise FloatingPointError("the equations of the needle in tissue have no finite solution")
 
     def end(self, delta: Array) -> Array:
         """End a tick in which the needle moved by ``delta`` (6,); returns force and moment (6,) of the tissue on it."""
-        self._delta[:] = delta
-        through = end_coupling(
-            self._interface.points, self._paths, self._held, self._rows, self._count, self._delta, self._wrench
-        )
-        self._conclude(self._left, through)
-        return self._wrench.copy()
+        self.arrays.delta[:] = delta
+        self.finish()
+        return self.arrays.wrench.copy()
+
+    def finish(self) -> None:
+        """`end` with the motion that `arrays` hold; they have the wrench then."""
+        self._conclude(self._left, end_coupling(self._interface.table, self.table, self._count))
 
     def forget(self) -> None:
         """Pass over a tick in which the needle is far from the tissue."""
         self._before[:] = np.nan
 
-    def _place(self, tip: Array, tangent: Array, normal: Array, centre: Array) -> None:
+    def _take(self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array) -> None:
         self._shape[:3], self._shape[3:6], self._shape[6:9], self._shape[11:] = tip, tangent, normal, centre
-        if self._held.tip[0] == states.OUTSIDE:
-            self._look_for_surface()
+        self.arrays.H[:], self.arrays.g[:] = H, g
 
     def _conclude(self, left: int, through: bool) -> None:
         """Follow the tip: out of the tissue, further in, or off the surface."""
@@ -158,18 +164,13 @@ class NeedleInTissue:
 
     def _look_for_surface(self) -> None:
         """Begin a contact where the tip came through the surface in the last tick."""
-        tip, tangent = self._shape[:3], self._shape[3:6]
-        way = tip - self._before
-        size = float(np.sqrt((way**2).sum()))
-        if not (size > 0.0 and float((way * tangent).sum()) > 0.0):
-            return
-        self._meet(self._before, way / size, size)
+        face = look_for_surface(self._interface.table, self.table, self._before, self._weights4, self._normal)
+        if face >= 0:
+            self._meet(face)
 
-    def _meet(self, start: Array, direction: Array, reach: float) -> None:
+    def _meet(self, face: int) -> None:
+        """Begin a contact where the tip comes through a face: in a path that opens there, or on the surface."""
         x, grid = self._interface.elastic.x, self._interface.elastic.grid
-        face, _ = cross_surface(x, grid.faces, start, direction, reach, -1.0, self._weights4, self._normal)
-        if face < 0:
-            return
         h = self._held
         crossing = self._weights4 @ x[grid.faces[face]]
         path, sense = self._opening(crossing)
@@ -222,7 +223,7 @@ class NeedleInTissue:
             path = begin_path(paths, point)
             h.passing[path], h.tip[:] = 1, [states.CUTS, path, -1]
             h.engaged[point], h.anchor[point], h.sigma[point], h.share[point] = 1, 0.0, 0.0, 0.0
-            self._interface.equip(point, self._interface.cell_of[point], self.radius)
+            self._interface.equip(point, self._interface.points.cell[point], self.radius)
             # The bristle takes over the force that is left, so that the tip does not leap by what it yields.
             paths.cut[path] = -float(h.limit[0] * self._interface.points.soft[point])
             self._find_far_surface()
@@ -324,7 +325,7 @@ class NeedleInTissue:
             # A point on the normal through the tip keeps the pressure; its place across starts anew.
             self._interface.place(point, grid.faces[face], self._weights4)
             h.offset[point] = 0.0
-            self._interface.cell_of[point] = int(grid.face_cell[face])
+            self._interface.points.cell[point] = int(grid.face_cell[face])
         steep = states.TOUCHES if self._steep() else states.SLIDES
         if steep != h.tip[0]:
             h.tip[0], h.tip_side[:] = steep, 0
@@ -335,7 +336,10 @@ class NeedleInTissue:
         near = h.engaged.astype(bool) & (np.abs(h.sigma) < 3e-3)
         if near.any() or self._locate(tip) < 0:
             return
-        self._meet(tip - 2e-3 * tangent, tangent, 2e-3)
+        elastic, start = self._interface.elastic, tip - 2e-3 * tangent
+        face, _ = cross_surface(elastic.x, elastic.grid.faces, start, tangent, 2e-3, -1.0, self._weights4, self._normal)
+        if face >= 0:
+            self._meet(face)
 
     def _locate(self, at: Array) -> int:
         elastic = self._interface.elastic
@@ -402,15 +406,16 @@ class NeedleInTissue:
             array[:] = 0
         self._held.tip[:] = [states.OUTSIDE, -1, -1]
         self._before[:] = np.nan
-        self._delta[:], self._shape[:9], self._shape[11:] = 0.0, 0.0, 0.0
+        self.arrays.delta[:], self._shape[:9], self._shape[11:] = 0.0, 0.0, 0.0
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick."""
         kept = {name: array.copy() for name, array in zip(self._held._fields, self._held, strict=True)}
-        return {**kept, "before": self._before.copy(), "delta": self._delta.copy(), "shape": self._shape.copy()}
+        return {**kept, "before": self._before.copy(), "delta": self.arrays.delta.copy(), "shape": self._shape.copy()}
 
     def restore(self, snapshot: dict[str, Array]) -> None:
         """Continue from `snapshot`."""
         for name, array in zip(self._held._fields, self._held, strict=True):
             array[:] = snapshot[name]
-        self._before[:], self._delta[:], self._shape[:] = snapshot["before"], snapshot["delta"], snapshot["shape"]
+        self._before[:], self._shape[:] = snapshot["before"], snapshot["shape"]
+        self.arrays.delta[:] = snapshot["delta"]

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.tissue.interface import Interface
+from ligature.tissue.layout import Paths
 from ligature.tissue.location import locate
-from ligature.tissue.paths import Paths, remove_node
+from ligature.tissue.paths import remove_node
 
 Array = NDArray[np.float64]
 
@@ -20,6 +21,8 @@ def tear(interface: Interface, paths: Paths, torn: Array) -> None:
 
     ``torn`` is cleared. Positions are those at the start of a step.
     """
+    if not torn.any():
+        return
     weights = np.zeros(8)
     elastic, points = interface.elastic, interface.points
     for i in np.flatnonzero((torn != 0.0).any(axis=1)).tolist():
@@ -27,7 +30,7 @@ def tear(interface: Interface, paths: Paths, torn: Array) -> None:
         torn[i] = 0.0
         if cell >= 0:
             interface.place(i, elastic.grid.cells[cell], weights)
-            interface.cell_of[i] = cell
+            points.cell[i] = cell
         else:
             remove_node(paths, i)
             interface.release(i)

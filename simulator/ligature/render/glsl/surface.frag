@@ -55,6 +55,23 @@ layout(location = PASS_NORMALS) out vec4 fNormal;
 layout(location = PASS_FLOW) out vec2 fFlow;
 #endif
 
+#ifdef MARKS
+uniform int uMarkCount;
+uniform vec4 uMarks[MARKS];     // of punctures: place in eye space, radius
+uniform vec4 uMarkAxes[MARKS];  // outward normal, how far along it the mark is seen
+
+// What punctures leave of a colour: dark discs with a soft edge.
+vec3 marked(vec3 eye) {
+    float left = 1.0;
+    for (int i = 0; i < uMarkCount; ++i) {
+        vec3 away = eye - uMarks[i].xyz, axis = uMarkAxes[i].xyz;
+        float along = dot(away, axis), beside = length(away - along * axis);
+        if (abs(along) < uMarkAxes[i].w) left = min(left, smoothstep(0.6, 1.1, beside / uMarks[i].w));
+    }
+    return mix(vec3(0.2, 0.04, 0.04), vec3(1.0), left);
+}
+#endif
+
 #ifdef PASS_RGB
 vec3 shadedNormal(vec3 n) {
 #ifdef NORMAL_MAP
@@ -100,6 +117,9 @@ void main() {
     vec4 texel = texture(uTexture, vTexCoord);
 #else
     vec4 texel = vec4(1.0);
+#endif
+#ifdef MARKS
+    texel.rgb *= marked(eye);
 #endif
 #ifdef PHYSICAL
     fColour.rgb = physical(uDiffuse * texel.rgb, eye, shadedNormal(normal), toEye);

@@ -13,6 +13,9 @@ in mat4 iModelView;
 in ivec2 iIds;  // of the object, of the piece
 #ifdef PASS_FLOW
 in mat4 iBefore;  // model-view-projection of the frame before
+#ifdef DEFORMS
+in vec3 aBefore;  // place of the vertex then
+#endif
 #endif
 
 #ifdef ANALYTIC
@@ -71,6 +74,10 @@ void main() {
 #endif
 #ifdef PASS_FLOW
     vNow = gl_Position;
+#ifdef DEFORMS
+    vBefore = iBefore * vec4(aBefore, 1.0);
+#else
     vBefore = iBefore * vec4(place, 1.0);
+#endif
 #endif
 }

@@ -1,0 +1,73 @@
+"""``ligature dataset``: what is in a dataset, one file of an interrupted one, and the formats of LeRobot."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from ligature.datasets.store import DatasetError, episode_names, join, opened
+
+
+def info(file: Path, console: Console) -> int:
+    """Print what a dataset holds; the exit status is 1 for a file that is none."""
+
+    def report() -> None:
+        with opened(file) as found:
+            attributes, names = found.attrs, episode_names(found)
+            closed = "" if attributes.get("closed", True) else "; 'ligature dataset join' makes one file of it"
+            say(f"{attributes['format']} of Ligature {attributes['version']}, scene {attributes['scene']}{closed}")
+            arms = ", ".join(found.get("arms", ()))
+            say(f"{len(names)} episodes at {attributes['rate']:g} samples a second, arms {arms}")
+            for name in names:
+                say(f"{name}: {_episode(found[name], list(map(str, attributes['phases'])))}")
+
+    say = _saying(console)
+    return _reported(report, console)
+
+
+def _episode(episode: Any, phases: list[str]) -> str:
+    attributes = episode.attrs
+    outcome = "success" if attributes["success"] else "failure"
+    labels, counts = np.unique(episode["phase"][:], return_counts=True)
+    shares = ", ".join(f"{phases[k] or 'none'} {n}" for k, n in zip(labels, counts, strict=True))
+    return f"{attributes['samples']} samples, {outcome if attributes.get('judged', True) else 'not judged'}; {shares}"
+
+
+def join_episodes(file: Path, console: Console) -> int:
+    """Make one file of a dataset whose writer was killed."""
+    return _reported(lambda: _saying(console)(f"{file}: {join(file)} episodes in one file"), console)
+
+
+def export(source: Path, target: Path, format: str, codec: str, license: str, console: Console) -> int:
+    """Write a dataset in one of LeRobot's formats; the exit status is 1 when that is not possible."""
+
+    def write() -> None:
+        from ligature.datasets.lerobot import export as run_export
+
+        begin = time.perf_counter()
+        run_export(source, target, format, codec, license, _saying(console))
+        size = sum(path.stat().st_size for path in target.rglob("*") if path.is_file())
+        seconds = time.perf_counter() - begin
+        _saying(console)(
+            f"{target}: {format}, {size / 1e6:.1f} MB in {seconds:.1f} s ({source.stat().st_size / 1e6:.1f} MB before)"
+        )
+
+    return _reported(write, console)
+
+
+def _saying(console: Console) -> Callable[[str], None]:
+    return lambda text: console.print(text, markup=False)
+
+
+def _reported(work: Callable[[], None], console: Console) -> int:
+    try:
+        work()
+    except (DatasetError, ValueError) as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
+    return 0

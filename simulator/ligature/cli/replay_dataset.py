@@ -1,0 +1,76 @@
+"""A recorded run, simulated again, as an episode of a dataset: labelled by the ground truth, judged if possible."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import ligature
+from ligature.bus.record import Record
+from ligature.cli.options import RunOptions
+from ligature.cli.replay import Sampled, resimulate
+from ligature.cli.score import EVERY
+from ligature.datasets import DatasetWriter
+from ligature.datasets.interrupts import interrupted_once
+from ligature.datasets.labels import ACTIVITIES, ActivityWatch, phase_of
+from ligature.tasks import Attempt
+
+NEEDS_REPORT = "pose_estimation"
+"""The task that is judged by what somebody reports."""
+
+
+class _Sampler:
+    """Watches a run that is simulated again; its writer belongs to ``files``."""
+
+    def __init__(self, dataset: Sampled, task: str, source: str, files: ExitStack) -> None:
+        self._dataset, self._task, self._source, self._files = dataset, task, source, files
+        self._writer: DatasetWriter | None = None
+        self._attempt: Attempt | None = None
+
+    def watch(self, simulation: ligature.Simulation) -> None:
+        """Take what is due of an update."""
+        if self._writer is None:
+            self._begin(simulation)
+        assert self._writer is not None
+        state = simulation.state[0]
+        tick = round(simulation.time / simulation.dt)
+        if self._attempt is not None and tick % round(EVERY / simulation.dt) < simulation.ticks_per_update:
+            self._attempt.observe(state)
+        self._writer.sample(phase_of(self._activities.activities(state)))
+
+    def _begin(self, simulation: ligature.Simulation) -> None:
+        given, sampling = self._dataset, self._dataset.sampling
+        self._attempt = Attempt(simulation.scene, self._task) if self._task else None
+        self._activities = ActivityWatch(simulation.scene)
+        writer = DatasetWriter(
+            given.path, simulation, sampling.cameras, sampling.size, sampling.rate, ACTIVITIES,
+            given.text or self._task, remarks={"source": self._source},
+        )  # fmt: skip
+        self._writer = self._files.enter_context(writer)
+
+    def finish(self) -> str:
+        """End the episode; returns how it went, in words."""
+        assert self._writer is not None
+        found, why = self._dataset.success, "" if self._dataset.success is None else "as the operator found"
+        figures: dict[str, float | int | str] = {}
+        if found is None and self._attempt is not None:
+            score = self._attempt.judge().report()
+            found, why = bool(score["success"]), str(score.get("why", ""))
+        if self._attempt is not None:
+            figures = {f"measured_{name}": value for name, value in self._attempt.monitor.measures().report().items()}
+        self._writer.end_episode(bool(found), judged=found is not None, why=why, **figures)
+        if found is None:
+            return "the episode is not judged: say with '--task' what was to be done, or with '--success' how it went"
+        return f"the episode is a {'success' if found else 'failure'}{': ' + why if why else ''}"
+
+
+def sampled(record: Record, scene: Path | None, dataset: Sampled) -> tuple[ligature.Simulation, str]:
+    """Simulate ``record`` again into ``dataset``; returns the simulation at its end, and how the episode went."""
+    if dataset.task == NEEDS_REPORT:
+        raise ValueError(f"a record of a run holds no reported pose, so that '{NEEDS_REPORT}' cannot be judged")
+    recorded = RunOptions.from_text(record.header.options).task
+    task = dataset.task or (recorded if recorded != NEEDS_REPORT else "")
+    with interrupted_once(), ExitStack() as files:
+        sampler = _Sampler(dataset, task, "recorded run", files)
+        simulation = resimulate(record, scene, sampler.watch)
+        return simulation, sampler.finish()

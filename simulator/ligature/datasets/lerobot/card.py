@@ -1,0 +1,105 @@
+"""The card of an exported dataset: what it holds, in which units, how it was made, and what it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import h5py
+import numpy as np
+
+MEANING: Mapping[str, str] = {
+    "observation.state": "measured joints, the jaw after those of its arm (rad, m)",
+    "observation.setpoint": "joint set-points at the time of the sample (rad, m)",
+    "observation.velocity": "measured joint velocities (rad/s, m/s)",
+    "observation.effort": "joint efforts (N m, N)",
+    "observation.cartesian": "measured pose of the tool's tip in the base of its arm (m, quaternion)",
+    "observation.meta.force_torque": "wrench that the world exerts on the tip, in axes of the arm's base (N, N m)",
+    "observation.meta.jaw_force": "force that presses the fingers together on what they hold (N)",
+    "observation.meta.sim_time": "simulated seconds since the episode began",
+    "observation.meta.tool": "instruments of the arms",
+    "instruction.text": "the task and its phase, in words",
+    "observation.environment_state": "the observation of the learning environment, as its class documents it",
+    "extra.expert_action": "the action of the learning environment's expert for this observation",
+    "action": "joint set-points of the next sample, absolute (rad, m)",
+    "delta_action": "the same less the set-points of this sample",
+    "cartesian_action": "the same as poses of the tip in the base of its arm (m, quaternion), and the jaw (rad)",
+    "cartesian_delta_action": "step to it: along the base's axes (m), rotation vector about the tip's (rad)",
+    "ground_truth.needle_pose": "pose of the needle in the world (m, quaternion)",
+    "ground_truth.needle_twist": "twist of the needle in the world (m/s, rad/s)",
+    "ground_truth.needle_force": "force of the tissue on the needle in the world (N)",
+    "ground_truth.thread_points": "nodes of the thread in the world (m)",
+    "ground_truth.thread_tension": "tension along the thread (N)",
+    "label.phase": "phase of the work, by its number below",
+    "label.arm_phase": "the same for each arm, 0 where it has no part in it",
+    "label.arm_activity": "what each arm does by the ground truth, by its number below",
+    "next.done": "the episode ends with this sample",
+    "next.success": "it ends with this sample, and is a success",
+}
+
+
+def card(
+    file: h5py.File, info: Mapping[str, Any], episodes: Sequence[str], constant: Sequence[str], license: str
+) -> str:
+    """The card in Markdown, with the front matter of the Hugging Face Hub; ``constant`` features are left out."""
+    attributes = file.attrs
+    hours = info["total_frames"] / info["fps"] / 3600.0
+    jitter = max(_jitter(file[name]["time"][:], info["fps"]) for name in episodes)
+    tasks = sorted({str(file[name].attrs["task"]) for name in episodes})
+    done = sum(bool(file[name].attrs["success"]) for name in episodes)
+    lines = [
+        "---", f"license: {license or 'unknown'}", "task_categories:", "- robotics", "tags:", "- LeRobot", "- surgical",
+        "- simulation", "configs:", "- config_name: default", "  data_files: data/*/*.parquet", "---", "",
+        f"# {attributes['scene']}: simulated suturing", "",
+        f"Made with Ligature {attributes['version']} in the scene `{attributes['scene']}`; format LeRobot "
+        f"{info['codebase_version']}.", "",
+        "| | |", "|---|---|", f"| episodes | {info['total_episodes']}, {done} of them successful |",
+        f"| frames | {info['total_frames']} at {info['fps']} Hz, {hours:.2f} h |", "| data type | simulated |",
+        f"| collected by | {attributes.get('source', 'unknown')} |", f"| licence | {license or 'unknown'} |",
+        f"| splits (episodes from:to) | {', '.join(f'{name} {ends}' for name, ends in info['splits'].items())} |", "",
+        "## Tasks", "", *(f"- {text or 'without an instruction'}" for text in tasks), "",
+        "## Robot", "", "| arm | instrument | base in the world (x y z qx qy qz qw) |", "|---|---|---|",
+        *(f"| {name} | {arm.attrs['tool']} | {_pose(arm)} |" for name, arm in sorted(file["arms"].items())), "",
+        "## Synchronisation", "",
+        "All of a sample is taken at one instant of simulated time: pictures and motion are synchronised without "
+        f"offset. `timestamp` is the number of the sample over {info['fps']} Hz; the simulated time is up to "
+        f"{1e3 * jitter:.1f} ms later (`observation.meta.sim_time`).", "",
+        "## Features", "", "| name | shape | meaning |", "|---|---|---|",
+        *(f"| `{name}` | {tuple(each['shape'])} | {_meaning(name)} |" for name, each in info["features"].items()), "",
+        "Depth, object ids and what else the simulation knows stay in the HDF5 file. Calibrations of cameras and bases "
+        "of arms are in `meta/calibration.json`.", "",
+        *_left_out(constant),
+        "## Labels", "", "| number | phase | gesture of JIGSAWS |", "|---|---|---|",
+        *(f"| {k} | {phase or 'none'} | {gesture} |" for k, (phase, gesture) in enumerate(_phases(file))), "",
+        "| number | activity of an arm |", "|---|---|",
+        *(f"| {k} | {name} |" for k, name in enumerate(map(str, attributes["activities"]))), "",
+        "## Limits", "",
+        "Simulated robots, tissue and light: a policy trained on them alone is not one for a robot. The scripted "
+        "expert, where it is the source, is precise and does not hesitate, search or recover as people do.", "",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _left_out(constant: Sequence[str]) -> list[str]:
+    names = ", ".join(f"`{name}`" for name in constant)
+    return [f"Left out, since they never change here: {names}.", ""] if constant else []
+
+
+def _phases(file: h5py.File) -> list[tuple[str, str]]:
+    return list(zip(map(str, file.attrs["phases"]), map(str, file.attrs["gestures"]), strict=True))
+
+
+def _pose(arm: h5py.Group) -> str:
+    if "base_pose" not in arm.attrs:
+        return "none"
+    return " ".join(f"{x:.5g}" for x in arm.attrs["base_pose"])
+
+
+def _jitter(time: Any, fps: int) -> float:
+    return float(np.abs(time - time[0] - np.arange(len(time)) / fps).max())
+
+
+def _meaning(name: str) -> str:
+    if name.startswith("observation.images."):
+        return f"camera {name.rsplit('.', 1)[1]}"
+    return MEANING.get(name, "counter of LeRobot")

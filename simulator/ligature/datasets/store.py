@@ -1,0 +1,210 @@
+"""Where the episodes of a dataset lie on the disk while it grows, so that nothing takes a finished one away.
+
+Each episode is a file of its own in the folder ``NAME.episodes`` until the dataset is closed. When it ends, its file
+gets its name and ``NAME`` is replaced by one that links to all finished episodes: whoever opens ``NAME`` at any moment,
+also after the writer was killed, reads all of them. Closing joins them into one file, `join` does so later.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+Describe = Callable[[h5py.File], None]
+"""Writes into a file what holds for all episodes."""
+
+
+class DatasetError(RuntimeError):
+    """A dataset that cannot be written or read; the message gives the reason."""
+
+
+class _Disk(io.FileIO):
+    """A file that keeps the first ``error`` of writing to itself: HDF5 crashes when its disk is full."""
+
+    error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all of ``data``."""
+        view = memoryview(data).cast("B")
+        try:
+            at = 0
+            while at < len(view) and self.error is None:
+                at += super().write(view[at:])
+        except OSError as error:
+            self.error = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Make the file as long as HDF5 wants it."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+
+class PartFile:
+    """An HDF5 file that is called ``PATH.part`` until it is whole; raises OSError where it cannot be written."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._part = path, path.with_name(f"{path.name}.part")
+        self._disk = _Disk(self._part, "w+")
+        self.file = h5py.File(self._disk, "w")
+
+    def check(self) -> None:
+        """Raise what went wrong with the disk so far."""
+        if self._disk.error is not None:
+            raise self._disk.error
+
+    def finish(self) -> None:
+        """Hand it to the disk; then it gets its name."""
+        self.file.close()
+        self.check()
+        os.fsync(self._disk.fileno())
+        self._disk.close()
+        self._part.replace(self._path)
+        _sync_folder(self._path.parent)
+
+    def drop(self) -> None:
+        """Remove it."""
+        with suppress(OSError, RuntimeError):
+            self.file.close()
+        with suppress(OSError):
+            self._disk.close()
+        self._part.unlink(missing_ok=True)
+
+
+class EpisodeStore:
+    """The episodes of the dataset ``path``, which must not exist; ``describe`` writes what holds for all of them.
+
+    Raises `DatasetError` for a dataset that exists, and OSError where the disk fails.
+    """
+
+    def __init__(self, path: Path, describe: Describe) -> None:
+        self._path, self._describe, self._folder = path, describe, episode_folder(path)
+        if path.exists():
+            raise DatasetError(f"'{path}' exists already; choose another name")
+        if self._folder.exists():
+            raise DatasetError(
+                f"'{self._folder}' is left of a recording that was killed before an episode ended, or belongs to "
+                "one that goes on; remove it or choose another name"
+            )
+        self._folder.mkdir()
+        self._open: PartFile | None = None
+        self.count = 0
+
+    def begin(self) -> h5py.File:
+        """The file of a new episode."""
+        self._open = PartFile(self._folder / f"{_name(self.count)}.h5")
+        return self._open.file
+
+    def check(self) -> None:
+        """Raise what went wrong with the disk so far."""
+        if self._open is not None:
+            self._open.check()
+
+    def finish(self) -> None:
+        """The episode is whole: from now on it is part of the dataset."""
+        assert self._open is not None
+        self._open.finish()
+        self._open, self.count = None, self.count + 1
+        self._link()
+
+    def drop(self) -> None:
+        """Remove the episode that is not whole."""
+        if self._open is not None:
+            self._open.drop()
+            self._open = None
+
+    def _link(self) -> None:
+        """Replace the dataset by one that links to all finished episodes."""
+        index = PartFile(self._path)
+        try:
+            self._describe(index.file)
+            index.file.attrs["closed"] = False
+            for number in range(self.count):
+                name = _name(number)
+                index.file[name] = h5py.ExternalLink(f"{self._folder.name}/{name}.h5", "/")
+            index.finish()
+        except BaseException:
+            index.drop()
+            raise
+
+    def close(self, empty: bool) -> None:
+        """Join the episodes into one file; without any, there is a file only if ``empty``."""
+        self.drop()
+        self.count = len(list(self._folder.glob("episode_*.h5")))  # an interrupt may have come between name and count
+        if self.count or empty:
+            self._link()
+            join(self._path)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def join(path: Path) -> int:
+    """Make one file of a dataset whose episodes are files of their own; returns how many episodes it has.
+
+    A dataset that is one file stays. Raises `DatasetError`, for which the dataset stays as it was.
+    """
+    folder = episode_folder(path)
+    whole = PartFile(path)
+    try:
+        with opened(path) as linked:
+            names = episode_names(linked)
+            if linked.attrs.get("closed", True):
+                whole.drop()
+                return len(names)
+            whole.file.attrs.update(linked.attrs)
+            whole.file.attrs["closed"] = True
+            for name in linked:
+                linked.copy(linked[name], whole.file, name)
+                whole.check()
+        whole.finish()
+    except BaseException as error:
+        whole.drop()
+        if isinstance(error, OSError | RuntimeError) and not isinstance(error, DatasetError):
+            raise DatasetError(f"cannot join the episodes of '{path}': {error}; they stay in '{folder}'") from error
+        raise
+    shutil.rmtree(folder, ignore_errors=True)
+    return len(names)
+
+
+def opened(path: Path) -> h5py.File:
+    """A dataset for reading; raises `DatasetError` for a file that is none."""
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise DatasetError(f"cannot read the dataset '{path}': {error}") from error
+    if not str(file.attrs.get("format", "")).startswith("ligature dataset"):
+        file.close()
+        raise DatasetError(f"'{path}' is an HDF5 file, but no dataset of Ligature")
+    return file
+
+
+def episode_names(file: h5py.File) -> list[str]:
+    """The episodes of a dataset, in their order."""
+    return sorted(name for name in file if name.startswith("episode_"))
+
+
+def episode_folder(path: Path) -> Path:
+    """Where the episodes of a dataset lie while it grows."""
+    return path.with_name(f"{path.name}.episodes")
+
+
+def _name(number: int) -> str:
+    return f"episode_{number:04d}"
+
+
+def _sync_folder(folder: Path) -> None:
+    """Hand the names in a folder to the disk."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

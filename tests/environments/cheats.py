@@ -1,0 +1,213 @@
+"""Policies that try to get an environment's reward without the deed, and experts that do the deed.
+
+``python -m tests.environments.cheats`` prints the table of docs/learning.md. Policies use the actions that an agent has,
+and the ground truth of the simulation to find what they cheat with. World axes, metres, radians.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from ligature.environments import SuturingEnv
+from ligature.environments.experts import EXPERTS, OPEN, SHUT, Hand, Policy, drive
+from ligature.model.frames import frame, inverse
+from ligature.tasks.throws import PAD, UP
+
+Array = np.ndarray
+MOST = 400
+"""Actions of an episode: twice as many as registered environments allow."""
+
+
+def still(hand: Hand, observation: Array) -> Iterator[Array]:
+    """do nothing"""
+    yield from np.zeros((100, 7))
+
+
+def flail(hand: Hand, observation: Array) -> Iterator[Array]:
+    """random actions"""
+    yield from np.random.default_rng(5).uniform(-1.0, 1.0, (100, 7))
+
+
+# --- reach ----------------------------------------------------------------------------------
+
+
+def fly_through(hand: Hand, observation: Array) -> Iterator[Array]:
+    """pass the target at full speed"""
+    way = observation[30:33] - observation[27:30]
+    beyond = observation[30:33] + 0.03 * way / np.linalg.norm(way)
+    yield from hand.go(frame(hand.tool[:3, :3], beyond), 0.0)
+
+
+def shake(hand: Hand, observation: Array) -> Iterator[Array]:
+    """shuttle through the target"""
+    at, way = observation[30:33], observation[30:33] - observation[27:30]
+    aside = 0.006 * way / np.linalg.norm(way)
+    for k in range(20):
+        yield from hand.go(frame(hand.tool[:3, :3], at + (-1.0) ** k * aside), 0.0)
+
+
+def stop_short(hand: Hand, observation: Array) -> Iterator[Array]:
+    """stop 3 mm before the target"""
+    way = observation[30:33] - observation[27:30]
+    yield from hand.go(frame(hand.tool[:3, :3], observation[30:33] - 0.003 * way / np.linalg.norm(way)), 0.0)
+    yield from hand.stay(100, 0.0)
+
+
+# --- pick -----------------------------------------------------------------------------------
+
+
+def lift_by_thread(hand: Hand, observation: Array) -> Iterator[Array]:
+    """grasp the thread beside the needle and lift both"""
+    bodies = list(hand.simulation.scene.rods[0].bodies)
+    points = hand.simulation.state["body_pose"][0, bodies, :3]
+    tail = hand.env._scenery.needle_points(hand.simulation.state["body_pose"][0])[0]
+    nearest = int(np.argmin(np.linalg.norm(points - tail, axis=1)))
+    k = int(np.clip(nearest + (3 if nearest < len(points) / 2 else -3), 1, len(points) - 2))
+    along = points[k + 1] - points[k - 1]
+    along = along - (along @ UP) * UP
+    x = along / np.linalg.norm(along)
+    x = x if x @ hand.tool[:3, 0] > 0.0 else -x
+    R = np.column_stack([x, np.cross(-UP, x), -UP])
+    yield from hand.take(frame(R, points[k] + PAD * UP))
+    yield from hand.go(hand.moved(z=0.06), SHUT)
+    yield from hand.stay(60, SHUT)
+
+
+def close_in_the_air(hand: Hand, observation: Array) -> Iterator[Array]:
+    """close the jaws above the needle and lift them"""
+    T = hand.grasp()
+    yield from hand.take(frame(T[:3, :3], T[:3, 3] + 0.006 * UP))
+    yield from hand.go(hand.moved(z=0.045), SHUT)
+    yield from hand.stay(40, SHUT)
+
+
+def toss(hand: Hand, observation: Array) -> Iterator[Array]:
+    """lift the needle and let go at once"""
+    yield from hand.take(hand.grasp())
+    yield from hand.go(hand.moved(z=0.03), SHUT)
+    yield from hand.stay(10, OPEN)
+    yield from hand.stay(40, OPEN)
+
+
+def sweep(hand: Hand, observation: Array) -> Iterator[Array]:
+    """sweep the needle away and up with shut jaws"""
+    T = hand.grasp()
+    yield from hand.go(frame(T[:3, :3], T[:3, 3] + 0.02 * UP), SHUT)
+    yield from hand.go(frame(T[:3, :3], T[:3, 3] + np.array([0.015, 0.0, 0.003])), SHUT)
+    for _ in range(3):
+        yield from hand.go(hand.moved(x=-0.03), SHUT)
+        yield from hand.go(hand.moved(x=0.03, z=0.002), SHUT)
+    yield from hand.go(hand.moved(z=0.04), SHUT)
+
+
+def hold_low(hand: Hand, observation: Array) -> Iterator[Array]:
+    """hold the needle just above the pad"""
+    yield from hand.take(hand.grasp())
+    yield from hand.go(hand.moved(z=0.008), SHUT)
+    yield from hand.stay(60, SHUT)
+
+
+# --- insert and puncture --------------------------------------------------------------------
+
+
+def let_go(hand: Hand, observation: Array) -> Iterator[Array]:
+    """open the jaws"""
+    yield from hand.stay(130, OPEN)
+
+
+def over_the_top(hand: Hand, observation: Array) -> Iterator[Array]:
+    """carry the needle through the air from the entry to beyond the exit"""
+    goal = hand.env.goal
+    way = goal._ends()[1] - goal._ends()[0]
+    for x, z in ((0.0, 0.02), (1.2, 0.0), (0.0, -0.02), (0.0, 0.03)):
+        yield from hand.go(hand.moved(x * way[0], x * way[1], x * way[2] + z), SHUT)
+
+
+def backwards(hand: Hand, observation: Array) -> Iterator[Array]:
+    """turn the needle the wrong way"""
+    goal = hand.env.goal
+    T_arc_tool = inverse(hand.needle_arc) @ hand.tool
+    for angle in np.linspace(-0.4, -2.0, 80):
+        yield hand.action(goal.throw.arc_at(float(angle), goal.arc) @ T_arc_tool, SHUT)[0]
+
+
+def beside(hand: Hand, observation: Array) -> Iterator[Array]:
+    """make the whole throw 8 mm beside the place"""
+    yield from hand.go(hand.moved(z=0.015), SHUT)
+    yield from drive(hand, observation, np.array([0.0, 0.008, 0.0]))
+
+
+def leave_it_in(hand: Hand, observation: Array) -> Iterator[Array]:
+    """drive the needle half way in and let go"""
+    yield from drive(hand, observation, end=0.7)
+    yield from hand.stay(30, OPEN)
+    yield from hand.go(hand.moved(z=0.02), OPEN)
+
+
+def peck(hand: Hand, observation: Array) -> Iterator[Array]:
+    """prick the entry again and again"""
+    goal = hand.env.goal
+    T_arc_tool = inverse(hand.needle_arc) @ hand.tool
+    for angle in np.concatenate([np.r_[np.linspace(-0.4, 0.25, 25), np.linspace(0.25, -0.4, 25)]] * 4):
+        yield hand.action(goal.throw.arc_at(float(angle), goal.arc) @ T_arc_tool, SHUT)[0]
+
+
+CHEATS: dict[str, tuple[Policy, ...]] = {
+    "reach": (still, flail, fly_through, shake, stop_short),
+    "pick": (still, flail, lift_by_thread, close_in_the_air, toss, sweep, hold_low),
+    "insert": (still, flail, let_go, over_the_top, backwards, beside, leave_it_in),
+    "puncture": (still, let_go, over_the_top, backwards, beside, leave_it_in, peck),
+}
+
+
+class Outcome(NamedTuple):
+    """How an episode went: dense reward, what the deed would have paid, success, why it was lost, actions."""
+
+    total: float
+    deed: float
+    success: bool
+    lost: str
+    steps: int
+
+
+def roll(env: SuturingEnv, policy: Policy, seed: int) -> Outcome:
+    """One episode; whatever a policy leaves over is spent standing still."""
+    observation, info = env.reset(seed=seed)
+    deed, total, steps, ended, success, lost = 1.0 + 100.0 * info["distance"], 0.0, 0, False, False, ""
+    hand = Hand(env)
+    for action in policy(hand, observation):
+        observation, reward, ended, cut, info = env.step(np.asarray(action, dtype=np.float32))
+        total, steps = total + reward, steps + 1
+        success, lost = info["is_success"], info["lost"]
+        if ended or cut:
+            break
+    return Outcome(total, deed, success, lost, steps)
+
+
+def said(policy: Policy) -> str:
+    """What a policy does."""
+    text = (policy.__doc__ or "").split("\n")[0].rstrip(".")
+    return text[0].lower() + text[1:]
+
+
+def main() -> int:
+    """Print the table of all experts and cheats."""
+    sys.stdout.write("| environment | policy | dense reward | of | sparse | ends |\n|---|---|---|---|---|---|\n")
+    for task, cheats in CHEATS.items():
+        env = SuturingEnv(task, max_steps=MOST)
+        for policy in (EXPERTS[task], *cheats):
+            found = roll(env, policy, seed=3)
+            what = said(policy) if policy in cheats else f"**{said(policy)}**"
+            ends = found.lost or ("done" if found.success else "cut")
+            rewards = f"{found.total:.2f} | {found.deed:.2f} | {int(found.success)}"
+            sys.stdout.write(f"| {task} | {what} | {rewards} | {ends} |\n")
+            sys.stdout.flush()
+        env.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""No environment pays for less than its deed: policies that cheat fail, and experts who do the deed succeed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ligature.environments import SuturingEnv
+from ligature.environments.experts import EXPERTS, SHUT, Hand, Policy
+from ligature.environments.goals import GOALS
+
+from tests.environments.cheats import CHEATS, MOST, roll, said
+
+LEARNING = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
+
+
+@pytest.fixture(scope="module", params=sorted(CHEATS))
+def env(request: pytest.FixtureRequest) -> Iterator[SuturingEnv]:
+    made = SuturingEnv(request.param, max_steps=MOST)
+    yield made
+    made.close()
+
+
+def task_of(env: SuturingEnv) -> str:
+    return next(name for name, goal in GOALS.items() if type(env.goal) is goal)
+
+
+def test_every_environment_has_three_cheats_and_an_expert() -> None:
+    assert set(CHEATS) == set(EXPERTS) == set(GOALS)
+    assert min(len(cheats) for cheats in CHEATS.values()) >= 3
+
+
+def test_the_expert_does_the_deed(env: SuturingEnv) -> None:
+    found = roll(env, EXPERTS[task_of(env)], 11)
+    assert found.success, found
+    assert found.total == pytest.approx(found.deed, abs=1e-9)
+
+
+def test_no_cheat_succeeds(env: SuturingEnv) -> None:
+    for policy in CHEATS[task_of(env)]:
+        found = roll(env, policy, 3)
+        assert not found.success, (policy.__name__, found)
+        assert found.total < found.deed - 1.0, (policy.__name__, found)
+
+
+@pytest.mark.slow
+def test_experts_succeed_and_cheats_fail_wherever_the_needle_lies(env: SuturingEnv) -> None:
+    task, seeds = task_of(env), range(20, 40)
+    done = [roll(env, EXPERTS[task], seed).success for seed in seeds]
+    assert sum(done) >= 0.95 * len(done), dict(zip(seeds, done, strict=True))
+    for policy in CHEATS[task]:
+        for seed in range(20, 23):
+            assert not roll(env, policy, seed).success, (policy.__name__, seed)
+
+
+def test_the_documents_list_every_cheat() -> None:
+    text = LEARNING.read_text("utf-8")
+    missing = [said(p) for cheats in CHEATS.values() for p in cheats if f"| {said(p)} |" not in text]
+    assert not missing
+
+
+def lifted(env: SuturingEnv, policy: Policy, seed: int) -> tuple[float, bool]:
+    """How high the needle's lowest point came, and whether the thread was ever held."""
+    observation, _ = env.reset(seed=seed)
+    hand, highest, held = Hand(env), 0.0, False
+    start = env._scenery.needle_points(env._simulation.state["body_pose"][0])[:, 2].min()
+    thread = env._simulation.scene.rod_bodies
+    for action in policy(hand, observation):
+        env.step(np.asarray(action, dtype=np.float32))
+        now = env._scenery.needle_points(env._simulation.state["body_pose"][0])[:, 2].min()
+        highest = max(highest, float(now - start))
+        held = held or int(env._simulation.state["jaw_body"][0, 0]) in thread
+    return highest, held
+
+
+def test_the_thread_really_lifts_the_needle() -> None:
+    """The cheat does what it claims: otherwise that it fails would show nothing."""
+    env = SuturingEnv("pick", max_steps=MOST)
+    policy = next(p for p in CHEATS["pick"] if p.__name__ == "lift_by_thread")
+    highest, held = lifted(env, policy, 3)
+    env.close()
+    assert held and highest > 0.02
+
+
+def test_a_needle_must_be_held_for_half_a_second() -> None:
+    """It is done half a second after the needle is up, not before: 25 actions."""
+    env = SuturingEnv("pick", max_steps=MOST)
+    observation, _ = env.reset(seed=3)
+    hand, shares = Hand(env), []
+    for action in EXPERTS["pick"](hand, observation):
+        observation, _, ended, _, info = env.step(np.asarray(action, dtype=np.float32))
+        shares.append(observation[50])
+        if ended:
+            break
+    env.close()
+    assert info["is_success"]
+    up = np.flatnonzero(np.array(shares) > 0.0)
+    assert len(up) == 25 and up[-1] == len(shares) - 1
+    assert np.diff(shares[-25:]) == pytest.approx(0.04)
+
+
+def test_a_dropped_needle_ends_the_episode() -> None:
+    for task in ("pick", "insert"):
+        env = SuturingEnv(task, max_steps=MOST, reward="sparse")
+        policy = next(p for p in CHEATS[task] if p.__name__ in ("toss", "let_go"))
+        found = roll(env, policy, 3)
+        env.close()
+        assert found.lost == "the needle was dropped"
+        assert found.steps < MOST / 2 and found.total == 0.0
+
+
+def test_an_open_hand_ends_no_episode_in_which_nothing_was_lifted() -> None:
+    env = SuturingEnv("pick")
+    env.reset(seed=3)
+    hand = Hand(env)
+    for action in hand.stay(30, 0.8):
+        *_, ended, _, info = env.step(np.asarray(action, dtype=np.float32))
+        assert not ended and not info["lost"]
+    env.close()
+    assert SHUT < 0.0
