@@ -119,7 +119,7 @@ def collect(collection: bpy.types.Collection, with_meshes: bool = False) -> Coll
         kind, stored.source, stored.filepath, stored.byte_order_mark,
         fetch(getattr(stored, identifier(kind)), kind), parts, any(has_mesh(obj) for obj in objects),
         json.loads(stored.imported_keys or "[]"), _meshes(objects) if with_meshes and kind == "model" else [],
-        [f"'{obj.name}' {note}" for obj in objects for note in notes_of(obj)],
+        [f"'{obj.name}' {note}" for obj in objects for note in notes_of(obj)] + _lost(objects, places, states),
     )  # fmt: skip
 
 
@@ -128,6 +128,16 @@ def _new_name(obj: bpy.types.Object) -> str:
     if not obj.adf.called or obj.adf.called == obj.name:
         return ""
     return obj.name if obj.adf.role == "JOINT" else topic_name(obj.name)
+
+
+def _lost(objects: list[bpy.types.Object], places: list[Placed], states: list[State | None]) -> list[str]:
+    """Joints that were moved, of which the file keeps its own pose since not both bodies are open."""
+    return [
+        f"'{obj.name}' was moved, and joins a body that is not open: its pose in the file stays"
+        for obj, place, before in zip(objects, places, states, strict=True)
+        if place.ends is not None and place.frames is None and before and "pose" in before
+        and "pose" not in unchanged_groups(before, place.state())
+    ]  # fmt: skip
 
 
 def notes_of(obj: bpy.types.Object) -> list[str]:

@@ -89,6 +89,8 @@ class Placed:
         The object's pose in its owner, or in the world without one; a body's always in the world.
     reach
         The greatest coordinate that ``T`` was computed from; 0 where Blender stores ``T`` itself.
+    far
+        The greatest coordinate of the object and its owner in the world, from which a user put one onto the other.
     frames
         Of a joint between two bodies.
     lens, cone
@@ -102,6 +104,7 @@ class Placed:
     ends: tuple[str, str] | None = None
     T: np.ndarray | None = None
     reach: float = 0.0
+    far: float = 0.0
     frames: JointFrames | None = None
     lens: tuple[float, float, float] | None = None
     cone: float | None = None
@@ -117,6 +120,8 @@ class Placed:
             state: State = {"ends": [*self.ends]}
             if self.frames is not None:
                 state["frames"] = [*_flat(self.frames.T_parent_joint), *_flat(self.frames.T_parent_child)]
+            elif self.T is not None:
+                state["pose"] = _flat(self.T)
             return state
         state = {"pose": _flat(self.T), "parent": [self.parent]}
         if self.lens is not None:
@@ -227,7 +232,9 @@ def _placed(placed: Placed, before: State, same: set[str], file_values: Keys) ->
     if "pose" in same:
         values.update(_kept(file_values, "location"))
     else:
-        values["location"] = _pose(file_values.get("location"), _before(placed, before, same), placed.T, placed.reach)
+        was = _before(placed, before, same)
+        reach = placed.far if was is None else placed.reach
+        values["location"] = _pose(file_values.get("location"), was, placed.T, reach)
     if placed.shapes:
         values.update(_shapes(placed, before, same, file_values))
     return values
@@ -360,7 +367,7 @@ def _camera(placed: Placed, before: State, same: set[str], file_values: Keys) ->
     if "pose" in same:
         values.update(_kept(file_values, "location", "look at", "up"))
     elif was is None:
-        keys = new_view(placed.T, _distance(file_values), placed.reach)
+        keys = new_view(placed.T, _distance(file_values), placed.far)
         values.update(zip(("location", "look at", "up"), keys, strict=True))
     else:
         location, look_at = (file_values.get(name, ZERO) for name in ("location", "look at"))
@@ -402,7 +409,7 @@ def _light(placed: Placed, before: State, same: set[str], file_values: Keys) -> 
     if "pose" in same:
         values.update(_kept(file_values, "location", "direction"))
     elif was is None or not any(file_values.get("direction", ZERO)):
-        values.update(zip(("location", "direction"), new_light(placed.T, placed.reach), strict=True))
+        values.update(zip(("location", "direction"), new_light(placed.T, placed.far), strict=True))
     else:
         values["location"] = moved_pose((file_values.get("location", ZERO), ZERO), was, placed.T, placed.reach)[0]
         values["direction"] = moved_direction(file_values["direction"], was, placed.T)

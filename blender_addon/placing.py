@@ -118,7 +118,8 @@ def placed(obj: bpy.types.Object) -> Placed:
     if role == "JOINT":
         bodies, texts = (obj.adf.parent_object, obj.adf.child_object), (obj.adf.parent_text, obj.adf.child_text)
         ends = [reference(obj, body, text) if body else text for body, text in zip(bodies, texts, strict=True)]
-        return Placed(kind, ends=tuple(ends), frames=None if None in bodies else _joint_frames(obj, *bodies))
+        frames = None if None in bodies else _joint_frames(obj, *bodies)
+        return Placed(kind, ends=tuple(ends), T=relative_pose(owner_of(obj), obj), frames=frames)
     owner, own = owner_of(obj), rest_pose(obj)
     T = own if owner is None or role == "BODY" else np.linalg.inv(rest_pose(owner)) @ own
     shaped = role in SHAPED
@@ -126,7 +127,8 @@ def placed(obj: bpy.types.Object) -> Placed:
         kind,
         parent=_parent_of(obj, owner),
         T=T,
-        reach=0.0 if obj.parent is None and not obj.constraints else float(np.abs(T[:3, 3]).max()),
+        reach=0.0 if obj.parent is None and not obj.constraints else _reach(T),
+        far=0.0 if owner is None or role == "BODY" else max(_reach(own), _reach(rest_pose(owner))),
         lens=(obj.data.angle_y, obj.data.clip_start, obj.data.clip_end)
         if (role, obj.type) == ("CAMERA",) * 2
         else None,
@@ -134,6 +136,11 @@ def placed(obj: bpy.types.Object) -> Placed:
         inertial=inertial_frame(obj) if shaped and children_with(obj, "INERTIAL") else None,
         shapes={use: _placed_shapes(obj, use) for use in ("COLLISION", "VISUAL")} if shaped else {},
     )
+
+
+def _reach(T: np.ndarray) -> float:
+    """The greatest coordinate of a pose."""
+    return float(np.abs(T[:3, 3]).max())
 
 
 def _parent_of(obj: bpy.types.Object, owner: bpy.types.Object | None) -> str:
@@ -156,7 +163,7 @@ def _joint_frames(obj: bpy.types.Object, parent: bpy.types.Object, child: bpy.ty
         (inertial_frame(parent), inertial_frame(child)),
         tuple(body.adf.body.scale or 1.0 for body in (parent, child)),
         obj.adf.joint.type,
-        max(float(np.abs(rest_pose(one)[:3, 3]).max()) for one in (obj, parent, child)),
+        max(_reach(rest_pose(one)) for one in (obj, parent, child)),
     )
 
 

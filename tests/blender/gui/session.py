@@ -409,6 +409,38 @@ def nothing_goes_on():
     RESULT["ended"] |= {"after": len(workers()), "left": len(pieces())}
 
 
+def escape():
+    area = view()["area"]
+    for value in ("PRESS", "RELEASE"):
+        window.main().event_simulate(type="ESC", value=value, x=area.x + 200, y=area.y + 200)
+
+
+@step
+def ask_before_an_export_replaces_files():
+    """As after the file browser: the operator was invoked by a user, and finds a file of somebody else."""
+    (OUT / "asked").mkdir()
+    (OUT / "asked" / "scene.yaml").write_text("of somebody else")
+    words = {"filepath": str(OUT / "asked" / "scene.yaml"), "collection": "scene"}
+    notes = ["'part' moves and collides as a triangle mesh; decompose it into convex pieces, or fit primitives"]
+    files = json.dumps([words["filepath"]])
+    area = view()["area"]
+    window.main().event_simulate(type="MOUSEMOVE", value="NOTHING", x=area.x + 300, y=area.y + 400)
+    bpy.ops.adf.confirm_export(
+        "INVOKE_DEFAULT", operator="export_file", arguments=json.dumps(words), files=files, notes=json.dumps(notes)
+    )
+    STEPS[:0] = [redraw, lambda: picture("blender_replace"), escape, redraw, ask_for_folders]
+
+
+def ask_for_folders():
+    assert (OUT / "asked" / "scene.yaml").read_text() == "of somebody else"
+    bpy.ops.adf.allow_folders("INVOKE_DEFAULT", folders=json.dumps(["/models/meshes/tools", "/models/meshes/grippers"]))
+    STEPS[:0] = [redraw, lambda: picture("blender_folders"), escape, redraw, nothing_was_allowed]
+
+
+def nothing_was_allowed():
+    assert bpy.context.scene.adf.folders == ""
+
+
 @step
 def disable():
     addon_utils.disable("adf_studio", default_set=True)

@@ -153,3 +153,35 @@ def test_a_moved_body_writes_its_own_pose_only(corpus, tmp_path):
     before, after = file.read_text().split("\n"), (tmp_path / "phantom.yaml").read_text().split("\n")
     changed = [(a, b) for a, b in zip(before, after) if a != b]
     assert len(before) == len(after) and len(changed) == 1 and changed[0][1].strip().startswith("x: ")
+
+
+def test_a_vehicle_comes_back_with_keys_that_blender_does_not_hold_and_aliases(tmp_path):
+    text = """bodies: [BODY c]
+joints: []
+vehicles: [VEHICLE v]
+BODY c: {name: c, mass: 1.0}
+wheel: &wheel {mesh: wheel.OBJ, radius: 0.30, width: 0.10, friction: 1, mine: kept}   # all four
+VEHICLE v:
+  name: v
+  chassis: BODY c
+  wheels:
+  - *wheel
+  # the second
+  - mesh: wheel.OBJ
+    width: 0.20
+    radius: 0.3
+    suspension: {stiffness: 10, damping: 1, compression: 1, rest length: 0.10}
+    steering limits: {low: -0.5, high: 0.5}
+  - *wheel
+"""
+    file = tmp_path / "v.yaml"
+    file.write_text(text)
+    done = import_file(file, bpy.context.scene)
+    assert prepared(done.collection, file).text == text
+    vehicle = next(o for o in done.collection.objects if o.adf.role == "VEHICLE")
+    vehicle.adf.vehicle.wheels[1].radius = 0.25
+    assert prepared(done.collection, file).text == text.replace("    radius: 0.3\n", "    radius: 0.25\n")
+    vehicle.adf.vehicle.wheels[2].radius = 0.25
+    after = prepared(done.collection, file).text
+    expanded = "  - {mesh: wheel.OBJ, radius: 0.25, width: 0.10, friction: 1, mine: kept}\n"
+    assert after == text.replace("    radius: 0.3\n", "    radius: 0.25\n")[: -len("  - *wheel\n")] + expanded
