@@ -6,6 +6,7 @@ STEP   := sh .ci/step.sh
 STAMPS := build/stamps
 SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
+READERS ?= 100000
 SCENES ?= 10000
 RELEASES ?= 100
 COMMANDS ?= 1000000
@@ -87,6 +88,7 @@ test-slow: developers
 fuzz: developers
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
 	$(PYTHON) -m tests.fuzz.run --scenes $(SCENES)
+	$(PYTHON) -m tests.fuzz.run --readers $(READERS)
 	$(PYTHON) -m tests.fuzz.release --trials $(RELEASES)
 	$(PYTHON) -m tests.fuzz.commands --commands $(COMMANDS)
 	$(PYTHON) -m tests.fuzz.kills --kills $(KILLS)

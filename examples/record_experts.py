@@ -1,7 +1,7 @@
 """Records demonstrations of a learning environment's scripted expert as a dataset.
 
-``python examples/record_experts.py OUT.h5 --task reach --episodes 50``; then ``ligature dataset export OUT.h5 FOLDER``
-and ``python examples/train_bc.py FOLDER``. Ctrl-C and SIGTERM keep the episodes that have ended.
+``python examples/record_experts.py OUT.h5 --task reach --episodes 50``; ``ligature dataset export OUT.h5 FOLDER`` makes
+a dataset of LeRobot of it. Ctrl-C and SIGTERM keep the episodes that have ended.
 """
 
 from __future__ import annotations

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
-from ligature.bus.record import Excerpt, Header, Moment, Record, RecordError, RecordWriter, is_record
+from hypothesis import given, strategies
+from hypothesis.strategies import DataObject, integers
+from ligature.bus.record import MOST_UPDATES, Excerpt, Header, Moment, Record, RecordError, RecordWriter, is_record
 from ligature.model.commands import BodyCommand, Command, CommandType, Reset
 from ligature.robots.commands import ServoJp
 
@@ -105,16 +108,42 @@ def test_a_record_that_is_cut_off_is_reported(whole: Path, share: float) -> None
 def test_what_is_no_record_is_reported(tmp_path: Path, whole: Path) -> None:
     other = tmp_path / "other"
     for data, message in (
-        (b"", "not a record of a run"),
-        (b"#ROSBAG V2.0\nabc", "not a record of a run"),
-        (b'{"format": "ligature record 9", "options": "", "begin": ""}\n', "this version reads 'ligature record 2'"),
-        (b'{"format": "ligature record 2", "begin": ""}\n', "not a record of a run"),
-        (whole.read_bytes()[:-44] + struct.pack("<QI", 9, 70_000), "invalid frame"),
-        (whole.read_bytes()[:-44] + struct.pack("<QI", 2, 8), "invalid frame"),
+        (b"", "line 1: not the header of a record"),
+        (b"#ROSBAG V2.0\nabc", "line 1: not the header of a record"),
+        (b'{"format": "ligature record 9", "options": "", "begin": ""}\n', "this version reads 'ligature record 3'"),
+        (b'{"format": "ligature record 3", "begin": ""}\n', "not the header of a record of a run"),
+        (whole.read_bytes()[:-60] + struct.pack("<QI", 9, 70_000), "invalid frame"),
+        (whole.read_bytes()[:-60] + struct.pack("<QI", 2, 8), "invalid frame"),
     ):
         other.write_bytes(data)
         with pytest.raises(RecordError, match=message):
             Record.read(other)
+
+
+@given(strategies.data())
+def test_a_record_with_any_byte_changed_is_found_before_anything_is_simulated(draw: DataObject) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "run.record")
+        writer = RecordWriter(path, HEADER)
+        for update, command in COMMANDS:
+            writer.write(update, command)
+        writer.finish(9, "cd" * 32)
+        content = bytearray(path.read_bytes())
+        at = draw.draw(integers(0, len(content) - 1))
+        content[at] ^= 1 << draw.draw(integers(0, 7))
+        path.write_bytes(content)
+        with pytest.raises(RecordError, match="run.record"):
+            Record.read(path)
+
+
+@given(integers(MOST_UPDATES + 1, 2**64 - 1))
+def test_a_run_that_would_be_replayed_for_ever_is_refused(updates: int) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "run.record")
+        writer = RecordWriter(path, HEADER)
+        writer.finish(updates, "cd" * 32)
+        with pytest.raises(RecordError, match=f"a run of {updates} updates; at most {MOST_UPDATES} are replayed"):
+            Record.read(path)
 
 
 def test_bytes_that_are_no_command_are_reported_with_their_place(whole: Path) -> None:

@@ -264,8 +264,8 @@ def rolled(env: gymnasium.Env) -> np.ndarray:
     return np.array([*seen, np.append(env.reset()[0], 0.0)])
 
 
-@pytest.mark.parametrize("task", ["reach", "pick", "insert", "puncture"])
-def test_what_was_saved_goes_on_to_the_bit_here_and_in_copies(task: str) -> None:
+@pytest.mark.parametrize("task", ["reach", "insert", pytest.param("pick", marks=pytest.mark.slow)])
+def test_what_was_saved_goes_on_to_the_bit_and_copies_go_on_alike(task: str) -> None:
     env = SuturingEnv(task)
     env.reset(seed=4)
     for action in ACTIONS:
@@ -273,10 +273,13 @@ def test_what_was_saved_goes_on_to_the_bit_here_and_in_copies(task: str) -> None
     state = env.save()
     first = rolled(env)
     env.restore(state)
-    copied, pickled = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
-    for other in (env, copied, pickled):
-        assert (rolled(other) == first).all()
+    assert (rolled(env) == first).all()
+    for duplicate in (copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))):
+        env.restore(state)
+        other = duplicate(env)
+        assert (rolled(other) == rolled(env)).all()
         other.close()
+    env.close()
 
 
 def test_a_copy_of_a_made_environment_steps() -> None:

@@ -23,6 +23,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from tests.fuzz import readers
 from tests.fuzz.mutate import mutate
 from tests.fuzz.scenes import scene
 from tests.fuzz.seeds import Seed, seeds, write_scene
@@ -127,6 +128,12 @@ class Campaign:
 
 
 MUTANTS = Campaign(try_mutant, mutant_files, "mutant", lambda number: Path(mutant(number)[0].name).suffix[1:])
+READERS = Campaign(
+    readers.try_reader,
+    lambda number: {readers.mutant(number)[0].name: readers.mutant(number)[1]},
+    "file",
+    lambda number: readers.mutant(number)[0].kind,
+)
 SCENES = Campaign(try_scene, scene_files, "scene", lambda number: "scene")
 
 
@@ -272,11 +279,17 @@ def main() -> int:
     kind = flags.add_mutually_exclusive_group()
     kind.add_argument("--mutants", type=int, default=100_000)
     kind.add_argument("--scenes", type=int, help="generated scenes, instead of mutants")
+    kind.add_argument("--readers", type=int, help="mutants of files that are no scenes, instead of mutants of scenes")
     flags.add_argument("--first", type=int, default=0, help="number of the first one")
     flags.add_argument("--jobs", type=int, default=2, help="worker processes")
     given = flags.parse_args()
     begin = time.monotonic()
-    if given.scenes is None:
+    if given.readers is not None:
+        cases, outcome = (
+            given.readers,
+            run(given.readers, given.first, given.jobs, campaign=READERS, log=sys.stderr.write),
+        )
+    elif given.scenes is None:
         cases, outcome = given.mutants, run(given.mutants, given.first, given.jobs, log=sys.stderr.write)
     else:
         cases = given.scenes
@@ -291,7 +304,7 @@ def main() -> int:
         )
     ended = ", ".join(f"{key} {count}" for key, count in sorted(outcome.ended.items()))
     seconds = time.monotonic() - begin
-    noun = "mutants" if given.scenes is None else "scenes"
+    noun = "files" if given.readers is not None else "mutants" if given.scenes is None else "scenes"
     sys.stdout.write(f"{cases} {noun} in {seconds:.0f} s: {ended}; {len(outcome.failures)} failures\n")
     return int(bool(outcome.failures))
 

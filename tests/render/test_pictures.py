@@ -16,6 +16,7 @@ from ligature.render import CameraView, Frame, Renderer, RenderUnavailable, view
 from ligature.render.camera import perspective
 
 from tests.render.stage import assert_looks_like
+from tests.wound import pass_through_the_wound
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
@@ -84,6 +85,17 @@ def small() -> Simulation:
     return posed(SMALL, None, arms, 2500)
 
 
+@pytest.fixture(scope="module")
+def soft() -> Simulation:
+    arms = {
+        "psm1/baselink": [-0.05, -0.12, 0.165, 0.5, 0.3, 0.2, 0.5, 0.5],
+        "psm2/baselink": [0.0, -0.12, 0.17, -0.4, -0.2, 0.1, 0.3, 0.3],
+    }
+    simulation = posed(ROOT / "scenes" / "soft_suturing" / "launch.yaml", None, arms, 1500)
+    pass_through_the_wound(simulation)
+    return simulation
+
+
 def test_the_small_scene_looks_as_in_the_readme(small: Simulation) -> None:
     renderer = renderer_of(small)
     frame = renderer.render(small.state, view(small, 0, (960, 600)))
@@ -114,6 +126,32 @@ def test_a_needle_is_steel_and_a_thread_is_round_from_near(small: Simulation) ->
     assert np.abs(steel.max(axis=1) - steel.min(axis=1)).mean() < 40, "steel has no colour of its own"
     thread = frame.rgb[frame.ids == 1 + names.index("Thread")].astype(int)
     assert thread.std(axis=0).max() > 8, "a round thread is lighter in the middle than at its sides"
+
+
+def test_a_needle_in_soft_tissue_crosses_the_wound(soft: Simulation) -> None:
+    """Shaft between the lips, thread behind it, a mark where it went in; and the pad through the endoscope."""
+    pad = body(soft, "Pad")[:3]
+    at = pad + [0.0, 0.006, 0.0075]
+    frame = renderer_of(soft).render(soft.state, from_above(at, at + [0.02, -0.05, 0.06], (720, 450)), ("rgb", "ids"))
+    assert_looks_like(frame.rgb, PICTURES / "tissue.png", MOVED)
+    names = [b.identity.name for b in soft.scene.bodies]
+    assert {"Needle", "Pad", "Thread"} <= {names[i - 1] for i in np.unique(frame.ids) if i}
+
+
+def test_the_soft_scene_looks_as_in_the_pages(soft: Simulation) -> None:
+    frame = renderer_of(soft).render(soft.state, view(soft, 0, (640, 480)))
+    assert_looks_like(frame.rgb, PICTURES / "soft_suturing.png", MOVED)
+
+
+def from_above(at: np.ndarray, eye: np.ndarray, size: tuple[int, int]) -> CameraView:
+    """What is seen from ``eye`` (3,) that looks at ``at`` (3,), z up."""
+    away = (eye - at) / np.linalg.norm(eye - at)
+    right = np.cross([0.0, 0.0, 1.0], away)
+    right /= np.linalg.norm(right)
+    R = np.array([right, np.cross(away, right), away])
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, -R @ eye
+    return CameraView(T, perspective(0.45, size[0] / size[1], 0.001, 10.0), 0.001, 10.0, *size)
 
 
 def test_a_labs_scene_is_seen_with_both_eyes_depth_and_ids(corpus: Path) -> None:

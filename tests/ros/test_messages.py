@@ -51,6 +51,7 @@ TriggerOperatingState d941a2d049e2c9ac5773fc4a3a8a892d
 
 CISST = """
 IntervalStatistics 25eabfa93979fc6d9ab895c84674476c
+mtsIntervalStatistics fc177c4951f85470a8a9c80c56822cfb
 BoolStamped 542e22b190dc8e6eb476d50dda88feb7
 DoubleVec fb60495edd59d3fcf90e173153ae8a9a
 """

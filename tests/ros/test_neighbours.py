@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.ros.conftest import BIN, SMALL, Program
+from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 
@@ -70,3 +72,66 @@ def test_frames_of_two_simulators_are_distinguished(start: Callable[..., Program
     half = [pair for pair in seen() if pair[0].startswith("left/") != pair[1].startswith("left/")]
     assert half == []  # no frame of one hangs below a frame of the other
     assert second.end() == 0
+
+
+@pytest.fixture(scope="module")
+def both(start: Callable[..., Program], node: Any) -> Iterator[dict[str, Any]]:
+    """A PSM of each of two simulators with prefixes, beside the one without."""
+    from tests.ros import crtk
+
+    programs = [
+        start(BIN / "ligature", "run", SMALL, "-p", "100", "--no-cameras", "--ns", f"/{side}", "--src-crtk")
+        for side in ("left", "right")
+    ]
+    for program in programs:
+        program.wait_for("first state published")
+    arms = {side: crtk.Psm(node, f"{side}/PSM1") for side in ("left", "right")}
+    for arm in arms.values():
+        arm.check_connections(10.0)
+    yield arms
+    for arm in arms.values():
+        arm.close()
+    for program in programs:
+        assert program.end() == 0
+        assert "stays silent" not in program.output
+
+
+def test_two_simulators_with_prefixes_are_driven_independently(both: dict[str, Any], node: Any) -> None:
+    from tests.ros import crtk
+
+    system = crtk.System(node, "left/system")
+    system.check_connections(10.0)
+    system.say("power_on", crtk.Empty())
+    left, right = both["left"], both["right"]
+    until(lambda: left.state.now.state == "ENABLED", "the left one has power", 20.0)
+    assert right.state.now.state == "DISABLED", "the right one has not"
+    assert left.home(20.0) and right.enable(10.0) and right.home(20.0)
+    goals = {"left": [0.2, 0.0, 0.13, 0.0, 0.0, 0.0], "right": [-0.2, 0.1, 0.11, 0.0, 0.0, 0.0]}
+    moves = [both[side].move_jp(goal) for side, goal in goals.items()]
+    assert all(move.wait() for move in moves)
+    for side, goal in goals.items():
+        until(lambda side=side, goal=goal: np.allclose(both[side].measured_jp(), goal, atol=2e-3), side, 10.0)
+    left.say("servo_jp", crtk.JointState(position=[0.0] * 2 + [0.13, 0.0, 0.0, 0.0]))
+    until(lambda: abs(left.measured_jp()[0]) < 2e-3, "the left one goes back", 10.0)
+    assert np.allclose(right.measured_jp(), goals["right"], atol=2e-3)
+    system.close()
+
+
+def test_everything_of_a_simulator_with_a_prefix_is_below_it(both: dict[str, Any], listen: Callable[..., Any]) -> None:
+    """No topic and no service of it stands elsewhere, but those that every node has, and frames for everybody."""
+    import rosgraph
+    from tf2_msgs.msg import TFMessage
+
+    everybody = {"/rosout", "/diagnostics", "/tf", "/tf_static"}
+    published, subscribed, services = rosgraph.Master("/look").getSystemState()
+    names = [
+        name for kind in (published, subscribed, services) for name, nodes in kind if "/ligature_left_ambf_env" in nodes
+    ]
+    assert len(names) > 300
+    outside = {name for name in names if not name.startswith(("/left/", "/ligature_left_ambf_env/"))}
+    assert outside <= everybody
+    for side, other in (("left", "right"), ("right", "left")):
+        tf = listen(f"/{side}/tf", TFMessage)
+        tf.wait(lambda m: any(t.child_frame_id.endswith("PSM1") for t in m.transforms), 20.0)
+        frames = {t.child_frame_id for m in tf.messages for t in m.transforms}
+        assert f"{side}/PSM1" in frames and not any(name.startswith(f"{other}/") for name in frames)

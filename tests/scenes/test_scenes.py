@@ -11,9 +11,14 @@ import numpy as np
 import pytest
 from ligature import Simulation
 from ligature.adf import Severity
+from ligature.arms import ArmSet
 from ligature.model.frames import axis_rotation, frame, inverse
+from ligature.model.scene import Scene
+from ligature.model.state import new_state
 from ligature.render import Renderer, RenderUnavailable, view_of
 from PIL import Image
+
+from tests.wound import pass_through_the_wound
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 LAUNCHES = sorted(SCENES.glob("*/launch*.yaml"))
@@ -105,19 +110,50 @@ def test_triangles_rest_on_the_board_around_their_posts() -> None:
         assert np.abs(block.twist).max() < 1e-3, number
 
 
+def reaching(scene: Scene, arms: ArmSet, places: list[np.ndarray]) -> list[set[str]]:
+    """The arms that bring their tool, pointing down, to each of ``places`` (3,)."""
+    down = np.diag([1.0, -1.0, -1.0])
+    found = []
+    for place in places:
+        reached = set()
+        for arm in (a for a in scene.arms if a.name in ("PSM1", "PSM2")):
+            T_base = inverse(scene.bodies[arm.base].T_world_body)
+            turns = [frame(down @ axis_rotation((0, 0, 1), t), place) for t in np.linspace(-1.5, 1.5, 7)]
+            if arms[arm.name].kinematics.inverse(np.array([T_base @ T for T in turns])).ok.any():
+                reached.add(arm.name)
+        found.append(reached)
+    return found
+
+
 def test_every_post_is_within_reach_of_an_arm() -> None:
     author = authored_by("author_peg_transfer")
     scene = ligature.load(SCENES / "peg_transfer" / "launch.yaml")
-    arms = Simulation(scene).arms
-    down = np.diag([1.0, -1.0, -1.0])
-    for x, y in author.posts():
-        above = frame(down, np.array(author.theatre.PLACE) + [x, y, author.BOARD[2] + 0.03])
-        reached = []
-        for arm in (a for a in scene.arms if a.name in ("PSM1", "PSM2")):
-            T_base = inverse(scene.bodies[arm.base].T_world_body)
-            turns = [above @ frame(axis_rotation((0, 0, 1), t), np.zeros(3)) for t in np.linspace(-1.5, 1.5, 7)]
-            reached.append(arms[arm.name].kinematics.inverse(np.array([T_base @ T for T in turns])).ok.any())
-        assert any(reached), (x, y)
+    places = [np.array(author.theatre.PLACE) + [x, y, author.BOARD[2] + 0.03] for x, y in author.posts()]
+    assert all(reaching(scene, Simulation(scene).arms, places))
+
+
+def test_both_arms_reach_both_sides_of_the_wound_and_the_needle() -> None:
+    author = authored_by("author_soft_suturing")
+    scene = ligature.load(SCENES / "soft_suturing" / "launch.yaml")
+    top = author.BOARD_HIGH[2] + author.PAD[2]
+    beside = [(author.ASIDE + x, y, top + 0.012) for x in (-0.008, 0.008) for y in (-0.02, 0.0, 0.02)]
+    places = [np.array(author.theatre.PLACE) + place for place in [*beside, (*author.NEEDLE, 0.02)]]
+    assert reaching(scene, Simulation(scene).arms, places) == [{"PSM1", "PSM2"}] * 7
+
+
+def test_a_needle_passes_both_lips_of_the_wound_and_stays_on_its_way() -> None:
+    simulation = Simulation(ligature.load(SCENES / "soft_suturing" / "launch.yaml"))
+    top = pass_through_the_wound(simulation)
+    state = simulation.state[0]
+    count = int(state["puncture_count"][0])
+    across = np.sort(state["puncture_point"][0, :count, 0] - simulation.bodies["Pad"].pose[0])
+    assert count == 3 and across[0] == pytest.approx(-0.0085, abs=5e-4), across
+    assert np.abs(across[1:] - [-0.002, 0.002]).max() < 5e-4, "the walls of the wound are where its width has them"
+    form = simulation.scene.tissues[0].form
+    moved = state["tissue_node"][simulation.scene.tissues[0].rows] - new_state(simulation.scene)["tissue_node"][0]
+    assert np.isfinite(moved).all() and 1e-5 < np.abs(moved).max() < 2e-3
+    assert np.abs(moved[form.fixed]).max() < 1e-12
+    assert top == pytest.approx(state["tissue_node"][:, 2].max(), abs=1e-3)
 
 
 def test_looks_are_what_their_script_writes() -> None:

@@ -93,6 +93,9 @@ def _check_entry(
         message = f"key '{path}' of {element.kind} '{element.key}' has no effect"
         found.append(Diagnostic(Severity.DEBUG, message, key_node.mark, key.doc, "ignored"))
     else:
+        if key.status is Status.UNUSED:
+            message = f"key '{path}' of {element.kind} '{element.key}' has no effect here, other than in AMBF"
+            found.append(Diagnostic(Severity.DEBUG, message, key_node.mark, key.doc, "unused"))
         _check_value(key, value, element, found)
 
 

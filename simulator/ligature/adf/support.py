@@ -9,8 +9,9 @@ _INTRODUCTION = """# ADF support
 Every key that the reader knows, by kind of file or object, with its type, default and what becomes of it. Section
 numbers (§) are those of the ADF specification. Keys that are not here are reported as unknown, with a suggestion.
 
-- **used**, where nothing else is stated: has the effect that AMBF gives it.
+- **used**, where nothing else is stated: has the effect that AMBF gives it (`tests/adf/test_effects.py` tries each).
 - **{ignored}**: legal, without effect there and here; reported at debug level (`ligature check -v`).
+- **{unused}**: AMBF uses it, and its meaning is stated; its value is checked, and `ligature check -v` names it.
 - **{kept}**: handed on as written; no plug-in is run.
 - **{not_simulated_status}**: of kinds that are not simulated.
 - **{ours}**, so files that use it stay valid there.
@@ -33,6 +34,7 @@ def support_table() -> str:
     parts = [
         _INTRODUCTION.format(
             ignored=Status.IGNORED.value,
+            unused=Status.UNUSED.value,
             kept=Status.KEPT.value,
             not_simulated_status=Status.NOT_SIMULATED.value,
             ours=Status.OURS.value,

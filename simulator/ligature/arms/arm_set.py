@@ -70,7 +70,9 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def release(self, index: int) -> None:
         """Whoever commanded an arm is gone: it stays where it is."""
         arm = self._arms[index]
-        if arm.is_enabled and arm.is_homed:
+        if arm.is_taken_over:
+            self._guarded("hold", arm, arm.direct, "hold")
+        elif arm.is_enabled and arm.is_homed:
             self._guarded("hold", arm, arm.hold)
 
     def step(self, tick: int) -> None:

@@ -2,12 +2,14 @@
 
 The same scene and commands give the same bits, so that a record is all that a run was. A file has one line of JSON,
 then frames: update (u8), length (u4), a command as `ligature.bus.codec` packs it; the last has the length `END` and
-holds the hash of the final state. A record that was asked for in the middle of a run holds all commands before, too,
-and a frame of the length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
+holds the hash of the final state, then the digest of all bytes before: a damaged record is found before anything is
+simulated. A record that was asked for in the middle of a run holds all commands before, too, and a frame of the
+length `BEGIN` with the hash of the state then. Until it is whole the file is called ``NAME.active``.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import struct
@@ -21,11 +23,18 @@ from ligature.bus.codec import CodecError, decode, encode
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
 
-FORMAT = "ligature record 2"
+FORMAT = "ligature record 3"
 END, BEGIN = 0xFFFFFFFF, 0xFFFFFFFE
 _HEAD = struct.Struct("<QI")
 _HASH_BYTES = 32
 _CHUNK = 1 << 20
+_DIGEST_BYTES = 16
+
+MOST_UPDATES = 10**9
+"""Longest run that is replayed: 11 days at 1000 updates per second."""
+
+MOST_FILE_BYTES = 1 << 32
+"""Largest record: 18 hours of servo commands to five arms at 1000 Hz."""
 
 
 class RecordError(ValueError):
@@ -54,14 +63,19 @@ class Journal:
 
     def __init__(self, file: BinaryIO, header: Header) -> None:
         self._file = file
+        self._digest = _new_digest()
         head = {"format": FORMAT, "options": header.options, "begin": header.begin}
-        self._file.write(json.dumps(head).encode() + b"\n")
+        self._put(json.dumps(head).encode() + b"\n")
         self._file.flush()
+
+    def _put(self, data: bytes) -> None:
+        self._file.write(data)
+        self._digest.update(data)
 
     def write(self, update: int, command: Command) -> None:
         """Note that ``command`` was taken after ``update`` updates."""
         data = encode(command)
-        self._file.write(_HEAD.pack(update, len(data)) + data)
+        self._put(_HEAD.pack(update, len(data)) + data)
 
     def flush(self) -> None:
         """Hand what was written to the disk."""
@@ -72,13 +86,13 @@ class Journal:
         self._file.flush()
         return Moment(update, state_hash, self._file.tell())
 
-    def copy(self, into: BinaryIO, begin: int, end: int) -> None:
-        """Copy bytes from ``begin`` to ``end``; may run beside `write` on another thread."""
+    def copy(self, put: Callable[[bytes], object], begin: int, end: int) -> None:
+        """Give ``put`` bytes from ``begin`` to ``end``; may run beside `write` on another thread."""
         while begin < end:
             data = os.pread(self._file.fileno(), min(_CHUNK, end - begin), begin)
             if not data:
                 raise OSError(0, "the journal of the run has been truncated")
-            into.write(data)
+            put(data)
             begin += len(data)
 
     def close(self) -> None:
@@ -96,7 +110,8 @@ class RecordWriter(Journal):
 
     def finish(self, update: int, state_hash: str) -> None:
         """End with the hash of the state after ``update`` updates; now the file gets its name."""
-        self._file.write(_HEAD.pack(update, END) + bytes.fromhex(state_hash))
+        self._put(_HEAD.pack(update, END) + bytes.fromhex(state_hash))
+        self._file.write(self._digest.digest())
         self._file.close()
         self._part.replace(self._path)
 
@@ -119,12 +134,18 @@ class Excerpt:
 
     def finish(self, end: Moment) -> None:
         """Write all of it, and give the file its name; takes as long as the disk does, on any thread."""
-        begin, file, journal = self.begin, self._file, self._journal
+        begin, file, journal, digest = self.begin, self._file, self._journal, _new_digest()
+
+        def put(data: bytes) -> None:
+            file.write(data)
+            digest.update(data)
+
         try:
-            journal.copy(file, 0, begin.size)
-            file.write(_HEAD.pack(begin.update, BEGIN) + bytes.fromhex(begin.state))
-            journal.copy(file, begin.size, end.size)
-            file.write(_HEAD.pack(end.update, END) + bytes.fromhex(end.state))
+            journal.copy(put, 0, begin.size)
+            put(_HEAD.pack(begin.update, BEGIN) + bytes.fromhex(begin.state))
+            journal.copy(put, begin.size, end.size)
+            put(_HEAD.pack(end.update, END) + bytes.fromhex(end.state))
+            file.write(digest.digest())
             file.close()
             self._part.replace(self.path)
         except OSError:
@@ -164,12 +185,17 @@ class Record:
     @classmethod
     def read(cls, path: Path) -> Record:
         """The record ``path``; raises `RecordError`, and OSError."""
+        if path.stat().st_size > MOST_FILE_BYTES:
+            raise RecordError(f"{path}: has more than {MOST_FILE_BYTES >> 30} GiB; no record is as large")
         data = path.read_bytes()
         header, begin = _header(data, path)
         commands: list[tuple[int, Command]] = []
         asked = (1, 0, "")
         for update, length, at in _frames(data, begin, path):
             if length == END:
+                if len(data) < at + _HASH_BYTES + _DIGEST_BYTES:
+                    break
+                _check_whole(data, at + _HASH_BYTES, path)
                 return cls(header, tuple(commands), update, data[at : at + _HASH_BYTES].hex(), *asked)
             if length == BEGIN:
                 asked = (update, len(commands), data[at : at + _HASH_BYTES].hex())
@@ -217,9 +243,21 @@ def _header(data: bytes, path: Path) -> tuple[Header, int]:
         if head["format"] != FORMAT:
             raise RecordError(f"{path}: is a '{head['format']}'; this version reads '{FORMAT}'")
         header = Header(str(head["options"]), str(head["begin"]))
-    except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError):
-        raise RecordError(f"{path}: not a record of a run") from None
+    except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, RecursionError):
+        raise RecordError(f"{path}: line 1: not the header of a record of a run") from None
     return header, len(line) + len(newline)
+
+
+def _new_digest() -> hashlib.blake2b:
+    return hashlib.blake2b(digest_size=_DIGEST_BYTES)
+
+
+def _check_whole(data: bytes, end: int, path: Path) -> None:
+    """Raise `RecordError` unless the bytes before ``end`` are those that were written."""
+    digest = _new_digest()
+    digest.update(memoryview(data)[:end])
+    if data[end:] != digest.digest():
+        raise RecordError(f"{path}: at byte {end}: the record is damaged: its digest does not fit what it holds")
 
 
 def _frames(data: bytes, at: int, path: Path) -> Iterator[tuple[int, int, int]]:
@@ -231,6 +269,8 @@ def _frames(data: bytes, at: int, path: Path) -> Iterator[tuple[int, int, int]]:
         size = _HASH_BYTES if length in (BEGIN, END) else length
         if size > MOST_BYTES or update < before:
             raise RecordError(f"{path}: at byte {at}: invalid frame")
+        if update > MOST_UPDATES:
+            raise RecordError(f"{path}: at byte {at}: a run of {update} updates; at most {MOST_UPDATES} are replayed")
         if at + size > len(data):
             return
         yield update, length, at

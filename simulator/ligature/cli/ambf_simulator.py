@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
+from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, rate_notes
 from ligature.cli.supervisor import supervise
 
 MAX_UPDATE_RATE = 1000.0
@@ -39,6 +39,8 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
     flags.add_argument("--override_min_comm_freq", type=int, help="publishing rate without commands")
     flags.add_argument("--arm", action="append", default=[], type=_arm, help="NAME=KIND:BODY:TOOL (not an AMBF flag)")
+    flags.add_argument("--only", default="", help="names of the arms that are there (not an AMBF flag)")
+    flags.add_argument("--no-masters", action="store_true", help="no master arms (not an AMBF flag)")
     flags.add_argument("--src-crtk", action="store_true", help="arms under /CRTK too (not an AMBF flag)")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument(
@@ -73,6 +75,10 @@ def options_of(arguments: list[str]) -> RunOptions:
         devices = model_indices(given.i)
     except ValueError as error:
         flags.error(f"-i {error}")
+    try:
+        only = arm_names(given.only)
+    except ValueError as error:
+        flags.error(f"--only {error}")
     if not given.p >= 1 or not 0 < given.s < float("inf"):
         flags.error("-p must be at least 1 update per second, and -s larger than 0")
     for name in ("override_min_comm_freq", "override_max_comm_freq"):
@@ -84,7 +90,7 @@ def options_of(arguments: list[str]) -> RunOptions:
         min(given.p, MAX_UPDATE_RATE), given.s,
         min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
-        window=bool(given.g), notes=_notes(given), devices=devices,
+        window=bool(given.g), notes=_notes(given), devices=devices, only=only, masters=not given.no_masters,
     )  # fmt: skip
 
 

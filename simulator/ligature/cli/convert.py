@@ -14,6 +14,7 @@ from ligature.authoring.mjcf import from_mjcf
 from ligature.authoring.objfile import MeshWriteError, Paint, Surface, obj_texts
 from ligature.authoring.save import SaveError, checked_text, save_all
 from ligature.authoring.urdf import from_urdf
+from ligature.authoring.xml_files import XmlError, check_xml
 
 
 def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
@@ -25,9 +26,10 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
         console.print(f"{source}: file not found", style="red", markup=False)
         return 1
     try:
+        check_xml(source)
         converted = _mjcf(source) if _is_mjcf(source) else _urdf(source)
         written = save_all(_files(converted, out.resolve(), namespace))
-    except (SaveError, PatchError, MeshWriteError, MissingReaderError) as error:
+    except (SaveError, PatchError, MeshWriteError, MissingReaderError, XmlError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
     except Exception as error:  # what a library raises for bad files is its own affair

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from ligature.bundle import launch_file, scene_names
 from ligature.cli.missing import remedy
-from ligature.cli.options import RunOptions, arm_entry, model_indices, rate_notes
+from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, rate_notes
 from ligature.cli.sampling import Sampling, picture_size
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import Softening
@@ -118,6 +118,10 @@ def run(
         Optional[list[str]],  # noqa: UP045
         typer.Option(help="An arm, NAME=KIND:BODY:TOOL; replaces the arms found in the scene; repeatable."),
     ] = None,
+    only: Annotated[str, typer.Option(help="Names of the arms that are there, such as PSM1,PSM2; no others.")] = "",
+    masters: Annotated[
+        bool, typer.Option("--masters/--no-masters", help="With master arms, or without: a real console has its own.")
+    ] = True,
     src_crtk: Annotated[
         bool, typer.Option("--src-crtk", help="Publish arms under /CRTK too, as the challenge's node does.")
     ] = False,
@@ -155,6 +159,7 @@ def run(
         for text in arms:
             arm_entry(text)
         Softening(soft or ())
+        names_of_arms = arm_names(only)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     options = RunOptions(
@@ -162,7 +167,7 @@ def run(
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
         task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
-        devices=indices(devices) or (), soft=tuple(soft or ()),
+        devices=indices(devices) or (), soft=tuple(soft or ()), only=names_of_arms, masters=masters,
     )  # fmt: skip
     supervise(options)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+import math
+from dataclasses import asdict, dataclass, replace
+from types import UnionType
+from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
 import ligature
+from ligature.adf import Diagnostic, Severity
 
 if TYPE_CHECKING:
-    from ligature.model.scene import Camera, Scene
+    from ligature.model.scene import ArmDescription, Camera, Scene
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,8 @@ class RunOptions:
     one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
     the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines for the user at
     the start, ``devices`` are indices of the input devices whose proxies are there, ``soft`` bodies
-    that are soft tissue.
+    that are soft tissue, ``only`` the names of the arms that are there (empty: all), ``masters`` whether
+    master arms are.
     """
 
     scene: str
@@ -50,12 +54,28 @@ class RunOptions:
     notes: tuple[str, ...] = ()
     devices: tuple[int, ...] = ()
     soft: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
+    masters: bool = True
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
         arms = [arm_entry(text) for text in self.arms] if self.arms else None
-        return ligature.load(
+        scene = ligature.load(
             self.scene, self.models, self.files, self.roots, self.prefix, arms, self.devices, self.soft
+        )
+        return replace(scene, arms=self._chosen(scene))
+
+    def _chosen(self, scene: Scene) -> tuple[ArmDescription, ...]:
+        """The arms of a scene that are asked for; raises `ligature.SceneError` for one that is missing."""
+        known = [arm.name for arm in scene.arms]
+        missing = [name for name in self.only if name not in known]
+        if missing:
+            text = f"--only: the scene has no arm '{missing[0]}'; it has {', '.join(known) or 'none'}"
+            raise ligature.SceneError(Diagnostic(Severity.ERROR, text))
+        return tuple(
+            arm
+            for arm in scene.arms
+            if (not self.only or arm.name in self.only) and (self.masters or arm.kind.value != "mtm")
         )
 
     def shown_cameras(self, scene: Scene) -> tuple[Camera, ...]:
@@ -70,12 +90,38 @@ class RunOptions:
 
     @classmethod
     def from_text(cls, text: str) -> RunOptions:
-        """The options of `to_text`."""
-        values = json.loads(text)
-        for name in ("models", "files", "roots", "arms", "notes", "devices", "soft"):
-            if values.get(name) is not None:
-                values[name] = tuple(values[name])
-        return cls(**values)
+        """The options of `to_text`; raises ValueError for any other text, which a record of a stranger may hold."""
+        try:
+            values = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"the options of the run are not JSON: {error}") from None
+        if not isinstance(values, dict):
+            raise ValueError(f"the options of the run are {type(values).__name__}, not names with values")
+        types = get_type_hints(cls)
+        for name, value in values.items():
+            if name not in types:
+                raise ValueError(f"the options of the run have an unknown name '{name[:40]}'")
+            if isinstance(value, list):
+                value = values[name] = tuple(value)
+            if not _fits(value, types[name]):
+                raise ValueError(f"option '{name}' of the run is {str(value)[:40]!r}, not {types[name]}")
+        if not isinstance(values.get("scene"), str):
+            raise ValueError("the options of the run name no scene")
+        options = cls(**values)
+        if not (1.0 <= options.rate <= 1000.0 and 0.0 < options.speed < math.inf):
+            raise ValueError(f"the run has {options.rate:g} updates per second at speed {options.speed:g}")
+        return options
+
+
+def _fits(value: object, type_: Any) -> bool:
+    """Whether ``value`` is of a type such as ``tuple[int, ...] | None``."""
+    if get_origin(type_) is UnionType:
+        return any(_fits(value, each) for each in get_args(type_))
+    if get_origin(type_) is tuple:
+        return isinstance(value, tuple) and all(_fits(each, get_args(type_)[0]) for each in value)
+    if type_ in (int, float):
+        return isinstance(value, int if type_ is int else (int, float)) and not isinstance(value, bool)
+    return isinstance(value, type_)
 
 
 def arm_entry(text: str) -> dict[str, str]:
@@ -93,6 +139,14 @@ def arm_entry(text: str) -> dict[str, str]:
     if body:
         found["tip" if kind == "camera" else "base"] = body
     return {**found, "tool": tool} if tool else found
+
+
+def arm_names(text: str) -> tuple[str, ...]:
+    """Names of a list such as ``PSM1, PSM2``; raises ValueError for one without any."""
+    found = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    if text and not found:
+        raise ValueError(f"'{text}' is not a list of arms such as PSM1,PSM2")
+    return found
 
 
 def model_indices(text: str) -> tuple[int, ...]:

@@ -99,6 +99,8 @@ def replay(
 
 
 def _again(record: Record, scene: Path | None, dataset: Sampled | None, console: Console) -> int:
+    rate = RunOptions.from_text(record.header.options).rate
+    console.print(f"{len(record.commands)} commands, {record.updates / rate:.3f} s of simulated time", markup=False)
     clock = time.perf_counter()
     if dataset is None:
         simulation = resimulate(record, scene)

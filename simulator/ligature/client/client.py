@@ -5,6 +5,8 @@ from __future__ import annotations
 import os.path
 import threading
 import time
+from collections.abc import Sequence
+from difflib import SequenceMatcher
 from typing import Any
 
 import rospy
@@ -36,6 +38,8 @@ FIRST_STATE_TIMEOUT = 0.5
 """Seconds to wait for an object's first state when its handle is given out."""
 POLL = 0.02
 COMPLAINT_PAUSE = 5.0
+NAMED, LINES, LINE = 4, 2, 120
+"""A failed look-up names so many of the closest objects, in so many lines of so many characters."""
 
 
 class Client:
@@ -185,9 +189,15 @@ class Client:
         if len(matches) == 1:
             return self._objects[matches[0]]
         if matches:
-            rospy.logwarn(f"{name!r} is a part of several names, give more of one: {', '.join(matches)}")
+            rospy.logwarn(f"{name!r} is a part of {len(matches)} names, give more of one\n" + _some(matches))
+        elif self._objects:
+            close = sorted(self._objects, key=lambda key: -SequenceMatcher(None, name, key).ratio())
+            rospy.logwarn(
+                f"no object's name contains {name!r} (get_obj_names() lists all {len(close)}); the closest are\n"
+                + _some(close[:NAMED])
+            )
         else:
-            rospy.logwarn(f"no object's name contains {name!r}; there are: {', '.join(self._objects) or 'none'}")
+            rospy.logwarn(f"no object's name contains {name!r}: there are no objects; is the simulator running?")
         return None
 
     def _publish(self) -> None:
@@ -199,6 +209,18 @@ class Client:
             now = time.monotonic()
             due = max(due + self._period, now)
             time.sleep(due - now)
+
+
+def _some(names: Sequence[str]) -> str:
+    """One or two lines of names, and how many more there are."""
+    lines = [""]
+    for count, name in enumerate(names):
+        if len(lines[-1]) + len(name) > LINE and lines[-1]:
+            if len(lines) == LINES:
+                return "\n".join(lines) + f" and {len(names) - count} more"
+            lines.append("")
+        lines[-1] += ("  " if not lines[-1] else ", ") + name
+    return "\n".join(lines)
 
 
 def _send(handle: BaseObject) -> None:

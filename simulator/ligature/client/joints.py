@@ -32,6 +32,14 @@ class JointedObject(BaseObject):
         """Principal moments of inertia, kg·m²."""
         return self._state.pInertia
 
+    def get_force_command(self) -> Vector3:
+        """The commanded force, zero while none was commanded."""
+        return self._cmd.wrench.force
+
+    def get_torque_command(self) -> Vector3:
+        """The commanded torque, zero while none was commanded."""
+        return self._cmd.wrench.torque
+
     def set_force(self, fx: float, fy: float, fz: float) -> None:
         """Command a force on the centre of mass, world axes; the torque stays the commanded one."""
         self.set_wrench(Wrench(vector(fx, fy, fz), self._cmd.wrench.torque))
@@ -101,6 +109,9 @@ class JointedObject(BaseObject):
     def get_publish_children_names_flag(self) -> bool:
         """Whether the command asks for the names of children."""
         return self._cmd.publish_children_names
+
+    get_publish_children_name_flag = get_publish_children_names_flag
+    """As AMBF writes it too."""
 
     def get_publish_joint_names_flag(self) -> bool:
         """Whether the command asks for the names of joints."""

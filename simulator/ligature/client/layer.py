@@ -53,10 +53,10 @@ class ral:  # noqa: N801 - the name that clients import
         return list(rospy.myargv(list(argv)))
 
     def create_child(self, child_namespace: str) -> ral:
-        """A ``ral`` of a namespace below this one; ValueError when that child exists."""
+        """A ``ral`` of a namespace below this one; RuntimeError when that child exists, as in CRTK's."""
         name = child_namespace.strip("/")
         if name in self._children:
-            raise ValueError(f"ral {self._namespace or '/'!r} has a child {name!r} already")
+            raise RuntimeError(f"ral {self._namespace or '/'!r} has a child {name!r} already")
         child = ral(self._node_name, f"{self._namespace}/{name}", self._node)
         self._children[name] = child
         return child
@@ -98,6 +98,10 @@ class ral:  # noqa: N801 - the name that clients import
     def create_rate(self, hz: float) -> rospy.Rate:
         """A rate whose ``sleep()`` keeps a loop at ``hz``; a number in text, as from a command line, will do."""
         return rospy.Rate(float(hz))
+
+    def sleep(self, seconds: Any) -> None:
+        """Wait for ``seconds``, a number or a duration."""
+        time.sleep(max(0.0, self.to_sec(seconds) if hasattr(seconds, "to_sec") else float(seconds)))
 
     def create_time(self) -> rospy.Time:
         """The time zero."""
@@ -171,8 +175,11 @@ class ral:  # noqa: N801 - the name that clients import
 
         With ``check_children`` also in children.
 
-        TimeoutError names what is missing after ``timeout_seconds``; zero looks once. Services are not checked.
+        TimeoutError names what is missing after ``timeout_seconds``; with zero nothing is checked, as in CRTK's.
+        Services are not checked.
         """
+        if timeout_seconds == 0:
+            return
         deadline = time.monotonic() + timeout_seconds
         while unheard := self._unconnected(check_children):
             if time.monotonic() >= deadline:

@@ -22,6 +22,8 @@ class RigidBody(JointedObject):
 
     State = RigidBodyState
     Command = RigidBodyCmd
+    object_type, body_type = "RIGID_BODY", "DYNAMIC"
+    _twisted = False
 
     def get_linear_vel(self) -> Vector3:
         """Velocity of the centre of mass."""
@@ -30,6 +32,14 @@ class RigidBody(JointedObject):
     def get_angular_vel(self) -> Vector3:
         """Angular velocity."""
         return self._state.twist.angular
+
+    def get_linear_velocity_command(self) -> Vector3:
+        """The commanded velocity, or the measured one while none was commanded."""
+        return (self._cmd if self._twisted else self._state).twist.linear
+
+    def get_angular_velocity_command(self) -> Vector3:
+        """The commanded angular velocity, or the measured one while none was commanded."""
+        return (self._cmd if self._twisted else self._state).twist.angular
 
     def set_linear_vel(self, vx: float, vy: float, vz: float) -> None:
         """Command a velocity ``vx``, ``vy``, ``vz`` (m/s); the angular one stays the commanded one."""
@@ -46,6 +56,7 @@ class RigidBody(JointedObject):
         with self._lock:
             self._cmd.twist = copy.deepcopy(twist)
             self._cmd.cartesian_cmd_type = VELOCITY
+            self._twisted = True
 
     def velocity_command(
         self, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, *_joints: float

@@ -66,7 +66,7 @@ class Cockpit:
         block.read(self._state)
         block.events.skip()
         self._address = address
-        self.server = serve(address, Gate(address, token))
+        self.server = serve(address, Gate(address, token, warn))
         self._deadman = DeadMan(self.server)
         self._inbox: deque[tuple[str, int, Any]] = deque()
         self._clockwork = Clockwork(self._outbox.push)

@@ -6,10 +6,13 @@ where there is no token: they could reach a loopback address through the browser
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import hmac
 import http
 import inspect
+import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from html import escape
@@ -23,6 +26,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ligature.cockpit.address import Address
+from ligature.cockpit.guesses import REPORT_PAUSE, Guesses
 from ligature.cockpit.intake import MOST_BYTES, careful
 
 COOKIE = "ligature_cockpit"
@@ -40,6 +44,9 @@ HEADERS = {
 MOST_PATH = 2000
 """Most characters of the path of a request."""
 
+MOST_CONNECTIONS = 64
+"""Most browsers at a time: one that never reads holds half a megabyte until its connection is given up."""
+
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Ligature cockpit</title>
 <body style="font-family: sans-serif; background: #1a1b1e; color: #c1c2c5; text-align: center; padding-top: 20vh">
 <h2>Ligature cockpit</h2><p id="why">{why}</p>
@@ -47,22 +54,50 @@ _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Ligature 
 
 
 class Gate:
-    """Decides about every request to ``address`` before anything else sees it; no ``token`` (empty) asks for none."""
+    """Decides about every request to ``address`` before anything else sees it; no ``token`` (empty) asks for none.
 
-    def __init__(self, address: Address, token: str) -> None:
-        self._token = token
+    ``log`` receives lines for the terminal.
+    """
+
+    def __init__(self, address: Address, token: str, log: Callable[[str], None] = lambda _: None) -> None:
+        self._token, self._log = token, log
+        self._guesses = Guesses(log)
+        self.connections = 0
+        self._crowded = -math.inf
         self._local = address.loopback and not token
         self._pass = hmac.new(token.encode(), COOKIE.encode(), hashlib.sha256).hexdigest()
         self.rejected = 0
 
-    def answer(self, request: Request) -> Response | None:
-        """The response that ends a request here; None lets it in."""
-        found = self._answer(request)
+    async def decide(self, request: Request, who: str) -> Response | None:
+        """The answer to a request of address ``who``, after the time that wrong tokens cost it."""
+        if self._token and _shown(request):
+            wait = self._guesses.wait(who, time.monotonic())
+            if wait is None:
+                self.rejected += 1
+                return _refusal(http.HTTPStatus.TOO_MANY_REQUESTS, "Too many wrong tokens. Wait, then try again.")
+            await asyncio.sleep(wait)
+        found = self.answer(request, who)
+        if found is None and self.connections >= MOST_CONNECTIONS:
+            self.complain()
+            return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers watch already.")
+        return found
+
+    def complain(self) -> None:
+        """Count a connection that was too many, and say so now and then."""
+        self.rejected += 1
+        now = time.monotonic()
+        if now - self._crowded > REPORT_PAUSE:
+            self._crowded = now
+            self._log(f"cockpit: {MOST_CONNECTIONS} connections are open; no more are taken")
+
+    def answer(self, request: Request, who: str = "") -> Response | None:
+        """The response that ends a request of address ``who`` here; None lets it in."""
+        found = self._answer(request, who)
         if found is not None and found.status_code >= http.HTTPStatus.BAD_REQUEST:
             self.rejected += 1
         return found
 
-    def _answer(self, request: Request) -> Response | None:
+    def _answer(self, request: Request, who: str) -> Response | None:
         hosts = request.headers.get_all("Host")
         if len(hosts) != 1 or len(request.path) > MOST_PATH:
             return _refusal(http.HTTPStatus.BAD_REQUEST, "A request has one host and a short address.")
@@ -74,10 +109,11 @@ class Gate:
             return _refusal(http.HTTPStatus.FORBIDDEN, "Requests from other sites are rejected.")
         if not self._token or self._has_pass(request.headers):
             return None
-        shown = parse_qs(request.path.partition("?")[2]).get(PARAMETER, [""])[0]
+        shown = _shown(request)
         if not shown:
             return _refusal(http.HTTPStatus.UNAUTHORIZED, "This page needs the token of the cockpit.")
-        if not hmac.compare_digest(shown.encode(), self._token.encode()):
+        if not hmac.compare_digest(shown.encode("utf-8", "replace"), self._token.encode()):
+            self._guesses.wrong(who, time.monotonic())
             return _refusal(http.HTTPStatus.FORBIDDEN, "The token is wrong.")
         headers = Headers({"Location": "/", "Set-Cookie": f"{COOKIE}={self._pass}; HttpOnly; SameSite=Strict; Path=/"})
         return Response(http.HTTPStatus.SEE_OTHER, "See Other", headers, b"")
@@ -88,6 +124,11 @@ class Gate:
         except CookieError:
             return False
         return COOKIE in cookies and hmac.compare_digest(cookies[COOKIE].value.encode(), self._pass.encode())
+
+
+def _shown(request: Request) -> str:
+    """The token in the address of a request, or an empty text."""
+    return parse_qs(request.path.partition("?")[2]).get(PARAMETER, [""])[0]
 
 
 def _names_this_machine(host: str) -> bool:
@@ -113,6 +154,12 @@ def _refusal(status: http.HTTPStatus, why: str) -> Response:
     return Response(status, status.phrase, headers, body)
 
 
+def _caller(connection: ServerConnection) -> str:
+    """The address of whoever asks."""
+    address = connection.remote_address
+    return str(address[0]) if address else "an unknown address"
+
+
 @contextmanager
 def guarded(gate: Gate) -> Iterator[None]:
     """Have ``gate`` stand before a websocket server that is started within: viser has no hook for that of its own."""
@@ -125,7 +172,7 @@ def guarded(gate: Gate) -> Iterator[None]:
         **options: Any,
     ) -> Any:
         async def process(connection: ServerConnection, request: Request) -> Any:
-            response = gate.answer(request)
+            response = await gate.decide(request, _caller(connection))
             if response is None and process_request is not None:
                 response = process_request(connection, request)
                 if inspect.isawaitable(response):
@@ -136,7 +183,19 @@ def guarded(gate: Gate) -> Iterator[None]:
             return response
 
         options["max_size"] = MOST_BYTES
-        return serve(careful(handler), *arguments, process_request=process, **options)
+
+        async def counted(connection: Any) -> None:
+            gate.connections += 1
+            try:
+                if gate.connections > MOST_CONNECTIONS:  # those of one moment were all let in
+                    gate.complain()
+                    await connection.close(1013, "too many browsers watch already")
+                else:
+                    await careful(handler)(connection)
+            finally:
+                gate.connections -= 1
+
+        return serve(counted, *arguments, process_request=process, **options)
 
     websockets.asyncio.server.serve = guarded_serve  # type: ignore[assignment,misc]
     try:

@@ -11,6 +11,7 @@ from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 from ligature.model.scene import Scene
+from ligature.render.picture_files import read_picture
 from ligature.render.surface import Physical, Surface, roughness_of
 from ligature.render.visuals import Piece, VisualLoader
 
@@ -106,8 +107,8 @@ def _picture(surface: Surface) -> Image.Image | None:
     if surface.texture is None:
         return None
     try:
-        picture = Image.open(surface.texture).convert("RGB")
-    except (OSError, ValueError, Image.DecompressionBombError):
+        picture = read_picture(surface.texture).convert("RGB")
+    except (OSError, ValueError):
         return None
     picture.thumbnail((LARGEST_PICTURE, LARGEST_PICTURE))
     return picture

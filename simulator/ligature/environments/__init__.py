@@ -15,7 +15,10 @@ MAX_STEPS = 200
 
 
 def registered(task: str, **options: Any) -> SuturingEnv:
-    """What ``gymnasium.make`` calls: an environment whose episodes are cut by Gymnasium's own wrapper."""
+    """What ``gymnasium.make`` calls: an environment of ``task`` whose episodes are cut by Gymnasium's own wrapper.
+
+    ``options`` are those of `SuturingEnv` but ``max_steps``, for which ValueError is raised.
+    """
     if "max_steps" in options:
         raise ValueError("gymnasium.make has 'max_episode_steps' for what SuturingEnv calls 'max_steps'")
     return SuturingEnv(task, **options, max_steps=None)

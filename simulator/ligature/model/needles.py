@@ -45,9 +45,11 @@ def fit_arc(points: Array) -> Arc:
 
     Raises ValueError for fewer than three points or points on a line.
     """
+    if len(points) < 3:
+        raise ValueError("an arc needs three points")
     middle = points.mean(axis=0)
     _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
-    if len(points) < 3 or spread[1] < 1e-6 * spread[0]:
+    if spread[1] < 1e-6 * spread[0]:
         raise ValueError("an arc needs three points that are not on one line")
     flat = (points - middle) @ axes[:2].T
     u, v, radius = _circle(flat)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from ligature.model.frames import pose7_matrix
-from ligature.model.scene import Scene
+from ligature.model.scene import Scene, Sensor, SensorType
 from ligature.render.camera import CameraView
 
 Array = NDArray[np.float64]
@@ -82,6 +82,47 @@ def joint_axes(scene: Scene, state: NDArray[np.void], size: float) -> list[Segme
             pivot, axis = (T @ joint.T_parent_a)[:3, 3], T[:3, :3] @ joint.axis
             found.append((pivot - size * axis, pivot + size * axis, YELLOW))
     return found
+
+
+def senses(scene: Scene, state: NDArray[np.void], pixel: float) -> list[Segment]:
+    """What visible sensors and actuators look like: rays, green until they hit, contact points, actuators (§17).
+
+    ``pixel`` is the length in metres of one pixel of a contact sensor's marks.
+    """
+    found: list[Segment] = []
+    start = 0
+    for sensor in scene.sensors:
+        if sensor.type is not SensorType.CONTACT:
+            count = len(sensor.rays)
+            if sensor.visible:
+                found += _rays(sensor, state, slice(start, start + count))
+            start += count
+        elif sensor.visible and sensor.contact_details:
+            rows = np.flatnonzero(state["contact_sensor"][0, : int(state["contact_count"][0])] == sensor.index)
+            for point in state["contact_point"][0, rows]:
+                found += _cross(point, pixel * sensor.visible_size, RED)
+    for actuator in scene.actuators:
+        if actuator.visible:
+            T = pose7_matrix(state["body_pose"][0, actuator.parent]) @ actuator.T_body_actuator
+            colour = GREEN if state["actuator_active"][0, actuator.index] else YELLOW
+            found += _cross(T[:3, 3], actuator.visible_size, colour)
+    return found
+
+
+def _rays(sensor: Sensor, state: NDArray[np.void], rows: slice) -> list[Segment]:
+    T = pose7_matrix(state["body_pose"][0, sensor.parent]) @ sensor.T_body_sensor
+    ends = sensor.rays @ T[:3, :3].T + T[:3, 3]
+    found: list[Segment] = []
+    for (a, b), hit, body in zip(ends, state["ray_point"][0, rows], state["ray_body"][0, rows], strict=True):
+        sensed = int(body) >= 0
+        found.append((a, hit if sensed else b, RED if sensed else GREEN))
+        found += _cross(a, sensor.visible_size, RED if sensed else GREEN)
+    return found
+
+
+def _cross(point: Array, size: float, colour: Colour) -> list[Segment]:
+    """Three strokes through a point, ``size`` metres to either side."""
+    return [(point - size * axis, point + size * axis, colour) for axis in np.eye(3)]
 
 
 def contacts(state: NDArray[np.void], size: float) -> tuple[list[Segment], float]:

@@ -11,6 +11,7 @@ from PIL import Image
 from ligature.adf import AdfError, Diagnostic, Mark, Resolver, Severity
 from ligature.model.scene import Scene
 from ligature.render.camera import CameraView
+from ligature.render.picture_files import PictureError, read_picture
 from ligature.render.programs import Program, source
 
 FACES = ("right", "left", "bottom", "top", "front", "back")
@@ -41,12 +42,11 @@ class Sky:
             path = Path(scene.world.skybox[face])
             try:
                 allowed = (resolver or Resolver([path.parent])).allow(path)
-                with Image.open(allowed) as image:
-                    pictures.append(image.copy())
+                pictures.append(read_picture(allowed))
             except AdfError as error:
                 problems.append(error)
                 return None
-            except (OSError, Image.DecompressionBombError) as error:
+            except (OSError, PictureError) as error:
                 message = f"sky box: the picture of its {face} cannot be read: {error}"
                 problems.append(AdfError(Diagnostic(Severity.WARNING, message, Mark(path, 1, 1), "", "render")))
                 return None

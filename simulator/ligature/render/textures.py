@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from ligature.adf import AdfError, Diagnostic, Mark, Severity
+from ligature.render.picture_files import read_picture
 
 
 class Textures:
@@ -34,11 +35,10 @@ class Textures:
 
     def _load(self, path: Path) -> moderngl.Texture | None:
         try:
-            with Image.open(path) as picture:
-                image = _eight_bits(picture).convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
+            image = _eight_bits(read_picture(path)).convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
         except FileNotFoundError:
             return None  # as the mesh reader has stated
-        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        except (OSError, ValueError) as error:
             message = f"texture '{path.name}' is not a picture that can be read: {error}"
             self._problems.append(AdfError(Diagnostic(Severity.WARNING, message, Mark(path, 1, 1), "", "render")))
             return None

@@ -63,11 +63,12 @@ class TissueSurface:
         form, self.rows, self.index = tissue.form, tissue.rows, tissue.index
         length = fineness * float(np.median(form.grid.sizes))
         rest = _opened(_at_rest(piece), form.slits, length)
-        self._embedding = _embedded(rest, form)
+        embedding = _embedded(rest, form)
         if walls and form.slits:
-            rest, self._embedding = _with_walls(rest, self._embedding, form)
+            rest, embedding = _with_walls(rest, embedding, form)
         self._faces, self._uvs = rest.faces, rest.uvs
-        self._group = _smooth_groups(rest, self._embedding)
+        self._carried = _matrix(embedding, len(form.grid.nodes))
+        self._group = _smooth_groups(rest, embedding)
         corners = self._group[rest.faces].reshape(-1)
         shape = (int(self._group.max(initial=-1)) + 1, len(corners))
         self._summed = csr_matrix((np.ones(len(corners)), (corners, np.arange(len(corners)))), shape)
@@ -77,7 +78,7 @@ class TissueSurface:
         )  # fmt: skip
         self._nodes = np.zeros((0, 3))
         self._moved = rest
-        self._first = np.unique(self._group, return_index=True)[1]
+        self._carried_once = self._carried[np.unique(self._group, return_index=True)[1]]
         self.smooth_faces = self._group[rest.faces]
         """Faces (m, 3) of `places`."""
 
@@ -86,25 +87,26 @@ class TissueSurface:
         own = nodes[self.rows]
         if not np.array_equal(own, self._nodes):
             self._nodes = own.copy()
-            x = self._embedding.positions(own)
+            x = np.asarray(self._carried @ own)
             self._moved = Triangles(x, self._normals(x), self._uvs, self._faces)
         return self._moved
 
     def places(self, nodes: Array) -> Array:
         """Positions of the surface with one vertex for all that share a place and a normal."""
-        own = nodes[self.rows]
-        return np.einsum("vk,vka->va", self._embedding.weights[self._first], own[self._embedding.nodes[self._first]])
+        return np.asarray(self._carried_once @ nodes[self.rows])
 
     def _normals(self, x: Array) -> Array:
         """Normals (v, 3): those of the faces around, by their angles (Thürmer and Wüthrich 1998)."""
-        corners = x[self._faces]
-        edges = np.roll(corners, -1, axis=1) - corners
-        across = np.cross(edges[:, 0], edges[:, 1])
-        across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), SLIVER)
-        edges = _unit(edges)
-        cosine = -np.einsum("mka,mka->mk", edges, np.roll(edges, 1, axis=1))
-        angles = np.arccos(np.clip(cosine, -1.0, 1.0))
-        sums = self._summed @ (angles[..., None] * across[:, None]).reshape(-1, 3)
+        a, b, c = x.T[:, self._faces.T].transpose(1, 0, 2)  # (3, m) each: long rows are quick
+        u, v, w = b - a, c - b, a - c
+        uu, vv, ww = (np.einsum("am,am->m", e, e) for e in (u, v, w))
+        across = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]])
+        double = np.sqrt(np.einsum("am,am->m", across, across))
+        # each corner by its edges: tan = |across| / (inner product of the edges that leave it)
+        angles = np.stack([np.arctan2(2.0 * double, ww + uu - vv), np.arctan2(2.0 * double, uu + vv - ww)])
+        angles = np.concatenate([angles, np.pi - angles.sum(axis=0, keepdims=True)])
+        weights = angles / np.maximum(double, SLIVER)
+        sums = self._summed @ (weights[:, None] * across).transpose(2, 0, 1).reshape(-1, 3)
         normals: Array = _unit(sums)[self._group]
         return normals
 
@@ -190,6 +192,13 @@ def _embedded(surface: Triangles, form: TissueForm) -> Embedding:
     found = form.embed(x[first], beside[first])
     each = each.reshape(-1)
     return Embedding(found.nodes[each], found.weights[each])
+
+
+def _matrix(embedding: Embedding, nodes: int) -> csr_matrix:
+    """The embedding in ``nodes`` nodes as a matrix (v, nodes), which is quicker."""
+    vertices, corners = embedding.nodes.shape
+    rows = np.repeat(np.arange(vertices), corners)
+    return csr_matrix((embedding.weights.reshape(-1), (rows, embedding.nodes.reshape(-1))), (vertices, nodes))
 
 
 def _middles(surface: Triangles) -> Array:

@@ -7,7 +7,7 @@ callable, as every front end's do.
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import moderngl
@@ -97,6 +97,7 @@ class Viewer:
         self._cameras = [camera.index for camera in scene.cameras if camera.visible]
         self.camera: int | None = self._cameras[0] if self._cameras else None
         self._viewpoint, self._angle = Viewpoint(_middle(scene), 1.0), FREE_ANGLE
+        self._mouse: Mapping[str, float] = {}
         self._hold: _Hold | None = None
         self._view: CameraView | None = None
         self._state: NDArray[np.void] | None = None
@@ -122,7 +123,7 @@ class Viewer:
 
     def _segments(self, state: NDArray[np.void]) -> list[overlay.Segment]:
         size = MARK_SHARE * self._reach(state)
-        found: list[overlay.Segment] = []
+        found = overlay.senses(self.scene, state, PAN_RATE * self._reach(state))
         if "frames" in self.shown:
             found += overlay.frames(self.scene, state, size)
         if "joints" in self.shown:
@@ -215,6 +216,7 @@ class Viewer:
             distance = 0.2 if found is None else found[2]
             self._viewpoint = Viewpoint.at(self._state["camera_world"][0, self.camera], distance)
             self._angle = self.scene.cameras[self.camera].field_of_view
+            self._mouse = self.scene.cameras[self.camera].mouse_multipliers
         self.camera = None
 
     # --- mouse ------------------------------------------------------------------------------
@@ -222,17 +224,19 @@ class Viewer:
     def orbit(self, right: float, down: float) -> None:
         """Turn the view by a mouse movement in pixels."""
         self._leave_camera()
-        self._viewpoint = self._viewpoint.orbit(ORBIT_RATE * right, -ORBIT_RATE * down)
+        rate = ORBIT_RATE * self._mouse.get("arcball", 1.0)
+        self._viewpoint = self._viewpoint.orbit(rate * right, -rate * down)
 
     def pan(self, right: float, down: float) -> None:
         """Move the view by a mouse movement in pixels."""
         self._leave_camera()
-        self._viewpoint = self._viewpoint.pan(PAN_RATE * right, -PAN_RATE * down)
+        rate = PAN_RATE * self._mouse.get("pan", 1.0)
+        self._viewpoint = self._viewpoint.pan(rate * right, -rate * down)
 
     def zoom(self, steps: float) -> None:
         """Go nearer by steps of the wheel."""
         self._leave_camera()
-        self._viewpoint = self._viewpoint.zoom(steps)
+        self._viewpoint = self._viewpoint.zoom(steps * self._mouse.get("scroll", 1.0))
 
     @property
     def holds(self) -> bool:

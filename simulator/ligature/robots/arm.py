@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ligature.model.frames import inverse, matrix_pose7
+from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.robots.axes import Axes
 from ligature.robots.device import Device
 from ligature.robots.impedance import CartesianImpedance
@@ -23,6 +23,9 @@ from ligature.robots.operating_state import Rejected, State
 from ligature.robots.poses import pose_matrix_of, turned
 
 Array = NDArray[np.float64]
+
+CHALLENGE = "CRTK"
+"""Where the suturing challenge's node has its topics, which `Arm.direct` serves; warnings name them."""
 
 PULL_BACK = 1e-2
 """Damping of the inverse that turns twists into joint velocities: bounded near singular poses."""
@@ -89,6 +92,7 @@ class Arm(Device):
         self.cf_orientation_absolute = False
         self._T_reference_base = np.eye(4)
         self._pushing: tuple[str, Any] | None = None
+        self._direct = False
         self._tip_wrench: Callable[[], Array] | None = None
 
     _KEPT = (
@@ -110,7 +114,24 @@ class Arm(Device):
 
     # --- readiness --------------------------------------------------------------------------
 
+    def direct(self, method: str, *values: Any) -> None:
+        """Carry out a motion for a client that knows no states, as the suturing challenge's node does (§4.7).
+
+        The arm is enabled where it stands and need not be homed; the tip may begin anywhere and keeps no depth, poses
+        are in the base. Joints are clipped to their limits all the same.
+        """
+        self.take_over()
+        self._direct = True
+        try:
+            getattr(self, method)(*values)
+        except Rejected as error:
+            raise Rejected(f"{CHALLENGE}/{self.name.lower()}/{error}") from error
+        finally:
+            self._direct = False
+
     def _require_joints(self, what: str) -> None:
+        if self._direct:
+            return
         if self._state is not State.ENABLED:
             raise Rejected(f"{what}: {self.name} is {self._state.name}, not ENABLED; arm not ready")
         if not self._homed:
@@ -285,9 +306,22 @@ class Arm(Device):
         self._require_cartesian("move_cp")
         self._start_move(self.joints, self._solve(pose, "move_cp"))
 
+    def servo_cr(self, step: ArrayLike) -> None:
+        """Add to the set-point of the tip: ``step`` moves and turns it in axes of `setpoint_cp`."""
+        self._require_cartesian("servo_cr")
+        T = pose7_matrix(self.local_setpoint_cp() if self._direct else self.setpoint_cp())
+        change = pose_matrix_of(step, "servo_cr")
+        T[:3, :3] = change[:3, :3] @ T[:3, :3]
+        T[:3, 3] += change[:3, 3]
+        q = self._solve(T, "servo_cr")
+        self._stop_for(self.joints)
+        self.joints.servo(q)
+
     def _solve(self, pose: ArrayLike, what: str) -> Array:
         """Joint values of a pose in the reference frame; beyond joint limits they are clipped, as the drives do."""
-        T = inverse(self._T_reference_base) @ pose_matrix_of(pose, what)
+        T = pose_matrix_of(pose, what)
+        if not self._direct:
+            T = inverse(self._T_reference_base) @ T
         result = self.kinematics.inverse(T, self.joints.setpoint[0])
         if int(result.code) not in (Reason.REACHED, Reason.OUTSIDE_LIMITS):
             raise Rejected(

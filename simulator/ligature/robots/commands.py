@@ -267,6 +267,53 @@ class MoveCp(_Pose, code=70, verb="move_cp"):
     """Move to a tip pose (7,)."""
 
 
+class ServoCr(_Pose, code=71, verb="servo_cr"):
+    """Move and turn the set-point of the tip by a pose (7,)."""
+
+
+# --- for clients that know no states ------------------------------------------------------------
+
+
+class _Direct(ArmCommand):
+    """As the verb without ``direct/``, wherever the arm stands; see `ligature.robots.arm.Arm.direct`."""
+
+    def _call(self, arm: Any) -> None:
+        arm.direct(self._method, *[getattr(self, name) for name, _, _ in self.fields()[1:]])
+
+
+class DirectServoJp(_Direct, _Position, code=128, verb="direct/servo_jp", method="servo_jp", streamed=True):
+    """Follow a stream of joint positions (n,)."""
+
+
+class DirectMoveJp(_Direct, _Position, code=129, verb="direct/move_jp", method="move_jp"):
+    """Move the joints to ``position`` (n,)."""
+
+
+@dataclass(frozen=True)
+class DirectServoJv(_Direct, code=130, verb="direct/servo_jv", method="servo_jv", streamed=True):
+    """Follow a stream of joint velocities (n,)."""
+
+    velocity: Vector = wire(Numbers())
+
+
+class DirectServoCp(_Direct, _Pose, code=131, verb="direct/servo_cp", method="servo_cp", streamed=True):
+    """Follow a stream of tip poses (7,) in the base."""
+
+
+class DirectMoveCp(_Direct, _Pose, code=132, verb="direct/move_cp", method="move_cp"):
+    """Move to a tip pose (7,) in the base."""
+
+
+class DirectServoCr(_Direct, _Pose, code=133, verb="direct/servo_cr", method="servo_cr"):
+    """Move and turn the set-point of the tip by a pose (7,) in axes of the base."""
+
+
+class DirectJawServoJp(
+    _Direct, _Position, code=134, verb="direct/jaw/servo_jp", method="servo_jaw", streamed=True, kind=ArmKind.PSM
+):
+    """Follow a stream of openings (1,)."""
+
+
 def _rotation(quaternion: Vector) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """Rotation (3, 3) of a quaternion (4,); one of zeros is none."""
     q = np.array(quaternion)

@@ -68,7 +68,7 @@ class Device:
         self._pending: Action | None = None
         self._due = 0.0
         self._busy_until = 0.0
-        self._homing = False
+        self._homing = self._taken_over = False
         self._astray = 0.0
         self._emit_state()
 
@@ -137,6 +137,22 @@ class Device:
             self._homed = False
         self._emit_state(again=True)
 
+    @property
+    def is_taken_over(self) -> bool:
+        """Whether a client that knows no states drives the arm, which is enabled but need not be homed."""
+        return self._taken_over and self._state is State.ENABLED
+
+    def take_over(self) -> None:
+        """Be enabled at once for a client that knows no states; whether the arm is homed stays as it was."""
+        if self._state is State.FAULT:
+            raise Rejected(f"{self.name} is in FAULT; send 'disable', then 'enable'")
+        if self._state is State.ENABLED and not self._homing and (self._homed or self._taken_over):
+            return
+        self._state, self._taken_over, self._pending = State.ENABLED, True, None
+        self._stop_moves()
+        self._hold_all()
+        self._emit_state()
+
     def adopt(self) -> None:
         """Be enabled and homed at once, where the arm stands: for clients that know no states."""
         if self._state is State.FAULT:
@@ -163,6 +179,7 @@ class Device:
             self._move_home()
 
     def _move_home(self) -> None:
+        self._taken_over = False
         self.joints.move(self._home)
         self.emit("desired_state", "HOMED")
         self._homing = True
@@ -179,7 +196,7 @@ class Device:
 
     def _switch_off(self, state: State) -> None:
         self._stop_moves()
-        self._state, self._pending = state, None
+        self._state, self._pending, self._taken_over = state, None, False
         self._off_all()
 
     def fault(self, why: str) -> None:
@@ -280,6 +297,7 @@ class Device:
 
     _KEPT: tuple[str, ...] = (
         "time", "_state", "_homed", "_busy", "_emitted", "_pending", "_due", "_busy_until", "_homing", "_astray",
+        "_taken_over",
     )  # fmt: skip
 
     def snapshot(self) -> dict[str, Any]:

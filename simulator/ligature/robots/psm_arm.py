@@ -136,7 +136,7 @@ class PsmArm(Arm):
 
     def _require_cartesian(self, what: str) -> None:
         super()._require_cartesian(what)
-        if self.depth < ENTRY_DEPTH:
+        if self.depth < ENTRY_DEPTH and not self._direct:
             raise Rejected(
                 f"{what}: the tool of {self.name} is {1000 * self.depth:.0f} mm below the remote centre; "
                 f"insert it to {1000 * LEAST_DEPTH:.0f} mm first"
@@ -144,6 +144,8 @@ class PsmArm(Arm):
 
     def _solve(self, pose: ArrayLike, what: str) -> Array:
         q = super()._solve(pose, what)
+        if self._direct:
+            return q
         q[INSERTION] = max(q[INSERTION], self.kinematics.insertion_at(LEAST_DEPTH))
         return q
 

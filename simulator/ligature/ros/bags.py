@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import bz2
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import rosbag
 from numpy.typing import NDArray
 
+from ligature import definitions
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
@@ -23,30 +26,96 @@ REPORTS = "/surgical_robotics_challenge/completion_report"
 """Root of the topics on which teams of the challenge report (interface reference §4.5)."""
 
 
+MOST_CHUNK_BYTES = 256 << 20
+"""Most bytes of a chunk when it is decompressed; recorders begin a new one after 0.75 MiB, or after one message."""
+
+
 class BagError(ValueError):
     """A bag that cannot be used; the message gives the reason."""
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[rosbag.Bag]:
-    """The bag ``path`` to read; raises `BagError` for a file that is none, cut off or damaged, also while reading."""
+    """The bag ``path`` to read; raises `BagError` for a file that is none, cut off or damaged.
+
+    What is in it comes from `topics` and `messages`, which do the same.
+    """
+    with _blamed(path):
+        bag = rosbag.Bag(str(path))
+    with bag:
+        yield bag
+
+
+def topics(bag: rosbag.Bag) -> set[str]:
+    """Names of all topics of a bag."""
+    with _blamed(bag.filename, bag):
+        return {connection.topic for connection in bag._get_connections()}
+
+
+def messages(bag: rosbag.Bag, topics: list[str]) -> Iterator[tuple[str, Any, float]]:
+    """Topic, message and time (s) of all messages on ``topics``, in their order."""
+    with _blamed(bag.filename, bag):
+        rows = bag.read_messages(topics=topics)
+    while True:
+        with _blamed(bag.filename, bag):
+            row = next(rows, None)
+        if row is None:
+            return
+        yield row.topic, row.message, row.timestamp.to_sec()
+
+
+@contextmanager
+def _blamed(path: Path | str, bag: rosbag.Bag | None = None) -> Iterator[None]:
+    """Whatever rosbag raises becomes a `BagError` with the place in the file: it trusts the numbers that it reads."""
     try:
-        with rosbag.Bag(str(path)) as bag:
-            yield bag
+        yield
     except rosbag.ROSBagUnindexedException:
         raise BagError(
             f"{path}: the bag is truncated: its recorder did not finish; 'rosbag reindex' may repair it"
         ) from None
     except rosbag.ROSBagException as error:
-        raise BagError(f"{path}: not a bag, or a damaged one: {error}") from None
+        raise BagError(f"{path}{_place(bag)}: not a bag, or a damaged one: {error}") from None
+    except BagError as error:
+        raise BagError(f"{path}{_place(bag)}: {error}") from None
     except OSError as error:
-        raise BagError(f"{path}: {error.strerror or error}") from None
+        raise BagError(f"{path}{_place(bag)}: {error.strerror or error}") from None
+    except Exception as error:
+        raise BagError(f"{path}{_place(bag)}: a damaged bag: {type(error).__name__}: {str(error)[:200]}") from None
 
 
-def messages(bag: rosbag.Bag, topics: list[str]) -> Iterator[tuple[str, Any, float]]:
-    """Topic, message and time (s) of all messages on ``topics``, in their order."""
-    for topic, message, stamp in bag.read_messages(topics=topics):
-        yield topic, message, stamp.to_sec()
+def _place(bag: rosbag.Bag | None) -> str:
+    file = getattr(bag, "_file", None)
+    return "" if file is None or file.closed else f": near byte {file.tell()}"
+
+
+def _message_type(info: Any) -> Any:
+    """In place of rosbag's own, which runs what a definition says."""
+    if info.md5sum not in _classes:
+        try:
+            _classes[info.md5sum] = definitions.message_class(info.datatype, info.md5sum, info.msg_def)
+        except definitions.DefinitionError as error:
+            raise BagError(f"topic {info.topic}: {error}") from None
+    return _classes[info.md5sum]
+
+
+class _BoundedBz2(ModuleType):
+    """``bz2`` for rosbag, whose chunks of a few bytes may otherwise become gigabytes."""
+
+    def decompress(self, data: bytes) -> bytes:
+        """The content of a chunk."""
+        reader = bz2.BZ2Decompressor()
+        content = reader.decompress(data, MOST_CHUNK_BYTES)
+        if not reader.eof and len(content) >= MOST_CHUNK_BYTES:
+            raise BagError(f"a chunk holds more than {MOST_CHUNK_BYTES >> 20} MiB")
+        return content
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(bz2, name)
+
+
+_classes: dict[str, Any] = {}
+rosbag.bag._get_message_type = _message_type
+rosbag.bag.bz2 = _BoundedBz2("bz2")
 
 
 def reported_pose(message: Any) -> Array:
@@ -65,7 +134,7 @@ def judge(path: Path, scene: Scene, task: str) -> tuple[Score, Attempt]:
     """
     attempt, state = Attempt(scene, task), new_state(scene)
     with opened(path) as bag:
-        found = set(bag.get_type_and_topic_info().topics)
+        found = topics(bag)
         bodies, clock = _body_topics(scene, attempt, found, path)
         reports = [t for t in found if t.startswith(REPORTS) and t.rstrip("/").endswith(f"/task{TASKS[task]}")]
         score: Score | None = None

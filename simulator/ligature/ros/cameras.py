@@ -24,7 +24,7 @@ from ligature.model.optics import EYES, R_CAMERA_OPTICAL, Calibration, eye_offse
 from ligature.model.scene import Camera, Scene
 from ligature.ros import pictures
 from ligature.ros.master import node_name, require_free
-from ligature.ros.names import WORLD_FRAME
+from ligature.ros.names import WORLD_FRAME, tf_topics
 from ligature.ros.start import start_node
 
 PICTURES = {
@@ -137,18 +137,23 @@ class CameraNode:
             for eye in ("", *(EYES if c.stereo else ()))
         ]
         self._frames, self._world = frames, prefix + WORLD_FRAME
-        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
-        self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
-        self._static.publish(TFMessage([t for topics in self.topics for t in self._fixed(topics)]))
+        self._tf = [rospy.Publisher(topic, TFMessage, queue_size=10) for topic in tf_topics(scene.world, "tf")]
+        self._static = [
+            rospy.Publisher(topic, TFMessage, queue_size=1, latch=True) for topic in tf_topics(scene.world, "tf_static")
+        ]
+        fixed = TFMessage([t for topics in self.topics for t in self._fixed(topics)])
+        for publisher in self._static:
+            publisher.publish(fixed)
 
     def publish_frames(self, poses: NDArray[np.float64], shown: Sequence[Camera], stamp: float) -> None:
         """Publish where the cameras ``shown`` stand; ``poses`` (cameras, 7) in world axes."""
         indices = sorted({camera.index for camera in shown})
-        if indices and _heard(self._tf):
+        heard = [publisher for publisher in self._tf if _heard(publisher)]
+        if indices and heard:
             time = rospy.Time.from_sec(stamp)
-            self._tf.publish(
-                TFMessage([pictures.transform(self._world, self._frames[i], poses[i], time) for i in indices])
-            )
+            frames = [pictures.transform(self._world, self._frames[i], poses[i], time) for i in indices]
+            for publisher in heard:
+                publisher.publish(TFMessage(frames))
 
     def _fixed(self, topics: CameraTopics) -> list[Any]:
         """Transforms that never change: from the camera to its eye, and to the optical frame."""

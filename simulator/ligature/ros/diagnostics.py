@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from ligature.adf import Severity
 from ligature.bus import Block
+from ligature.ros.arms.rivals import Rival
 
 PERIOD = 1.0
 FRESH = 60.0
@@ -21,7 +22,8 @@ SLOW = 0.95
 class Diagnostics:
     """Publishes the figures of the bus once a second; ``missed`` are messages that slow clients did not take.
 
-    ``faults`` are the arms in FAULT, each with the reason; ``more`` adds statuses of other parts.
+    ``faults`` are the arms in FAULT, each with the reason; ``rivals`` publish what the simulator leaves to them;
+    ``more`` adds statuses of other parts.
     """
 
     def __init__(self, block: Block, more: Callable[[], Sequence[DiagnosticStatus]] = tuple) -> None:
@@ -30,6 +32,7 @@ class Diagnostics:
         self._next = 0.0
         self.missed = 0
         self.faults: dict[str, str] = {}
+        self.rivals: Mapping[str, Rival] = {}
 
     def publish(self, now: float) -> None:
         """Publish when a second has passed; ``now`` on the monotonic clock."""
@@ -64,6 +67,7 @@ class Diagnostics:
             "camera frames dropped": str(figures["frames_dropped"]),
             "camera frame time (ms)": f"{1e3 * figures['frame_seconds']:.1f}",
         }
+        rows.update({f"{part} left to": f"{rival.node} ({rival.topic})" for part, rival in self.rivals.items()})
         status.values = [KeyValue(key=k, value=v) for k, v in rows.items()]
         faults = [
             DiagnosticStatus(

@@ -35,10 +35,19 @@ _SIMULATORS = re.compile(r"/(ligature|ambf)(?!.*_\d+_\d+\Z)")
 """Nodes of simulators, ours and AMBF's; those of programs beside them have names that end in process and time."""
 
 
+WATCHER = "_rivals"
+"""How names of nodes end that listen to topics only to know who publishes them (`ligature.ros.arms.rivals`)."""
+
+
 def commanded_topics() -> set[str]:
     """Topics that a simulator on this master listens to; raises one of `NO_ANSWER`."""
     _, subscribers, _ = rosgraph.Master("/ligature_look").getSystemState()
-    return {topic for topic, nodes in subscribers if any(_SIMULATORS.match(node) for node in nodes)}
+    return {topic for topic, nodes in subscribers if any(map(is_simulator, nodes))}
+
+
+def is_simulator(node: str) -> bool:
+    """Whether a node of this name is a simulator, and not a program beside it or what only watches for rivals."""
+    return _SIMULATORS.match(node) is not None and not node.endswith(WATCHER)
 
 
 class NameTaken(RuntimeError):
@@ -51,7 +60,7 @@ def require_free(name: str) -> None:
         uri = rosgraph.Master("/ligature_start").lookupNode(name)
     except NO_ANSWER:
         return
-    if _lives(uri):
+    if _answers(uri):
         raise NameTaken(
             f"another simulator runs on this ROS master (node {name} at {uri}); end it, give this one a prefix"
             " with '--ns', or set ROS_MASTER_URI to another master"
@@ -68,7 +77,15 @@ class Hasty(xmlrpc.client.Transport):
         return connection
 
 
-def _lives(uri: str) -> bool:
+def lives(node: str) -> bool:
+    """Whether the node of this name answers; one that was killed is still known to the master."""
+    try:
+        return _answers(rosgraph.Master("/ligature_look").lookupNode(node))
+    except NO_ANSWER:
+        return False
+
+
+def _answers(uri: str) -> bool:
     try:
         code, _, _ = xmlrpc.client.ServerProxy(uri, Hasty()).getPid("/ligature_start")  # type: ignore[misc]
     except (*NO_ANSWER, ValueError):

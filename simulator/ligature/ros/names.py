@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from ligature.model.scene import Identity
+from ligature.model.scene import Identity, WorldSettings
 
 POLICIES = ("ambf", "src")
 
@@ -32,6 +32,15 @@ def topics(objects: Iterable[tuple[str, Identity]], policy: str, world: str) -> 
     base = world.rpartition("/")[0]
     taken: set[str] = set()
     return [_for_the_challenge(kind, identity, base, taken) for kind, identity in objects]
+
+
+def tf_topics(world: WorldSettings, name: str) -> list[str]:
+    """Where frames are published: on ``name``, such as ``tf``, of all programs, and on that below the prefix.
+
+    Frames of a prefix have it in their names, so that both are right for any number of simulators; a program that
+    was moved into a namespace as a whole hears ``/left/tf`` only.
+    """
+    return [f"/{name}"] if world.root == "/" else [f"/{name}", f"{world.root}{name}"]
 
 
 def _for_the_challenge(kind: str, identity: Identity, base: str, taken: set[str]) -> str | None:

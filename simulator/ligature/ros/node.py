@@ -61,7 +61,7 @@ class Node:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
         self._arms = ArmsNode(scene, self._block, self._outbox, challenge)
-        arms = ", ".join(arm.name for arm in scene.arms) or "none"
+        arms = ", ".join(outlet.description.name for outlet in self._arms.outlets) or "none"
         self.summary = f"{2 * len(outlets) + len(tissues)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block, lambda: tissue.statuses(scene, self._state[0]))
         self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
@@ -158,6 +158,7 @@ class Node:
         figures["malformed"] = self._reception.rejected + self._arms.rejected + oversized.count
         self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
         self._diagnostics.faults = self._arms.faults
+        self._diagnostics.rivals = self._arms.rivals
         self._world.loop_hz = float(figures["loop_hz"][0])
         self._diagnostics.publish(now)
         return self._block.active

@@ -16,7 +16,7 @@ import rospy
 from crtk_msgs.msg import OperatingState, StringStamped
 from sensor_msgs.msg import JointState
 
-from ligature.ros.bags import BagError, messages, opened
+from ligature.ros.bags import BagError, messages, opened, topics
 from ligature.ros.master import commanded_topics
 
 TIMEOUT = 20.0
@@ -40,7 +40,7 @@ def play(path: Path, joints: str, speed: float, log: Callable[[str], None]) -> i
     rospy.init_node("ligature_replay", anonymous=True, disable_signals=True)
     taken = commanded_topics()
     with opened(path) as bag:
-        found = sorted(bag.get_type_and_topic_info().topics)
+        found = sorted(topics(bag))
         routes = _joint_routes(found, joints, taken) if joints else {topic: topic for topic in found if topic in taken}
         if not routes:
             what = f"{joints} joints of an arm" if joints else "commands"

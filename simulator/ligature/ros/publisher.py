@@ -45,6 +45,10 @@ class Publisher:
         """Whether anybody listens."""
         return bool(self._publisher.impl.connections)
 
+    def close(self) -> None:
+        """Have the master forget the topic; nothing may be published after this."""
+        self._publisher.unregister()
+
     def publish(self, message: Any) -> None:
         """Send ``message`` to every client that has room for it."""
         topic = self._publisher.impl

@@ -95,7 +95,16 @@ class TeleopConfig:
 
 def read(path: Path) -> TeleopConfig:
     """The configuration in a file; raises `AdfError`, whose diagnostics name file, line and what would be right."""
-    return from_text(path.read_text("utf-8"), path)
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        mark = Mark(path, line, error.start - (data.rfind(b"\n", 0, error.start) + 1) + 1)
+        raise AdfError(
+            Diagnostic(Severity.ERROR, f"byte {data[error.start]:#04x} is no UTF-8", mark, "", "teleop")
+        ) from None
+    return from_text(text, path)
 
 
 def from_text(text: str, path: Path) -> TeleopConfig:

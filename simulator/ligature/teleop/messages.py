@@ -10,8 +10,9 @@ import importlib
 from collections.abc import Callable
 from typing import Any
 
-import genpy.dynamic
 import rospy
+
+from ligature import definitions
 
 
 class MissingPackage(RuntimeError):
@@ -54,22 +55,16 @@ class Listener:
 
     def _class_of(self, md5: str, type_: str, definition: str) -> Any:
         if md5 not in self._classes:
-            self._classes[md5] = _generated(type_, definition)
-            if self._classes[md5] is None:
-                rospy.logerr(f"{self._topic}: its publisher sends no usable definition of {type_}")
+            try:
+                self._classes[md5] = definitions.message_class(type_, md5, definition)
+            except definitions.DefinitionError as error:
+                self._classes[md5] = None
+                rospy.logerr(f"{self._topic}: {error}")
         return self._classes[md5]
 
     def close(self) -> None:
         """Listen no more."""
         self._subscriber.unregister()
-
-
-def _generated(type_: str, definition: str) -> Any:
-    """A class made from a definition as publishers report it; None when that is not one."""
-    try:
-        return genpy.dynamic.generate_dynamic(type_, definition)[type_]
-    except (genpy.MsgGenerationException, KeyError, SyntaxError):
-        return None
 
 
 def pose_numbers(message: Any) -> list[float]:

@@ -77,18 +77,61 @@ class Replay:
                 yield row["event"], tuple(value) if isinstance(value, list) else value
 
 
+VALUES: dict[str, type] = {
+    "enable": bool, "scale": float, "select": str, "unselect": str, "cycle": str, "clutch": bool, "camera": bool,
+    "present": bool,
+}  # fmt: skip
+"""Events with one value, and its kind."""
+
+LISTS = {"pair": 2, "component": 3, "drive camera": 2}
+"""Events with a list of values: names, and at the end of the last two a verb and what it is about."""
+
+VERBS: dict[str, type] = {
+    "state_command": str, "scale": float, "lock_rotation": bool, "lock_translation": bool, "align": bool,
+}  # fmt: skip
+
+
 def _rows(path: Path) -> Iterator[dict[str, Any]]:
-    with path.open(encoding="utf-8") as file:
+    with path.open("rb") as file:
         for number, line in enumerate(file, 1):
             try:
                 row = json.loads(line)
-                if "device" in row:
-                    valid = len([float(x) for x in row["pose"]]) == 7 and isinstance(row["buttons"], dict)
-                else:
-                    valid = isinstance(row["event"], str) and "value" in row
-                valid = valid and np.isfinite(row["t"])
-            except (ValueError, KeyError, TypeError):
+                valid = _is_reading(row) if "device" in row else _is_event(row)
+                valid = valid and _is(row["t"], float) and np.isfinite(row["t"])
+            except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
                 valid = False
             if not valid:
                 raise ValueError(f"{path}:{number}: neither a reading of a device nor an event")
             yield row
+
+
+def _is_reading(row: dict[str, Any]) -> bool:
+    """Whether a line has what a reading has; its numbers may be none, as a device's may."""
+    pose, grip, buttons = row["pose"], row["grip"], row["buttons"]
+    return (
+        isinstance(row["device"], str)
+        and isinstance(pose, list)
+        and len([float(x) for x in pose if _is(x, float)]) == len(pose) == 7
+        and (grip is None or _is(grip, float))
+        and isinstance(buttons, dict)
+        and all(isinstance(down, bool) for down in buttons.values())
+    )
+
+
+def _is_event(row: dict[str, Any]) -> bool:
+    """Whether a line is an event that teleoperation knows, with a value of its kind."""
+    name, value = row["event"], row["value"]
+    if name in VALUES:
+        return _is(value, VALUES[name])
+    if not (isinstance(value, list) and len(value) == LISTS[name]):
+        return False
+    if name == "pair":
+        return all(isinstance(each, str) for each in value)
+    *names, verb, what = value
+    return all(isinstance(each, str) for each in names) and _is(what, VERBS[verb])
+
+
+def _is(value: Any, kind: type) -> bool:
+    if kind is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, kind)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ligature.adf.schema.blocks import COLOUR, IDENTITY, PARENT, F, N, P, T, U, V, shaders
-from ligature.adf.schema.keys import POSE_ZERO, ZERO, Fault, Key, Status, Type, each, ignored, spellings
+from ligature.adf.schema.keys import POSE_ZERO, ZERO, Fault, Key, Status, Type, each, ignored, spellings, unused
 
 C, MAP, POSE = Type.CHOICE, Type.MAP, Type.POSE
 
@@ -27,7 +27,7 @@ SENSOR = (
     Key("parametric.horizontal angle", N, unit="rad", doc="full angle about z", required=True),
     Key("parametric.vertical angle", N, unit="rad", doc="full angle about y", required=True),
     Key("parametric.start offset", N, unit="m", doc="distance of the starts from S", required=True),
-    Key("visible", F, False, doc="draw the sensor"),
+    Key("visible", F, False, doc="draw the sensor in the window"),
     Key("visible size", N, 0.02, "m", "radius of the markers; pixels for a contact sensor"),
     Key("friction", MAP, doc="of a resistance sensor, §17.3"),
     Key("friction.static", N, 0.0, doc="stick stiffness"),
@@ -47,7 +47,7 @@ ACTUATOR = (
     *PARENT,
     Key("type", C, doc="actuator type", required=True, choices=ACTUATOR_TYPES, fault=Fault.OBJECT),
     Key("location", POSE, POSE_ZERO, "m, rad", "actuator frame on the parent"),
-    Key("visible", F, False, doc="draw the actuator"),
+    Key("visible", F, False, doc="draw the actuator in the window"),
     Key("visible size", N, 0.02, "m", "radius of the marker"),
     Key("ligature slip", MAP, doc="hold by friction between pads normal to z, not rigidly", status=Status.OURS),
     Key("ligature slip.normal force", N, unit="N", doc="of the pads", required=True, status=Status.OURS, least=0.0),
@@ -79,13 +79,17 @@ CAMERA = (
     Key("field view angle", N, 0.7, "rad", "vertical field of view"),
     Key("orthographic view width", N, unit="m", doc="orthographic when present"),
     Key("stereo", MAP, doc="two eyes side by side"),
-    Key("stereo.mode", T, doc="any text", required=True),
+    *unused((Key("stereo.mode", T, doc="any text", required=True),)),
     Key("stereo.eye separation", N, 0.2, "m", "distance of the eyes", required=True),
     Key("stereo.focal length", N, 0.5, "m", "distance of the common plane", required=True),
-    Key("monitor", U, 0, doc="monitor of the window"),
+    *unused((Key("monitor", U, 0, doc="monitor of the window"),)),
     Key("visible", F, True, doc="false: no window; images are published all the same"),
-    Key("multipass", F, False, doc="draw transparent things in several passes"),
-    Key("controlling devices", Type.TEXTS, (), doc="title of the window"),
+    *unused(
+        (
+            Key("multipass", F, False, doc="draw transparent things in several passes; they are sorted here"),
+            Key("controlling devices", Type.TEXTS, (), doc="title of the window, which shows all cameras in turn here"),
+        )
+    ),
     Key("publish image", F, False, doc="publish colour images"),
     Key("publish image interval", U, 1, "frames", "publish every n-th image"),
     *_resolution("publish image resolution", (640, 480), "size of the published images"),
@@ -100,7 +104,10 @@ CAMERA = (
     *shaders("preprocessing shaders", "shader program of the published image"),
     *shaders("depth compute shaders", "shader program that makes points of depths"),
     Key("mouse control multipliers", MAP, doc="factors on the mouse's gains"),
-    *each(("pan", "rotate", "scroll", "arcball"), N, "mouse control multipliers.{}", 1.0, doc="factor of {}"),
+    *each(("pan", "scroll", "arcball"), N, "mouse control multipliers.{}", 1.0, doc="factor of {}"),
+    *unused(
+        each(("rotate",), N, "mouse control multipliers.{}", 1.0, doc="factor of {}, which the mouse has no button for")
+    ),
     *_resolution("window resolution", None, "size of the window, and of images unless they have their own"),
     Key("camera intrinsics", MAP, doc="pinhole parameters; come before the field of view"),
     *each(("fx", "fy", "f"), N, "camera intrinsics.{}", unit="px", doc="focal length {}; 100 when absent"),

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from ligature.adf.schema.keys import LARGEST_SCALE, POSE_ZERO, Fault, Key, Status, Type, each, ignored, spellings
+from ligature.adf.schema.keys import (
+    LARGEST_SCALE,
+    POSE_ZERO,
+    Fault,
+    Key,
+    Status,
+    Type,
+    each,
+    ignored,
+    spellings,
+    unused,
+)
 
 N, U, F, T, P, C = Type.NUMBER, Type.UNSIGNED, Type.FLAG, Type.TEXT, Type.PATH, Type.CHOICE
 V, POSE, MAP, MAPS = Type.VECTOR, Type.POSE, Type.MAP, Type.MAPS
@@ -92,7 +103,7 @@ def _compound(block: str, doc: str) -> tuple[Key, ...]:
 
 LOOKS = (
     Key("mesh", P, "", doc="visual mesh, and collision mesh unless another is named; '' is none"),
-    Key("mesh remove duplicates", F, False, doc="weld identical visual vertices"),
+    *unused((Key("mesh remove duplicates", F, False, doc="weld identical visual vertices, which look the same"),)),
     Key("shape", C, doc="visual primitive; comes before `mesh`", choices=SHAPES),
     *geometry("geometry", "dimensions of `shape`"),
     *_compound("compound shape", "several visual primitives"),

@@ -30,6 +30,7 @@ from ligature.adf.schema.keys import (
     Type,
     each,
     ignored,
+    unused,
 )
 
 C, I, MAP, POSE = Type.CHOICE, Type.INTEGER, Type.MAP, Type.POSE
@@ -216,8 +217,12 @@ JOINT = (
     *gains("controller", "joint PID, §15.6", required=False),
     OUTPUT_TYPE,
     Key("max motor impulse", N, 0.1, "N·m·s, N·s", "motor strength for each ms"),
-    Key("joint erp", N, 0.1, doc="error reduction of the constraint, §15.4"),
-    Key("joint cfm", N, 0.1, doc="constraint force mixing, §15.4"),
+    *unused(
+        (
+            Key("joint erp", N, 0.1, doc="error reduction of the constraint, §15.4; articulations have no error"),
+            Key("joint cfm", N, 0.1, doc="constraint force mixing, §15.4; articulations do not yield"),
+        )
+    ),
     *_six("damping", 0.7, "N·s/m, N·m·s/rad", "damper of a spring; revolute and prismatic joints ignore it", 0.0),
     *_six("stiffness", 1.0, "N/m, N·m/rad", "spring", 0.0),
     *_six("equilibrium point", 0.0, "m, rad", "rest position; the middle of the limits when absent"),
@@ -233,7 +238,7 @@ GHOST = (
     *IDENTITY,
     *PARENT,
     *LOOKS,
-    *COLLISION,
+    *unused(COLLISION, "collision groups"),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame"),
     Key("inertial offset", POSE, None, "m, rad", "taken when `collision offset` is absent"),
     *ignored(("mass", "inertia", "friction", "damping", "restitution"), "a ghost has no mechanics"),
@@ -308,7 +313,7 @@ VEHICLE = (
     *ignored(("high resolution path",), "no effect"),
 )
 SUTURE = (
-    *IDENTITY,
+    *unused(IDENTITY, "passive"),
     Key("length", N, unit="m", doc="length of the thread", required=True),
     Key("diameter", N, unit="m", doc="diameter; or give `USP size`"),
     Key("USP size", T, "", doc="such as 2-0"),

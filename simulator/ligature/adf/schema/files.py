@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ligature.adf.schema.blocks import PLUGINS, F, N, P, T, U, V, gains, shaders
 from ligature.adf.schema.bodies import ROD
-from ligature.adf.schema.keys import STRONGEST, ZERO, Fault, Key, Status, Type, each, ignored
+from ligature.adf.schema.keys import STRONGEST, ZERO, Fault, Key, Status, Type, each, ignored, unused
 
 MAP = Type.MAP
 
@@ -49,13 +49,13 @@ WORLD = (
     *ignored(("enclosure",), "walls where no environment is"),
     Key("namespace", T, "", doc="namespace of the world's topics, lights and cameras"),
     Key("gravity", V, (0.0, 0.0, -9.8), "m/s²", "gravity", most=STRONGEST),
-    Key("max iterations", U, 10, doc="most sub-steps of 1 ms of an update"),
+    *unused((Key("max iterations", U, 10, doc="most sub-steps of an update; an update is a whole number of ticks"),)),
     Key("lights", Type.TEXTS, (), doc="lights that exist, in order"),
     Key("cameras", Type.TEXTS, (), doc="cameras that exist, in order"),
     Key("skybox", MAP, doc="images around the scene; all six or none"),
     Key("skybox.path", P, doc="folder of the images", required=True),
     *each(("right", "left", "top", "bottom", "front", "back"), P, "skybox.{}", "", doc="image of the {} side"),
-    *shaders("skybox.shaders", "shader program of the sky"),
+    *unused(shaders("skybox.shaders", "shader program of the sky")),
     *shaders("shaders", "shader program of the models' visual objects"),
     PLUGINS,
     *ignored(("name",), "the world is always called World"),

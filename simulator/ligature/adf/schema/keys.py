@@ -35,6 +35,7 @@ class Status(enum.Enum):
 
     USED = "used"
     IGNORED = "read and ignored, as in AMBF"
+    UNUSED = "without effect here"
     KEPT = "kept as written for plug-ins"
     NOT_SIMULATED = "checked, not simulated"
     OURS = "Ligature's own; AMBF ignores it"
@@ -108,6 +109,14 @@ def each(names: str | Iterable[str], type_: Type, path: str, *args: Any, **kwarg
 def ignored(names: str | Iterable[str], doc: str) -> tuple[Key, ...]:
     """Keys of real files that have no effect, here as in AMBF; any value is fine."""
     return tuple(Key(name, Type.ANY, doc=doc, status=Status.IGNORED) for name in names)
+
+
+def unused(keys: Iterable[Key], *paths: str) -> tuple[Key, ...]:
+    """Keys that AMBF uses and that have no effect here; their values are checked all the same.
+
+    With ``paths`` only those; the others stay as they are.
+    """
+    return tuple(replace(key, status=Status.UNUSED) if not paths or key.path in paths else key for key in keys)
 
 
 def spellings(*names: str) -> dict[str, str]:

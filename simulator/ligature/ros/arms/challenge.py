@@ -22,7 +22,8 @@ from std_msgs.msg import Empty
 from ligature.model.commands import ActuatorCommand, BodyCommand, Command, CommandType, Release
 from ligature.model.frames import frame, matrix_pose7, pose7_matrix, rpy_matrix
 from ligature.model.scene import ArmDescription, ArmKind, Scene
-from ligature.robots.commands import VERBS, Adopt
+from ligature.robots.arm import CHALLENGE
+from ligature.robots.commands import VERBS
 from ligature.robots.ecm import SrcCamera
 from ligature.ros.arms.outlet import ArmOutlet
 from ligature.ros.arms.readings import set_pose
@@ -58,7 +59,7 @@ class ChallengeFace:
         self._scene, self._push = scene, push
         self._state: Any = None
         self._due = 0.0
-        root, self._world = f"{scene.world.root}CRTK", f"{scene.world.frame_prefix}world"
+        root, self._world = f"{scene.world.root}{CHALLENGE}", f"{scene.world.frame_prefix}world"
         self._arms = [
             _Psm(
                 f"{root}/{outlet.description.name.lower()}", scene, outlet.index, outlet.description, self._newest, push
@@ -145,12 +146,13 @@ class _Psm:
         self._grasping = False
         self._measured_js = rospy.Publisher(f"{root}/measured_js", JointState, queue_size=QUEUE)
         self._measured_cp = rospy.Publisher(f"{root}/measured_cp", PoseStamped, queue_size=QUEUE)
+        self._setpoint_cp = rospy.Publisher(f"{root}/setpoint_cp", PoseStamped, queue_size=QUEUE)
         self._base = rospy.Publisher(f"{root}/T_b_w", PoseStamped, queue_size=QUEUE)
         self._measured_cv = rospy.Publisher(f"{root}/measured_cv", TwistStamped, queue_size=QUEUE)
         for verb in ("servo_jp", "move_jp"):
             _listen(f"{root}/{verb}", JointState, partial(self._joints, verb))
         _listen(f"{root}/servo_jv", JointState, lambda m: self.command("servo_jv", tuple(m.velocity)))
-        for verb in ("servo_cp", "move_cp"):
+        for verb in ("servo_cp", "servo_cr", "move_cp"):
             _listen(f"{root}/{verb}", PoseStamped, partial(self._pose, verb))
         _listen(f"{root}/jaw/servo_jp", JointState, lambda m: self.jaw(m.position[0]))
 
@@ -161,11 +163,8 @@ class _Psm:
         self.command(verb, _numbers(message.pose))
 
     def command(self, verb: str, values: tuple[float, ...]) -> None:
-        """Send a command, after having the arm take it where it stands."""
-        record = self._newest()["arm"][self._index]
-        if not (record["operating"] == 1 and record["homed"]):
-            self._push(Adopt(self._index))
-        self._push(VERBS[verb](self._index, values))
+        """Send a command, which the arm takes where it stands."""
+        self._push(VERBS[f"direct/{verb}"](self._index, values))
 
     def jaw(self, value: float) -> None:
         """Both fingers to ``value``, which opens the jaw by twice that; holds what both feel when nearly closed."""
@@ -197,6 +196,7 @@ class _Psm:
         message.header.stamp = stamp
         self._measured_js.publish(message)
         self._measured_cp.publish(_posed(self._frame, record["local_measured_cp"], stamp))
+        self._setpoint_cp.publish(_posed(self._frame, record["local_setpoint_cp"], stamp))
         self._base.publish(_posed(self._world, state["body_pose"][self.description.base], stamp))
 
 

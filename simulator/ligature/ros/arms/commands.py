@@ -126,6 +126,7 @@ COMMANDS: list[tuple[Any, ...]] = [
     (crtk.ServoJv, JointState, _velocity),
     (crtk.ServoJf, JointState, _effort),
     (crtk.ServoCp, PoseStamped, _pose),
+    (crtk.ServoCr, PoseStamped, _pose),
     (crtk.ServoCv, TwistStamped, _twist),
     (crtk.ServoCs, CartesianState, _cartesian_state),
     (crtk.ServoCi, CartesianImpedance, _impedance),

@@ -6,7 +6,8 @@ the console itself moves nothing but the power of the arms.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Container, Sequence
 from typing import Any
 
 import rospy
@@ -18,11 +19,13 @@ from std_msgs.msg import Bool, Empty, Float64, Float64MultiArray, String
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.scene import ArmKind, WorldSettings
 from ligature.robots.commands import ArmCommand, StateCommand
+from ligature.ros.arms.latched import Latched
 from ligature.ros.arms.outlet import ArmOutlet
 from ligature.ros.arms.readings import set_pose
 
 QUEUE = 10
 SUJ_JOINTS = 6
+LOCAL = "local/measured_cp"
 PEDALS = ("clutch", "camera", "operator_present")
 ALIASES = {
     "clutch": "footpedals/clutch",
@@ -33,25 +36,25 @@ OTHER_PEDALS = ("footpedals/coag", "footpedals/bicoag", "footpedals/cam_minus", 
 DEFAULT_SCALE = 0.2
 
 
-def _latched(topic: str, type_: type) -> Any:
-    return rospy.Publisher(topic, type_, latch=True, queue_size=QUEUE)
-
-
 class Console:
-    """One console, and the system's power; ``push`` sends commands to arms."""
+    """One console, and the system's power; ``push`` sends commands to arms. A ``silent`` one only listens."""
 
-    def __init__(self, prefix: str, outlets: Sequence[ArmOutlet], push: Callable[[ArmCommand], None]) -> None:
+    def __init__(
+        self, prefix: str, outlets: Sequence[ArmOutlet], push: Callable[[ArmCommand], None], silent: bool
+    ) -> None:
         self._arms = [outlet.index for outlet in outlets]
-        self._push = push
+        self._push, self._silent = push, silent
+        self._said: list[Latched] = []
         console = f"{prefix}console"
-        self._enabled = _latched(f"{console}/teleop/enabled", Bool)
-        self._scale = _latched(f"{console}/teleop/scale", Float64)
-        self._selected = _latched(f"{console}/teleop/selected", String)
-        self._unselected = _latched(f"{console}/teleop/unselected", String)
-        self._volume = _latched(f"{prefix}system/volume", Float64)
-        self._enabled.publish(False)
-        self._scale.publish(DEFAULT_SCALE)
-        self._listen(f"{console}/teleop/enable", Bool, lambda m: self._enabled.publish(m.data))
+        self._enabled = self._latched(f"{console}/teleop/enabled", Bool)
+        self._scale = self._latched(f"{console}/teleop/scale", Float64)
+        self._selected = self._latched(f"{console}/teleop/selected", String)
+        self._unselected = self._latched(f"{console}/teleop/unselected", String)
+        self._volume = self._latched(f"{prefix}system/volume", Float64)
+        self._values: dict[Latched, Any] = {self._enabled: False, self._scale: DEFAULT_SCALE}
+        self.beat()
+        self._listen(f"{console}/teleop/enable", Bool, lambda m: self._report(self._enabled, m.data))
+        self._listen(f"{console}/teleop/scale", Float64, self._hear_scale)
         self._listen(f"{console}/teleop/set_scale", Float64, self._set_scale)
         self._listen(f"{console}/teleop/select", String, lambda m: self._selected.publish(m.data))
         self._listen(f"{console}/teleop/unselect", String, lambda m: self._unselected.publish(m.data))
@@ -64,6 +67,29 @@ class Console:
             self._listen(f"{root}/beep", Float64MultiArray, lambda m: rospy.loginfo(f"beep {list(m.data)}"))
             self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"string_to_speech: {m.data}"))
 
+    def beat(self) -> None:
+        """Publish switch and scale again: clients take none that is older than a second."""
+        for topic, value in self._values.items():
+            topic.publish(value)
+
+    def _report(self, topic: Latched, value: Any) -> None:
+        self._values[topic] = value
+        topic.publish(value)
+
+    def _hear_scale(self, message: Any) -> None:
+        """Whoever teleoperates reports the scale that it has, which may come from its own file."""
+        if message._connection_header["callerid"] != rospy.get_name():
+            self._values[self._scale] = message.data
+
+    def close(self) -> None:
+        """Fall silent: another console publishes. What switches the power of arms is heard all the same."""
+        for topic in self._said:
+            topic.close()
+
+    def _latched(self, topic: str, type_: type) -> Latched:
+        self._said.append(Latched(topic, type_, self._silent))
+        return self._said[-1]
+
     def _listen(self, topic: str, type_: type, take: Callable[[Any], None]) -> None:
         rospy.Subscriber(topic, type_, take, queue_size=QUEUE)
 
@@ -71,18 +97,24 @@ class Console:
         """Pedals are pressed by ``emulate_…`` messages, and reported under their new and old names."""
         for pedal in PEDALS:
             names = (f"{console}/{pedal}", f"{prefix}{ALIASES[pedal]}")
-            self._listen(f"{console}/emulate_{pedal}", Joy, _relay([_latched(name, Joy) for name in names]))
-        self._others = [_latched(f"{prefix}{name}", Joy) for name in OTHER_PEDALS]
+            self._listen(f"{console}/emulate_{pedal}", Joy, _relay([self._latched(name, Joy) for name in names]))
+        for name in OTHER_PEDALS:
+            self._latched(f"{prefix}{name}", Joy)
 
     def _set_scale(self, message: Any) -> None:
         if 0.0 < message.data <= 1.0:
-            self._scale.publish(message.data)
+            self._report(self._scale, message.data)
         else:
             rospy.logwarn(f"console: a scale must be above 0 and at most 1, not {message.data:g}")
 
     def _all(self, command: str) -> None:
         for arm in self._arms:
             self._push(StateCommand(arm, command))
+
+
+def console_topics(prefix: str) -> list[str]:
+    """What only a console publishes; pedals and selections have others who press and select."""
+    return [f"{prefix}console/teleop/enabled", f"{prefix}system/volume"]
 
 
 def _relay(publishers: Sequence[Any]) -> Callable[[Any], None]:
@@ -100,28 +132,32 @@ def _press(message: Any) -> Joy:
     return event
 
 
-class SetupJoints:
-    """Where the bases of the arms stand: fixed in a scene, published as the set-up joints of the cart."""
+def setup_topics(world: WorldSettings, arm: str) -> list[str]:
+    """What the set-up joints of an arm publish."""
+    return [f"{world.root}SUJ/{arm}/{name}" for name in ("operating_state", "measured_js", "measured_cp", LOCAL)]
 
-    def __init__(self, world: WorldSettings, outlets: Sequence[ArmOutlet]) -> None:
+
+class SetupJoints:
+    """Where the bases of the arms stand: fixed in a scene, published as the set-up joints of the cart.
+
+    Those of arms called in ``silent`` are not published.
+    """
+
+    def __init__(self, world: WorldSettings, outlets: Sequence[ArmOutlet], silent: Container[str]) -> None:
         self._outlets = [outlet for outlet in outlets if outlet.description.kind is not ArmKind.MTM]
         self._reference, self._frame_prefix = "ECM", world.frame_prefix
-        self._joints: dict[str, Any] = {}
-        self._local: dict[str, Any] = {}
-        self._poses: dict[str, Any] = {}
+        self._arms: dict[str, _SetupArm] = {}
         rospy.Subscriber(f"{world.root}SUJ/set_reference_arm", String, self._refer, queue_size=QUEUE)
         for outlet in self._outlets:
             name = outlet.description.name
-            root = f"{world.root}SUJ/{name}"
-            state = _latched(f"{root}/operating_state", OperatingState)
-            message = OperatingState(state="ENABLED", is_homed=True)
-            message.header.stamp = rospy.Time.now()
-            state.publish(message)
-            self._joints[name] = rospy.Publisher(f"{root}/measured_js", JointState, queue_size=QUEUE)
-            self._poses[name] = rospy.Publisher(f"{root}/measured_cp", PoseStamped, queue_size=QUEUE)
-            self._local[name] = rospy.Publisher(f"{root}/local/measured_cp", PoseStamped, queue_size=QUEUE)
-            for verb in ("servo_jp", "move_jp"):
-                rospy.Subscriber(f"{root}/{verb}", JointState, self._refuse(f"{root}/{verb}"), queue_size=QUEUE)
+            if name not in silent:
+                self._arms[name] = _SetupArm(f"{world.root}SUJ/{name}", name)
+
+    def fall_silent(self, arm: str) -> None:
+        """Publish no more of an arm: another node does."""
+        found = self._arms.pop(arm, None)
+        if found is not None:
+            threading.Thread(target=found.close, daemon=True).start()
 
     def _refer(self, message: Any) -> None:
         known = [outlet.description.name for outlet in self._outlets]
@@ -129,9 +165,6 @@ class SetupJoints:
             self._reference = message.data
         else:
             rospy.logwarn(f"SUJ/set_reference_arm: there is no '{message.data}'; there are {', '.join(known)}")
-
-    def _refuse(self, topic: str) -> Callable[[Any], None]:
-        return lambda _: rospy.logwarn_throttle(2.0, f"{topic}: the bases of the arms are fixed in this scene")
 
     def publish(self, state: Any, stamp: Any) -> None:
         """Poses of the bases: of the reference arm in the world, of the others in the tip of the reference arm."""
@@ -144,17 +177,50 @@ class SetupJoints:
             name = outlet.description.name
             if name == self._reference:
                 T_world_tip = bases[name] @ pose7_matrix(state["arm"][outlet.index]["local_measured_cp"])
-        for name, T in bases.items():
+        for name, arm in self._arms.items():
+            T = bases[name]
             apart = name != self._reference and T_world_tip is not None
             pose = inverse(T_world_tip) @ T if apart and T_world_tip is not None else T
-            self._publish(self._poses[name], pose, self._reference if apart else "Cart", stamp)
-            self._publish(self._local[name], T, "Cart", stamp)
-            joints = JointState(name=[f"SUJ_{name}_J{i}" for i in range(SUJ_JOINTS)], position=[0.0] * SUJ_JOINTS)
-            joints.header.stamp = stamp
-            self._joints[name].publish(joints)
+            reference = self._frame_prefix + (self._reference if apart else "Cart")
+            arm.publish(pose, reference, T, f"{self._frame_prefix}Cart", stamp)
 
-    def _publish(self, publisher: Any, T: Any, frame: str, stamp: Any) -> None:
-        message = PoseStamped()
-        message.header.frame_id, message.header.stamp = self._frame_prefix + frame, stamp
-        set_pose(message.pose, matrix_pose7(T))
-        publisher.publish(message)
+
+class _SetupArm:
+    """The set-up joints of one arm, whose topics are below ``root``."""
+
+    def __init__(self, root: str, name: str) -> None:
+        self._state = Latched(f"{root}/operating_state", OperatingState)
+        message = OperatingState(state="ENABLED", is_homed=True)
+        message.header.stamp = rospy.Time.now()
+        self._state.publish(message)
+        self._joints = JointState(name=[f"SUJ_{name}_J{i}" for i in range(SUJ_JOINTS)], position=[0.0] * SUJ_JOINTS)
+        self._measured_js = rospy.Publisher(f"{root}/measured_js", JointState, queue_size=QUEUE)
+        self._measured_cp = rospy.Publisher(f"{root}/measured_cp", PoseStamped, queue_size=QUEUE)
+        self._local = rospy.Publisher(f"{root}/{LOCAL}", PoseStamped, queue_size=QUEUE)
+        self._refusing = [
+            rospy.Subscriber(f"{root}/{verb}", JointState, self._refuse(f"{root}/{verb}"), queue_size=QUEUE)
+            for verb in ("servo_jp", "move_jp")
+        ]
+
+    def _refuse(self, topic: str) -> Callable[[Any], None]:
+        return lambda _: rospy.logwarn_throttle(2.0, f"{topic}: the bases of the arms are fixed in this scene")
+
+    def publish(self, pose: Any, reference: str, local: Any, cart: str, stamp: Any) -> None:
+        """Publish a pose (4, 4) in a frame called ``reference``, and one in the cart's."""
+        self._joints.header.stamp = stamp
+        self._measured_js.publish(self._joints)
+        self._measured_cp.publish(_posed(reference, pose, stamp))
+        self._local.publish(_posed(cart, local, stamp))
+
+    def close(self) -> None:
+        """Leave all topics to others."""
+        self._state.close()
+        for end in (self._measured_js, self._measured_cp, self._local, *self._refusing):
+            end.unregister()
+
+
+def _posed(frame: str, T: Any, stamp: Any) -> PoseStamped:
+    message = PoseStamped()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    set_pose(message.pose, matrix_pose7(T))
+    return message

@@ -11,8 +11,9 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool, Empty, Float64, String
 
 from ligature.model.scene import ArmKind
+from ligature.robots.arm import CHALLENGE
+from ligature.ros.arms.latched import Latched
 
-QUEUE = 100
 STATES = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
 
 LATCHED: dict[str, type] = {
@@ -38,6 +39,11 @@ _LOGS: dict[str, Callable[[str], None]] = {
     "status": rospy.logdebug,
 }
 WARNING_PAUSE = 2.0
+
+
+def event_topics(kind: ArmKind) -> list[str]:
+    """Names of the event topics of an arm."""
+    return ["operating_state", *LATCHED, *LATCHED_OF_KIND[kind]]
 
 
 def operating_state(values: list[Any], stamp: Any) -> OperatingState:
@@ -66,12 +72,9 @@ class EventTopics:
         self._root = root
         self._clock = Clock()
         self._state = [0, False, False]
-        self._operating = rospy.Publisher(f"{root}/operating_state", OperatingState, latch=True, queue_size=QUEUE)
+        self._operating = Latched(f"{root}/operating_state", OperatingState)
         topics = {**LATCHED, **LATCHED_OF_KIND[kind]}
-        self._publishers = {
-            name: rospy.Publisher(f"{root}/{name}", type_, latch=True, queue_size=QUEUE)
-            for name, type_ in topics.items()
-        }
+        self._publishers = {name: Latched(f"{root}/{name}", type_) for name, type_ in topics.items()}
         self._types = topics
         self._logged: dict[str, float] = {}
         self.error = ""
@@ -87,6 +90,11 @@ class EventTopics:
             type_ = self._types[name]
             self._publishers[name].publish(type_() if type_ is Empty else type_(data=value))
             self._log(name, value)
+
+    def close(self) -> None:
+        """Publish no more."""
+        for topic in (self._operating, *self._publishers.values()):
+            topic.close()
 
     @property
     def failed(self) -> bool:
@@ -109,4 +117,5 @@ class EventTopics:
         if now - self._logged.get(value, 0.0) > WARNING_PAUSE:
             self._logged = {text: at for text, at in self._logged.items() if now - at < WARNING_PAUSE}
             self._logged[value] = now
-            _LOGS[name](f"{self._root}: {value}")
+            direct = value.startswith(f"{CHALLENGE}/")  # names its topic, which is not below this arm's
+            _LOGS[name](f"{self._root.rpartition('/')[0]}/{value}" if direct else f"{self._root}: {value}")

@@ -6,7 +6,9 @@ Runs on the thread of `ligature.ros.node`; commands and services come in on rosp
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -24,8 +26,11 @@ from ligature.robots.commands import ArmCommand
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.ros.arms.challenge import ChallengeFace
 from ligature.ros.arms.commands import listeners
-from ligature.ros.arms.console import Console, SetupJoints
-from ligature.ros.arms.outlet import ArmOutlet
+from ligature.ros.arms.console import Console, SetupJoints, console_topics, setup_topics
+from ligature.ros.arms.outlet import ArmOutlet, published_topics
+from ligature.ros.arms.rivals import Rival, Rivals
+from ligature.ros.master import NO_ANSWER
+from ligature.ros.names import tf_topics
 from ligature.ros.publisher import Publisher
 
 PERIOD = 0.005
@@ -41,58 +46,102 @@ STALE = 0.1
 
 QUEUE = 10
 
+CONSOLE, SETUP = "console", "SUJ/"
+"""Names of what may be another node's beside arms: the console, and before the name of an arm its set-up joints."""
+
 
 class ArmsNode:
     """The arms of a scene on ROS.
 
     Topics and frames begin with the prefix of the scene; with ``challenge`` topics are there a second time, under
-    the names of the suturing challenge's own node.
+    the names of the suturing challenge's own node. What another node publishes already, or begins to publish, is left
+    to it for the rest of the run: two who report one arm are worse than none.
     """
 
     def __init__(self, scene: Scene, block: Block, outbox: Outbox, challenge: bool) -> None:
         self._block, self._outbox = block, outbox
         prefix = scene.world.root
         self._frame_prefix = scene.world.frame_prefix
-        self._base_body = [arm.base for arm in scene.arms]
-        self._outlets: list[ArmOutlet] = []
+        self._outlets: dict[int, ArmOutlet] = {}
         self.rejected = 0
         self._count = 0
         self._beat = 0.0
         self._due = -math.inf
+        self._rivals = Rivals(_parts(scene, prefix))
+        with suppress(*NO_ANSWER):
+            self._rivals.look()
+        taken = self._yielded()
         for index, description in enumerate(scene.arms):
-            outlet = ArmOutlet(index, description, f"{prefix}{description.name}", scene)
-            self._outlets.append(outlet)
-            self._subscribe(outlet)
-        self._tf = Publisher("/tf", TFMessage) if self._outlets else None
-        if self._outlets:
-            self._console = Console(prefix, self._outlets, self.push)
-            self._setup_joints = SetupJoints(scene.world, self._outlets)
-        self._challenge = ChallengeFace(scene, self._outlets, self.push) if challenge else None
+            if description.name not in taken:
+                outlet = ArmOutlet(index, description, f"{prefix}{description.name}", scene)
+                self._outlets[index] = outlet
+                self._subscribe(outlet)
+        outlets = self.outlets
+        self._tf = [Publisher(topic, TFMessage) for topic in tf_topics(scene.world, "tf")] if outlets else []
+        self._console: Console | None = None
+        self._setup_joints: SetupJoints | None = None
+        if outlets:
+            self._console = Console(prefix, outlets, self.push, CONSOLE in taken)
+            self._setup_joints = SetupJoints(scene.world, outlets, [name.removeprefix(SETUP) for name in taken])
+        self._challenge = ChallengeFace(scene, outlets, self.push) if challenge else None
 
     @property
     def outlets(self) -> list[ArmOutlet]:
-        """The arms in the order of the scene."""
-        return self._outlets
+        """The arms that are there on ROS, in the order of the scene."""
+        return list(self._outlets.values())
 
     @property
     def dropped(self) -> int:
         """Messages that slow clients missed."""
-        return sum(outlet.dropped for outlet in self._outlets)
+        return sum(outlet.dropped for outlet in self.outlets)
 
     @property
     def faults(self) -> dict[str, str]:
         """The arms in FAULT by name, each with its newest error."""
-        return {outlet.description.name: outlet.events.error for outlet in self._outlets if outlet.events.failed}
+        return {outlet.description.name: outlet.events.error for outlet in self.outlets if outlet.events.failed}
+
+    @property
+    def rivals(self) -> Mapping[str, Rival]:
+        """What is left to other nodes, by name."""
+        return self._rivals.found
 
     def start(self, state: Any) -> None:
         """Report the operating states that a running simulation has already; events before this are old."""
         self._block.events.skip()
-        for outlet, record in zip(self._outlets, state["arm"], strict=True):
+        for outlet in self.outlets:
+            record = state["arm"][outlet.index]
             outlet.follow(record)
             outlet.events.publish("operating_state", [record["operating"], record["homed"], record["busy"]])
             outlet.events.publish("trajectory_j/ratio", float(record["ratio"][0]))
             if outlet.description.kind is ArmKind.PSM and int(record["tool"]) in INSTRUMENTS:
                 outlet.events.publish("tool_type", INSTRUMENTS[int(record["tool"])].type)
+        if self._outlets:
+            self._rivals.start()
+
+    # --- rivals -----------------------------------------------------------------------------
+
+    def _yielded(self) -> list[str]:
+        """Names of parts that are another node's since the last call, each reported once."""
+        found = self._rivals.take()
+        for part, rival in found:
+            rospy.logwarn(
+                f"{part}: node {rival.node} publishes {rival.topic}; the simulated {part} stays silent and takes no "
+                "commands for the rest of this run; '--no-masters' and '--only' leave arms out, '--ns' renames all"
+            )
+        return [part for part, _ in found]
+
+    def _fall_silent(self, part: str) -> None:
+        """Leave a part to the node that publishes it; the master is asked on another thread."""
+        if part == CONSOLE and self._console is not None:
+            threading.Thread(target=self._console.close, daemon=True).start()
+        elif self._setup_joints is not None:
+            self._setup_joints.fall_silent(part.removeprefix(SETUP))
+        for index, outlet in list(self._outlets.items()):
+            if outlet.description.name == part:
+                del self._outlets[index]
+                threading.Thread(target=outlet.close, daemon=True).start()
+
+    # --- readings ---------------------------------------------------------------------------
 
     def next_due(self) -> float:
         """When `publish` has something to do, on the monotonic clock."""
@@ -106,24 +155,31 @@ class ArmsNode:
         """
         self._due = max(self._due + PERIOD, now + PERIOD / 5)
         self._count += 1
+        for part in self._yielded():
+            self._fall_silent(part)
+        outlets = self.outlets
         events = [event for event in self._block.events.read() if event.arm != RUN]
         if events:
             refresh()
         settled = {event.arm for event in events if event.name == "operating_state"}
         stamp = self._stamp(state)
         if self._count % FOLLOW_PERIODS == 0:
-            for outlet in self._outlets:
+            for outlet in outlets:
                 outlet.follow(state["arm"][outlet.index])
-            self._setup_joints.publish(state, stamp)
+            if self._setup_joints is not None:
+                self._setup_joints.publish(state, stamp)
         sent = 0
-        for outlet in self._outlets:
+        for outlet in outlets:
             sent += outlet.publish(state["arm"][outlet.index], stamp, 0 if outlet.index in settled else self._count)
         for event in events:
-            self._outlets[event.arm].events.publish(event.name, event.value)
+            if event.arm in self._outlets:
+                self._outlets[event.arm].events.publish(event.name, event.value)
         if now > self._beat:
             self._beat = now + HEARTBEAT
-            for outlet in self._outlets:
+            for outlet in outlets:
                 outlet.events.beat()
+            if self._console is not None:
+                self._console.beat()
         if self._challenge is not None:
             self._challenge.publish(now, state, stamp)
         if self._count % TF_PERIODS == 0:
@@ -135,24 +191,29 @@ class ArmsNode:
         return now if (now - stamp).to_sec() > STALE else stamp
 
     def _publish_tf(self, state: Any, stamp: Any) -> None:
-        if self._tf is None or not self._tf.heard:
+        heard = [topic for topic in self._tf if topic.heard]
+        if not heard:
             return
         frames = []
-        for outlet, body in zip(self._outlets, self._base_body, strict=True):
+        for outlet in self.outlets:
+            body = outlet.description.base
             record, name = state["arm"][outlet.index], f"{self._frame_prefix}{outlet.description.name}"
             parent = record["reference"].decode("utf-8", "replace") or outlet.base_frame
             frames.append(_transform(parent, name, record["measured_cp"], stamp))
             if outlet.description.kind is not ArmKind.MTM:
                 pose = state["body_pose"][body] if body >= 0 else matrix_pose7(outlet.T_base)
                 frames.append(_transform(f"{self._frame_prefix}world", outlet.base_frame, pose, stamp))
-        self._tf.publish(TFMessage(frames))
+        for topic in heard:
+            topic.publish(TFMessage(frames))
 
     # --- commands ---------------------------------------------------------------------------
 
     def _subscribe(self, outlet: ArmOutlet) -> None:
         for topic, type_, take in listeners(outlet.index, outlet.description.kind):
             listen = self._listener(outlet, topic, take)
-            rospy.Subscriber(f"{outlet.root}/{topic}", type_, listen, queue_size=QUEUE, tcp_nodelay=True)
+            outlet.subscribers.append(
+                rospy.Subscriber(f"{outlet.root}/{topic}", type_, listen, queue_size=QUEUE, tcp_nodelay=True)
+            )
 
     def _listener(self, outlet: ArmOutlet, topic: str, take: Callable[[Any], ArmCommand]) -> Callable[[Any], None]:
         def listen(message: Any) -> None:
@@ -170,6 +231,15 @@ class ArmsNode:
         """Send a command to the physics; raises ValueError when it may not go there."""
         command.check()
         self._outbox.push(command)
+
+
+def _parts(scene: Scene, prefix: str) -> dict[str, list[str]]:
+    """What is left to others as a whole, by name: each arm, its set-up joints, the console; and its topics."""
+    parts = {arm.name: published_topics(arm, f"{prefix}{arm.name}") for arm in scene.arms}
+    for arm in scene.arms:
+        if arm.kind is not ArmKind.MTM:
+            parts[SETUP + arm.name] = setup_topics(scene.world, arm.name)
+    return {**parts, CONSOLE: console_topics(prefix)} if parts else {}
 
 
 def _transform(parent: str, child: str, pose: Any, stamp: Any) -> TransformStamped:

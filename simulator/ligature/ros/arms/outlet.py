@@ -11,7 +11,7 @@ from ligature.model.scene import ArmDescription, Scene
 from ligature.robots.fitting import base_pose, kinematics_of
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.robots.psm import Psm
-from ligature.ros.arms.events import EventTopics
+from ligature.ros.arms.events import EventTopics, event_topics
 from ligature.ros.arms.readings import Reading, readings
 from ligature.ros.arms.services import Services
 from ligature.ros.publisher import Publisher
@@ -24,6 +24,12 @@ SELDOM = 4
 """Readings are published every so many periods: where the arm is at 200 Hz, what else programs close loops on at
 100 Hz, the rest at 50 Hz. A client of the dVRK listens to a dozen of them for each arm, in one Python process.
 """
+
+
+def published_topics(description: ArmDescription, root: str) -> list[str]:
+    """What an arm publishes below ``root``."""
+    names = (*(reading.topic for reading in readings(description.kind, (), "")), *event_topics(description.kind))
+    return [f"{root}/{name}" for name in names]
 
 
 class ArmOutlet:
@@ -41,7 +47,8 @@ class ArmOutlet:
             (reading, Publisher(f"{root}/{reading.topic}", type(reading.message)), EVERY.get(reading.topic, SELDOM))
             for reading in self._readings
         ]
-        Services(root, self.events, lambda: self._kinematics, lambda: self._T_reference_base)
+        self._services = Services(root, self.events, lambda: self._kinematics, lambda: self._T_reference_base)
+        self.subscribers: list[Any] = []
 
     def follow(self, record: Any) -> None:
         """Keep up with the instrument and the base frame of the state record."""
@@ -59,6 +66,15 @@ class ArmOutlet:
                 publisher.publish(reading.filled(record, stamp))
                 sent += 1
         return sent
+
+    def close(self) -> None:
+        """Fall silent and take no commands: all topics and services are left to others. Asks the master a lot."""
+        for subscriber in self.subscribers:
+            subscriber.unregister()
+        self.events.close()
+        for _, publisher, _ in self._outlets:
+            publisher.close()
+        self._services.close()
 
     @property
     def dropped(self) -> int:

@@ -58,8 +58,12 @@ class Services:
             "inverse_kinematics": self._inverse,
             "actuator_to_joint_position": self._convert,
         }
-        for name, type_ in SERVICES.items():
-            rospy.Service(f"{root}/{name}", type_, answers[name])
+        self._services = [rospy.Service(f"{root}/{name}", type_, answers[name]) for name, type_ in SERVICES.items()]
+
+    def close(self) -> None:
+        """Answer no more; a service that another node has registered since is left to it."""
+        for service in self._services:
+            service.shutdown()
 
     def _forward(self, request: Any, base: Array) -> QueryForwardKinematicsResponse:
         kinematics, cp = self._kinematics(), Pose()

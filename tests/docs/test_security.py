@@ -1,0 +1,27 @@
+"""Every promise of SECURITY.md names a test that is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+ROWS = [
+    line for line in (ROOT / "SECURITY.md").read_text("utf-8").partition("## What is promised")[2].splitlines()
+    if line.startswith("| ") and not line.startswith(("| promise", "|---"))
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[2:50])
+def test_a_promise_has_its_test(row: str) -> None:
+    tests = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", row)
+    assert tests, "no test is named"
+    for file, name in tests:
+        text = (ROOT / file).read_text("utf-8")
+        assert re.search(rf"^def {name}\(" if name else r"^def test_\w+\(", text, re.MULTILINE), (file, name)
+
+
+def test_there_is_a_promise_for_every_reader_and_for_the_page() -> None:
+    assert len(ROWS) >= 15
