@@ -24,7 +24,7 @@ def test_the_script_writes_the_scene_byte_for_byte(scripts: Path, tmp_path: Path
     version = subprocess.run([binary, "--version"], capture_output=True, text=True, timeout=100, check=True).stdout
     if "Blender 3.4" not in version:
         pytest.skip("the scene was written by Blender 3.4; other versions round bevelled edges in another order")
-    for folder in ("suturing_small", "theatre"):  # the arms and the room are named where they lie
+    for folder in ("suturing_small", "theatre"):  # the launch file names their models
         shutil.copytree(SCENES / folder, tmp_path / folder)
     script = shutil.copy(SCENES / "author_blender_suturing.py", tmp_path)
     target = tmp_path / "blender_suturing"
