@@ -245,3 +245,4 @@ def test_tissue_is_sampled_with_its_punctures_and_forces(tmp_path: Path) -> None
             expected = np.array([moment[field] if name == "points" else moment[field][0] for moment in truth])
             np.testing.assert_allclose(block[name][:], expected, rtol=1e-5, atol=1e-6, err_msg=name)
         assert np.abs(np.diff(block["points"][:], axis=0)).max() > 0.0
+        assert all("units" in block[name].attrs for name in block)

@@ -103,6 +103,10 @@ def test_turning_the_needle_along_its_arc_inserts_it(task: str) -> None:
             break
     env.close()
     assert done and info["is_success"]
+    if task == "puncture":
+        assert info["punctures"] >= 2 and 0.0 < info["tissue_peak_force"] < 5.0 and 0.0 < info["tissue_force"] < 5.0
+    else:
+        assert "punctures" not in info
     assert total == pytest.approx(1.0 + 100.0 * first, abs=1e-9)
 
 

@@ -338,6 +338,6 @@ def _tissue(scene: Scene, tissue: TissueBody, state: Any) -> Iterator[Value]:
     yield f"tissue/{own}/points", state["tissue_node"][tissue.rows], places
     yield f"tissue/{own}/wrench", state["tissue_wrench"][k], {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
     yield f"tissue/{own}/peak_force", state["tissue_peak"][k], {"dtype": "f4", "units": "N"}
-    yield f"tissue/{own}/puncture_count", state["puncture_count"][k], {"dtype": "i4"}
+    yield f"tissue/{own}/puncture_count", state["puncture_count"][k], {"dtype": "i4", "units": "1"}
     yield f"tissue/{own}/puncture_points", state["puncture_point"][k], places
-    yield f"tissue/{own}/puncture_normals", state["puncture_normal"][k], {"dtype": "f4"}
+    yield f"tissue/{own}/puncture_normals", state["puncture_normal"][k], {"dtype": "f4", "units": "1"}
