@@ -12,6 +12,7 @@ PACKAGES: Mapping[str, str] = {
     "genpy": "python3-genpy",
     "rosbag": "python3-rosbag",
     "rosgraph": "python3-rosgraph",
+    "roslib": "python3-roslib",
     "rospy": "python3-rospy",
     "diagnostic_msgs": "python3-diagnostic-msgs",
     "geometry_msgs": "python3-geometry-msgs",
