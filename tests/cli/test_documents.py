@@ -80,8 +80,8 @@ def test_a_urdf_robot_moves_in_the_simulator_as_its_file_states(tmp_path: Path) 
 
 def test_a_file_that_is_no_urdf_is_reported(tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text("<robot")
-    told = run("convert", tmp_path / "r.urdf", "-o", tmp_path / "r.yaml", status=1)
-    assert "r.urdf:1:1: error: not well-formed XML" in told
+    output = run("convert", tmp_path / "r.urdf", "-o", tmp_path / "r.yaml", status=1)
+    assert "r.urdf:1:1: error: not well-formed XML" in output
     assert not (tmp_path / "r.yaml").exists()
 
 

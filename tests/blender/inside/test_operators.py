@@ -261,8 +261,8 @@ def test_a_scene_without_a_world_is_written_with_all_files_that_a_launch_file_mu
     assert len(named) == 4 and all(reference.path.is_file() for reference in named)
     world = read_any(launch.world.path, Resolver([tmp_path]))
     assert world.kind == "world"
-    told = [d.message for d in world.diagnostics if d.severity.name != "DEBUG"]
-    assert told == ["world 'world.yaml' names no environment"]  # that is so
+    reported = [d.message for d in world.diagnostics if d.severity.name != "DEBUG"]
+    assert reported == ["world 'world.yaml' names no environment"]  # that is so
 
 
 def test_a_world_without_surroundings_comes_back_as_a_world(tmp_path):
