@@ -37,30 +37,45 @@ def hung(folder: Path, wall: list[float], place: list[float], mass: float = 0.0)
     return ligature.load(path)
 
 
-def speeds(simulation: ligature.Simulation, ticks: int) -> float:
-    """The largest speed of an element in the coming ticks, m/s."""
-    rods = sorted(simulation.scene.rod_bodies)
-    top_speed = 0.0
-    for _ in range(0, ticks, 5):
-        simulation.step(5)
-        top_speed = max(top_speed, float(np.linalg.norm(simulation.state["body_twist"][0, rods, :3], axis=1).max()))
-    return top_speed
+def carried(folder: Path, size: list[float], mass: float, inside: list[float]) -> ligature.Scene:
+    """A thread from a point ``inside`` a falling box of that ``size``, measured from its centre."""
+    scene = hung(folder, size, [-x for x in inside], mass)
+    path = folder / "model.yaml"
+    model = yaml.safe_load(path.read_text())
+    model["BODY holder"]["mass"] = 0.007
+    model["joints"] = ["JOINT weld"]
+    model["JOINT weld"] = {
+        "name": "weld", "type": "fixed", "parent": "BODY wall", "child": "BODY holder",
+        "parent pivot": dict(zip("xyz", inside, strict=True)), "child pivot": dict.fromkeys("xyz", 0.0),
+        "parent axis": {"x": 0.0, "y": 0.0, "z": 1.0}, "child axis": {"x": 0.0, "y": 0.0, "z": 1.0},
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(model, sort_keys=False))
+    assert len(scene.bodies) == 12
+    return ligature.load(path)
 
 
-edge = st.floats(0.012, 0.3)
-offset = st.floats(-0.1, 0.1)
+edge = st.floats(0.03, 0.15)
+offset = st.floats(-0.02, 0.02)
 
 
-@settings(max_examples=12, deadline=None)
-@given(wall=st.lists(edge, min_size=3, max_size=3), place=st.lists(offset, min_size=3, max_size=3))
-def test_a_thread_that_starts_in_a_body_swings_as_one_beside_it(
-    tmp_path_factory: pytest.TempPathFactory, wall: list[float], place: list[float]
+@settings(max_examples=20, deadline=None)
+@given(
+    size=st.lists(edge, min_size=3, max_size=3), inside=st.lists(offset, min_size=3, max_size=3),
+    exponent=st.floats(-2.0, 0.0),
+)  # fmt: skip
+def test_a_thread_that_starts_in_its_falling_carrier_stays_quiet(
+    tmp_path_factory: pytest.TempPathFactory, size: list[float], inside: list[float], exponent: float
 ) -> None:
-    scene = hung(tmp_path_factory.mktemp("hung"), wall, place)
+    """Without exclusions elements of most examples pass 20 m/s, up to 110; shallow starts are pushed out at up to 9."""
+    scene = carried(tmp_path_factory.mktemp("carried"), size, 10.0**exponent, inside)
     simulation = ligature.Simulation(scene)
+    rods = sorted(scene.rod_bodies)
+    (carrier,) = (b.index for b in scene.bodies if b.identity.key == "BODY wall")
     try:
-        # a pendulum of 0.1 m that falls from the horizontal has 1.4 m/s, its whipping end some more
-        assert speeds(simulation, 400) < 8.0
+        for _ in range(80):
+            simulation.step(5)
+            twist = simulation.state["body_twist"][0]
+            assert np.linalg.norm(twist[rods, :3] - twist[carrier, :3], axis=1).max() < 15.0
         assert not [p for p in simulation.problems if p.code == "diverged"]
     finally:
         simulation.close()
