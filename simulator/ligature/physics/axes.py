@@ -90,9 +90,9 @@ class Axes(NamedTuple):
     stopped: Flags  # kept at a position
     stop: Array
     slowed: Flags  # velocity and strength of the motor are bounded
-    slowest: Array
-    fastest: Array
-    strongest: Array
+    lower_speed: Array
+    upper_speed: Array
+    upper_effort: Array
     motor: Array  # velocities of motors
     asked: Array  # what a motor with force output exerts at most
     limit: Array  # largest efforts of motors in the coming tick
@@ -204,9 +204,9 @@ def _bound(axes: Axes, trees: Trees, k: int, dt: float) -> None:
         effort, wanted = limit, axes.motor[k]
         if axes.mode[k] == FORCE:
             effort, wanted = abs(axes.target[k]), np.sign(axes.target[k]) * FREE_SPEED
-        axes.motor[k] = min(max(wanted, axes.slowest[k]), axes.fastest[k])
-        within = axes.slowest[k] <= velocity <= axes.fastest[k]
-        limit = min(effort, axes.strongest[k]) if within else strength
+        axes.motor[k] = min(max(wanted, axes.lower_speed[k]), axes.upper_speed[k])
+        within = axes.lower_speed[k] <= velocity <= axes.upper_speed[k]
+        limit = min(effort, axes.upper_effort[k]) if within else strength
     if axes.stopped[k]:
         axes.motor[k] = STOP_GAIN / dt * (axes.stop[k] - position)
         if not axes.slowed[k]:

@@ -130,12 +130,12 @@ class _Clients:
 
 def _connect_watched() -> tuple[int, int]:
     """Connect, and find out where PyBullet notes that."""
-    memory = list(_memory())
-    before = [words.copy() for words in memory]
+    segments = list(_segments())
+    before = [words.copy() for words in segments]
     client = int(pybullet.connect(pybullet.DIRECT))
     found = [
         words.ctypes.data + 8 * int(k)
-        for words, old in zip(memory, before, strict=True)
+        for words, old in zip(segments, before, strict=True)
         for k in np.flatnonzero((words != old) & (old == 0))
         if _is_client(int(words[k]))
     ]
@@ -151,7 +151,7 @@ def _handle(client: int) -> int:
     return handle if _is_client(handle) else 0
 
 
-def _memory() -> Iterator[Integers]:
+def _segments() -> Iterator[Integers]:
     """The words of the library's variables; those that begin as 0 have no name of a file, and follow the others."""
     end = 0
     with contextlib.suppress(OSError), open("/proc/self/maps") as lines:
@@ -171,9 +171,9 @@ def _is_client(address: int) -> bool:
 def _word(address: int) -> int | None:
     """The word at an address, None where there is no memory."""
     try:
-        with open("/proc/self/mem", "rb", buffering=0) as memory:
-            memory.seek(address)
-            return int.from_bytes(memory.read(8), "little")
+        with open("/proc/self/mem", "rb", buffering=0) as own:
+            own.seek(address)
+            return int.from_bytes(own.read(8), "little")
     except (OSError, ValueError, OverflowError):
         return None
 

@@ -198,7 +198,7 @@ class TreeControl:
         row, own = self.row[joint], self.axes
         fresh = not own.slowed[row]
         own.slowed[row] = True
-        own.slowest[row], own.fastest[row], own.strongest[row] = low, high, strength
+        own.lower_speed[row], own.upper_speed[row], own.upper_effort[row] = low, high, strength
         if fresh:
             self._sort()
 
@@ -214,7 +214,7 @@ class TreeControl:
         """Let nothing stop or slow axes; what bounded them is forgotten, too."""
         own = self.axes
         own.stopped[rows], own.slowed[rows] = False, False
-        for array in (own.stop, own.slowest, own.fastest, own.strongest):
+        for array in (own.stop, own.lower_speed, own.upper_speed, own.upper_effort):
             array[rows] = 0.0
 
     def pull(self, joint: int, stiffness: float) -> float:
@@ -331,6 +331,6 @@ _COMMANDED = ("target", "pace", "max_velocity", "max_deceleration", "yield_stiff
 
 _KEPT = (
     "mode", "target", "integral", "kick", "kick_ticks", "pace", "max_velocity", "max_deceleration", "yield_stiffness",
-    "owned", "stopped", "stop", "slowed", "slowest", "fastest", "strongest", "asked",
+    "owned", "stopped", "stop", "slowed", "lower_speed", "upper_speed", "upper_effort", "asked",
 )  # fmt: skip
 """Arrays of `Axes` that last from tick to tick."""
