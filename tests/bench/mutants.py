@@ -52,8 +52,8 @@ PARTS = {
 }
 """Modules and the tests that are theirs."""
 
-SECONDS = 60
-"""Time after which a mutant counts as noticed: it hangs."""
+SECONDS = 60.0
+"""Time after which a mutant counts as noticed, for it hangs: on a quiet machine, else ``--seconds``."""
 
 KERNEL = re.compile(r"^@(compiled|kernel|inlined)\b", re.MULTILINE)
 
@@ -172,7 +172,7 @@ def parts_of(words: list[str]) -> dict[str, str]:
     return found
 
 
-def survives(module: str, path: Path, text: str, tests: list[str]) -> bool:
+def survives(module: str, path: Path, text: str, tests: list[str], seconds: float = SECONDS) -> bool:
     """Whether the tests pass with a module of this text."""
     child = os.fork()
     if child == 0:
@@ -189,7 +189,7 @@ def survives(module: str, path: Path, text: str, tests: list[str]) -> bool:
                 code = pytest.main(["-x", "-q", "-m", "not slow and not ros and not corpus", "--no-header", *tests])
         finally:
             os._exit(0 if code == 0 else 1)
-    deadline = time.monotonic() + SECONDS
+    deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
@@ -212,6 +212,7 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", metavar="ROOM|MODULE[=TESTS]")
     parser.add_argument("--most", type=int, default=25, help="mutants of a module that are tried, drawn at random")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="time after which a mutant counts as noticed")
     given = parser.parse_args()
     os.chdir(ROOT)
     sys.path[:0] = [str(ROOT / "simulator"), str(ROOT)]
@@ -235,14 +236,14 @@ def main() -> int:
             continue
         kind = tests, bool(KERNEL.search(path.read_text()))
         if kind not in passing:
-            passing[kind] = survives(module, path, path.read_text(), folders)
+            passing[kind] = survives(module, path, path.read_text(), folders, given.seconds)
         if not passing[kind]:
-            report(f"{name}: its tests fail, or take longer than {SECONDS} s, without a change")
+            report(f"{name}: its tests fail, or take longer than {given.seconds:g} s, without a change")
             continue
         chosen = random.Random(given.seed).sample(found, min(given.most, len(found)))
         begin, left = time.monotonic(), []
         for line, what, text in sorted(chosen, key=lambda m: m[0]):
-            if survives(module, path, text(), folders):
+            if survives(module, path, text(), folders, given.seconds):
                 left.append(f"    {path.name}:{line}: {what}")
         lived, tried = lived + len(left), tried + len(chosen)
         took = time.monotonic() - begin
