@@ -38,7 +38,7 @@ PARTS = {
     "model.messages": "model/test_commands.py,bus/test_codec.py",
     "model.commands": "model/test_commands.py,bus/test_codec.py,bus/test_mailbox.py",
     "model.lookup": "model/test_lookup.py",
-    "model.naming": "model/test_naming.py,model/test_load.py",
+    "model.naming": "model/test_naming.py,model/test_load.py,model/test_prefix.py,model/test_proxies.py",
     "bus.codec": "bus/test_codec.py,bus/test_mailbox.py",
     "bus.newest": "bus/test_mailbox.py,bus/test_codec.py,bus/test_outbox.py",
     "bus.mailbox": "bus/test_mailbox.py",

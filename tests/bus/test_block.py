@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from ligature.bus import Block, BusError
 from ligature.bus.block import RETRIES
-from ligature.bus.leftovers import FOLDER, remove_leftovers
+from ligature.bus.leftovers import FOLDER, remove, remove_leftovers
 
 DTYPE = np.dtype([("tick", "u8"), ("values", "f8", (5000,))])
 NAME = f"ligature-{os.getpid()}-0a0b0c0d"
@@ -147,6 +147,14 @@ def test_blocks_of_dead_runs_are_removed() -> None:
     assert leftover.name in remove_leftovers()
     assert not leftover.exists() and mine.exists()
     mine.unlink()
+
+
+def test_the_block_of_one_run_is_removed_whoever_lives_and_may_be_gone_already() -> None:
+    mine = FOLDER / f"ligature-{os.getpid()}-76543210"
+    mine.touch()
+    remove(mine.name)
+    assert not mine.exists()
+    remove(mine.name)
 
 
 def test_leftovers_of_another_user_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
