@@ -40,7 +40,7 @@ PARTS = {
     "model.lookup": "model/test_lookup.py",
     "model.naming": "model/test_naming.py,model/test_load.py,model/test_prefix.py,model/test_proxies.py",
     "bus.codec": "bus/test_codec.py,bus/test_mailbox.py",
-    "bus.newest": "bus/test_mailbox.py,bus/test_codec.py,bus/test_outbox.py",
+    "bus.newest": "bus/test_newest.py,bus/test_mailbox.py,bus/test_outbox.py",
     "bus.mailbox": "bus/test_mailbox.py",
     "bus.pacing": "bus/test_pacing.py",
     "bus.ring": "bus/test_outbox.py,bus/test_mailbox.py,bus/test_block.py",

@@ -112,10 +112,10 @@ def test_the_install_space_without_our_python_packages_names_what_to_install(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
+@pytest.mark.timeout(2800)
 def test_run_tests_runs_the_rostest_of_the_first_task(workspace: Path) -> None:
     # configured anew, since the first configuration writes down an environment without the packages that it builds
-    done = make(workspace, "--force-cmake", "run_tests", timeout=1700.0)
+    done = make(workspace, "--force-cmake", "run_tests", timeout=2600.0)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     (result,) = (workspace / "build" / "test_results" / "ligature").glob("rosunit-first_task.xml")
     suite = ET.parse(result).getroot()
