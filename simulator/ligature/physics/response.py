@@ -13,8 +13,12 @@ from ligature.model.axis import Axis
 
 Array = NDArray[np.float64]
 
-TURNS = np.linspace(0.0, 2.0 * np.pi, 4, endpoint=False)
-"""Positions of a turning axis at which the moved inertia is looked at: it varies with the angle between the arms."""
+TURNS = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
+"""Positions of a turning axis, or its limits before, at which the moved inertia is looked at: it varies with them."""
+
+TOGETHER = 2.0
+"""By how much efforts along several axes may help each other: a damper that stops an axis within 1.25 ticks is stable
+with twice its damping."""
 
 
 def moved_inertias(
@@ -25,8 +29,8 @@ def moved_inertias(
 
     By Gauss's principle every further joint of either body only adds to them, so that they hold in any tree. Efforts
     along several axes help each other where the body turns about a centre of mass away from the joint: with M the
-    mass matrix of the axes and D that of the returned values, no eigenvalue of M^-1 D exceeds 1, so that springs and
-    dampers which are stable for each of them alone are so together.
+    mass matrix of the axes and D that of the returned values, no eigenvalue of M^-1 D exceeds `TOGETHER`, so that
+    springs and dampers which are stable for each of them alone are so together.
 
     Parameters
     ----------
@@ -37,15 +41,20 @@ def moved_inertias(
     axes
         The free axes of the joint, in order; directions in the joint's frame. Only those with springs act.
     """
-    turning = [axis.direction for axis in axes if not axis.prismatic]
-    angles = [(direction, angle) for direction in turning for angle in TURNS] or [(np.eye(3)[2], 0.0)]
+    turning = [axis for axis in axes if not axis.prismatic]
+    angles = [(axis.direction, _within(axis, angle)) for axis in turning for angle in TURNS] or [(np.eye(3)[2], 0.0)]
     sprung = np.array([axis.sprung for axis in axes])
     responses = [_response(masses, inertias, T_inertial_frames, axes, axis_rotation(*turn)) for turn in angles]
     moved = 1.0 / np.max([np.diag(response) for response in responses], axis=0)
     scale = np.sqrt(moved[sprung])
     together = [np.linalg.eigvalsh(scale[:, None] * response[np.ix_(sprung, sprung)] * scale) for response in responses]
-    moved[sprung] /= max(1.0, float(np.max(together, initial=1.0)))
+    moved[sprung] /= max(1.0, float(np.max(together, initial=1.0)) / TOGETHER)
     return np.asarray(moved)
+
+
+def _within(axis: Axis, angle: float) -> float:
+    """``angle``, or the limit of an axis that lies before it."""
+    return angle if axis.low is None or axis.high is None else min(max(angle, axis.low), axis.high)
 
 
 def _response(
