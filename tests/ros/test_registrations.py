@@ -95,7 +95,7 @@ def haunt(env: dict[str, str], node: str, uri: str, rng: random.Random) -> None:
 
 def started(begin: Callable[..., Program]) -> Program:
     program = begin(BIN / "ligature", "run", SMALL, "-p", "200")
-    program.wait_for("first state published", 120.0)
+    program.wait_for("first state published", 250.0)
     return program
 
 
