@@ -18,8 +18,11 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
+from ligature.physics.bullet import connect
 from ligature.physics.closures import CLOSING
 from ligature.physics.motions import Motions
+from ligature.physics.trees import Places
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 
@@ -60,8 +63,8 @@ class Engine:
         The scene's articulations in Bullet, in order.
     motions
         Poses, twists, joints of all trees.
-    place_of
-        Where each body outside rods is.
+    place_of, places, place_table
+        Where each body outside rods is; the same as arrays, and their addresses for compiled code.
     body_at
         The body at Bullet's multibody and link.
     gravity
@@ -76,7 +79,7 @@ class Engine:
 
     def _build(self) -> None:
         scene = self.scene
-        self.client = pybullet.connect(pybullet.DIRECT)
+        self.client, handle = connect()
         self._end = weakref.finalize(self, pybullet.disconnect, self.client)
         iterations = LOOP_ITERATIONS if scene.closures else SOLVER_ITERATIONS
         pybullet.setPhysicsEngineParameter(
@@ -85,12 +88,17 @@ class Engine:
         )  # fmt: skip
         pybullet.setGravity(*self.gravity.tolist(), physicsClientId=self.client)
         self.trees = [build(self.client, self.cache, scene, a, dt=self.dt) for a in scene.articulations]
-        self.motions = Motions(self.client, self.trees)
+        self.motions = Motions(self.client, handle, self.trees)
         self.place_of = {
             body: Placement(self.client, tree, scene.bodies[body], self.motions, k)
             for k, tree in enumerate(self.trees)
             for body in tree.link_of
         }
+        self.places = Places(*np.full((4, len(scene.bodies)), -1))
+        for body, place in self.place_of.items():
+            for array, value in zip(self.places, (place.tree, place.row, place.uid, place.link), strict=True):
+                array[body] = value
+        self.place_table = table_of(self.places)
         self.body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
         self._colliders = [collider for tree in self.trees for collider in _colliders(tree)]
         self.start = self.snapshot()
@@ -127,7 +135,8 @@ class Engine:
             links = [link for link, *_ in tree.axes]
             states = pybullet.getJointStates(tree.uid, links, physicsClientId=self.client) if links else []
             trees.append((pose, velocity, [(s[0], s[1]) for s in states]))
-        return {"trees": trees, "sent": dict(self.motions.sent)}
+        arrays = self.motions.trees
+        return {"trees": trees, "sent": (arrays.sent.copy(), arrays.sent_effort.copy())}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Set the motion of all trees; `forget_contacts` is to follow. Bullet's own saved states are not exact."""
@@ -136,8 +145,7 @@ class Engine:
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
-        self.motions.sent.clear()
-        self.motions.sent.update(snapshot["sent"])
+        self.motions.trees.sent[:], self.motions.trees.sent_effort[:] = snapshot["sent"]
         self.motions.forget_all()
 
     def close(self) -> None:
