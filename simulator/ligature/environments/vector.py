@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -104,7 +104,7 @@ class SuturingVectorEnv(AsyncVectorEnv):
         with self._watched():
             super().set_attr(name, values)
 
-    def close_extras(self, timeout: float | None = None, terminate: bool = False) -> None:
+    def close_extras(self, timeout: float | None = None, terminate: bool = False, **_: Any) -> None:
         """End all processes; where one has ended, or ends now, the others are not asked first."""
         if any(process.exitcode is not None for process in self.processes):
             self._state, terminate = AsyncState.DEFAULT, True
@@ -134,7 +134,7 @@ class SuturingVectorEnv(AsyncVectorEnv):
         self.close(terminate=True)
         raise RuntimeError(f"{'; '.join(ended) or 'an environment'}: the vector is closed, make another") from error
 
-    def _raise_if_errors(self, successes: Sequence[bool]) -> None:
+    def _raise_if_errors(self, successes: list[bool] | tuple[bool]) -> None:
         """Raise RuntimeError for what an environment raised, and end all."""
         try:
             super()._raise_if_errors(successes)
