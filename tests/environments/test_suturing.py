@@ -12,8 +12,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ligature.environments import MAX_STEPS, SuturingEnv, make_vec
-from ligature.environments.suturing import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGTH
+from ligature.environments import MAX_STEPS, SuturingEnv, make_vec, suturing
+from ligature.environments.suturing import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGTH, STEP_LENGTH
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.robots.poses import rotation_vector
 
@@ -192,12 +192,14 @@ def test_an_environment_simulates_the_arm_of_its_task_alone() -> None:
 
 
 def test_what_takes_no_part_in_a_task_neither_moves_nor_is_there() -> None:
-    env = SuturingEnv("reach")
-    needle, start = env.needle, env.reset(seed=1)[0][14:21]
-    down = np.append(env.base_rotation.T @ (start[:3] - env.reset(seed=1)[0][27:30]), np.zeros(4))
-    for _ in range(80):
-        observation, *_ = env.step((down / np.abs(down).max()).astype(np.float32))
-    assert np.linalg.norm(observation[27:30] - start[:3]) < 0.02, "the tool has come down on the needle"
+    env = SuturingEnv("reach", max_steps=None)
+    needle, observation = env.needle, env.reset(seed=1)[0]
+    start, middle = observation[14:21], env._scenery.needle_points(env.simulation.state["body_pose"][0])[1]
+    for _ in range(120):
+        way = env.base_rotation.T @ (middle - observation[27:30]) / STEP_LENGTH
+        way /= max(float(np.abs(way).max()), 1.0)
+        observation, *_ = env.step(np.append(way, np.zeros(4)).astype(np.float32))
+    assert np.linalg.norm(observation[27:30] - middle) < 0.008, "the tool presses on the needle"
     assert (observation[14:21] == start).all() and not observation[21:27].any()
     assert env.simulation.scene.bodies[needle].static and not env.simulation.scene.rods
     env.close()
@@ -234,6 +236,7 @@ def test_a_used_environment_is_a_fresh_one_to_the_bit(
     """Whatever it did before, in whatever contacts and grasps, and whenever it was reset."""
     for earlier in before:
         rolled_out(used, *earlier)
+    suturing._STARTS.clear()
     fresh = SuturingEnv(used._options["task"], max_steps=None)
     (seen, digest), (expected, right) = rolled_out(used, seed, steps), rolled_out(fresh, seed, steps)
     fresh.close()

@@ -99,8 +99,14 @@ class Goal:
     """Attributes that last from action to action."""
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """Bring the scene to where all episodes begin from; raises ValueError where that cannot be done."""
+        """Find out what the task needs of a scene at its start; raises ValueError where it cannot be done there."""
         raise NotImplementedError
+
+    def settle(self, simulation: Simulation, arm: PsmArm) -> None:
+        """Bring the scene to where all episodes begin from: the arm above the work, the needle at rest."""
+        arm.place_jp(START)
+        arm.adopt()
+        simulation.step(200)
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
         """Set an episode up."""
@@ -153,13 +159,6 @@ def _holes_at(simulation: Simulation, *places: Array) -> set[int]:
     return {int(np.argmin(np.linalg.norm(at - place, axis=1))) for place in places} if len(at) else set()
 
 
-def _stand_ready(simulation: Simulation, arm: PsmArm) -> None:
-    """The arm above the work, the needle at rest."""
-    arm.place_jp(START)
-    arm.adopt()
-    simulation.step(200)
-
-
 class Reach(Goal):
     """Bring the tool's control point to within 2 mm of a random place above the work, and keep it there for 0.2 s."""
 
@@ -170,8 +169,7 @@ class Reach(Goal):
     _KEPT = ("_target", "_there", "_rested")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """The arm above the work."""
-        _stand_ready(simulation, arm)
+        """Nothing: the target follows from where the tool is."""
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
         """A target in a box around where the tool is."""
@@ -208,9 +206,8 @@ class Pick(Goal):
     _KEPT = ("_rest", "_at", "_held", "_high", "_up", "_lifted", "_free")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """The arm above the work."""
+        """Remember the bodies of the task."""
         self._scenery = scenery
-        _stand_ready(simulation, arm)
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
         """The needle near its place, turned any way about the vertical, at rest as it came to rest there."""
@@ -273,7 +270,7 @@ class Insert(Goal):
     _KEPT = ("_watch", "_grasped", "_held", "_kept", "_free", "_stage")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """The needle between the jaws, its tip before the entry."""
+        """Find how the needle is to be held, and where its tip shall go."""
         scene, self._simulation, self._scenery = simulation.scene, simulation, scenery
         self._body = scene.bodies[scenery.needle]
         self.arc = NeedleArc.of(scene.needles[0], self._body)
@@ -287,16 +284,17 @@ class Insert(Goal):
         grasp = best_grasp(self.arc, self.DEPTHS, arm.kinematics, T_base, way, way[0], entry)
         if grasp is None:
             raise ValueError(f"{arm.name} cannot hold the needle so that it reaches the whole throw")
-        self._take(simulation, arm, way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc))
+        self._first = way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc)
 
     def _ends(self) -> tuple[Array, Array]:
         """Where the tip goes in and out, (3,) each."""
         poses = self._simulation.state["body_pose"][0]
         return poses[self._scenery.entries[0], :3], poses[self._scenery.exits[0], :3]
 
-    def _take(self, simulation: Simulation, arm: PsmArm, T_world_arc: Array, T_base_tool: Array) -> None:
-        """Close the jaws on the needle, put where it is wanted."""
+    def settle(self, simulation: Simulation, arm: PsmArm) -> None:
+        """Close the jaws on the needle, its tip before the entry."""
         assert arm.jaw is not None
+        T_world_arc, T_base_tool = self._first
         arm.place_jp(arm.kinematics.inverse(T_base_tool[None]).q[0])
         arm.adopt()
         arm.jaw.servo_jp([self.OPEN])

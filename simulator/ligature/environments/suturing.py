@@ -9,8 +9,10 @@ import math
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import gymnasium
 import numpy as np
@@ -151,7 +153,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
         self._goal: Goal = GOALS[task]()
         arm = arm or self._goal.arm
-        self._simulation = Simulation(_scene(self._goal, arm) if scene is None else load(scene))
+        self._simulation = Simulation(_scene(task, arm) if scene is None else load(scene))
         found = self._simulation.arms[arm]
         if not isinstance(found, PsmArm):
             raise ValueError(f"'{arm}' is not a PSM")
@@ -171,9 +173,20 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         )
         self._ticks = round(CONTROL / self._simulation.dt)
         self._goal.prepare(self._simulation, self._scenery, self._arm)
-        self._settled = self._simulation.snapshot()
+        self._settled = self._start()
         self._count, self._closed = 0, False
         self._progress: Progress | None = None
+
+    def _start(self) -> Snapshot:
+        """Where all episodes begin from: it follows from scene, task and arm, and is simulated once in a process."""
+        known = _STARTS.setdefault(self._simulation.scene, {})
+        which = type(self._goal), self._arm.name
+        if which in known:
+            self._simulation.restore(known[which])
+        else:
+            self._goal.settle(self._simulation, self._arm)
+            known[which] = self._simulation.snapshot()
+        return known[which]
 
     @property
     def goal(self) -> Goal:
@@ -351,8 +364,14 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             self._simulation.close()
 
 
-def _scene(goal: Goal, arm: str) -> Scene:
+_STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], str], Snapshot]] = WeakKeyDictionary()
+"""Starts that were simulated, by scene, task and arm; the processes of a vector have them from the one that forks."""
+
+
+@cache
+def _scene(task: str, arm: str) -> Scene:
     """What a task needs of its scene; all of it when another arm than the task's own is asked for."""
+    goal = GOALS[task]
     path = SCENES / goal.scene / "launch.yaml"
     if arm != goal.arm:
         return load(path)
