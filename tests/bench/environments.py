@@ -72,7 +72,7 @@ def main() -> int:
         reference = chain_step_us()
         (one, spent, reset), two = rate_alone(name, seconds), rate(name, 2, seconds)
         found[name] = {
-            "steps_per_second": one, "times_real_time": one * CONTROL, "times_real_time_of_processor": spent * CONTROL,
+            "steps_per_second": one, "real_time_factor": one * CONTROL, "real_time_factor_of_processor": spent * CONTROL,
             "two_processes": two * CONTROL, "ratio": 1e6 / one / reference, "ratio_of_processor": 1e6 / spent / reference,
             "reset": {"ms": reset, "ratio": 1e3 * reset / reference},
         }  # fmt: skip
