@@ -42,7 +42,7 @@ class _Made:
         return SuturingEnv(self.task, **self.options)
 
     def _end_with_parent(self) -> None:
-        """End this process once its parent has: workers hold each other's pipes open, so none is told."""
+        """End this process once its parent has: workers hold each other's pipes open, so that none notices."""
         while os.getppid() == self.parent:
             time.sleep(PARENT_NAP)
         os._exit(0)
