@@ -1,0 +1,70 @@
+"""Threads on the surface of tissue: they lie, are drawn over edges, and push what they lie on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+TOP = 0.105
+LEVEL = [0.0, np.sin(-np.pi / 4), 0.0, np.cos(np.pi / 4)]
+"""Turns the needle so that its thread leaves it along X."""
+
+
+def _thread(kit, pad, length=0.04):
+    """A needle that a command holds 4 mm over the pad's left side, its thread along X over the pad."""
+    thread = kit.THREAD.replace("length: 0.1", f"length: {length}").replace("elements: 50", "elements: 20")
+    simulation = kit.run(pad, kit.needle(), thread)
+    needle = simulation.bodies["BODY Needle"]
+    rod = simulation.scene.rods[0].bodies
+    first, last = simulation.state["body_pose"][0, [rod[0], rod[-1]], :3]
+    along = (last - first) / np.linalg.norm(last - first)
+    turn = np.arctan2(-along[2], along[0])
+    needle.set_pose([0, 0, 0.2, *_about_y(-turn)])
+    place = np.array([-0.02, 0.003, TOP + 0.004]) - simulation.state["body_pose"][0, rod[0], :3] + needle.pose[:3]
+    needle.set_pose([*place, *_about_y(-turn)])
+    needle.command_twist([0] * 6)
+    return simulation, needle, list(rod)
+
+
+def _about_y(angle):
+    return [0.0, np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)]
+
+
+@pytest.mark.parametrize("material", ["silicone pad", "stomach"])
+def test_a_thread_lies_on_tissue_with_its_weight(kit, material):
+    simulation, _, rod = _thread(kit, kit.pad(material=material))
+    simulation.step(1500)
+    heights = simulation.state["body_pose"][0, rod[8:], 2] - TOP
+    radius = simulation.scene.bodies[rod[0]].colliders[0].shape.radius
+    assert (heights > -0.2e-3).all() and (heights < radius + 0.1e-3).all()
+    assert np.abs(simulation.state["body_twist"][0, rod[8:], :3]).max() < 1e-3
+    weight = 9.8 * sum(simulation.scene.bodies[b].mass for b in rod)
+    lying = -simulation.state["tissue_wrench"][0, 0, 2]
+    assert 0.4 * weight < lying < weight
+
+
+def test_a_thread_drawn_over_tissue_neither_sinks_nor_leaps(kit):
+    simulation, needle, rod = _thread(kit, kit.pad())
+    simulation.step(500)
+    needle.command_twist([-0.03, 0.02, -0.004, 0, 0, 0])
+    before = simulation.state["body_pose"][0, rod, :3]
+    for _ in range(900):
+        simulation.step()
+        now = simulation.state["body_pose"][0, rod, :3].copy()
+        assert np.linalg.norm(now - before, axis=1).max() < 0.5e-3
+        before = now
+        over = (np.abs(now[:, 0]) < 0.028) & (np.abs(now[:, 1]) < 0.018)
+        assert (now[over, 2] > TOP - 1e-3).all()
+    assert not simulation.problems
+
+
+def test_a_thread_on_a_free_piece_of_tissue_moves_it_by_all_it_does(kit):
+    """A light piece that falls takes up exactly the impulse that the thread loses."""
+    pad = kit.pad("    fixed: []\n", mass="0.004", size=(0.06, 0.02, 0.005), cell=0.005).replace("fixed: []", "fixed: [-z]")
+    simulation, _, rod = _thread(kit, pad)
+    simulation.step(10)
+    piece = simulation.tissues.pieces[0]
+    for _ in range(100):
+        simulation.step()
+        on_thread = sum(piece.lying[0].rod.springs.impulse[: piece.lying[0].rod.springs.filled[0], :3]) / simulation.dt
+        np.testing.assert_allclose(piece.lying[0].wrench[:3], -np.asarray(on_thread), atol=1e-12)
