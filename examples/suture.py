@@ -93,7 +93,8 @@ class Surgeon:
 
     def ends(self, number: int) -> tuple[Array, Array]:
         """Where a throw goes in and out, (3,) each: the holes of a pair."""
-        return tuple(self.simulation.bodies[f"BODY {side}{number}"].pose[:3] for side in ("Entry", "Exit"))
+        bodies = self.simulation.bodies
+        return bodies[f"BODY Entry{number}"].pose[:3], bodies[f"BODY Exit{number}"].pose[:3]
 
     # --- moving -----------------------------------------------------------------------------
 

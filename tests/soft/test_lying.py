@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 TOP = 0.105
-LEVEL = [0.0, np.sin(-np.pi / 4), 0.0, np.cos(np.pi / 4)]
-"""Turns the needle so that its thread leaves it along X."""
 
 
 def _thread(kit, pad, length=0.04):
@@ -56,15 +54,3 @@ def test_a_thread_drawn_over_tissue_neither_sinks_nor_leaps(kit):
         over = (np.abs(now[:, 0]) < 0.028) & (np.abs(now[:, 1]) < 0.018)
         assert (now[over, 2] > TOP - 1e-3).all()
     assert not simulation.problems
-
-
-def test_a_thread_on_a_free_piece_of_tissue_moves_it_by_all_it_does(kit):
-    """A light piece that falls takes up exactly the impulse that the thread loses."""
-    pad = kit.pad("    fixed: []\n", mass="0.004", size=(0.06, 0.02, 0.005), cell=0.005).replace("fixed: []", "fixed: [-z]")
-    simulation, _, rod = _thread(kit, pad)
-    simulation.step(10)
-    piece = simulation.tissues.pieces[0]
-    for _ in range(100):
-        simulation.step()
-        on_thread = sum(piece.lying[0].rod.springs.impulse[: piece.lying[0].rod.springs.filled[0], :3]) / simulation.dt
-        np.testing.assert_allclose(piece.lying[0].wrench[:3], -np.asarray(on_thread), atol=1e-12)

@@ -98,11 +98,11 @@ class LyingThread:
         self._arrays.face[:] = -1
         self._arrays.wrench[:] = 0.0
 
-    def snapshot(self) -> Array:
+    def snapshot(self) -> Integers:
         """What lasts from tick to tick: the faces."""
         return self._arrays.face.copy()
 
-    def restore(self, snapshot: Array) -> None:
+    def restore(self, snapshot: Integers) -> None:
         """Continue from `snapshot`."""
         self._arrays.face[:] = snapshot
 

@@ -169,8 +169,10 @@ class Piece:
         self.block.elastic.gravity[:] = 0.0
         self.block.reset()
         self.contacts.reset()
-        for part in (*self.piercers, *self.lying):
-            part.reset()
+        for piercer in self.piercers:
+            piercer.reset()
+        for lying in self.lying:
+            lying.reset()
         self.wrench[:], self.peak[:] = 0.0, 0.0
         self._read()
         self.frame.restart()

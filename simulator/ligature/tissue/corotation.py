@@ -28,9 +28,6 @@ Integers = NDArray[np.int64]
 LANES = 32
 """Cells that are worked on together: what they need stays in the first level of a cache."""
 
-TURNS = 2
-"""Newton's steps for a frame; the error after one is about the cube of the turn."""
-
 LEAST = 0.05
 """Least determinant of Newton's matrix, over that at rest; below, Müller's step (MIG 2016) turns the frame."""
 
@@ -126,8 +123,9 @@ def _find_frames(c: Array, size: Array, q: Array, lanes: int, R: Array) -> None:
         i, j, k = sx * c[4 * LANES + lane], sy * c[7 * LANES + lane], sz * c[13 * LANES + lane]
         m, n, o = sx * c[5 * LANES + lane], sy * c[8 * LANES + lane], sz * c[14 * LANES + lane]
         x, y, z, w = q[lane], q[LANES + lane], q[2 * LANES + lane], q[3 * LANES + lane]
-        for _ in range(TURNS):
-            x, y, z, w = _turn(x, y, z, w, f, g, h, i, j, k, m, n, o)
+        # Twice: the error after one step is about the cube of the turn. A loop here would keep the outer one scalar.
+        x, y, z, w = _turn(x, y, z, w, f, g, h, i, j, k, m, n, o)
+        x, y, z, w = _turn(x, y, z, w, f, g, h, i, j, k, m, n, o)
         q[lane], q[LANES + lane], q[2 * LANES + lane], q[3 * LANES + lane] = x, y, z, w
         r, s, t, u, v, a, b, d, e = _matrix(x, y, z, w)
         R[lane], R[LANES + lane], R[2 * LANES + lane] = r, s, t
@@ -136,25 +134,23 @@ def _find_frames(c: Array, size: Array, q: Array, lanes: int, R: Array) -> None:
 
 
 @inlined
-def _rotate(R: Array, v: Array, row: int, lanes: int, out: Array) -> None:
-    """``out`` = R v for the three rows from ``row`` on."""
+def _rotate(R: Array, v: Array, out: Array, lanes: int) -> None:
+    """``out`` = R v for three rows."""
     for lane in range(lanes):
-        at = row * LANES + lane
-        x, y, z = v[at], v[at + LANES], v[at + 2 * LANES]
-        out[at] = R[lane] * x + R[LANES + lane] * y + R[2 * LANES + lane] * z
-        out[at + LANES] = R[3 * LANES + lane] * x + R[4 * LANES + lane] * y + R[5 * LANES + lane] * z
-        out[at + 2 * LANES] = R[6 * LANES + lane] * x + R[7 * LANES + lane] * y + R[8 * LANES + lane] * z
+        x, y, z = v[lane], v[LANES + lane], v[2 * LANES + lane]
+        out[lane] = R[lane] * x + R[LANES + lane] * y + R[2 * LANES + lane] * z
+        out[LANES + lane] = R[3 * LANES + lane] * x + R[4 * LANES + lane] * y + R[5 * LANES + lane] * z
+        out[2 * LANES + lane] = R[6 * LANES + lane] * x + R[7 * LANES + lane] * y + R[8 * LANES + lane] * z
 
 
 @inlined
-def _rotate_back(R: Array, v: Array, row: int, lanes: int, out: Array) -> None:
-    """``out`` = Rᵀ v for the three rows from ``row`` on."""
+def _rotate_back(R: Array, v: Array, out: Array, lanes: int) -> None:
+    """``out`` = Rᵀ v for three rows."""
     for lane in range(lanes):
-        at = row * LANES + lane
-        x, y, z = v[at], v[at + LANES], v[at + 2 * LANES]
-        out[at] = R[lane] * x + R[3 * LANES + lane] * y + R[6 * LANES + lane] * z
-        out[at + LANES] = R[LANES + lane] * x + R[4 * LANES + lane] * y + R[7 * LANES + lane] * z
-        out[at + 2 * LANES] = R[2 * LANES + lane] * x + R[5 * LANES + lane] * y + R[8 * LANES + lane] * z
+        x, y, z = v[lane], v[LANES + lane], v[2 * LANES + lane]
+        out[lane] = R[lane] * x + R[3 * LANES + lane] * y + R[6 * LANES + lane] * z
+        out[LANES + lane] = R[LANES + lane] * x + R[4 * LANES + lane] * y + R[7 * LANES + lane] * z
+        out[2 * LANES + lane] = R[2 * LANES + lane] * x + R[5 * LANES + lane] * y + R[8 * LANES + lane] * z
 
 
 @inlined
@@ -163,10 +159,13 @@ def _resist(K: Array, y: Array, lanes: int, g: Array) -> None:
     for a in range(3):
         for pattern in range(1, 8):
             p = pattern ^ (1 << a)
+            # Rows as slices: indices into them that cannot be negative leave the loop a vector.
             i, j, k = 3 * (p ^ 1) * LANES, (3 * (p ^ 2) + 1) * LANES, (3 * (p ^ 4) + 2) * LANES
-            u, v, w, out = K[p, a, 0], K[p, a, 1], K[p, a, 2], (3 * pattern + a) * LANES
+            m = (3 * pattern + a) * LANES
+            r, s, t, out = y[i : i + LANES], y[j : j + LANES], y[k : k + LANES], g[m : m + LANES]
+            u, v, w = K[p, a, 0], K[p, a, 1], K[p, a, 2]
             for lane in range(lanes):
-                g[out + lane] = u * y[i + lane] + v * y[j + lane] + w * y[k + lane]
+                out[lane] = u * r[lane] + v * s[lane] + w * t[lane]
         for lane in range(lanes):
             g[a * LANES + lane] = 0.0
 
@@ -188,7 +187,8 @@ def add_elastic_forces(
         _to_patterns(c, lanes)
         _find_frames(c, size[kind], q[batch], lanes, R)
         for pattern in range(1, 8):
-            _rotate_back(R, c, 3 * pattern, lanes, y)
+            at, end = 3 * pattern * LANES, 3 * (pattern + 1) * LANES
+            _rotate_back(R, c[at:end], y[at:end], lanes)
         for lane in range(lanes):
             # At rest exactly nothing is left.
             y[3 * LANES + lane] -= 4.0 * edges[first + lane, 0]
@@ -198,7 +198,8 @@ def add_elastic_forces(
                 y[a * LANES + lane] = 0.0
         _resist(K[kind], y, lanes, c)
         for pattern in range(8):
-            _rotate(R, c, 3 * pattern, lanes, y)
+            at, end = 3 * pattern * LANES, 3 * (pattern + 1) * LANES
+            _rotate(R, c[at:end], y[at:end], lanes)
         _to_corners(y, lanes)
         for lane in range(lanes):
             for k in range(8):
