@@ -20,7 +20,7 @@ from ligature.render.context import RenderUnavailable
 from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
-from ligature.tasks import Measures, Monitor, Scenery, SutureScore, judge_suture
+from ligature.tasks import Measures, Monitor, SutureScore, judge_suture
 from ligature.tasks.throws import UP, NeedleArc, Throw, best_grasp, pose_of
 from PIL import Image
 
@@ -57,13 +57,10 @@ class Failure(RuntimeError):
 class Surgeon:
     """Two arms, a needle, and how they work together."""
 
-    def __init__(
-        self, simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None,
-        scenery: Scenery | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None) -> None:
         self.simulation, self._watch = simulation, watch
         scene = simulation.scene
-        self.monitor = Monitor(scene, scenery)
+        self.monitor = Monitor(scene)
         self._needle = simulation.bodies[scene.bodies[self.monitor.scenery.needle].identity.topic]
         self.arc = NeedleArc.of(scene.needles[0], scene.bodies[self.monitor.scenery.needle])
         self._base = {arm.name: scene.bodies[arm.base].T_world_body for arm in scene.arms if arm.base >= 0}
@@ -91,10 +88,9 @@ class Surgeon:
         """Pose (4, 4) of an arm's tool by its own sensors."""
         return self._base[name] @ pose_of(self.arms[name].local_measured_cp())
 
-    def ends(self, number: int) -> tuple[Array, Array]:
-        """Where a throw goes in and out, (3,) each: the holes of a pair."""
-        bodies = self.simulation.bodies
-        return bodies[f"BODY Entry{number}"].pose[:3], bodies[f"BODY Exit{number}"].pose[:3]
+    def hole(self, side: str, pair: int) -> Array:
+        """Position (3,) of a hole."""
+        return self.simulation.bodies[f"BODY {side}{pair}"].pose[:3]
 
     # --- moving -----------------------------------------------------------------------------
 
@@ -187,9 +183,9 @@ class Surgeon:
         while any(arm.is_busy or not arm.is_homed for arm in self.arms.values()):
             self.wait(0.05)
 
-    def throw(self, number: int) -> Throw:
-        """The circle of a throw."""
-        return Throw.through(*self.ends(number), self.arc.radius, UP)
+    def throw(self, pair: int) -> Throw:
+        """The circle through a pair of holes."""
+        return Throw.through(self.hole("Entry", pair), self.hole("Exit", pair), self.arc.radius, UP)
 
     def pick_up(self, name: str, throw: Throw) -> None:
         """Take the needle from the pad near its tip, and hold it up before the entry."""
@@ -205,7 +201,7 @@ class Surgeon:
     ) -> Array:
         """Pose (4, 4) of the tool in the arc frame that reaches the whole way, and where the needle is now."""
         kinematics, base = self.arms[name].kinematics, self._base[name]
-        grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.ends(1)[0], upright)
+        grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.hole("Entry", 1), upright)
         if grasp is None:
             raise Failure(f"{name} cannot hold the needle so that it reaches the whole throw")
         return grasp.tool_in_arc(self.arc)

@@ -53,7 +53,7 @@ class Piece:
         ]
         self._carried = [p for p in self.piercers if p.rod is not None]
         self._alone = [p for p in self.piercers if p.rod is None]
-        self.threads = [SceneThread(p.rod, p, self.block) for p in self._carried if p.rod is not None]
+        self.threads = [SceneThread(p.rod, p, self.block, self.frame) for p in self._carried if p.rod is not None]
         self.lying = [LyingThread(rod, self.block, self._body.friction) for rod in rods]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
         self.wrench, self.peak = np.zeros(6), np.zeros(1)
@@ -72,7 +72,7 @@ class Piece:
         for piercer in self._carried:
             piercer.begin(self._bodies, self.frame)
         for thread in self.threads:
-            thread.begin(self.frame, self._dt)
+            thread.begin(self._dt)
         for lying in self.lying:
             within = [e for thread in self.threads if thread.rod is lying.rod for e in thread.elements]
             lying.begin(self.frame, within, self._dt)
@@ -82,7 +82,7 @@ class Piece:
         for piercer in self._carried:
             piercer.end(self.frame)
         for thread in self.threads:
-            thread.end(self.frame, self._dt)
+            thread.end(self._dt)
         for lying in self.lying:
             lying.end(self.frame, self._dt)
         for piercer in self._alone:
