@@ -31,16 +31,17 @@ def _about_y(angle):
 
 
 @pytest.mark.parametrize("material", ["silicone pad", "stomach"])
-def test_a_thread_lies_on_tissue_with_its_weight(kit, material):
+def test_the_end_of_a_thread_lies_on_tissue_with_its_share_of_the_weight(kit, material):
     simulation, _, rod = _thread(kit, kit.pad(material=material, size=SIZE))
     simulation.step(1500)
-    heights = simulation.state["body_pose"][0, rod[-10:], 2] - TOP
+    # A beam clamped at the needle: its far end lies.
+    height = simulation.state["body_pose"][0, rod[-1], 2] - TOP
     radius = simulation.scene.bodies[rod[0]].colliders[0].shape.radius
-    assert (heights > -0.2e-3).all() and (heights < radius + 0.1e-3).all()
+    assert -0.1e-3 < height < radius + 0.02e-3
     assert np.abs(simulation.state["body_twist"][0, rod[-10:], :3]).max() < 1e-3
     weight = 9.8 * sum(simulation.scene.bodies[b].mass for b in rod)
     lying = -simulation.state["tissue_wrench"][0, 0, 2]
-    assert 0.3 * weight < lying < weight
+    assert 0.25 * weight < lying < 0.5 * weight
 
 
 def test_a_thread_drawn_over_tissue_neither_sinks_nor_leaps(kit):
