@@ -8,10 +8,12 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from ligature.mesh.grid import build_grid
 from ligature.model.material import TissueMaterial
 from ligature.tissue.elastic import ElasticGrid
-from ligature.tissue.elements import lame
+from ligature.tissue.elements import CORNERS, lame, stiffness
 from ligature.tissue.lips import Lips
 from scipy.spatial.transform import Rotation
 
@@ -190,6 +192,55 @@ def test_turned_cell_has_no_force_and_turned_stretch_turns_its_force():
         np.testing.assert_allclose(turned, force @ R.T, atol=1e-6 * np.abs(force).max())
 
 
+@settings(max_examples=30, deadline=None)
+@given(
+    size=st.tuples(*[st.floats(0.2, 5.0)] * 3), poisson=st.floats(0.0, 0.49), seed=st.integers(0, 2**31),
+    turn=st.floats(0.0, 3.0), stretch=st.floats(0.0, 0.4),
+)  # fmt: skip
+def test_force_of_a_cell_is_that_of_its_stiffness_in_its_nearest_frame(size, poisson, seed, turn, stretch):
+    rng = np.random.default_rng(seed)
+    grid = build_grid([np.array([0.0, s]) for s in size])
+    elastic = ElasticGrid(grid, [TissueMaterial(YOUNGS, poisson)], np.zeros(8, dtype=bool))
+    Q = Rotation.from_rotvec(turn * _unit(rng)).as_matrix()
+    X = grid.nodes[grid.cells[0]]
+    F = Q @ (np.eye(3) + stretch * rng.uniform(-1.0, 1.0, (3, 3)))
+    bent = 0.05 * stretch * min(size) * rng.normal(size=(8, 3))
+    x = X @ F.T + bent
+    elastic.x[grid.cells[0]] = x + 10.0 * rng.normal(size=3)
+    for _ in range(12):  # until the frame has turned all the way
+        force = elastic.elastic_forces()[grid.cells[0]]
+    # The mean gradient, and the rotation nearest to it by its singular values.
+    signs = np.where(CORNERS > 0.5, 1.0, -1.0)
+    mean = np.einsum("ka,kb->ab", x, 0.25 * signs / np.array(size))
+    U, _, V = np.linalg.svd(mean)
+    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+    y = ((x - x[0]) @ R - (X - X[0])).reshape(24)
+    expected = -(stiffness(np.array(size), YOUNGS, poisson) @ y).reshape(8, 3) @ R.T
+    atol = 1e-7 * np.abs(expected).max() + 1e-13 * YOUNGS * max(size) ** 2
+    np.testing.assert_allclose(force, expected, atol=atol)
+
+
+def _unit(rng):
+    v = rng.normal(size=3)
+    return v / np.linalg.norm(v)
+
+
+def test_a_solve_in_shares_has_the_bits_of_one_at_once():
+    whole, parts = _pad(), _pad()
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        load = 1e-2 * rng.normal(size=whole.x.shape)
+        parts.begin(load)
+        for share in np.sort(rng.uniform(0.0, 1.0, 3)):
+            parts.solve(share)
+            assert parts.progress[0] < len(parts._bulk.shares)
+        parts.solve(1.0)
+        d = whole.predict(load)
+        np.testing.assert_array_equal(parts.displacement(), d)
+        whole.advance(d)
+        parts.advance(d)
+
+
 def test_momentum_of_a_free_body_is_the_impulse_on_it():
     grid = _block((0.02, 0.02, 0.02), (3, 3, 3))
     elastic = ElasticGrid(grid, [TissueMaterial(YOUNGS)], np.zeros(len(grid.nodes), dtype=bool))
@@ -230,6 +281,14 @@ def _wound(gap):
     return elastic, Lips(elastic)
 
 
+def _step(elastic, lips, load):
+    external = load.copy()
+    lips.expect(external)
+    d = elastic.predict(external)
+    lips.close(d)
+    elastic.advance(d)
+
+
 def test_lips_pressed_together_close_and_do_not_pass_each_other():
     elastic, lips = _wound(0.004)
     assert lips.gaps().min() == pytest.approx(0.004)
@@ -241,10 +300,7 @@ def test_lips_pressed_together_close_and_do_not_pass_each_other():
     for a, b in lips.pairs[top]:
         load[a, 1], load[b, 1] = 0.4, -0.4
     for step in range(250):
-        d = elastic.predict(load)
-        lips.expect(d)
-        lips.close(d)
-        elastic.advance(d)
+        _step(elastic, lips, load)
         assert lips.gaps().min() > -5e-5, step
     assert lips.gaps()[middle].max() < 1e-4
     assert (lips.force[lips.gaps() > 1e-5] == 0.0).all()
@@ -252,10 +308,7 @@ def test_lips_pressed_together_close_and_do_not_pass_each_other():
     assert lips.force.sum() > 1.0
     # Let go, they part again.
     for _ in range(400):
-        d = elastic.predict()
-        lips.expect(d)
-        lips.close(d)
-        elastic.advance(d)
+        _step(elastic, lips, np.zeros_like(load))
     np.testing.assert_allclose(lips.gaps(), 0.004, atol=1e-6)
     assert not lips.force.any()
 
@@ -263,15 +316,12 @@ def test_lips_pressed_together_close_and_do_not_pass_each_other():
 PROGRAM = """
 import hashlib
 import numpy as np
-from tests.tissue.test_elastic import _wound
+from tests.tissue.test_elastic import _step, _wound
 elastic, lips = _wound(0.001)
 load = np.zeros_like(elastic.x)
 load[lips.pairs[:, 0], 1], load[lips.pairs[:, 1], 1] = 0.1, -0.1
 for _ in range(50):
-    d = elastic.predict(load)
-    lips.expect(d)
-    lips.close(d)
-    elastic.advance(d)
+    _step(elastic, lips, load)
 print(hashlib.sha256(elastic.x.tobytes() + lips.force.tobytes()).hexdigest())
 """
 

@@ -11,7 +11,7 @@ from ligature.mesh.grid import Grid
 from ligature.model.material import TissueMaterial
 from ligature.tissue import layout
 from ligature.tissue.contact import RESERVED
-from ligature.tissue.elastic import STEP, ElasticGrid
+from ligature.tissue.elastic import KEPT, STEP, ElasticGrid
 from ligature.tissue.interface import Interface
 from ligature.tissue.lips import Lips
 from ligature.tissue.location import locate
@@ -42,6 +42,12 @@ class TissueBlock:
         Length of a tick, s.
     ticks
         Ticks of a tissue step.
+
+    Attributes
+    ----------
+    pushed
+        Forces on the nodes beside those on points of contact, added up over the ticks of this step, (n, 3) N; they move
+        the nodes in the next one.
     """
 
     def __init__(
@@ -60,6 +66,7 @@ class TissueBlock:
         self.ages = np.zeros(len(self.paths.count), dtype=np.int64)
         self.needles: list[NeedleInTissue] = []
         self.threads: list[ThreadInTissue] = []
+        self.pushed = np.zeros_like(self.elastic.x)
         self._begin()
 
     def add_needle(self, curvature: float, length: float, radius: float) -> NeedleInTissue:
@@ -128,10 +135,15 @@ class TissueBlock:
         return path
 
     def step(self) -> None:
-        """End a tick; every few of them the nodes move."""
-        if not self.interface.count():
+        """End a tick; every few of them the nodes move.
+
+        How they will is found in the ticks before, a share of the work in each, so that no tick takes much longer.
+        """
+        complete = self.interface.count()
+        self.elastic.solve(self.interface.tick / max(self.interface.ticks - 1, 1))
+        if not complete:
             return
-        d = self.interface.expected.copy()
+        d = self.elastic.displacement()
         self.interface.push(d)
         self.lips.close(d)
         self.elastic.advance(d)
@@ -141,9 +153,11 @@ class TissueBlock:
         self.make_room()
 
     def _begin(self) -> None:
-        d = self.elastic.predict()
-        self.lips.expect(d)
-        self.interface.begin(d)
+        self.pushed /= self.interface.ticks
+        self.lips.expect(self.pushed)
+        self.elastic.begin(self.pushed)
+        self.pushed[:] = 0.0
+        self.interface.begin()
 
     # --- state --------------------------------------------------------------------------------
 
@@ -159,7 +173,7 @@ class TissueBlock:
         self.interface.reset()
         for array in self.paths:
             array[:] = 0
-        self.ages[:] = 0
+        self.ages[:], self.pushed[:] = 0, 0.0
         self.paths.length[:] = np.inf
         for _, line in self._lines():
             line.reset()
@@ -167,8 +181,9 @@ class TissueBlock:
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick, as named arrays."""
-        kept = {name: getattr(self.elastic, name).copy() for name in ("x", "v", "frames")}
+        kept = {name: getattr(self.elastic, name).copy() for name in KEPT}
         kept["lip_force"], kept["ages"] = self.lips.force.copy(), self.ages.copy()
+        kept["pushed"] = self.pushed.copy()
         kept.update({f"point_{name}": array for name, array in self.interface.snapshot().items()})
         kept.update({f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)})
         for prefix, line in self._lines():
@@ -183,9 +198,10 @@ class TissueBlock:
         KeyError
             When the snapshot is of a block with fewer needles or threads.
         """
-        for name in ("x", "v", "frames"):
+        for name in KEPT:
             getattr(self.elastic, name)[:] = snapshot[name]
         self.lips.force[:], self.ages[:] = snapshot["lip_force"], snapshot["ages"]
+        self.pushed[:] = snapshot["pushed"]
         self.interface.restore(_with_prefix(snapshot, "point_"))
         for name, array in zip(self.paths._fields, self.paths, strict=True):
             array[:] = snapshot[f"path_{name}"]

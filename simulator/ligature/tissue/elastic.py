@@ -6,8 +6,8 @@ The step is linearly implicit with a matrix of the shape at rest that never chan
 
 with f the corotated elastic forces, K the stiffness at rest, β the material's damping time and Kₛ resistance to local
 rotation, which keeps the fixed matrix stable while cells turn. At rest f = 0: neither Kₛ nor β change where tissue
-rests, only how it gets there. A⁻¹ is the compliance of the step: what a constant force in it moves. So a step is the
-one solve of `predict`, to which contacts add their forces times their `response`.
+rests, only how it gets there. A⁻¹ is the compliance of the step: what a constant force in it moves. So a step is one
+solve, whose work is shared out over its ticks, and contacts add their forces times their `response`.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.spatial.transform import Rotation
 
 from ligature.kernels import kernel
 from ligature.mesh.grid import Grid
 from ligature.model.material import TissueMaterial
 from ligature.tables import opener, table_of
 from ligature.tissue import elements
-from ligature.tissue.corotation import add_elastic_forces
-from ligature.tissue.factorisation import Factor, solve_in_place
+from ligature.tissue.corotation import LANES, add_elastic_forces
+from ligature.tissue.factorisation import Factor, shares, solve_in_place, solve_part
 from ligature.tissue.layout import Elimination
 
 Array = NDArray[np.float64]
@@ -41,27 +42,32 @@ TABLE_NODES = 1500
 """Free nodes up to which the whole compliance is tabulated."""
 
 
+KEPT = ("x", "v", "frames", "force", "load", "progress")
+"""Attributes of `ElasticGrid` that last from tick to tick."""
+
+
 class Bulk(NamedTuple):
     """A grid of n nodes (f of them free) and m cells of c kinds, for compiled code."""
 
-    cells: Integers  # (m, 8)
-    kind: Integers  # (m,)
-    K: Array  # (c, 24, 24) stiffness, N/m
+    cells: Integers  # (m, 8) nodes, kind by kind
+    batches: Integers  # (b, 3) first cell, count and kind of cells that are worked on together
+    K: Array  # (c, 8, 3, 3) stiffness, N/m
     size: Array  # (c, 3) edges, m
-    rest: Array  # (n, 3) nodes at rest
+    edges: Array  # (m, 3) the same of each cell, to the last bit
     x: Array  # (n, 3)
     v: Array  # (n, 3)
-    frames: Array  # (m, 4)
+    frames: Array  # (b, 4 LANES)
     mass: Array  # (n,)
     gravity: Array  # (3,)
     free: Integers  # (f,)
     factor: Elimination
-    force: Array  # (n, 3) scratch, and so on
-    load: Array  # (3 f,)
-    R: Array  # (3, 3)
-    F: Array  # (3, 3)
-    y: Array  # (24,)
-    g: Array  # (24,)
+    shares: Array  # (p,) of a solve's work after each of its parts
+    force: Array  # (n, 3) that moves the nodes in this step
+    load: Array  # (3 f,) what is solved, and the solution
+    progress: Integers  # (1,) parts of the solve that are done
+    R: Array  # scratch, and so on
+    c: Array
+    y: Array
 
 
 def _bulk_example() -> Bulk:
@@ -69,8 +75,8 @@ def _bulk_example() -> Bulk:
     z = np.zeros
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     return Bulk(
-        i(1, 8), i(1), z((1, 24, 24)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 4)), z(1), z(3), i(1),
-        Elimination(i(1, 2), i(1), z(1), z(1), z(1)), z((1, 3)), z(3), z((3, 3)), z((3, 3)), z(24), z(24),
+        i(1, 8), i(1, 3), z((1, 8, 3, 3)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 4)), z(1), z(3), i(1),
+        Elimination(i(1, 5), i(1), z(1), z(1), z(1)), z(1), z((1, 3)), z(3), i(1), z(1), z(1), z(1),
     )  # fmt: skip
 
 
@@ -98,7 +104,11 @@ class ElasticGrid:
     x, v
         Positions and velocities of the nodes, (n, 3).
     frames
-        Rotations of the cells as quaternions x y z w, (m, 4).
+        Rotations of the cells as quaternions x y z w, batch by batch, (b, 4 `LANES`).
+    force
+        What moves the nodes in this step: elastic forces, gravity, momentum and others, (n, 3) N.
+    load, progress
+        The solve of this step, and how many of its parts are done.
     free
         Indices of the nodes that move, (f,); `row` (n,) is the inverse, -1 for fixed nodes.
     """
@@ -125,12 +135,16 @@ class ElasticGrid:
         self._factor = Factor(self._matrix(), grid.site[self.free])
         self._responses: Array | None = None
         self.x, self.v = grid.nodes.copy(), np.zeros((n, 3))
-        self.frames = np.zeros((len(grid.cells), 4))
-        cells, rest, n_free = np.ascontiguousarray(grid.cells), np.ascontiguousarray(grid.nodes), len(self.free)
+        self.force, self.load = np.zeros((n, 3)), np.zeros(3 * len(self.free))
+        self.progress = np.zeros(1, dtype=np.int64)
+        order = np.argsort(self._kind, kind="stable")
+        batches = _batches(self._kind[order])
+        self.frames = np.zeros((len(batches), 4 * LANES))
         self._bulk = Bulk(
-            cells, self._kind, self._K, self._size, rest, self.x, self.v, self.frames, self.mass, self.gravity,
-            self.free, self._factor.arrays, np.zeros((n, 3)), np.zeros(3 * n_free), np.zeros((3, 3)),
-            np.zeros((3, 3)), np.zeros(24), np.zeros(24),
+            np.ascontiguousarray(grid.cells[order]), batches, np.array([elements.blocks(K) for K in self._K]),
+            self._size, np.ascontiguousarray(grid.sizes[order]), self.x, self.v, self.frames, self.mass, self.gravity,
+            self.free, self._factor.arrays, shares(self._factor.arrays), self.force, self.load, self.progress,
+            np.zeros(9 * LANES), np.zeros(24 * LANES), np.zeros(24 * LANES),
         )  # fmt: skip
         self._bulk_table = table_of(self._bulk)
         self.reset()
@@ -166,32 +180,52 @@ class ElasticGrid:
 
     # --- the step -----------------------------------------------------------------------------
 
-    def predict(self, external: Array | None = None) -> Array:
-        """Displacement of all nodes in the next step, (n, 3) m; turns the cells' frames.
+    def begin(self, external: Array | None = None) -> None:
+        """Find the `force` of the next step, and turn the cells' frames; `solve` then finds what it does.
 
         ``external`` (n, 3) are forces beside gravity; what contacts add is found by superposition of `response`.
         """
-        d = np.zeros_like(self.x) if external is None else np.array(external, dtype=np.float64)
-        predict(self._bulk_table, self.h, d)
+        self.force[:] = 0.0 if external is None else external
+        begin(self._bulk_table, self.h)
+
+    def solve(self, share: float) -> None:
+        """Go on with the solve until this share of its work is done, 1 for all."""
+        solve_share(self._bulk_table, share)
+
+    def displacement(self) -> Array:
+        """Displacements of all nodes in the step that is solved, (n, 3) m."""
+        d = np.zeros_like(self.x)
+        d[self.free] = self.load.reshape(-1, 3)
         return d
+
+    def predict(self, external: Array | None = None) -> Array:
+        """Displacement of all nodes in the next step, (n, 3) m: `begin`, the whole `solve`, `displacement`."""
+        self.begin(external)
+        self.solve(1.0)
+        return self.displacement()
 
     def advance(self, d: Array) -> None:
         """Move the nodes by a step's displacements (n, 3)."""
         self.x += d
         np.divide(d, self.h, out=self.v)
 
-    def _elastic_forces(self, f: Array) -> float:
-        return float(elastic_forces(self._bulk_table, f))
-
     def elastic_forces(self) -> Array:
-        """Elastic forces on all nodes, those of supports included, (n, 3) N."""
+        """Elastic forces on all nodes, those of supports included, (n, 3) N; turns the cells' frames."""
         f = np.zeros_like(self.x)
-        self._elastic_forces(f)
+        elastic_forces(self._bulk_table, f)
         return f
 
     def energy(self) -> float:
-        """Kinetic, elastic and potential energy in joules."""
-        elastic = self._elastic_forces(np.zeros_like(self.x))
+        """Kinetic, elastic and potential energy in joules; turns the cells' frames."""
+        self.elastic_forces()
+        b = self._bulk
+        elastic = 0.0
+        for (first, count, kind), q in zip(b.batches.tolist(), self.frames, strict=True):
+            R = Rotation.from_quat(q.reshape(4, LANES)[:, :count].T).as_matrix()
+            cells = b.cells[first : first + count]
+            x, rest = self.x[cells], self.grid.nodes[cells]
+            y = ((x - x[:, :1]) @ R - (rest - rest[:, :1])).reshape(count, 24)
+            elastic += 0.5 * float(np.einsum("ci,ij,cj->", y, self._K[kind], y))
         height = (self.x - self.grid.nodes) @ self.gravity
         return 0.5 * float(self.mass @ (self.v**2).sum(axis=1)) + elastic - float(self.mass @ height)
 
@@ -238,33 +272,49 @@ class ElasticGrid:
 
     def reset(self) -> None:
         """Return to rest."""
-        self.x[:], self.v[:] = self.grid.nodes, 0.0
-        self.frames[:] = [0.0, 0.0, 0.0, 1.0]
+        self.x[:], self.v[:], self.force[:], self.load[:], self.progress[:] = self.grid.nodes, 0.0, 0.0, 0.0, 0
+        self.frames[:] = np.repeat([0.0, 0.0, 0.0, 1.0], LANES)
+
+
+def _batches(kind: Integers) -> Integers:
+    """First cell, count and kind of batches of at most `LANES` cells of one kind, for ascending ``kind`` (m,)."""
+    ends = np.append(np.flatnonzero(np.diff(kind)) + 1, len(kind)).tolist()
+    found = []
+    for begin, end in zip([0, *ends[:-1]], ends, strict=True):
+        found += [(first, min(LANES, end - first), int(kind[begin])) for first in range(begin, end, LANES)]
+    return np.array(found, dtype=np.int64).reshape(-1, 3)
 
 
 @kernel
-def elastic_forces(table: Integers, f: Array) -> float:
-    """f (n, 3) -= the elastic forces on all nodes; returns the elastic energy in J."""
+def elastic_forces(table: Integers, f: Array) -> None:
+    """f (n, 3) -= the elastic forces on all nodes."""
     b = open_bulk(table)
-    return add_elastic_forces(b.cells, b.kind, b.K, b.size, b.rest, b.x, b.frames, f, b.R, b.F, b.y, b.g)
+    add_elastic_forces(b.cells, b.batches, b.K, b.size, b.edges, b.x, b.frames, f, b.R, b.c, b.y)
 
 
 @kernel
-def predict(table: Integers, h: float, d: Array) -> None:
-    """Replace the external forces ``d`` (n, 3) by the displacements in a step of ``h`` seconds."""
+def begin(table: Integers, h: float) -> None:
+    """Add to the external forces in ``force`` all that moves the nodes in a step of ``h`` s, and load its solve."""
     b = open_bulk(table)
     for i in range(b.x.shape[0]):
         for a in range(3):
-            b.force[i, a] = b.mass[i] * (b.v[i, a] / h + b.gravity[a]) + d[i, a]
-            d[i, a] = 0.0
-    add_elastic_forces(b.cells, b.kind, b.K, b.size, b.rest, b.x, b.frames, b.force, b.R, b.F, b.y, b.g)
+            b.force[i, a] += b.mass[i] * (b.v[i, a] / h + b.gravity[a])
+    add_elastic_forces(b.cells, b.batches, b.K, b.size, b.edges, b.x, b.frames, b.force, b.R, b.c, b.y)
     for k in range(b.free.shape[0]):
         for a in range(3):
             b.load[3 * k + a] = b.force[b.free[k], a]
-    solve_in_place(b.factor, b.load)
-    for k in range(b.free.shape[0]):
-        for a in range(3):
-            d[b.free[k], a] = b.load[3 * k + a]
+    b.progress[0] = 0
+
+
+@kernel
+def solve_share(table: Integers, share: float) -> None:
+    """Do the parts of the solve up to this share of its work."""
+    b = open_bulk(table)
+    end = b.progress[0]
+    while end < b.shares.shape[0] and b.shares[end] <= share:
+        end += 1
+    solve_part(b.factor, b.load, b.progress[0], end)
+    b.progress[0] = end
 
 
 @kernel

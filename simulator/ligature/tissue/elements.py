@@ -88,3 +88,19 @@ def skew_stiffness(size: Array, youngs: float, poisson: float) -> Array:
         K += W.T @ W
     # The skew part has each of its three values twice.
     return K * (2.0 * 2.0 * shear * float(np.prod(size)) / 8.0)
+
+
+def blocks(K: Array) -> Array:
+    """The stiffness (24, 24) of a box between patterns of its corners: eight blocks (8, 3, 3), its only values.
+
+    Block p couples component a of the pattern p xor 2ᵃ with b of p xor 2ᵇ. The sign of pattern m at corner k is the
+    product of -1 for each bit of m that k lacks; displacements on a pattern are sums with these signs, and forces on
+    corners sums with them of forces on patterns.
+    """
+    bits = (np.arange(8)[:, None] >> np.arange(3)) & 1
+    signs = np.where((bits[:, None] & ~bits[None, :]) == 1, -1.0, 1.0).prod(axis=2)
+    full = np.einsum("mk,kanb,ln->malb", signs, K.reshape(8, 3, 8, 3), signs) / 64.0
+    full[0], full[:, :, 0] = 0.0, 0.0
+    axis = np.arange(3)
+    pattern = np.arange(8)[:, None] ^ (1 << axis)
+    return np.ascontiguousarray(full[pattern[:, :, None], axis[:, None], pattern[:, None, :], axis])

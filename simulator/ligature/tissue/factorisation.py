@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from ligature.kernels import kernel
+from ligature.kernels import inlined, kernel
 from ligature.tissue.dense import invert, subtract_product
 from ligature.tissue.layout import Elimination
 
@@ -109,8 +109,10 @@ class Factor:
         dofs = [(_dofs(b.own), _dofs(b.later)) for b in blocks]
         width = np.array([len(own) for own, _ in dofs], dtype=np.int64)
         height = np.array([len(later) for _, later in dofs], dtype=np.int64)
+        sizes = np.stack([width + height, height * width, width * width + height * width], axis=1)
+        starts = np.cumsum(sizes, axis=0) - sizes
         self.arrays = Elimination(
-            np.ascontiguousarray(np.stack([width, height], axis=1)),
+            np.ascontiguousarray(np.column_stack([width, height, starts])),
             np.concatenate([np.concatenate(pair) for pair in dofs]) if blocks else np.zeros(0, np.int64),
             np.zeros(int((width * width).sum() + (height * width).sum())),
             np.zeros(int((height * width).sum())),
@@ -165,66 +167,84 @@ def _dofs(nodes: Integers) -> Integers:
     return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
+def shares(factor: Elimination) -> Array:
+    """Share of a solve's work that is done after each of its parts, (2 b,); see `solve_part`."""
+    w, m = factor.extent[:, 0], factor.extent[:, 1]
+    done = np.cumsum(np.concatenate([m * w, (w * w + m * w)[::-1]]), dtype=np.float64)
+    return done / done[-1] if len(done) else done
+
+
 @kernel
 def solve_in_place(factor: Elimination, x: Array) -> None:
     """Replace ``x`` (n,) by the solution of A x = b for the b that it holds."""
-    extent, index, down, up = factor.extent, factor.index, factor.down, factor.up
+    solve_part(factor, x, 0, 2 * factor.extent.shape[0])
+
+
+@kernel
+def solve_part(factor: Elimination, x: Array, begin: int, end: int) -> None:
+    """Do the parts from ``begin`` to ``end`` of what `solve_in_place` does: up the tree block by block, then down."""
+    blocks = factor.extent.shape[0]
+    for part in range(begin, min(end, blocks)):
+        _eliminate(factor, x, part)
+    for part in range(max(begin, blocks), end):
+        _substitute(factor, x, 2 * blocks - 1 - part)
+
+
+@inlined
+def _eliminate(factor: Elimination, x: Array, block: int) -> None:
+    """Take from the later unknowns of a block what its own do to them."""
+    index, up, u = factor.index, factor.up, factor.work
+    w, m, at, start = factor.extent[block, 0], factor.extent[block, 1], factor.extent[block, 2], factor.extent[block, 3]
+    # A load on few nodes leaves most blocks alone on the way up.
+    loaded = False
+    for j in range(w):
+        loaded = loaded or x[index[at + j]] != 0.0
+    if not loaded:
+        return
+    for i in range(m):
+        u[i] = 0.0
+    j = 0
+    while j + 4 <= w:
+        p, q, r, s = x[index[at + j]], x[index[at + j + 1]], x[index[at + j + 2]], x[index[at + j + 3]]
+        k = start + j * m
+        for i in range(m):
+            u[i] += p * up[k + i] + q * up[k + m + i] + r * up[k + 2 * m + i] + s * up[k + 3 * m + i]
+        j += 4
+    while j < w:
+        p = x[index[at + j]]
+        k = start + j * m
+        for i in range(m):
+            u[i] += p * up[k + i]
+        j += 1
+    for i in range(m):
+        x[index[at + w + i]] -= u[i]
+
+
+@inlined
+def _substitute(factor: Elimination, x: Array, block: int) -> None:
+    """Find the own unknowns of a block from the later ones."""
+    index, down = factor.index, factor.down
     half = factor.work.shape[0] // 2
     u, b = factor.work[:half], factor.work[half:]
-    at = 0
-    start = 0
-    for block in range(extent.shape[0]):
-        w, m = extent[block, 0], extent[block, 1]
-        # A load on few nodes leaves most blocks alone on the way up.
-        loaded = False
-        for j in range(w):
-            loaded = loaded or x[index[at + j]] != 0.0
-        if not loaded:
-            at += w + m
-            start += m * w
-            continue
-        for i in range(m):
-            u[i] = 0.0
-        j = 0
-        while j + 4 <= w:
-            p, q, r, s = x[index[at + j]], x[index[at + j + 1]], x[index[at + j + 2]], x[index[at + j + 3]]
-            k = start + j * m
-            for i in range(m):
-                u[i] += p * up[k + i] + q * up[k + m + i] + r * up[k + 2 * m + i] + s * up[k + 3 * m + i]
-            j += 4
-        while j < w:
-            p = x[index[at + j]]
-            k = start + j * m
-            for i in range(m):
-                u[i] += p * up[k + i]
-            j += 1
-        for i in range(m):
-            x[index[at + w + i]] -= u[i]
-        at += w + m
-        start += m * w
-    start = down.shape[0]
-    for block in range(extent.shape[0] - 1, -1, -1):
-        w, m = extent[block, 0], extent[block, 1]
-        at -= w + m
-        start -= w * w + m * w
-        for j in range(w):
-            b[j] = x[index[at + j]]
-            u[j] = 0.0
-        # The rows of D, then those of U with the values above them.
-        for j in range(m):
-            b[w + j] = -x[index[at + w + j]]
-        j = 0
-        while j + 4 <= w + m:
-            p, q, r, s = b[j], b[j + 1], b[j + 2], b[j + 3]
-            k = start + j * w
-            for i in range(w):
-                u[i] += p * down[k + i] + q * down[k + w + i] + r * down[k + 2 * w + i] + s * down[k + 3 * w + i]
-            j += 4
-        while j < w + m:
-            p = b[j]
-            k = start + j * w
-            for i in range(w):
-                u[i] += p * down[k + i]
-            j += 1
-        for j in range(w):
-            x[index[at + j]] = u[j]
+    w, m, at, start = factor.extent[block, 0], factor.extent[block, 1], factor.extent[block, 2], factor.extent[block, 4]
+    for j in range(w):
+        b[j] = x[index[at + j]]
+        u[j] = 0.0
+    # The rows of D, then those of U with the values above them.
+    for j in range(m):
+        b[w + j] = -x[index[at + w + j]]
+    j = 0
+    while j + 4 <= w + m:
+        p, q, r, s = b[j], b[j + 1], b[j + 2], b[j + 3]
+        k = start + j * w
+        for i in range(w):
+            u[i] += p * down[k + i] + q * down[k + w + i] + r * down[k + 2 * w + i] + s * down[k + 3 * w + i]
+        j += 4
+    while j < w + m:
+        p = b[j]
+        k = start + j * w
+        for i in range(w):
+            u[i] += p * down[k + i]
+        j += 1
+    for j in range(w):
+        x[index[at + j]] = u[j]

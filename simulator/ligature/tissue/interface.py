@@ -70,7 +70,6 @@ class Interface:
         self.elastic, self.ticks = elastic, ticks
         self.points = layout.points()
         self.field = _field(elastic, ticks)
-        self.expected = self.field.expected
         self._tissue = Tissue(self.field, self.points, paths)
         self.table = table_of(self._tissue)
 
@@ -130,9 +129,9 @@ class Interface:
         """Add to a step's displacements ``d`` (n, 3) what the points' mean forces do, and forget those that left."""
         push(self.table, d)
 
-    def begin(self, expected: Array) -> None:
-        """Begin a step in which the nodes move by ``expected`` (n, 3) without forces on the points."""
-        begin(self.table, expected)
+    def begin(self) -> None:
+        """Begin a step, whose forces `ElasticGrid.begin` has found."""
+        begin(self.table)
 
     # --- state --------------------------------------------------------------------------------
 
@@ -140,21 +139,18 @@ class Interface:
         """Let all points go."""
         for array in self.points:
             array[:] = 0
-        self.expected[:] = 0.0
         self.field.clock[0] = 0
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that lasts from tick to tick."""
         return {
             "tick": np.array([self.tick]),
-            "expected": self.expected.copy(),
             **{name: array.copy() for name, array in zip(self.points._fields, self.points, strict=True)},
         }
 
     def restore(self, snapshot: dict[str, Array]) -> None:
         """Continue from `snapshot`."""
         self.field.clock[0] = snapshot["tick"][0]
-        self.expected[:] = snapshot["expected"]
         for name, array in zip(self.points._fields, self.points, strict=True):
             array[:] = snapshot[name]
         refresh(self.table)
@@ -170,7 +166,7 @@ def _field(elastic: ElasticGrid, ticks: int) -> Field:
         np.ascontiguousarray(a, dtype=np.int64) for a in (grid.cells, grid.layer, grid.faces, grid.face_cell)
     )
     return Field(
-        elastic.x, np.zeros((n, 3)), cells, layers, faces, face_cell, np.zeros((len(faces), 2, 3)), np.zeros((2, 3)),
+        elastic.x, elastic.force, cells, layers, faces, face_cell, np.zeros((len(faces), 2, 3)), np.zeros((2, 3)),
         elastic.free, elastic.row, elastic.responses, elastic.factor, np.zeros(3 * len(elastic.free)),
         np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 3, n, 3)), material, np.array([0, ticks]),
     )  # fmt: skip
@@ -248,13 +244,20 @@ def place_point(field: Field, points: Points, i: int, nodes: Integers, weights: 
 
 @inlined
 def _locate_point(field: Field, points: Points, i: int) -> None:
-    """Place of a point at the start of the step, and where it would go under the last step's forces."""
+    """Place of a point at the start of the step, and where it would go under the last step's forces.
+
+    How the nodes move is known when the step ends; the point's response, which is symmetric, tells earlier of itself.
+    """
+    R, f = field.response[i], field.force
     for a in range(3):
-        p, u = 0.0, 0.0
+        p = 0.0
         for c in range(8):
             p += points.weights[i, c] * field.x[points.nodes[i, c], a]
-            u += points.weights[i, c] * field.expected[points.nodes[i, c], a]
-        points.start[i, a], points.move[i, a] = p, u
+        points.start[i, a] = p
+        S, u, v, w = R[a], 0.0, 0.0, 0.0
+        for k in range(f.shape[0]):
+            u, v, w = u + S[k, 0] * f[k, 0], v + S[k, 1] * f[k, 1], w + S[k, 2] * f[k, 2]
+        points.move[i, a] = u + v + w
     for k in range(points.filled[0]):
         j = points.used[k]
         for a in range(3):
@@ -397,13 +400,10 @@ def push(table: Integers, d: Array) -> None:
 
 
 @kernel
-def begin(table: Integers, expected: Array) -> None:
+def begin(table: Integers) -> None:
     """Where all points are at the start of a step, and the boxes around faces and nodes."""
     t = open_tissue(table)
     field, points = t.field, t.points
-    for k in range(expected.shape[0]):
-        for a in range(3):
-            field.expected[k, a] = expected[k, a]
     for k in range(points.filled[0]):
         _locate_point(field, points, points.used[k])
     _box(field)

@@ -32,7 +32,7 @@ FRICTION, STRENGTH, PUNCTURE, CUTTING, EXIT, SHEAR = range(6)
 class Elimination(NamedTuple):
     """A factor of the step's matrix, see `ligature.tissue.factorisation`."""
 
-    extent: Integers  # (b, 2) own and later unknowns of a block
+    extent: Integers  # (b, 5) own and later unknowns of a block, and where it begins in index, up and down
     index: Integers  # type: ignore[assignment]  # those unknowns, block after block
     down: Array
     up: Array
@@ -43,7 +43,7 @@ class Field(NamedTuple):
     """What points of contact need of a grid of n nodes (f of them free), m cells and q faces on the surface."""
 
     x: Array  # (n, 3) at the start of the step
-    expected: Array  # (n, 3) motion in this step without forces on the points
+    force: Array  # (n, 3) that moves the nodes in this step, besides those on the points, N
     cells: Integers  # (m, 8)
     layer: Integers  # (m,)
     faces: Integers  # (q, 4)
@@ -123,7 +123,7 @@ def _example() -> Tissue:
     """The smallest block: what counts is the types of its arrays."""
     z = np.zeros
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
-    factor = Elimination(i(1, 2), i(1), z(1), z(1), z(1))
+    factor = Elimination(i(1, 5), i(1), z(1), z(1), z(1))
     field = Field(
         z((1, 3)), z((1, 3)), i(1, 8), i(1), i(1, 4), i(1), z((1, 2, 3)), z((2, 3)), i(1), i(1), z((1, 3, 1, 3)),
         factor, z(3), z((1, 3)), z((1, 3, 1, 3)), z((1, 6)), i(2),

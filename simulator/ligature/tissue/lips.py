@@ -55,12 +55,12 @@ class Lips:
         self._near = np.zeros(n, dtype=np.bool_)
         self._gap = np.zeros(n)
 
-    def expect(self, d: Array) -> None:
-        """Add to the displacements ``d`` (n, 3) of the next step what the forces of the last one will do."""
-        add_responses(self.force, self._response, d)
+    def expect(self, external: Array) -> None:
+        """Add to the forces ``external`` (n, 3) of the next step those that kept the lips apart in the last one."""
+        push_apart(self.force, self.pairs, self._axis, external)
 
     def close(self, d: Array) -> None:
-        """Find the forces of a step with displacements ``d`` (n, 3) and add what they change since `expect`."""
+        """Find the forces of a step with displacements ``d`` (n, 3) and add what changes of those of `expect` do."""
         before = self.force.copy()
         relax(
             self._elastic.x, d, self.pairs, self._axis, self._B, MARGIN, self._aside, SWEEPS, self._near, self._gap,
@@ -112,6 +112,14 @@ def relax(
                     for j in range(n):
                         gap[j] += B[j, i] * change
                     force[i] = p
+
+
+@kernel
+def push_apart(force: Array, pairs: Integers, axis: Integers, external: Array) -> None:
+    """external (n, 3) += the forces (p,) on the nodes of the pairs."""
+    for i in range(force.shape[0]):
+        external[pairs[i, 0], axis[i]] -= force[i]
+        external[pairs[i, 1], axis[i]] += force[i]
 
 
 @kernel
