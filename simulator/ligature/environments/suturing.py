@@ -187,6 +187,28 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self._scenery.needle
 
     @property
+    def task(self) -> str:
+        """Name of what is to be done."""
+        return str(self._options["task"])
+
+    @property
+    def action(self) -> str:
+        """What actions are: ``cartesian`` or ``joint``."""
+        return self._action
+
+    @property
+    def tool_position(self) -> Array:
+        """The tool's control point (3,), world axes."""
+        return tip_position(self._simulation, self._arm)
+
+    @property
+    def needle_force(self) -> Array:
+        """What tissue, or holes in it, exert on the needle (3,), N, world axes."""
+        state = self._simulation.state[0]
+        n = int(state["insertion_count"])
+        return np.asarray(state["insertion_force"][:n][state["insertion_body"][:n] == self.needle].sum(axis=0))
+
+    @property
     def base_rotation(self) -> Array:
         """Rotation (3, 3) of the arm's base in the world: actions are along the base's axes, targets in the world's."""
         base = next(arm.base for arm in self._simulation.scene.arms if arm.name == self._arm.name)
