@@ -91,6 +91,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 50 | share of the time for which something must be so until the task is done | |
     | 51 | stage: the needle was lifted by half (``pick``), share of the holes passed (``insert``, ``puncture``) | |
 
+    Quaternions have the sign that is nearer to where tip and needle begin: they do not leap from one to the other.
     What the next state and reward depend on is among these but for the shapes of thread and tissue.
 
     With ``observation="image"`` they are pictures of ``camera``, `Box(0, 255, (height, width, 3), uint8)`; with
@@ -163,6 +164,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._ticks = round(CONTROL / self._simulation.dt)
         self._goal.prepare(self._simulation, self._scenery, self._arm)
         self._settled = self._simulation.snapshot()
+        self._tip_side = self._arm.local_measured_cp()[3:]
+        self._needle_side = self._simulation.state["body_pose"][0, self.needle, 3:].copy()
         self._count, self._closed = 0, False
         self._progress: Progress | None = None
 
@@ -329,9 +332,11 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         needle = self._scenery.needle
         assert self._progress is not None
         return np.concatenate([
-            now.position, none if jaw is None else jaw.position, arm.local_measured_cp(), state["body_pose"][0, needle],
+            now.position, none if jaw is None else jaw.position, _on_side(arm.local_measured_cp(), self._tip_side),
+            _on_side(state["body_pose"][0, needle], self._needle_side),
             state["body_twist"][0, needle], tip_position(self._simulation, arm), self._goal.target(),
-            [self._progress.left], now.velocity, none if jaw is None else jaw.velocity, arm.local_setpoint_cp(),
+            [self._progress.left], now.velocity, none if jaw is None else jaw.velocity,
+            _on_side(arm.local_setpoint_cp(), self._tip_side),
             none if arm.jaw is None else arm.jaw.setpoint_js().position, self._goal.marks(),
         ])  # fmt: skip
 
@@ -370,6 +375,11 @@ def _scene(goal: Goal, arm: str) -> Scene:
     scene = load(path, goal.models)
     arms = tuple(found for found in scene.arms if found.name == arm)
     return replace(scene, arms=arms, rods=scene.rods if goal.thread else ())
+
+
+def _on_side(pose: Array, side: Array) -> Array:
+    """A pose (7,) whose quaternion has the sign that is nearer to ``side`` (4,): it has no leaps near there."""
+    return pose if pose[3:] @ side >= 0.0 else np.concatenate([pose[:3], -pose[3:]])
 
 
 def _stepped(arm: PsmArm, action: Array) -> Array:

@@ -9,6 +9,7 @@ import rostest
 from ambf_msgs.msg import RigidBodyState
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from std_msgs.msg import Bool
 
 TIMEOUT = 90.0
 REPORT = "/surgical_robotics_challenge/completion_report/testers/task1/"
@@ -34,6 +35,7 @@ def seen(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 class FirstTask(unittest.TestCase):
     def setUp(self) -> None:
+        self.assertTrue(rospy.wait_for_message("/ligature/ready", Bool, TIMEOUT).data)
         self.scores: list[DiagnosticStatus] = []
         rospy.Subscriber(SCORE, DiagnosticStatus, self.scores.append, queue_size=10)
         self.report = rospy.Publisher(REPORT, PoseStamped, queue_size=1)
@@ -68,5 +70,5 @@ class FirstTask(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("first_task")
-    rostest.rosrun("ligature", "first_task", FirstTask)
+    rospy.init_node("score_test")
+    rostest.rosrun("ligature", "score", FirstTask)
