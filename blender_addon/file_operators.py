@@ -1,6 +1,5 @@
 """Import and export of model, world and launch files, with entries in the File menu."""
 
-import json
 import re
 from pathlib import Path
 
@@ -8,11 +7,11 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .compat import HAS_FILE_HANDLER
+from .dialogs import Asks
 from .folders import allow_folders, forget_session
 from .launch_file import export_scene, import_launch, prepared_scene
 from .ligature.adf import AdfError
-from .preview_operators import is_previewing
-from .read_file import import_file, outside_folders, worded
+from .read_file import import_file, worded
 from .write_file import ExportError, after_export, export_file, export_variants, prepared, prepared_variants
 
 FURTHER = bpy.props.StringProperty(
@@ -25,109 +24,6 @@ REPLACE = bpy.props.BoolProperty(
     description="Replace existing files that this scene neither was opened from nor wrote; else a dialog lists them",
     options={"SKIP_SAVE"},
 )
-
-
-class Asks:
-    """An operator that asks before it reads outside, or replaces files of others, when a user started it."""
-
-    asking = False
-
-    def by_user(self):
-        """Whether a user is there to be asked."""
-        return self.asking and not bpy.app.background
-
-    def ask_folders(self, operator, paths, **arguments):
-        """Ask for the folders outside the scene's own that hold meshes; None when there is nothing to ask."""
-        found = []
-        for path in paths:
-            try:
-                found += outside_folders(path, (Path(self.root),) if self.root else ())
-            except (AdfError, OSError):
-                continue  # opening it reports that
-        if not found or not self.by_user():
-            return None
-        words = json.dumps(arguments)
-        return bpy.ops.adf.allow_folders(
-            "INVOKE_DEFAULT", operator=operator, arguments=words, folders=json.dumps(found)
-        )
-
-    def ask_replace(self, operator, done, **arguments):
-        """Ask before anything surprising is written; None when there is nothing to ask."""
-        if self.replace or not (done.foreign or done.notes) or not self.by_user():
-            return None
-        lists = {"files": json.dumps([str(file) for file in done.foreign]), "notes": json.dumps(done.notes)}
-        words = json.dumps({**arguments, "replace": bool(done.foreign)})
-        return bpy.ops.adf.confirm_export("INVOKE_DEFAULT", operator=operator, arguments=words, **lists)
-
-
-class ADF_OT_allow_folders(bpy.types.Operator):
-    """Read meshes from folders outside the scene's own, and remember them in the blend file"""
-
-    bl_idname = "adf.allow_folders"
-    bl_label = "Read Meshes From There"
-    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
-
-    folders: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    operator: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    arguments: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    allow: bpy.props.BoolProperty(name="Read from there", default=True, options={"SKIP_SAVE"})
-
-    def invoke(self, context, event):
-        return context.window_manager.invoke_props_dialog(self, width=600)
-
-    def draw(self, context):
-        self.layout.label(text="Meshes lie outside this scene's folder, in:", icon="FILE_FOLDER")
-        for folder in json.loads(self.folders or "[]"):
-            self.layout.label(text=folder)
-        self.layout.prop(self, "allow")
-
-    def execute(self, context):
-        if self.allow:
-            allow_folders(context.scene, json.loads(self.folders or "[]"))
-        if self.operator:
-            return getattr(bpy.ops.adf, self.operator)(**_arguments(self.arguments))
-        return {"FINISHED"}
-
-
-class ADF_OT_confirm_export(bpy.types.Operator):
-    """Write after the user has seen which files are replaced and what surprises"""
-
-    bl_idname = "adf.confirm_export"
-    bl_label = "Write Anyway"
-    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
-
-    files: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    notes: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    operator: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    arguments: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-
-    def invoke(self, context, event):
-        return context.window_manager.invoke_props_dialog(self, width=700)
-
-    def draw(self, context):
-        files, notes = json.loads(self.files or "[]"), json.loads(self.notes or "[]")
-        if files:
-            self.layout.label(text="These files are not this scene's own and would be replaced:", icon="ERROR")
-            _listed(self.layout, files)
-        if notes:
-            self.layout.label(text="What is written may surprise:", icon="INFO")
-            _listed(self.layout, notes)
-
-    def execute(self, context):
-        if not self.operator:
-            return {"CANCELLED"}
-        return getattr(bpy.ops.adf, self.operator)(**_arguments(self.arguments))
-
-
-def _listed(layout, lines, most=20):
-    for line in lines[:most]:
-        layout.label(text=line)
-    if len(lines) > most:
-        layout.label(text=f"and {len(lines) - most} more")
-
-
-def _arguments(text):
-    return json.loads(text or "{}")
 
 
 class ADF_OT_import(Asks, bpy.types.Operator):
@@ -213,8 +109,7 @@ class ADF_OT_export(Asks, bpy.types.Operator):
         if collection is None:
             self.report({"ERROR"}, "No collection is an ADF file; make the one to be written active")
             return {"CANCELLED"}
-        if is_previewing(context.scene):
-            self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
+        if self.previewed(context):
             return {"CANCELLED"}
         path = Path(bpy.path.abspath(self.filepath or collection.adf.filepath))
         try:
@@ -285,8 +180,7 @@ class ADF_OT_export_variants(Asks, bpy.types.Operator):
         return self.execute(context)
 
     def execute(self, context):
-        if is_previewing(context.scene):
-            self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
+        if self.previewed(context):
             return {"CANCELLED"}
         try:
             if self.by_user():
@@ -366,8 +260,7 @@ class ADF_OT_export_scene(Asks, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        if is_previewing(context.scene):
-            self.report({"ERROR"}, "A joint is previewed; bring everything back to rest first")
+        if self.previewed(context):
             return {"CANCELLED"}
         try:
             path = Path(bpy.path.abspath(self.filepath or context.scene.adf.filepath))
@@ -450,8 +343,6 @@ CLASSES = (
     ADF_OT_export_scene,
     ADF_OT_add_variant,
     ADF_OT_export_variants,
-    ADF_OT_allow_folders,
-    ADF_OT_confirm_export,
     *_file_handlers(),
 )
 

@@ -83,6 +83,7 @@ CACHES: dict[str, str] = {
         (
             "Elimination.work",
             "Field.load",
+            "Field.change",
             "Field.response",
             "Lips._near",
             "Lips._gap",
@@ -221,7 +222,7 @@ def _walk(path: str, value: Any, above: dict[int, Any]) -> Iterator[tuple[str, b
         for i, item in enumerate(items):
             yield from _walk(f"{path}[{i}]", item, above)
     elif hasattr(value, "__dict__") and type(value).__module__.startswith("ligature."):
-        if type(value).__module__ != "ligature.model.scene":
+        if type(value).__module__ not in ("ligature.model.scene", "ligature.model.shapes"):
             for name, item in sorted(vars(value).items()):
                 yield from _attribute(path, value, name, item, above)
 

@@ -17,7 +17,8 @@ from pathlib import Path
 import ligature
 from ligature import Simulation
 from ligature.adf import Resolver, read_any
-from ligature.model.scene import Scene, ShaderFiles
+from ligature.model.scene import Scene
+from ligature.model.shapes import ShaderFiles
 from ligature.render import CameraView, Renderer, view_of
 from ligature.render.lights import LIGHT_AMBIENT
 from ligature.render.target import saturated_share

@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "suture"))
 from conftest import Bench, body, damped, line  # noqa: E402
-from ligature.model.scene import Plane  # noqa: E402
+from ligature.model.shapes import Plane
 from ligature.suture.description import from_material  # noqa: E402
 
 

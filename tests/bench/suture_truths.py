@@ -20,7 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "suture"))
 from conftest import DT, Bench, body, damped, energy, line  # noqa: E402
 from ligature.model.frames import axis_rotation, pose7_matrix  # noqa: E402
-from ligature.model.scene import Cylinder  # noqa: E402
+from ligature.model.shapes import Cylinder
 from ligature.suture.description import FREE, Attachment, RodDescription, from_material  # noqa: E402
 from ligature.suture.rod import Rod  # noqa: E402
 from scipy.integrate import solve_ivp  # noqa: E402

@@ -11,7 +11,7 @@ import pytest
 from ligature.mesh import box_inertia
 from ligature.model.frames import frame, matrix_quaternion, pose_matrix, rpy_matrix
 from ligature.model.geometry import estimate_size, mesh_centroid
-from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Plane, Shape, Sphere, TriMesh
+from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Plane, Shape, Sphere, TriMesh
 
 TURN = rpy_matrix(0.5, 0.3, -0.2)
 BULLETS = {

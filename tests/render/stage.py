@@ -13,7 +13,7 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
-from ligature.model.scene import Box, Sphere
+from ligature.model.shapes import Box, Sphere
 from ligature.render import Frame, Renderer, RenderUnavailable, view_of
 from ligature.render.geometry import Triangles, box, of_shape
 from PIL import Image

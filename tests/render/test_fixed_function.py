@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from ligature.adf import Resolver
 from ligature.model.frames import axis_rotation, frame
-from ligature.model.scene import Colour, ShaderFiles
+from ligature.model.shapes import Colour, ShaderFiles
 from ligature.render import LightKind, RenderUnavailable, legacy
 from ligature.render.camera import perspective
 from ligature.render.context import create_context

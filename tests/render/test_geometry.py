@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ligature.mesh import Material, Mesh, MeshPart
 from ligature.model.poses import pose7_matrices
-from ligature.model.scene import Box, Colour, Sphere
+from ligature.model.shapes import Box, Colour, Sphere
 from ligature.render.geometry import of_shape
 from ligature.render.surface import surface_of
 from ligature.render.thread import Tube

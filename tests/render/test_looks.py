@@ -134,7 +134,7 @@ def test_edges_are_smooth_and_ids_are_not(tmp_path: Path) -> None:
 
 
 def test_the_low_resolution_mesh_is_drawn_where_the_object_is_small(tmp_path: Path) -> None:
-    from ligature.model.scene import Sphere
+    from ligature.model.shapes import Sphere
     from ligature.render import geometry
 
     from tests.render.stage import write_obj

@@ -187,7 +187,7 @@ def test_a_preprocessing_shader_paints_labels_and_nothing_between_them(tmp_path:
     renderer, simulation, view = stage()
     for ending in ("vert", "frag"):
         (tmp_path / f"labels.{ending}").write_text(shader(f"labels.{ending}"))
-    files = ligature.model.scene.ShaderFiles(tmp_path / "labels.vert", tmp_path / "labels.frag")
+    files = ligature.model.shapes.ShaderFiles(tmp_path / "labels.vert", tmp_path / "labels.frag")
     frame = renderer.render(simulation.state, view, ("rgb", "ids"), shaders=files)
     assert renderer.problems == []
     assert set(map(tuple, frame.rgb[well_inside(frame, 1)])) == {(128, 64, 191)}

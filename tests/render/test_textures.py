@@ -13,21 +13,21 @@ from tests.render.stage import Stage, ball
 GREY = "Ka 0 0 0\nKd 1 1 1\nKs 0 0 0\n"
 
 
-def said(stage: Stage) -> str:
+def reported(stage: Stage) -> str:
     renderer, simulation = stage.renderer()
     simulation.step(1)
     return "\n".join(str(problem.diagnostics[0]) for problem in renderer.problems)
 
 
 def test_a_texture_that_does_not_exist_is_reported_with_file_and_line(tmp_path: Path) -> None:
-    assert "b0.mtl:5:1: warning: texture 'nothing.png' does not exist" in said(
+    assert "b0.mtl:5:1: warning: texture 'nothing.png' does not exist" in reported(
         Stage(tmp_path, [ball(GREY + "map_Kd nothing.png\n")])
     )
 
 
 def test_a_texture_that_is_no_picture_is_reported_once(tmp_path: Path) -> None:
     (tmp_path / "bad.png").write_bytes(b"\x89PNG\r\n\x1a\n and then nothing")
-    words = said(Stage(tmp_path, [ball(GREY + "map_Kd bad.png\nmap_Bump bad.png\n")]))
+    words = reported(Stage(tmp_path, [ball(GREY + "map_Kd bad.png\nmap_Bump bad.png\n")]))
     assert words.count("bad.png:1:1: warning: texture 'bad.png' is not a picture that can be read") == 1
 
 

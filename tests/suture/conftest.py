@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from ligature.model.frames import matrix_pose7, pose7_matrix
-from ligature.model.scene import Body, Collider, Identity, Scene, Shape, WorldSettings
+from ligature.model.scene import Body, Identity, Scene, WorldSettings
+from ligature.model.shapes import Collider, Shape
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, from_material
 from ligature.suture.rod import Partner, Rod

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ligature.model.frames import axis_rotation
-from ligature.model.scene import Box, Capsule, Cylinder, Hull, Plane, Sphere
+from ligature.model.shapes import Box, Capsule, Cylinder, Hull, Plane, Sphere
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ligature.model.frames import axis_rotation, pose7_matrix
-from ligature.model.scene import Cylinder
+from ligature.model.shapes import Cylinder
 
 LEFT, RIGHT = 0, 1
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from ligature.model.frames import axis_rotation
-from ligature.model.scene import Capsule
+from ligature.model.shapes import Capsule
 
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small"
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ligature.model.scene import Box, Plane
+from ligature.model.shapes import Box, Plane
 from ligature.suture.description import FREE, Attachment
 
 

@@ -156,8 +156,8 @@ def follows(
     """
     prismatic = kind == "prismatic"
     scaled = _scaled(keys, scales)
-    T_joint = joint_pose(scaled, *inertial, prismatic)
-    motion = inverse(T_joint) @ place.T_parent_child @ inverse(child_pose(scaled, *inertial, prismatic)) @ T_joint
+    T_joint, T_child = _poses(scaled, inertial, prismatic)
+    motion = inverse(T_joint) @ place.T_parent_child @ inverse(T_child) @ T_joint
     shift = motion[:3, 3].copy()
     if kind in _SLIDES:
         shift[_SLIDES[kind]] = 0.0
@@ -191,14 +191,12 @@ def moved_joint(
     child_stays = child_stays or not follows(keys, before, inertial, kind, scales)
     if joint_stays and child_stays:
         return keys
-    scaled = _scaled(keys, scales)
-    T_joint_0, T_child_0 = (make(scaled, *inertial, prismatic) for make in (joint_pose, child_pose))
+    T_joint_0, T_child_0 = _poses(_scaled(keys, scales), inertial, prismatic)
     T_joint = T_joint_0 if joint_stays else change(before.T_parent_joint, now.T_parent_joint, noise) @ T_joint_0
     T_child = T_child_0 if child_stays else change(before.T_parent_child, now.T_parent_child, noise) @ T_child_0
     moved = _moved_keys(keys, (T_joint_0, T_child_0), (T_joint, T_child), inertial, prismatic, scales, noise)
-    again = _scaled(moved, scales)
-    exact = same_place(joint_pose(again, *inertial, prismatic), T_joint, 4.0 * MOVED)
-    if exact and same_place(child_pose(again, *inertial, prismatic), T_child, 4.0 * MOVED):
+    again = zip(_poses(_scaled(moved, scales), inertial, prismatic), (T_joint, T_child), strict=True)
+    if all(same_place(found, wanted, 4.0 * MOVED) for found, wanted in again):
         return moved
     return _new_joint(joint_keys(T_joint, T_child, *inertial, prismatic, scales), noise)
 
@@ -246,6 +244,11 @@ def _moved_keys(
         _added_angle(keys.offset, first.offset, last.offset),
         _added_angle(keys.joint_offset, first.joint_offset, last.joint_offset),
     )
+
+
+def _poses(keys: JointKeys, inertial: tuple[Array, Array], prismatic: bool) -> tuple[Array, Array]:
+    """Poses (4, 4) of joint and child in the parent's frame that keys state, with pivots as `_scaled` has them."""
+    return joint_pose(keys, *inertial, prismatic), child_pose(keys, *inertial, prismatic)
 
 
 def _scaled(keys: JointKeys, scales: tuple[float, float]) -> JointKeys:

@@ -47,9 +47,9 @@ from ligature.model.scene import (
     Scene,
     Sensor,
     SensorType,
-    ShaderFiles,
     WorldSettings,
 )
+from ligature.model.shapes import ShaderFiles
 from ligature.model.softening import Softening
 from ligature.model.sutures import thread
 

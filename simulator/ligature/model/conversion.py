@@ -17,7 +17,8 @@ from ligature.model.frames import Array
 from ligature.model.geometry import FileContext, GeometryError, shader_files
 from ligature.model.mounted import camera_of, ghost_of, light_of, sensor_rays
 from ligature.model.parts import body_of, sensor_of
-from ligature.model.scene import Body, Camera, Ghost, Light, Sensor, ShaderFiles
+from ligature.model.scene import Body, Camera, Ghost, Light, Sensor
+from ligature.model.shapes import ShaderFiles
 
 Kind = TypeVar("Kind")
 

@@ -18,7 +18,7 @@ from ligature.mesh import ConvexPart, collision_parts, load_mesh
 from ligature.mesh.load import EXTENSIONS
 from ligature.mesh.mesh import LOOK
 from ligature.model.frames import Array, frame, inverse, pose_matrix, rpy_matrix
-from ligature.model.scene import (
+from ligature.model.shapes import (
     Box,
     Capsule,
     Collider,

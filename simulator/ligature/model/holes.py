@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ligature.model.frames import inverse
 from ligature.model.piercing import Hole
-from ligature.model.scene import Body, Box, Capsule, Collider, Cone, Cylinder, Ghost, Hull, Shape, Sphere
+from ligature.model.scene import Body, Ghost
+from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Shape, Sphere
 
 Array = NDArray[np.float64]
 

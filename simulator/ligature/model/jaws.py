@@ -13,19 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.frames import inverse
-from ligature.model.scene import (
-    ArmDescription,
-    Body,
-    Box,
-    Collider,
-    Hull,
-    Jaw,
-    Joint,
-    JointType,
-    Plane,
-    Sphere,
-    TriMesh,
-)  # fmt: skip
+from ligature.model.scene import ArmDescription, Body, Jaw, Joint, JointType
+from ligature.model.shapes import Box, Collider, Hull, Plane, Sphere, TriMesh
 
 Array = NDArray[np.float64]
 

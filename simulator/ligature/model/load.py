@@ -28,7 +28,8 @@ from ligature.bundle import launch_file
 from ligature.model.builder import SceneBuilder
 from ligature.model.geometry import shader_files
 from ligature.model.naming import prefixed, topic_name
-from ligature.model.scene import InputDevice, Scene, ShaderFiles, WorldSettings
+from ligature.model.scene import InputDevice, Scene, WorldSettings
+from ligature.model.shapes import ShaderFiles
 from ligature.model.softening import Softening
 
 SKYBOX_FACES = ("right", "left", "top", "bottom", "front", "back")

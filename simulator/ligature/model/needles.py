@@ -12,21 +12,8 @@ from numpy.typing import NDArray
 
 from ligature.model.frames import inverse
 from ligature.model.piercing import Arc, Needle
-from ligature.model.scene import (
-    Articulation,
-    Body,
-    Box,
-    Capsule,
-    Collider,
-    Cone,
-    Cylinder,
-    Hull,
-    Joint,
-    RodChain,
-    Shape,
-    Sphere,
-    TriMesh,
-)
+from ligature.model.scene import Articulation, Body, Joint, RodChain
+from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Shape, Sphere, TriMesh
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,6 @@ from ligature.model.geometry import FileContext, colliders, estimate_size, mesh_
 from ligature.model.scene import (
     Body,
     CartesianController,
-    Collider,
     Gains,
     Identity,
     Joint,
@@ -26,9 +25,9 @@ from ligature.model.scene import (
     Resistance,
     Sensor,
     SensorType,
-    ShaderFiles,
     SixDof,
 )
+from ligature.model.shapes import Collider, ShaderFiles
 from ligature.model.tissue import inertial_of, surface_friction, tissue_of
 
 _INERTIAL_KEYS = ("inertia", "inertial offset", "gravity")

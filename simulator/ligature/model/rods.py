@@ -14,7 +14,8 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import Array
-from ligature.model.scene import Body, Capsule, Cylinder, Joint, JointType, RodChain, Sphere
+from ligature.model.scene import Body, Joint, JointType, RodChain
+from ligature.model.shapes import Capsule, Cylinder, Sphere
 
 LEAST_ELEMENTS = 4
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ligature.mesh.surface import convex_surface
 from ligature.model.frames import Array
-from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Plane, Sphere, TriMesh
+from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Plane, Sphere, TriMesh
 
 AROUND, UP = 32, 12
 """Points around the axis of a round shape, and from pole to pole of a sphere."""

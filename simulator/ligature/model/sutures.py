@@ -13,17 +13,8 @@ import numpy as np
 from ligature.adf import Diagnostic, Element, Severity
 from ligature.model.frames import Array, frame, pose_matrix
 from ligature.model.geometry import GeometryError
-from ligature.model.scene import (
-    Body,
-    Capsule,
-    Collider,
-    Colour,
-    Identity,
-    Joint,
-    JointType,
-    SixDof,
-    Visual,
-)
+from ligature.model.scene import Body, Identity, Joint, JointType, SixDof
+from ligature.model.shapes import Capsule, Collider, Colour, Visual
 
 USP_MILLIMETRES = {
     "10-0": 0.0245, "9-0": 0.0345, "8-0": 0.0445, "7-0": 0.0595, "6-0": 0.0845, "5-0": 0.1245, "4-0": 0.1745,

@@ -24,7 +24,7 @@ from ligature.model.solids import surface_of
 
 if TYPE_CHECKING:
     from ligature.mesh.grid import Grid
-    from ligature.model.scene import Collider, Visual
+    from ligature.model.shapes import Collider, Visual
 
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
 USUAL_CELLS = 600

@@ -10,7 +10,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from ligature.model.hits import Contact, RayHits
-from ligature.model.scene import Collider
+from ligature.model.shapes import Collider
 from ligature.physics import shapes
 from ligature.physics.engine import Engine
 from ligature.physics.wrenches import contact_forces

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ligature.mesh import CollisionCache
 from ligature.mesh.decompose import convex_pieces
 from ligature.model.frames import matrix_quaternion
-from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Plane, Sphere, TriMesh
+from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Plane, Sphere, TriMesh
 
 Array = NDArray[np.float64]
 

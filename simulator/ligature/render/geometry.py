@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Shape, Sphere
+from ligature.model.shapes import Box, Capsule, Cone, Cylinder, Hull, Plane, Shape, Sphere
 
 Array = NDArray[np.float64]
 

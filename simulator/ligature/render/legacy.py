@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import AdfError, Diagnostic, Mark, Resolver, Severity
-from ligature.model.scene import Colour, ShaderFiles
+from ligature.model.shapes import Colour, ShaderFiles
 from ligature.render.geometry import Triangles
 from ligature.render.lights import LIGHT_AMBIENT, LIGHT_MODEL_AMBIENT, LightKind, Lights, LightSettings
 from ligature.render.programs import Program

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import AdfError, Resolver
-from ligature.model.scene import ShaderFiles
+from ligature.model.shapes import ShaderFiles
 from ligature.model.state import MAX_PUNCTURES
 from ligature.render import legacy
 from ligature.render.batches import Batch, Seen

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ligature.adf import AdfError, Resolver
 from ligature.model.poses import pose7_matrices
-from ligature.model.scene import Scene, ShaderFiles
+from ligature.model.scene import Scene
+from ligature.model.shapes import ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
 from ligature.render.context import create_context, draws_on_processor

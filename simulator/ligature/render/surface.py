@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ligature.mesh import Material
-from ligature.model.scene import Colour
+from ligature.model.shapes import Colour
 
 METAL_SPECULAR, METAL_SHININESS, METAL_LIGHTNESS, METAL_CHROMA = 0.4, 250.0, 0.55, 0.03
 """An untextured grey at least this bright, with at most this chroma and a highlight at least this strong and sharp,

@@ -14,7 +14,8 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from ligature.mesh.voxels import Embedding
-from ligature.model.scene import Capsule, Cylinder, Scene
+from ligature.model.scene import Scene
+from ligature.model.shapes import Capsule, Cylinder
 from ligature.model.soft import TissueBody, TissueForm
 from ligature.render.geometry import Triangles
 from ligature.render.refine import ON_PLANE, faces_of, split_at, split_edges

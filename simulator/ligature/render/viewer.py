@@ -19,7 +19,8 @@ from ligature.bus.pacing import Throttle
 from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release, Reset, WatchContacts
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.optics import stereo_partners
-from ligature.model.scene import Collider, Colour, Scene, TriMesh, Visual
+from ligature.model.scene import Scene
+from ligature.model.shapes import Collider, Colour, TriMesh, Visual
 from ligature.render import overlay
 from ligature.render.camera import CameraView, perspective, view_matrix, view_of
 from ligature.render.renderer import Renderer

@@ -17,19 +17,8 @@ from scipy.sparse.csgraph import connected_components
 from ligature.adf import AdfError, Resolver
 from ligature.mesh import Material, Mesh, MeshError, MeshPart, load_mesh
 from ligature.mesh.surface import joined, open_edges
-from ligature.model.scene import (
-    Capsule,
-    Cone,
-    Cylinder,
-    Hull,
-    Plane,
-    Scene,
-    ShaderFiles,
-    Shape,
-    Sphere,
-    TriMesh,
-    Visual,
-)
+from ligature.model.scene import Scene
+from ligature.model.shapes import Capsule, Cone, Cylinder, Hull, Plane, ShaderFiles, Shape, Sphere, TriMesh, Visual
 from ligature.render.geometry import Triangles, flat_shaded, of_shape
 from ligature.render.surface import Surface, surface_of
 

@@ -13,7 +13,8 @@ from ligature.kernels import compiled
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
 from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
-from ligature.model.scene import Box, Capsule, Collider, Cone, Cylinder, Hull, Scene, Shape, Sphere, TriMesh
+from ligature.model.scene import Scene
+from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Shape, Sphere, TriMesh
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem
 from ligature.sensing.queries import Queries

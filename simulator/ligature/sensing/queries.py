@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.hits import Contact, RayHits
-from ligature.model.scene import Collider, Slip
+from ligature.model.scene import Slip
+from ligature.model.shapes import Collider
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,11 @@ from ligature.suture.bodies import SutureBodies
 from ligature.suture.colliders import shape_arrays
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
 from ligature.tables import opener, table_of
-from ligature.tissue import contact
+from ligature.tissue import contact_arrays as arrays
 from ligature.tissue.block import TissueBlock
-from ligature.tissue.contact import REACH, Contacts, open_contacts, touch
+from ligature.tissue.contact import touch
+from ligature.tissue.contact_arrays import Contacts, open_contacts
+from ligature.tissue.contact_search import REACH
 from ligature.tissue.layout import open_tissue
 
 Array = NDArray[np.float64]
@@ -84,7 +86,7 @@ class BodyContacts:
         self._around = _around(len(self.listed) + 1)
         grid, fixed = block.elastic.grid, block.elastic.row < 0
         self._contacts = Contacts(
-            contact.touching(), contact.partners(len(self.listed) + 1), self._gather(scene), contact.scratch(),
+            arrays.touching(), arrays.partners(len(self.listed) + 1), self._gather(scene), arrays.scratch(),
             ~fixed[grid.faces].all(axis=1), np.zeros(1, np.int64),
         )  # fmt: skip
         self._touching = self._contacts.touching
@@ -102,7 +104,7 @@ class BodyContacts:
         """Whether there was no room for a point of contact."""
         return bool(self._contacts.overflow[0])
 
-    def _gather(self, scene: Scene) -> contact.Parts:
+    def _gather(self, scene: Scene) -> arrays.Parts:
         """The parts of all bodies; their radius about the centre of mass goes to `Around`."""
         rows = [
             (row + 1, inverse(scene.bodies[index].T_body_inertial) @ part.T_body_shape, *shape_arrays(part.shape))
@@ -110,7 +112,7 @@ class BodyContacts:
             for part in scene.bodies[index].colliders
         ]
         ends = np.cumsum([0, *(len(planes) for _, _, _, _, planes, _ in rows)])
-        parts = contact.parts(len(rows), int(ends[-1]))
+        parts = arrays.parts(len(rows), int(ends[-1]))
         for k, (body, T, kind, size, planes, box) in enumerate(rows):
             parts.body[k], parts.local[k], parts.kind[k], parts.size[k] = body, T, kind, size
             parts.plane_range[k] = ends[k], ends[k + 1]

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ligature.kernels import kernel
 from ligature.model.piercing import Needle
-from ligature.model.scene import Body, Box, Capsule, Cone, Cylinder, Scene, Sphere
+from ligature.model.scene import Body, Scene
+from ligature.model.shapes import Box, Capsule, Cone, Cylinder, Sphere
 from ligature.soft.frame import Frame, into, open_frame, turn_six, velocity_at
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.rod import Rod

@@ -52,7 +52,7 @@ class Piece:
         ]
         self._carried = [p for p in self.piercers if p.rod is not None]
         self._alone = [p for p in self.piercers if p.rod is None]
-        self.threads = [SceneThread(p.rod, p, self.block) for p in self._carried if p.rod is not None]
+        self.threads = [SceneThread(p.rod, p, self.block, self.frame) for p in self._carried if p.rod is not None]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
         self.wrench, self.peak = np.zeros(6), np.zeros(1)
         self._read()
@@ -70,14 +70,14 @@ class Piece:
         for piercer in self._carried:
             piercer.begin(self._bodies, self.frame)
         for thread in self.threads:
-            thread.begin(self.frame, self._dt)
+            thread.begin(self._dt)
 
     def end(self) -> None:
         """What comes after: forces of needles and threads, the reaction on the rigid body, the tissue's own motion."""
         for piercer in self._carried:
             piercer.end(self.frame)
         for thread in self.threads:
-            thread.end(self.frame, self._dt)
+            thread.end(self._dt)
         for piercer in self._alone:
             piercer.couple(self._bodies, self.frame)
         self._react()

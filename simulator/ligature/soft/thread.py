@@ -13,15 +13,17 @@ from ligature.soft.needle import ScenePiercer
 from ligature.suture.layout import Nodes
 from ligature.suture.rod import Rod
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
-from ligature.suture.springs import CAPACITY, open_springs
+from ligature.suture.springs import CAPACITY, Springs, open_springs
 from ligature.suture.tracking import open_nodes
 from ligature.tables import opener, table_of
 from ligature.tissue.block import TissueBlock
-from ligature.tissue.layout import open_tissue
-from ligature.tissue.strand import finish, open_strand, prepare
+from ligature.tissue.layout import Tissue, open_tissue
+from ligature.tissue.strand import Strand, finish, open_strand, prepare
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Tables = tuple[Integers, Integers, Integers, Integers, Integers, Integers]
+"""Of the tissue, its strand, the run, the rod's nodes and springs, and the frame."""
 
 
 class Run(NamedTuple):
@@ -45,16 +47,19 @@ open_run = opener(_run(1, 0, False))
 
 
 class SceneThread:
-    """One rod and one body of tissue; ``piercer`` is the needle whose path it follows."""
+    """One rod and one body of tissue in its ``frame``; ``piercer`` is the needle whose path it follows."""
 
-    def __init__(self, rod: Rod, piercer: ScenePiercer, block: TissueBlock) -> None:
+    def __init__(self, rod: Rod, piercer: ScenePiercer, block: TissueBlock, frame: Frame) -> None:
         self.rod, self._piercer = rod, piercer
         self.inside = block.add_thread(float(rod.description.radius.min()))
         first = next(a for a in rod.description.attachments if a.body == piercer.body.index)
         # The thread's first point is at the needle's tail.
         self._turned = first.element > 0
         self._run = _run(len(rod.description.mass), rod.first, self._turned)
-        self._tables = (block.interface.table, self.inside.table, table_of(self._run), table_of(rod.nodes))
+        self._tables = (
+            block.interface.table, self.inside.table, table_of(self._run), table_of(rod.nodes), rod.spring_table,
+            frame.table,
+        )  # fmt: skip
         self._holds = False
 
     @property
@@ -66,17 +71,25 @@ class SceneThread:
         """Element of the rod that a segment of the thread is."""
         return len(self.rod.description.mass) - 1 - segment if self._turned else segment
 
-    def begin(self, frame: Frame, dt: float) -> None:
+    def begin(self, dt: float) -> None:
         """Hand the rod what the tissue does to it."""
         self.inside.draw_in(self._piercer.inside)
         self._holds = self.engaged
         if self._holds:
-            hold(*self._tables, self.rod.spring_table, frame.table, dt)
+            hold(self._tables, dt)
 
-    def end(self, frame: Frame, dt: float) -> None:
+    def end(self, dt: float) -> None:
         """Conclude with the motion that the rod's solve found."""
         if self._holds:
-            let_settle(*self._tables, self.rod.spring_table, frame.table, dt)
+            let_settle(self._tables, dt)
+
+
+@inlined
+def _open(tables: Tables) -> tuple[Tissue, Strand, Run, Nodes, Springs, FrameArrays]:
+    return (
+        open_tissue(tables[0]), open_strand(tables[1]), open_run(tables[2]), open_nodes(tables[3]),
+        open_springs(tables[4]), open_frame(tables[5]),
+    )  # fmt: skip
 
 
 @inlined
@@ -101,14 +114,9 @@ def _lay_out(run: Run, nodes: Nodes, f: FrameArrays) -> None:
 
 
 @kernel
-def hold(
-    tissue: Integers, thread: Integers, run_: Integers, nodes_: Integers, springs: Integers, frame: Integers, dt: float
-) -> None:
+def hold(tables: Tables, dt: float) -> None:
     """Find the nodes that hold a rod as its tick begins, and make springs of them."""
-    t, strand, run, nodes, s, f = (
-        open_tissue(tissue), open_strand(thread), open_run(run_), open_nodes(nodes_), open_springs(springs),
-        open_frame(frame),
-    )  # fmt: skip
+    t, strand, run, nodes, s, f = _open(tables)
     _lay_out(run, nodes, f)
     prepare(t.points, t.paths, strand, run.line, (t.field.clock[0] + 1) / t.field.clock[1])
     rows, K = strand.rows, run.K
@@ -153,14 +161,9 @@ def _spread(k: Array, x: float, y: float, z: float, K: Array) -> None:
 
 
 @kernel
-def let_settle(
-    tissue: Integers, thread: Integers, run_: Integers, nodes_: Integers, springs: Integers, frame: Integers, dt: float
-) -> None:
+def let_settle(tables: Tables, dt: float) -> None:
     """End a tick with the forces of the springs as the rod's solve found them."""
-    t, strand, run, nodes, s, f = (
-        open_tissue(tissue), open_strand(thread), open_run(run_), open_nodes(nodes_), open_springs(springs),
-        open_frame(frame),
-    )  # fmt: skip
+    t, strand, run, nodes, s, f = _open(tables)
     rows, line = strand.rows, run.line
     for r in range(rows.filled[0]):
         row = run.springs[1 + r] if r < run.springs[0] else -1

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, HULL, SPHERE, hull_planes
 from ligature.model.frames import inverse, matrix_pose7
-from ligature.model.scene import Box, Capsule, Cone, Cylinder, Hull, Plane, Scene, Shape, Sphere, TriMesh
+from ligature.model.scene import Scene
+from ligature.model.shapes import Box, Capsule, Cone, Cylinder, Hull, Plane, Shape, Sphere, TriMesh
 from ligature.model.subsystem import kept, put_back
 from ligature.suture.bodies import Bodies
 from ligature.suture.layout import Shapes

@@ -1,8 +1,7 @@
 """Rigid bodies on the surface of tissue: where they touch it, and normal and friction forces; metres, newtons.
 
-A body's convex parts are compared with the faces of the surface. Each part has at most one point of contact with each
-face, the deepest: the best of a few, from which a search with ever smaller steps goes on. All points of a block are
-solved at once by projected Gauss–Seidel on ::
+Each convex part of a body has at most one point of contact with each face of the surface, the deepest
+(`ligature.tissue.contact_search`). All points of a block are solved at once by projected Gauss–Seidel on ::
 
     u_i = w_i + Σ D_ij f_j,   D_ij = C_ij + h² (recoil of the body + recoil of the block's own rigid body)
     f_n ≥ 0, u_n + c f_n ≥ 0, one of them zero; ‖f_t‖ ≤ μ f_n, u_t + c f_t = 0 unless it slips
@@ -14,41 +13,21 @@ compliance c). Axes are those of the block.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
-from ligature.mesh.distance import signed_distance
-from ligature.tables import opener
-from ligature.tissue.interface import add_point, place_point, settle_point
-from ligature.tissue.layout import LEAVING, MOST_POINTS, Field, Points
+from ligature.tissue.contact_arrays import Contacts, Solve, Touching
+from ligature.tissue.contact_search import find_contacts, measure_contacts, place_part
+from ligature.tissue.dense import times, times_transposed
+from ligature.tissue.interface import add_point, displaced, place_point, settle_point
+from ligature.tissue.layout import LEAVING, Field, Points
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
-CAPACITY = 64
-"""Most points of contact of a block with bodies."""
 
 RESERVED = 40
 """Points that needles find unused at least, as far as ways that nothing is in can be closed for them."""
-
-FACING = -0.2
-"""Cosine between the surface's outward normal and a contact's above which a body is not before that face."""
-
-COARSE = 3
-"""Points along an edge of a face from the best of which the search for the deepest begins."""
-
-FINE = 0.1e-3
-"""How exact the place of a point of contact is found, m."""
-
-LEVEL = 1e-7
-"""Depth in metres by which a further place must be deeper: flat contacts keep theirs."""
-
-REACH = 1.5e-3
-"""Distance in metres at which a point of contact is let go."""
 
 MEET = 0.5e-3
 """Distance in metres at which one begins, beside what the body moves in a tick."""
@@ -70,259 +49,6 @@ ROLLING = 0.3e-3
 
 TIP = 4e-3
 """Length of a needle from its tip, m, that does not touch the surface as a body, for it punctures it."""
-
-
-class Touching(NamedTuple):
-    """K points of contact of a block."""
-
-    used: Integers  # (K,)
-    part: Integers  # (K,)
-    face: Integers  # (K,)
-    point: Integers  # (K,) of the interface
-    body: Integers  # (K,) row of `Partners`
-    normal: Array  # (K, 3) from the body into the tissue
-    distance: Array  # (K,) between point and part when the tick begins
-    anchor: Array  # (K, 3) of friction, in the inertial frame of the body
-    force: Array  # (K, 3) on the tissue
-    friction: Array  # (K,) Coulomb coefficient
-
-
-class Partners(NamedTuple):
-    """B bodies; row 0 is the block's own rigid body."""
-
-    R: Array  # (B, 3, 3) of the inertial frame
-    centre: Array  # (B, 3)
-    twist: Array  # (B, 6) relative to the block, linear part at the centre of mass
-    light: Array  # (B,) 1 / kg; 0 for what no force moves
-    spin: Array  # (B, 3, 3) inverse of the inertia
-    friction: Array  # (B,) coefficient with the block
-    tip: Array  # (B, 3) of a needle that punctures; infinite for other bodies
-    push: Array  # (B, 6) force and moment of the block on it in this tick
-
-
-class Parts(NamedTuple):
-    """P convex parts of bodies."""
-
-    body: Integers  # (P,) row of `Partners`
-    local: Array  # (P, 4, 4) in the inertial frame of the body
-    kind: Integers  # (P,) as in `ligature.mesh.distance`
-    size: Array  # (P, 3)
-    planes: Array  # (Q, 4)
-    plane_range: Integers  # (P, 2)
-    middle: Array  # (P, 3) of its box, in its own frame
-    half: Array  # (P, 3) size of that
-    live: Flags  # (P,) looked at in this tick
-    R: Array  # (P, 3, 3) where it is in this tick
-    centre: Array  # (P, 3)
-
-
-class Solve(NamedTuple):
-    """Scratch of a tick."""
-
-    rows: Integers  # (K,)
-    w: Array  # (K, 3)
-    u: Array  # (K, 3)
-    lever: Array  # (K, 3) from the body's centre of mass
-    own: Array  # (K, 3) from the centre of mass of the block's own body
-    D: Array  # (K, K, 3, 3)
-    own_point: Flags  # (N,) points of the interface that are these
-    change: Array  # (N, 3) forces on the points without those of bodies, over those of the last step
-    found: Integers  # (F, 2) part and face
-    values: Array  # (F, 6) distance, normal towards the tissue, place on the face
-    order: Integers  # (F,) the nearest first
-    known: Flags  # (K,) points of contact that were not found yet
-    vectors: Array  # (5, 3)
-    weights: Array  # (4,)
-
-
-class Contacts(NamedTuple):
-    """All that a tick of the bodies at one block works on."""
-
-    touching: Touching
-    partners: Partners
-    parts: Parts
-    solve: Solve
-    looked_at: Flags  # (q,) faces that move
-    overflow: Integers  # (1,) points of contact for which there was no room
-
-
-def touching(capacity: int = CAPACITY) -> Touching:
-    """Room for ``capacity`` points of contact, none yet."""
-    K, z = capacity, np.zeros
-    i = lambda: np.zeros(K, np.int64)  # noqa: E731
-    return Touching(i(), i(), i(), i(), i(), z((K, 3)), z(K), z((K, 3)), z((K, 3)), z(K))
-
-
-def partners(bodies: int) -> Partners:
-    """``bodies`` that nothing moves, and no needles."""
-    B, z = bodies, np.zeros
-    return Partners(z((B, 3, 3)), z((B, 3)), z((B, 6)), z(B), z((B, 3, 3)), z(B), np.full((B, 3), np.inf), z((B, 6)))
-
-
-def parts(number: int, planes: int) -> Parts:
-    """Room for ``number`` parts with ``planes`` in all."""
-    P, z = number, np.zeros
-    return Parts(
-        np.zeros(P, np.int64), z((P, 4, 4)), np.zeros(P, np.int64), z((P, 3)), z((planes, 4)),
-        np.zeros((P, 2), np.int64), z((P, 3)), z((P, 3)), np.zeros(P, np.bool_), z((P, 3, 3)), z((P, 3)),
-    )  # fmt: skip
-
-
-def scratch(points: int = MOST_POINTS, capacity: int = CAPACITY) -> Solve:
-    """Scratch for ``capacity`` points of contact among ``points`` of the interface."""
-    K, F, z = capacity, 4 * capacity, np.zeros
-    return Solve(
-        np.zeros(K, np.int64), z((K, 3)), z((K, 3)), z((K, 3)), z((K, 3)), z((K, K, 3, 3)), np.zeros(points, np.bool_),
-        z((points, 3)), np.zeros((F, 2), np.int64), z((F, 6)), np.zeros(F, np.int64), np.zeros(K, np.bool_),
-        z((5, 3)), z(4),
-    )  # fmt: skip
-
-
-open_contacts = opener(
-    Contacts(touching(1), partners(1), parts(1, 1), scratch(1, 1), np.zeros(1, np.bool_), np.zeros(1, np.int64))
-)
-
-
-# --- small vectors ----------------------------------------------------------------------------
-
-
-@inlined
-def _times(R: Array, v: Array, out: Array) -> None:
-    """out = R v."""
-    x, y, z = v[0], v[1], v[2]
-    for k in range(3):
-        out[k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z
-
-
-@inlined
-def _times_transposed(R: Array, v: Array, out: Array) -> None:
-    """out = Rᵀ v."""
-    x, y, z = v[0], v[1], v[2]
-    for k in range(3):
-        out[k] = R[0, k] * x + R[1, k] * y + R[2, k] * z
-
-
-# --- finding contacts -------------------------------------------------------------------------
-
-
-@inlined
-def _place_part(parts: Parts, partners: Partners, c: int) -> None:
-    """Where part ``c`` is in this tick."""
-    T, Q, o, b = parts.local[c], parts.R[c], parts.centre[c], parts.body[c]
-    R = partners.R[b]
-    for k in range(3):
-        for m in range(3):
-            Q[k, m] = R[k, 0] * T[0, m] + R[k, 1] * T[1, m] + R[k, 2] * T[2, m]
-        o[k] = partners.centre[b, k] + R[k, 0] * T[0, 3] + R[k, 1] * T[1, 3] + R[k, 2] * T[2, 3]
-
-
-@inlined
-def _distance_to(parts: Parts, c: int, p: Array, a: Array, b: Array, normal: Array) -> float:
-    """Signed distance of ``p`` (3,) to part ``c``, and its outward ``normal`` there; a, b are scratch."""
-    R, o = parts.R[c], parts.centre[c]
-    for k in range(3):
-        b[k] = p[k] - o[k]
-    _times_transposed(R, b, a)
-    first, last = parts.plane_range[c, 0], parts.plane_range[c, 1]
-    d = signed_distance(parts.kind[c], parts.size[c], parts.planes[first:last], a, b)
-    _times(R, b, normal)
-    return d
-
-
-@inlined
-def _at(x: Array, faces: Integers, q: int, u: float, v: float, p: Array) -> None:
-    """Point of face ``q`` at u, v to p (3,)."""
-    i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
-    for m in range(3):
-        low = x[i, m] + u * (x[j, m] - x[i, m])
-        high = x[h, m] + u * (x[k, m] - x[h, m])
-        p[m] = low + v * (high - low)
-
-
-@inlined
-def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count: int) -> int:
-    """Add the deepest point of face ``q`` for part ``c``, if it is near, to what was found; returns how many are."""
-    x, faces, vectors = field.x, field.faces, work.vectors
-    p, a, b, normal, best_normal = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
-    best, u, v = math.inf, 0.5, 0.5
-    for s in range(COARSE * COARSE):
-        su, sv = (s % COARSE + 0.5) / COARSE, (s // COARSE + 0.5) / COARSE
-        _at(x, faces, q, su, sv, p)
-        d = _distance_to(parts, c, p, a, b, normal)
-        if d < best:
-            best, u, v = d, su, sv
-            best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
-    i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
-    for m in range(3):
-        a[m], b[m] = x[k, m] - x[i, m], x[h, m] - x[j, m]
-    nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    edge = math.sqrt(size)
-    if best > REACH + edge / COARSE:
-        return count
-    step = 0.5 / COARSE
-    while step * edge > FINE:
-        moved = False
-        for way in range(4):
-            su = min(max(u + (step if way == 0 else -step if way == 1 else 0.0), 0.0), 1.0)
-            sv = min(max(v + (step if way == 2 else -step if way == 3 else 0.0), 0.0), 1.0)
-            _at(x, faces, q, su, sv, p)
-            d = _distance_to(parts, c, p, a, b, normal)
-            if d < best - LEVEL:
-                best, u, v, moved = d, su, sv, True
-                best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
-        if not moved:
-            step *= 0.5
-    facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
-    if best > REACH or facing > FACING * size:
-        return count
-    work.found[count, 0], work.found[count, 1] = c, q
-    work.values[count, 0], work.values[count, 4], work.values[count, 5] = best, u, v
-    for m in range(3):
-        work.values[count, 1 + m] = best_normal[m]
-    return count + 1
-
-
-@kernel
-def find_contacts(field: Field, parts: Parts, work: Solve, looked_at: Flags) -> int:
-    """Deepest point of each face for each part that is near; returns how many there are in ``work``."""
-    count = 0
-    low, high = work.vectors[0], work.vectors[1]
-    for c in range(parts.kind.shape[0]):
-        if not parts.live[c]:
-            continue
-        R, o = parts.R[c], parts.centre[c]
-        outside = False
-        for m in range(3):
-            middle, reach = o[m], REACH
-            for k in range(3):
-                middle += R[m, k] * parts.middle[c, k]
-                reach += abs(R[m, k]) * parts.half[c, k]
-            low[m], high[m] = middle - reach, middle + reach
-            outside = outside or low[m] > field.box[1, m] or high[m] < field.box[0, m]
-        if outside:
-            continue
-        lx, ly, lz, hx, hy, hz = low[0], low[1], low[2], high[0], high[1], high[2]
-        for q in range(field.faces.shape[0]):
-            if not looked_at[q] or count == work.found.shape[0]:
-                continue
-            box = field.face_box[q]
-            if box[0, 0] > hx or box[1, 0] < lx or box[0, 1] > hy or box[1, 1] < ly or box[0, 2] > hz or box[1, 2] < lz:
-                continue
-            count = _search_face(field, parts, work, c, q, count)
-    return count
-
-
-@kernel
-def measure_contacts(touching: Touching, points: Points, parts: Parts, partners: Partners, vectors: Array) -> None:
-    """Distance and normal of every point of contact as the tick begins."""
-    a, b = vectors[0], vectors[1]
-    for r in range(touching.used.shape[0]):
-        if touching.used[r]:
-            c, at = touching.part[r], points.at[touching.point[r]]
-            if not parts.live[c]:
-                _place_part(parts, partners, c)
-            touching.distance[r] = _distance_to(parts, c, at, a, b, touching.normal[r])
 
 
 # --- which contacts there are -----------------------------------------------------------------
@@ -350,7 +76,7 @@ def _anchor(contacts: Contacts, points: Points, r: int, found: int) -> None:
     away = contacts.solve.vectors[0]
     for k in range(3):
         away[k] = points.at[t.point[r], k] + SOFT * (f[k] - along * n[k]) - partners.centre[t.body[r], k]
-    _times_transposed(partners.R[t.body[r]], away, t.anchor[r])
+    times_transposed(partners.R[t.body[r]], away, t.anchor[r])
 
 
 @inlined
@@ -470,19 +196,12 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
             arm[k] = at[k] - centre[k]
             work.own[a, k] = at[k] - partners.centre[0, k]
         # Where friction anchors, at the end of the tick.
-        _times(partners.R[b], touching.anchor[r], u)
+        times(partners.R[b], touching.anchor[r], u)
         lx, ly, lz = u[0], u[1], u[2]
         u[0] += centre[0] + dt * (twist[0] + twist[4] * lz - twist[5] * ly)
         u[1] += centre[1] + dt * (twist[1] + twist[5] * lx - twist[3] * lz)
         u[2] += centre[2] + dt * (twist[2] + twist[3] * ly - twist[4] * lx)
-        x, y, z = points.start[i, 0], points.start[i, 1], points.start[i, 2]
-        x, y, z = x + s * points.move[i, 0], y + s * points.move[i, 1], z + s * points.move[i, 2]
-        for k in range(used):
-            j = points.used[k]
-            C = points.C[i, j]
-            for m in range(3):
-                f = work.change[j, m]
-                x, y, z = x + C[0, m] * f, y + C[1, m] * f, z + C[2, m] * f
+        x, y, z = displaced(points, i, s, work.change)
         w[0], w[1], w[2] = x - u[0], y - u[1], z - u[2]
         along = w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2]
         vx = dt * (twist[0] + twist[4] * arm[2] - twist[5] * arm[1])
@@ -524,7 +243,7 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
         for k in range(3):
             points.force[i, k] = f[k]
             work.w[a, k] = u[k] - along_u * normal[k] + SOFT * (f[k] - along_f * normal[k])
-        _times_transposed(partners.R[touching.body[r]], work.w[a], work.u[a])
+        times_transposed(partners.R[touching.body[r]], work.w[a], work.u[a])
         for k in range(3):
             touching.anchor[r, k] += work.u[a, k]
     return n
@@ -571,7 +290,7 @@ def touch(field: Field, points: Points, contacts: Contacts, dt: float) -> bool:
     t, parts, partners, work = contacts.touching, contacts.parts, contacts.partners, contacts.solve
     for c in range(parts.kind.shape[0]):
         if parts.live[c]:
-            _place_part(parts, partners, c)
+            place_part(parts, partners, c)
     measure_contacts(t, points, parts, partners, work.vectors)
     count = find_contacts(field, parts, work, contacts.looked_at)
     match_contacts(field, points, contacts, count, dt)

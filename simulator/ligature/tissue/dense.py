@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.kernels import kernel
+from ligature.kernels import inlined, kernel
 
 Array = NDArray[np.float64]
 
@@ -110,3 +110,19 @@ def subtract_product(U: Array, V: Array, out: Array) -> None:
             for j in range(n):
                 out[i, j] -= a * V[k, j]
             k += 1
+
+
+@inlined
+def times(R: Array, v: Array, out: Array) -> None:
+    """out = R v, all of three rows."""
+    x, y, z = v[0], v[1], v[2]
+    for k in range(3):
+        out[k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z
+
+
+@inlined
+def times_transposed(R: Array, v: Array, out: Array) -> None:
+    """out = Rᵀ v, all of three rows."""
+    x, y, z = v[0], v[1], v[2]
+    for k in range(3):
+        out[k] = R[0, k] * x + R[1, k] * y + R[2, k] * z

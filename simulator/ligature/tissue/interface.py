@@ -172,7 +172,7 @@ def _field(elastic: ElasticGrid, ticks: int) -> Field:
     return Field(
         elastic.x, np.zeros((n, 3)), cells, layers, faces, face_cell, np.zeros((len(faces), 2, 3)), np.zeros((2, 3)),
         elastic.free, elastic.row, elastic.responses, elastic.factor, np.zeros(3 * len(elastic.free)),
-        np.zeros((MOST_POINTS, 3, n, 3)), material, np.array([0, ticks]),
+        np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 3, n, 3)), material, np.array([0, ticks]),
     )  # fmt: skip
 
 
@@ -283,8 +283,27 @@ def add_point(field: Field, points: Points, nodes: Integers, weights: Array) -> 
 def settle_point(field: Field, points: Points, i: int) -> None:
     """Let a point that was placed anew stand where it is at this time of the step."""
     s = field.clock[0] / field.clock[1]
-    for a in range(3):
-        points.at[i, a] = points.start[i, a] + s * points.move[i, a]
+    points.at[i, 0], points.at[i, 1], points.at[i, 2] = carried(points, i, s)
+
+
+@inlined
+def carried(points: Points, i: int, s: float) -> tuple[float, float, float]:
+    """p + s u: where a point is at the part ``s`` of a step in which all forces are the means of the last one."""
+    p, u = points.start[i], points.move[i]
+    return p[0] + s * u[0], p[1] + s * u[1], p[2] + s * u[2]
+
+
+@inlined
+def displaced(points: Points, i: int, s: float, change: Array) -> tuple[float, float, float]:
+    """p + s u + C (λ - λ̄): where a point is with forces that differ by ``change`` (N, 3) from those means."""
+    x, y, z = carried(points, i, s)
+    for k in range(points.filled[0]):
+        j = points.used[k]
+        C = points.C[i, j]
+        for b in range(3):
+            f = change[j, b]
+            x, y, z = x + C[0, b] * f, y + C[1, b] * f, z + C[2, b] * f
+    return x, y, z
 
 
 @kernel
@@ -331,21 +350,16 @@ def equip(table: Integers, i: int, cell: int, radius: float) -> None:
 def end_tick(table: Integers) -> bool:
     """Where all points are when a tick ends, and the sums of their forces; True when the step is complete."""
     t = open_tissue(table)
-    points, clock = t.points, t.field.clock
+    points, clock, change = t.points, t.field.clock, t.field.change
     s, n = (clock[0] + 1) / clock[1], points.filled[0]
     for k in range(n):
         i = points.used[k]
-        x, y, z = points.start[i, 0], points.start[i, 1], points.start[i, 2]
-        x, y, z = x + s * points.move[i, 0], y + s * points.move[i, 1], z + s * points.move[i, 2]
-        for m in range(n):
-            j = points.used[m]
-            C = points.C[i, j]
-            for b in range(3):
-                change = points.force[j, b] - points.mean[j, b]
-                x, y, z = x + C[0, b] * change, y + C[1, b] * change, z + C[2, b] * change
-        points.at[i, 0], points.at[i, 1], points.at[i, 2] = x, y, z
         for a in range(3):
+            change[i, a] = points.force[i, a] - points.mean[i, a]
             points.total[i, a] += points.force[i, a]
+    for k in range(n):
+        i = points.used[k]
+        points.at[i, 0], points.at[i, 1], points.at[i, 2] = displaced(points, i, s, change)
     for k in range(n):
         i = points.used[k]
         if points.status[i] == LEAVING:

@@ -55,6 +55,7 @@ class Field(NamedTuple):
     table: Array  # (f, 3, n, 3) responses of the free nodes, m/N; or (0, 3, n, 3), and `factor` is used
     factor: Elimination
     load: Array  # (3 f,) scratch
+    change: Array  # (N, 3) scratch: forces on the points over their means in the last step
     response: Array  # (N, 3, n, 3) displacements of all nodes for 1 N along x, y, z on a point
     material: Array  # (layers, 6)
     clock: Integers  # (2,) ticks of this step that are over, and in all
@@ -125,7 +126,7 @@ def _example() -> Tissue:
     factor = Elimination(i(1, 2), i(1), z(1), z(1), z(1))
     field = Field(
         z((1, 3)), z((1, 3)), i(1, 8), i(1), i(1, 4), i(1), z((1, 2, 3)), z((2, 3)), i(1), i(1), z((1, 3, 1, 3)),
-        factor, z(3), z((1, 3, 1, 3)), z((1, 6)), i(2),
+        factor, z(3), z((1, 3)), z((1, 3, 1, 3)), z((1, 6)), i(2),
     )  # fmt: skip
     return Tissue(field, points(1), paths(1, 1))
 

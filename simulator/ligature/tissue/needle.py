@@ -1,14 +1,7 @@
 """A rigid needle in tissue: what holds it at the nodes of its paths and at its tip, solved with its own motion.
 
-Each row is a direction e at a point of the needle, with a bristle between the needle and the point of tissue there: the
-force λ = stretch / c within limits. All rows of a needle, its motion and the tissue's compliance C are solved at
-once. With J the rows' directions and moments about the centre of mass, and the elastic rows E apart from
-those at their limits L,
-
-    (c + C_EE) λ_E = e₀ + J_E δ - C_EL λ_L,    H δ = g - Jᵀ λ,
-
-so the tissue looks like a 6 x 6 stiffness to the needle. Which rows are at their limits is found by
-repetition, starting from the last tick. World axes, SI units.
+Friction along a node of a path, the hold across it, cutting at the tip and the pressure of a tip on the surface are
+rows of `ligature.tissue.rows`. World axes, SI units.
 """
 
 from __future__ import annotations
@@ -21,16 +14,23 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.tables import opener
-from ligature.tissue.dense import cholesky, solve_cholesky
+from ligature.tissue.interface import displaced
 from ligature.tissue.layout import MOST_PATHS, MOST_POINTS, Paths, Points, open_tissue
 from ligature.tissue.location import cross_surface
+from ligature.tissue.rows import (
+    MOST_ROWS,
+    Rows,
+    expand_rows,
+    reduce_rows,
+    row_arrays,
+    set_row,
+    solve_rows,
+    stretch_of,
+    sum_up,
+)
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-MOST_ROWS = 160
-MOST_PASSES = 12
-"""Repetitions for the limits at most."""
 
 AXIAL, ACROSS, TIP, ENTRY, ENTRY_ACROSS, SLIDE, RUB = 0, 1, 2, 3, 4, 5, 6
 """Rows: friction along a node, hold across it, cutting at the tip, pressure of the tip on the surface along it and
@@ -57,31 +57,6 @@ DROP = 6e-3
 
 TIP_FRICTION = 0.2
 """Coulomb coefficient of a tip that slides over the surface."""
-
-
-class Rows(NamedTuple):
-    """Scratch of a needle's tick: up to M rows."""
-
-    kind: Integers  # (M,)
-    point: Integers  # (M,) of the interface
-    e: Array  # (M, 3)
-    J: Array  # (M, 6)
-    rest: Array  # (M,) stretch without motion of the needle and without its forces
-    soft: Array  # (M,) c above
-    low: Array  # (M,)
-    high: Array  # (M,)
-    side: Integers  # (M,) 0 elastic, 1 at the upper, -1 at the lower limit
-    force: Array  # (M,)
-    C: Array  # (M, M)
-    A: Array  # (M, M)
-    X: Array  # (7, M)
-    elastic: Integers  # (M,) the rows that are
-    H: Array  # (6, 6)
-    g: Array  # (6,)
-    K: Array  # (6, 6) stiffness of the rows that are elastic, as the needle sees it
-    load: Array  # (6,) force and moment of all rows on the needle where it does not move
-    change: Array  # (N, 3) forces on points of the interface without the needle's own, over those of the last step
-    base: Array  # (N, 3) where they would put its points at the end of the tick
 
 
 class Held(NamedTuple):
@@ -122,17 +97,7 @@ class NeedleArrays(NamedTuple):
 def needle_arrays(points: int = MOST_POINTS, paths: int = MOST_PATHS, capacity: int = MOST_ROWS) -> NeedleArrays:
     """A needle that is outside, at the origin."""
     z = np.zeros
-    return NeedleArrays(held(points, paths), rows(points, capacity), z(14), z((6, 6)), z(6), z(6), z(6), z(3))
-
-
-def rows(points: int, capacity: int) -> Rows:
-    """Scratch for ``capacity`` rows."""
-    M, z = capacity, np.zeros
-    i = lambda: np.zeros(M, np.int64)  # noqa: E731
-    return Rows(
-        i(), i(), z((M, 3)), z((M, 6)), z(M), z(M), z(M), z(M), i(), z(M), z((M, M)), z((M, M)), z((7, M)), i(),
-        z((6, 6)), z(6), z((6, 6)), z(6), z((points, 3)), z((points, 3)),
-    )  # fmt: skip
+    return NeedleArrays(held(points, paths), row_arrays(points, capacity), z(14), z((6, 6)), z(6), z(6), z(6), z(3))
 
 
 def held(capacity: int, paths: int) -> Held:
@@ -289,38 +254,18 @@ def follow_tip(points: Points, paths: Paths, held: Held, dt: float) -> int:
 
 
 @inlined
-def _set_row(
-    rows: Rows, m: int, kind: int, point: int, ex: float, ey: float, ez: float, rx: float, ry: float, rz: float
-) -> None:
-    e, J = rows.e[m], rows.J[m]
-    e[0], e[1], e[2] = ex, ey, ez
-    J[0], J[1], J[2] = ex, ey, ez
-    J[3], J[4], J[5] = ry * ez - rz * ey, rz * ex - rx * ez, rx * ey - ry * ex
-    rows.kind[m], rows.point[m] = kind, point
-
-
-@inlined
 def _find_bases(points: Points, held: Held, rows: Rows, s: float) -> None:
     """Where the needle's points would be at the end of this tick without its own forces."""
-    contact, n = held.tip[2], points.filled[0]
-    for u in range(n):
+    contact = held.tip[2]
+    for u in range(points.filled[0]):
         j = points.used[u]
         mine = held.engaged[j] == 1 or j == contact
         for b in range(3):
             rows.change[j, b] = -points.mean[j, b] if mine else points.force[j, b] - points.mean[j, b]
-    for u in range(n):
+    for u in range(points.filled[0]):
         i = points.used[u]
-        if held.engaged[i] == 0 and i != contact:
-            continue
-        x, y, z = points.start[i, 0], points.start[i, 1], points.start[i, 2]
-        x, y, z = x + s * points.move[i, 0], y + s * points.move[i, 1], z + s * points.move[i, 2]
-        for m in range(n):
-            j = points.used[m]
-            C = points.C[i, j]
-            for b in range(3):
-                f = rows.change[j, b]
-                x, y, z = x + C[0, b] * f, y + C[1, b] * f, z + C[2, b] * f
-        rows.base[i, 0], rows.base[i, 1], rows.base[i, 2] = x, y, z
+        if held.engaged[i] == 1 or i == contact:
+            rows.base[i, 0], rows.base[i, 1], rows.base[i, 2] = displaced(points, i, s, rows.change)
 
 
 @kernel
@@ -340,7 +285,7 @@ def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s
         # Along: what friction holds, and how the tissue moves by itself.
         at = points.at[i]
         slid = tx * (at[0] - bx) + ty * (at[1] - by) + tz * (at[2] - bz)
-        _set_row(rows, m, AXIAL, i, tx, ty, tz, rx, ry, rz)
+        set_row(rows, m, AXIAL, i, tx, ty, tz, rx, ry, rz)
         rows.rest[m] = held.sigma[i] - held.anchor[i] + slid
         limit = points.friction[i] * held.share[i]
         rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = -limit, limit, points.soft[i], held.side[i, 0]
@@ -359,7 +304,7 @@ def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s
         for turn in range(2):
             if turn == 1:
                 nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
-            _set_row(rows, m, ACROSS, i, nx, ny, nz, rx, ry, rz)
+            set_row(rows, m, ACROSS, i, nx, ny, nz, rx, ry, rz)
             rows.rest[m] = nx * (dx - ox) + ny * (dy - oy) + nz * (dz - oz)
             rows.low[m], rows.high[m], rows.soft[m] = -limit, limit, points.soft[i]
             rows.side[m] = held.side[i, 1 + turn]
@@ -374,7 +319,7 @@ def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s
         if front >= 0:
             i = paths.node[tip_path, front]
             at = points.at[i]
-            _set_row(rows, m, TIP, i, tx, ty, tz, rx, ry, rz)
+            set_row(rows, m, TIP, i, tx, ty, tz, rx, ry, rz)
             slid = 0.0
             for a in range(3):
                 slid += shape[3 + a] * (at[a] - rows.base[i, a])
@@ -395,7 +340,7 @@ def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s
             nx, ny, nz = shape[3] - along * tx, shape[4] - along * ty, shape[5] - along * tz
             size = math.sqrt(nx * nx + ny * ny + nz * nz)
             nx, ny, nz = nx / size, ny / size, nz / size
-        _set_row(rows, m, kind, i, tx, ty, tz, rx, ry, rz)
+        set_row(rows, m, kind, i, tx, ty, tz, rx, ry, rz)
         rows.rest[m] = tx * dx + ty * dy + tz * dz
         rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = low, high, points.soft[i], held.tip_side[0]
         m += 1
@@ -403,7 +348,7 @@ def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s
         for turn in range(2):
             if turn == 1:
                 nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
-            _set_row(rows, m, other, i, nx, ny, nz, rx, ry, rz)
+            set_row(rows, m, other, i, nx, ny, nz, rx, ry, rz)
             rows.rest[m] = nx * dx + ny * dy + nz * dz
             rows.low[m], rows.high[m], rows.soft[m] = -bound, bound, points.soft[i]
             rows.side[m] = held.tip_side[1 + turn]
@@ -418,114 +363,6 @@ def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s
             rows.C[a, b] = value
             rows.C[b, a] = value
     return m
-
-
-@inlined
-def _reduce(rows: Rows, m: int) -> int:
-    """Stiffness and load of the rows on the needle for the limits as they are; elastic rows, -1 where it failed."""
-    n = 0
-    for a in range(m):
-        if rows.side[a] == 0:
-            rows.elastic[n] = a
-            n += 1
-        else:
-            rows.force[a] = rows.high[a] if rows.side[a] > 0 else rows.low[a]
-    for i in range(6):
-        rows.load[i] = 0.0
-        for j in range(6):
-            rows.K[i, j] = 0.0
-    for a in range(m):
-        if rows.side[a] != 0:
-            for i in range(6):
-                rows.load[i] -= rows.J[a, i] * rows.force[a]
-    for p in range(n):
-        a = rows.elastic[p]
-        b = rows.rest[a]
-        for c in range(m):
-            if rows.side[c] != 0:
-                b -= rows.C[a, c] * rows.force[c]
-        rows.X[6, p] = b
-        for i in range(6):
-            rows.X[i, p] = rows.J[a, i]
-        for q in range(p + 1):
-            rows.A[p, q] = rows.C[a, rows.elastic[q]]
-        rows.A[p, p] += rows.soft[a]
-    if not cholesky(rows.A, n):
-        return -1
-    for c in range(7):
-        X = rows.X[c]
-        for p in range(n):
-            total = X[p]
-            for q in range(p):
-                total -= rows.A[p, q] * X[q]
-            X[p] = total / rows.A[p, p]
-    for i in range(6):
-        for p in range(n):
-            rows.load[i] -= rows.X[i, p] * rows.X[6, p]
-        for j in range(i + 1):
-            total = 0.0
-            for p in range(n):
-                total += rows.X[i, p] * rows.X[j, p]
-            rows.K[i, j], rows.K[j, i] = total, total
-    return n
-
-
-@inlined
-def _expand(rows: Rows, n: int, delta: Array) -> None:
-    """Forces of the ``n`` elastic rows after `_reduce` for a motion ``delta`` (6,) of the needle."""
-    for p in range(n - 1, -1, -1):
-        total = rows.X[6, p]
-        for i in range(6):
-            total += rows.X[i, p] * delta[i]
-        for q in range(p + 1, n):
-            total -= rows.A[q, p] * rows.force[rows.elastic[q]]
-        rows.force[rows.elastic[p]] = total / rows.A[p, p]
-
-
-@kernel
-def solve_rows(rows: Rows, m: int, H: Array, g: Array, delta: Array) -> int:
-    """Forces of the rows and motion ``delta`` (6,) of the needle.
-
-    Returns 1 when `_reduce` has seen the limits as they are now, 0 when they changed last, -1 where it failed.
-    """
-    for turn in range(MOST_PASSES):
-        n = _reduce(rows, m)
-        if n < 0:
-            return -1
-        for i in range(6):
-            delta[i] = g[i] + rows.load[i]
-            for j in range(i + 1):
-                rows.H[i, j] = H[i, j] + rows.K[i, j]
-        if not cholesky(rows.H, 6):
-            return -1
-        solve_cholesky(rows.H, 6, delta)
-        _expand(rows, n, delta)
-        changed = False
-        for a in range(m):
-            side = rows.side[a]
-            if side == 0:
-                if rows.force[a] > rows.high[a]:
-                    rows.side[a], changed = 1, True
-                elif rows.force[a] < rows.low[a]:
-                    rows.side[a], changed = -1, True
-            elif turn < MOST_PASSES - 3:
-                # At its limit as long as the stretch there would ask for more; in the last passes none comes back.
-                bristle = _stretch(rows, m, a, delta) / rows.soft[a]
-                if (side > 0 and bristle < rows.high[a]) or (side < 0 and bristle > rows.low[a]):
-                    rows.side[a], changed = 0, True
-        if not changed:
-            return 1
-    return 0
-
-
-@inlined
-def _stretch(rows: Rows, m: int, a: int, delta: Array) -> float:
-    stretch = rows.rest[a]
-    for i in range(6):
-        stretch += rows.J[a, i] * delta[i]
-    for c in range(m):
-        stretch -= rows.C[a, c] * rows.force[c]
-    return stretch
 
 
 @kernel
@@ -547,7 +384,7 @@ def conclude(points: Points, paths: Paths, held: Held, rows: Rows, m: int, delta
         force = rows.force[a]
         excess = 0.0
         if rows.side[a] != 0:
-            excess = _stretch(rows, m, a, delta) - force * rows.soft[a]
+            excess = stretch_of(rows, m, a, delta) - force * rows.soft[a]
         for b in range(3):
             points.force[i, b] += force * rows.e[a, b]
         turn = 0 if i != done or kind == AXIAL else turn + 1
@@ -582,15 +419,6 @@ def conclude(points: Points, paths: Paths, held: Held, rows: Rows, m: int, delta
     return through
 
 
-@inlined
-def _sum_up(rows: Rows, m: int, wrench: Array) -> None:
-    """Force and moment of all rows on the needle."""
-    for i in range(6):
-        wrench[i] = 0.0
-        for a in range(m):
-            wrench[i] -= rows.force[a] * rows.J[a, i]
-
-
 @kernel
 def couple(tissue: Integers, needle: Integers, dt: float) -> tuple[int, int]:
     """A needle's tick: (path that the tip has left or -1, what became of it: 1 got through, 0 stayed, -1 failed)."""
@@ -602,7 +430,7 @@ def couple(tissue: Integers, needle: Integers, dt: float) -> tuple[int, int]:
     if solve_rows(rows, m, n.H, n.g, n.delta) < 0:
         return left, -1
     through = conclude(points, paths, held, rows, m, n.delta, True)
-    _sum_up(rows, m, n.wrench)
+    sum_up(rows, m, n.wrench)
     return left, (1 if through else 0)
 
 
@@ -619,7 +447,7 @@ def begin_coupling(tissue: Integers, needle: Integers, dt: float) -> tuple[int, 
     left = follow_tip(points, paths, held, dt)
     m = gather(points, paths, held, rows, n.shape, (t.field.clock[0] + 1) / t.field.clock[1])
     found = solve_rows(rows, m, n.H, n.g, n.delta)
-    if found < 0 or (found == 0 and _reduce(rows, m) < 0):
+    if found < 0 or (found == 0 and reduce_rows(rows, m) < 0):
         return left, -1
     return left, m
 
@@ -635,9 +463,9 @@ def end_coupling(tissue: Integers, needle: Integers, m: int) -> bool:
     for a in range(m):
         if n.rows.side[a] == 0:
             elastic += 1
-    _expand(n.rows, elastic, n.delta)
+    expand_rows(n.rows, elastic, n.delta)
     through = conclude(t.points, t.paths, n.held, n.rows, m, n.delta, False)
-    _sum_up(n.rows, m, n.wrench)
+    sum_up(n.rows, m, n.wrench)
     return through
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.tables import opener
+from ligature.tissue.interface import carried
 from ligature.tissue.layout import Paths, Points, open_tissue
 from ligature.tissue.needle import CAPTURE
 
@@ -204,8 +205,7 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
             for b in range(a):
                 mean = 0.5 * (W[a, b] + W[b, a])
                 W[a, b], W[b, a] = mean, mean
-        x, y, z = points.start[i, 0], points.start[i, 1], points.start[i, 2]
-        x, y, z = x + fraction * points.move[i, 0], y + fraction * points.move[i, 1], z + fraction * points.move[i, 2]
+        x, y, z = carried(points, i, fraction)
         for b in range(3):
             f = points.mean[i, b]
             x, y, z = x - W[0, b] * f, y - W[1, b] * f, z - W[2, b] * f

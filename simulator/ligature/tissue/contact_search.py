@@ -1,0 +1,156 @@
+"""Where rigid bodies are nearest to the surface of tissue: each face's deepest point for each convex part; metres.
+
+The best of a few points of a face, from which a search with ever smaller steps goes on.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.kernels import inlined, kernel
+from ligature.mesh.distance import signed_distance
+from ligature.tissue.contact_arrays import Partners, Parts, Solve, Touching
+from ligature.tissue.dense import times, times_transposed
+from ligature.tissue.layout import Field, Points
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+FACING = -0.2
+"""Cosine between the surface's outward normal and a contact's above which a body is not before that face."""
+
+COARSE = 3
+"""Points along an edge of a face from the best of which the search for the deepest begins."""
+
+FINE = 0.1e-3
+"""How exact the place of a point of contact is found, m."""
+
+LEVEL = 1e-7
+"""Depth in metres by which a further place must be deeper: flat contacts keep theirs."""
+
+REACH = 1.5e-3
+"""Distance in metres at which a point of contact is let go."""
+
+
+@inlined
+def place_part(parts: Parts, partners: Partners, c: int) -> None:
+    """Where part ``c`` is in this tick."""
+    T, Q, o, b = parts.local[c], parts.R[c], parts.centre[c], parts.body[c]
+    R = partners.R[b]
+    for k in range(3):
+        for m in range(3):
+            Q[k, m] = R[k, 0] * T[0, m] + R[k, 1] * T[1, m] + R[k, 2] * T[2, m]
+        o[k] = partners.centre[b, k] + R[k, 0] * T[0, 3] + R[k, 1] * T[1, 3] + R[k, 2] * T[2, 3]
+
+
+@inlined
+def _distance_to(parts: Parts, c: int, p: Array, a: Array, b: Array, normal: Array) -> float:
+    """Signed distance of ``p`` (3,) to part ``c``, and its outward ``normal`` there; a, b are scratch."""
+    R, o = parts.R[c], parts.centre[c]
+    for k in range(3):
+        b[k] = p[k] - o[k]
+    times_transposed(R, b, a)
+    first, last = parts.plane_range[c, 0], parts.plane_range[c, 1]
+    d = signed_distance(parts.kind[c], parts.size[c], parts.planes[first:last], a, b)
+    times(R, b, normal)
+    return d
+
+
+@inlined
+def _at(x: Array, faces: Integers, q: int, u: float, v: float, p: Array) -> None:
+    """Point of face ``q`` at u, v to p (3,)."""
+    i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
+    for m in range(3):
+        low = x[i, m] + u * (x[j, m] - x[i, m])
+        high = x[h, m] + u * (x[k, m] - x[h, m])
+        p[m] = low + v * (high - low)
+
+
+@inlined
+def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count: int) -> int:
+    """Add the deepest point of face ``q`` for part ``c``, if it is near, to what was found; returns how many are."""
+    x, faces, vectors = field.x, field.faces, work.vectors
+    p, a, b, normal, best_normal = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
+    best, u, v = math.inf, 0.5, 0.5
+    for s in range(COARSE * COARSE):
+        su, sv = (s % COARSE + 0.5) / COARSE, (s // COARSE + 0.5) / COARSE
+        _at(x, faces, q, su, sv, p)
+        d = _distance_to(parts, c, p, a, b, normal)
+        if d < best:
+            best, u, v = d, su, sv
+            best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+    i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
+    for m in range(3):
+        a[m], b[m] = x[k, m] - x[i, m], x[h, m] - x[j, m]
+    nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    edge = math.sqrt(size)
+    if best > REACH + edge / COARSE:
+        return count
+    step = 0.5 / COARSE
+    while step * edge > FINE:
+        moved = False
+        for way in range(4):
+            su = min(max(u + (step if way == 0 else -step if way == 1 else 0.0), 0.0), 1.0)
+            sv = min(max(v + (step if way == 2 else -step if way == 3 else 0.0), 0.0), 1.0)
+            _at(x, faces, q, su, sv, p)
+            d = _distance_to(parts, c, p, a, b, normal)
+            if d < best - LEVEL:
+                best, u, v, moved = d, su, sv, True
+                best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+        if not moved:
+            step *= 0.5
+    facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
+    if best > REACH or facing > FACING * size:
+        return count
+    work.found[count, 0], work.found[count, 1] = c, q
+    work.values[count, 0], work.values[count, 4], work.values[count, 5] = best, u, v
+    for m in range(3):
+        work.values[count, 1 + m] = best_normal[m]
+    return count + 1
+
+
+@kernel
+def find_contacts(field: Field, parts: Parts, work: Solve, looked_at: Flags) -> int:
+    """Deepest point of each face for each part that is near; returns how many there are in ``work``."""
+    count = 0
+    low, high = work.vectors[0], work.vectors[1]
+    for c in range(parts.kind.shape[0]):
+        if not parts.live[c]:
+            continue
+        R, o = parts.R[c], parts.centre[c]
+        outside = False
+        for m in range(3):
+            middle, reach = o[m], REACH
+            for k in range(3):
+                middle += R[m, k] * parts.middle[c, k]
+                reach += abs(R[m, k]) * parts.half[c, k]
+            low[m], high[m] = middle - reach, middle + reach
+            outside = outside or low[m] > field.box[1, m] or high[m] < field.box[0, m]
+        if outside:
+            continue
+        lx, ly, lz, hx, hy, hz = low[0], low[1], low[2], high[0], high[1], high[2]
+        for q in range(field.faces.shape[0]):
+            if not looked_at[q] or count == work.found.shape[0]:
+                continue
+            box = field.face_box[q]
+            if box[0, 0] > hx or box[1, 0] < lx or box[0, 1] > hy or box[1, 1] < ly or box[0, 2] > hz or box[1, 2] < lz:
+                continue
+            count = _search_face(field, parts, work, c, q, count)
+    return count
+
+
+@kernel
+def measure_contacts(touching: Touching, points: Points, parts: Parts, partners: Partners, vectors: Array) -> None:
+    """Distance and normal of every point of contact as the tick begins."""
+    a, b = vectors[0], vectors[1]
+    for r in range(touching.used.shape[0]):
+        if touching.used[r]:
+            c, at = touching.part[r], points.at[touching.point[r]]
+            if not parts.live[c]:
+                place_part(parts, partners, c)
+            touching.distance[r] = _distance_to(parts, c, at, a, b, touching.normal[r])
