@@ -24,7 +24,7 @@ SHARES = ("success", "lost")
 
 def write_page(report: Mapping[str, Any], pictures: Sequence[tuple[int, Sequence[Path]]], path: Path) -> Path:
     """Write what `ligature.environments.evaluation.report` returns, with ``pictures`` by the seed of their episode."""
-    title = f"{report['policy']} in {report['environment'].get('task')}"
+    title = f"{Path(report['policy']).name} in {report['environment'].get('task')}"
     options = ", ".join(f"{name} {value}" for name, value in report["environment"].items())
     text = [
         "<!doctype html>", '<html lang="en"><head><meta charset="utf-8">', f"<title>{escape(title)}</title>",
