@@ -19,7 +19,7 @@ from ligature import Simulation
 from ligature.cache import cache_folder
 from ligature.model.scene import Scene
 from ligature.model.subsystem import Subsystem
-from ligature.physics import control, impulses
+from ligature.physics import control, engine, impulses
 from ligature.sensing import rays
 from ligature.simulation import Snapshot
 from ligature.suture import colliders, rod
@@ -125,15 +125,33 @@ def test_a_reset_scene_stands_as_a_fresh_one_whatever_was_commanded(name: str) -
         assert simulation.state[field].tobytes() == fresh[field].tobytes(), field
 
 
+@pytest.mark.parametrize("name", QUICK[:2])
+def test_a_scene_of_many_bodies_moves_alike_and_gets_another_bullet_world(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    simulation, start, expected = driven(name)
+    assert simulation._world.engine.forgets
+    monkeypatch.setattr(engine, "MOST_PAIRED", 0)
+    large = Simulation(scene_of(name))
+    assert not large._world.engine.forgets
+    large.restore(start)
+    trees = large._world.engine.trees
+    for _ in range(2):
+        large.restore(start)
+        assert large._world.engine.trees is not trees
+        Driver(large.scene, 0).run(large, 0, TICKS)
+        assert large.state_hash() == expected
+
+
 def test_a_restore_keeps_bullets_world_and_forgets_its_contacts() -> None:
     simulation = Simulation(scene_of("suturing_small"))
-    engine, needle = simulation._world.engine, simulation.bodies["BODY Needle"].body.index
+    bullet, needle = simulation._world.engine, simulation.bodies["BODY Needle"].body.index
     simulation.step(300)
-    taken, client = simulation.snapshot(), engine.client
+    taken, trees = simulation.snapshot(), bullet.trees
     simulation.step(1)
     assert simulation._world.queries.contacts(needle, 0.0), "the needle lies on the pad"
     simulation.restore(taken)
-    assert engine.client == client
+    assert bullet.trees is trees
     assert not simulation._world.queries.contacts(needle, 0.0)
 
 

@@ -32,6 +32,13 @@ LOOP_ITERATIONS = 200
 MOVES, STANDS = (1, -1), (2, -3)
 """Bullet's collision group and mask of what moves, and of what stands and meets only what moves: its own defaults."""
 
+MOST_PAIRED = 128
+"""Bodies up to which Bullet compares all pairs of boxes in a tick, which costs nothing up to a hundred.
+
+Its trees of boxes, for more, balance themselves by addresses in memory and by counters that nothing resets: the order
+of pairs, and with it that of contacts in the solver, goes on from whatever moved before.
+"""
+
 NEAR = 0.002
 """Gap in metres up to which Bullet prepares contacts; its 20 mm takes half of the time of a needle on a phantom."""
 
@@ -49,8 +56,9 @@ def common_gravity(scene: Scene) -> Array:
 class Engine:
     """The trees of ``scene`` in a Bullet client.
 
-    Bullet's contacts and the order of its broad phase cannot be read or set, so whatever begins anew does so in another
-    client, by `rebuild`; whoever keeps one of these attributes over that has those of the client that is gone.
+    Bullet's contacts cannot be read or set, so whatever begins anew begins without: `forget_contacts` where that is
+    all that is remembered, else `rebuild`; whoever keeps one of these attributes over a rebuild has those of the
+    client that is gone.
 
     Attributes
     ----------
@@ -66,18 +74,23 @@ class Engine:
         The body at Bullet's multibody and link.
     gravity
         Bullet's gravity (3,).
+    forgets
+        Whether `forget_contacts` leaves nothing of what was before.
     """
 
     def __init__(self, scene: Scene, dt: float) -> None:
         self.scene, self.dt = scene, dt
         self.cache = CollisionCache()
         self.gravity = common_gravity(scene)
+        self.forgets = sum(len(articulation.links) for articulation in scene.articulations) <= MOST_PAIRED
         self._build()
 
     def _build(self) -> None:
         scene = self.scene
         self.client = pybullet.connect(pybullet.DIRECT)
         self._end = weakref.finalize(self, pybullet.disconnect, self.client)
+        if self.forgets:
+            pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=self.client)
         iterations = LOOP_ITERATIONS if scene.closures else SOLVER_ITERATIONS
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=iterations, erp=CLOSING,
@@ -104,8 +117,8 @@ class Engine:
     def forget_contacts(self) -> None:
         """Take all shapes out of Bullet's world and put them back in their first order, where they are now.
 
-        Their contacts, pairs and boxes go, with what solvers know from the last tick. In a client that has stepped,
-        the broad phase remembers more; see `rebuild`.
+        Their contacts, pairs and boxes go, with what solvers know from the last tick. Where Bullet compares all pairs,
+        each shape gets its place and number back, and what follows is a function of poses, velocities and commands.
         """
         for uid, link, group, mask in self._colliders:
             pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)

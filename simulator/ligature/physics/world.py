@@ -127,6 +127,7 @@ class World(Subsystem):
     def _set_up(self) -> None:
         """Make what acts on bodies within a tick, for the engine's present client."""
         engine = self.engine
+        self._broken = False
         self._lifts = gravity_lifts(engine, self.joints.controls)
         self._damped = self._damping_factors()
         self._closures = Closures(engine.client, self.scene, engine.trees, engine.place_of, engine.motions, self.dt)
@@ -135,7 +136,12 @@ class World(Subsystem):
         engine.forget_contacts()
 
     def _begin(self) -> None:
-        """Begin anew in another Bullet client: in the same one its broad phase would go on where it was."""
+        """Make ready to begin anew; in another Bullet client where this one would remember, or does not work."""
+        if self.engine.forgets and not self._broken:
+            self.welds.loosen()
+            self._closures.begin()
+            self._parting.begin()
+            return
         self.engine.rebuild()
         self.joints.rebuild()
         self.collisions.rebuild()
@@ -239,6 +245,7 @@ class World(Subsystem):
 
     def _heal(self) -> None:
         """Put trees that diverged back to where the scene starts, with all that loops join to them."""
+        self._broken = True
         found = diverged(self.engine)
         for k in found:
             name = self.scene.bodies[self.engine.trees[k].root].identity.identifier
@@ -325,7 +332,7 @@ class World(Subsystem):
     def reset(self) -> None:
         """Put every body back to its initial pose, at rest.
 
-        Bullet's world is built anew, for its contacts would go on. Commands hold, as if they were sent again; so do the
+        Bullet's contacts are forgotten, for they would go on. Commands hold, as if they were sent again; so do the
         constraints of actuators.
         """
         held = self.joints.held()
@@ -341,6 +348,7 @@ class World(Subsystem):
 
     def recover(self) -> None:
         """Put every body back, and clear all commands."""
+        self._broken = True
         self.clear_commands()
         self.reset()
 
@@ -352,7 +360,7 @@ class World(Subsystem):
         }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Continue from `snapshot` in another Bullet client."""
+        """Forget Bullet's contacts and continue from `snapshot`."""
         self._begin()
         for name, part in self._parts().items():
             part.restore(snapshot[name])
