@@ -29,6 +29,9 @@ STILL = 1e-4
 class Policy(nn.Module):
     """Observations (n, k) to actions (n, 7) within -1 and 1; it scales what it sees by itself."""
 
+    mean: torch.Tensor
+    scale: torch.Tensor
+
     def __init__(self, mean: torch.Tensor, scale: torch.Tensor) -> None:
         super().__init__()
         self.register_buffer("mean", mean)

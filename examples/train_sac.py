@@ -23,6 +23,7 @@ from ligature.environments.goals import GOALS
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
 from torch import nn
 
@@ -33,9 +34,17 @@ WINDOW = 50
 class Actor(nn.Module):
     """The deterministic policy alone, which scales observations (n, k) as `VecNormalize` did in training."""
 
+    mean: torch.Tensor
+    deviation: torch.Tensor
+    limit: float
+    body: nn.Module
+    mu: nn.Module
+
     def __init__(self, model: SAC, scales: VecNormalize) -> None:
         super().__init__()
-        mean, variance = scales.obs_rms.mean, scales.obs_rms.var  # type: ignore[union-attr]
+        seen = scales.obs_rms
+        assert isinstance(seen, RunningMeanStd)
+        mean, variance = seen.mean, seen.var
         self.register_buffer("mean", torch.tensor(mean, dtype=torch.float32))
         self.register_buffer("deviation", torch.tensor(variance + scales.epsilon, dtype=torch.float32).sqrt())
         self.limit = float(scales.clip_obs)

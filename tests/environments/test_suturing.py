@@ -78,7 +78,7 @@ POSES = ((7, 14), (14, 21), (41, 48))
 @settings(max_examples=6, deadline=None)
 @given(task=st.sampled_from(["reach", "pick", "insert"]), seed=st.integers(0, 2**31))
 def test_what_is_observed_does_not_leap(task: str, seed: int) -> None:
-    """Quaternions of one rotation have two signs: between actions, and from one start to another, it is the nearer one."""
+    """Quaternions have two signs; the wrong one is farther than 1.4. A needle that falls turns by 0.3 in an action."""
     env, rng = SuturingEnv(task), np.random.default_rng(seed)
     starts = []
     for start in range(3):
@@ -87,7 +87,7 @@ def test_what_is_observed_does_not_leap(task: str, seed: int) -> None:
         for _ in range(40):
             now, *_ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
             for first, last in POSES:
-                assert np.linalg.norm(now[first:last] - before[first:last]) < 0.3, (first, task)
+                assert np.linalg.norm(now[first:last] - before[first:last]) < 1.0, (first, task)
             before = now
     env.close()
     for first, _ in (POSES[0], POSES[2]):
