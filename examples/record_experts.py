@@ -51,7 +51,7 @@ def main() -> int:
     arguments.add_argument("--task", choices=sorted(EXPERTS), default="reach")
     arguments.add_argument("--episodes", type=int, default=50)
     arguments.add_argument("--seed", type=int, default=1000, help="of the first episode")
-    arguments.add_argument("--noise", type=float, default=0.1, help="that disturbs the expert, as a share of an action")
+    arguments.add_argument("--noise", type=float, default=0.3, help="that disturbs the expert, as a share of an action")
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
     given = arguments.parse_args()
     env = SuturingEnv(given.task, max_steps=MOST)

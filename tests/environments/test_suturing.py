@@ -71,6 +71,30 @@ def test_going_straight_to_the_target_reaches_it(reward: str) -> None:
     assert total == pytest.approx(1.0 + (100.0 * first if reward == "dense" else 0.0), abs=1e-9)
 
 
+POSES = ((7, 14), (14, 21), (41, 48))
+"""Where an observation has poses: tip, needle, set-point."""
+
+
+@settings(max_examples=6, deadline=None)
+@given(task=st.sampled_from(["reach", "pick", "insert"]), seed=st.integers(0, 2**31))
+def test_what_is_observed_does_not_leap(task: str, seed: int) -> None:
+    """Quaternions have two signs; the wrong one is farther than 1.4. A needle that falls turns by 0.3 in an action."""
+    env, rng = SuturingEnv(task), np.random.default_rng(seed)
+    starts = []
+    for start in range(3):
+        before, _ = env.reset(seed=seed % 1000 + start)
+        starts.append(before)
+        for _ in range(40):
+            now, *_ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+            for first, last in POSES:
+                assert np.linalg.norm(now[first:last] - before[first:last]) < 1.0, (first, task)
+            before = now
+    env.close()
+    for first, _ in (POSES[0], POSES[2]):
+        quaternions = np.array([start[first + 3 : first + 7] for start in starts])
+        assert (quaternions @ quaternions[0] > 0.0).all()
+
+
 def test_images_are_what_the_camera_sees() -> None:
     env = SuturingEnv("reach", observation="image", render_mode="rgb_array")
     observation, _ = env.reset(seed=1)

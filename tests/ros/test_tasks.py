@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,16 +12,6 @@ from tests.ros.conftest import BIN, ROOT, SMALL, Program, free_port
 
 pytestmark = pytest.mark.ros
 SUTURING = ROOT / "scenes" / "suturing" / "launch.yaml"
-
-
-def test_the_first_task_runs_from_launch_file_to_score(ros_env: dict[str, str], tmp_path: Path) -> None:
-    env = dict(ros_env, ROS_PACKAGE_PATH=f"{ROOT}:{ROOT / 'ros_msgs'}", ROS_HOME=str(tmp_path))
-    done = subprocess.run(
-        ["/usr/bin/rostest", ROOT / "tests" / "ros" / "first_task.test"],
-        env=env, capture_output=True, text=True, timeout=240,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    assert "RESULT: SUCCESS" in done.stdout
 
 
 def test_an_insertion_that_was_not_made_is_reported_with_measures(

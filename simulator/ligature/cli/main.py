@@ -397,6 +397,31 @@ def demo(
 
 
 @app.command()
+def evaluate(
+    policy: Annotated[
+        str,
+        typer.Argument(help="expert, random, a network *.onnx, FILE.py:FUNCTION or MODULE:FUNCTION (its code runs)."),
+    ],
+    env: Annotated[str, typer.Option("--env", help="Task of the environment: reach, pick, insert or puncture.")],
+    episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 100,
+    first_seed: Annotated[int, typer.Option(help="Seed of the first; train with seeds below it.", min=0)] = 1_000_000,
+    max_steps: Annotated[int, typer.Option(help="Actions until an episode is cut.", min=1)] = 200,
+    action: Annotated[str, typer.Option(help="cartesian or joint.")] = "cartesian",
+    observation: Annotated[str, typer.Option(help="state, image or both.")] = "state",
+    out: Annotated[Optional[Path], typer.Option(help="Folder for evaluation.json and a page with pictures.")] = None,  # noqa: UP045
+    pictures: Annotated[int, typer.Option(help="Episodes with pictures on the page.", min=0)] = 4,
+    jobs: Annotated[int, typer.Option("-j", help="Processes.", min=1)] = 1,
+) -> None:
+    """Measure a policy in an environment: success, time, path and forces over held-out seeds, with intervals."""
+    from ligature.cli.evaluate import evaluate as run_evaluate
+
+    options = {"task": env, "action": action, "observation": observation}
+    seeds = range(first_seed, first_seed + episodes)
+    console = Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_evaluate(policy, options, seeds, max_steps, out, pictures, jobs, console))
+
+
+@app.command()
 def record(
     out: Annotated[Path, typer.Argument(help="The bag to write.")],
     exclude: Annotated[str, typer.Option(help="Regular expression of topics to exclude.")] = "",

@@ -13,6 +13,7 @@ EXTRAS: Mapping[str, str] = {
     "websockets": "cockpit",
     "pyarrow": "lerobot",
     "av": "lerobot",
+    "onnxruntime": "train",
     "yourdfpy": "convert",
     "mujoco": "convert",
 }

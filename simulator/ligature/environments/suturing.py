@@ -97,6 +97,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 50 | share of the time for which something must be so until the task is done | |
     | 51 | stage: the needle was lifted by half (``pick``), share of the holes passed (``insert``, ``puncture``) | |
 
+    Quaternions have the sign that is nearer to where tip and needle begin: they do not leap from one to the other.
     What the next state and reward depend on is among these but for the shapes of thread and tissue.
 
     With ``observation="image"`` they are pictures of ``camera``, `Box(0, 255, (height, width, 3), uint8)`; with
@@ -174,6 +175,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._ticks = round(CONTROL / self._simulation.dt)
         self._goal.prepare(self._simulation, self._scenery, self._arm)
         self._settled = self._start()
+        self._tip_side = self._arm.local_measured_cp()[3:]
+        self._needle_side = self._simulation.state["body_pose"][0, self.needle, 3:].copy()
         self._count, self._closed = 0, False
         self._progress: Progress | None = None
 
@@ -207,6 +210,28 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def needle(self) -> int:
         """The body of the needle."""
         return self._scenery.needle
+
+    @property
+    def task(self) -> str:
+        """Name of what is to be done."""
+        return str(self._options["task"])
+
+    @property
+    def action(self) -> str:
+        """What actions are: ``cartesian`` or ``joint``."""
+        return self._action
+
+    @property
+    def tool_position(self) -> Array:
+        """The tool's control point (3,), world axes."""
+        return self._reading.tip_position()
+
+    @property
+    def needle_force(self) -> Array:
+        """What tissue, or holes in it, exert on the needle (3,), N, world axes."""
+        state = self._simulation.state[0]
+        n = int(state["insertion_count"])
+        return np.asarray(state["insertion_force"][:n][state["insertion_body"][:n] == self.needle].sum(axis=0))
 
     @property
     def base_rotation(self) -> Array:
@@ -332,9 +357,9 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         assert self._progress is not None
         arm = self._reading
         return np.concatenate([
-            arm.joints, arm.jaw[:1], arm.tip, self._needle_pose, self._needle_twist, arm.tip_position(),
-            self._goal.target(), (self._progress.left,), arm.joint_velocities, arm.jaw[1:2], arm.setpoint,
-            arm.jaw_setpoint[:1], self._goal.marks(),
+            arm.joints, arm.jaw[:1], _on_side(arm.tip, self._tip_side), _on_side(self._needle_pose, self._needle_side),
+            self._needle_twist, arm.tip_position(), self._goal.target(), (self._progress.left,), arm.joint_velocities,
+            arm.jaw[1:2], _on_side(arm.setpoint, self._tip_side), arm.jaw_setpoint[:1], self._goal.marks(),
         ])  # fmt: skip
 
     def _info(self) -> dict[str, Any]:
@@ -382,6 +407,11 @@ def _scene(task: str, arm: str) -> Scene:
     fixed = {needle.body for needle in scene.needles}
     bodies = tuple(replace(body, mass=0.0) if body.index in fixed else body for body in scene.bodies)
     return replace(scene, bodies=bodies, rods=())
+
+
+def _on_side(pose: Array, side: Array) -> Array:
+    """A pose (7,) whose quaternion has the sign that is nearer to ``side`` (4,): it has no leaps near there."""
+    return pose if pose[3:] @ side >= 0.0 else np.concatenate([pose[:3], -pose[3:]])
 
 
 def _stepped(T: Array, action: Array) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 import rosgraph.names
 import rospy
 from rospy.impl.registration import get_topic_manager
+from std_msgs.msg import Bool
 
 from ligature.bus import Block, Outbox
 from ligature.bus.stop import Stop
@@ -67,13 +68,14 @@ class Node:
         self.summary = f"{2 * len(outlets) + len(tissues)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block, lambda: tissue.statuses(scene, self._state[0]))
         self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
+        self._ready = rospy.Publisher(f"{scene.world.root}ligature/ready", Bool, queue_size=1, latch=True)
         self._master = MasterWatch(Parameters(scene, self._adopt).poll)
 
     def run(self, stop: Stop, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
         self._master.start()
         threading.Thread(target=_report_dead_neighbours, name="dead neighbours", daemon=True).start()
-        published, housekeeping = False, 0.0
+        published, ready, housekeeping = False, False, 0.0
         if self._block.read(self._state):
             self._arms.start(self._state[0])
         while not stop.is_set() and not rospy.is_shutdown():
@@ -91,6 +93,9 @@ class Node:
                 if not published:
                     published = True
                     on_first()
+                if not ready and self._state["update"][0] > 0:  # the first state is there before physics has started
+                    ready = True
+                    self._ready.publish(True)
 
     def _advertise(self, min_hz: int | None, max_hz: int | None, policy: str) -> list[Outlet]:
         """An outlet for the world and one for every object that the name policy lets be seen."""

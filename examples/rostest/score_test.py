@@ -9,6 +9,7 @@ import rostest
 from ambf_msgs.msg import RigidBodyState
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from std_msgs.msg import Bool
 
 TIMEOUT = 90.0
 COMPILING = 900.0
@@ -29,14 +30,15 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.append(a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3]), a[3] * b[3] - a[:3] @ b[:3])
 
 
-def seen(name: str, timeout: float = TIMEOUT) -> tuple[np.ndarray, np.ndarray]:
-    pose = rospy.wait_for_message(f"/ambf/env/{name}/State", RigidBodyState, timeout).pose
+def seen(name: str) -> tuple[np.ndarray, np.ndarray]:
+    pose = rospy.wait_for_message(f"/ambf/env/{name}/State", RigidBodyState, TIMEOUT).pose
     p, q = pose.position, pose.orientation
     return np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
 
 
 class FirstTask(unittest.TestCase):
     def setUp(self) -> None:
+        self.assertTrue(rospy.wait_for_message("/ligature/ready", Bool, COMPILING).data)
         self.scores: list[DiagnosticStatus] = []
         rospy.Subscriber(SCORE, DiagnosticStatus, self.scores.append, queue_size=10)
         self.report = rospy.Publisher(REPORT, PoseStamped, queue_size=1)
@@ -59,7 +61,7 @@ class FirstTask(unittest.TestCase):
         return {row.key: row.value for row in self.scores[-1].values}
 
     def test_from_launch_file_to_score(self) -> None:
-        (camera, camera_q), (needle, needle_q) = seen("CameraFrame", COMPILING), seen("Needle")
+        (camera, camera_q), (needle, needle_q) = seen("CameraFrame"), seen("Needle")
         back = camera_q * [-1, -1, -1, 1]
         position, q = turned(back, needle - camera), product(back, needle_q)
         exact = self.judged(position, q)
@@ -72,5 +74,5 @@ class FirstTask(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("first_task")
-    rostest.rosrun("ligature", "first_task", FirstTask)
+    rospy.init_node("score_test")
+    rostest.rosrun("ligature", "score", FirstTask)

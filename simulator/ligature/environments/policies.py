@@ -1,0 +1,146 @@
+"""What acts in an environment: networks in ONNX files, functions of Python files, the scripted experts, chance."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.environments.experts import EXPERTS, Hand
+from ligature.environments.suturing import SuturingEnv
+
+Act = Callable[[Any], NDArray[Any]]
+"""The action (7,) for an observation; of one episode, whose first observation is the first that it is called with."""
+
+Policy = Callable[[SuturingEnv, int], Act]
+"""What acts in an episode, from the environment, which has been reset, and the seed of the episode."""
+
+STILL = np.zeros(7, dtype=np.float32)
+
+
+class PolicyError(ValueError):
+    """A policy that cannot be had, or that answers with something other than an action."""
+
+
+def load_policy(name: str) -> Policy:
+    """A policy by its name.
+
+    Parameters
+    ----------
+    name
+        ``expert``, ``random``; a file ``*.onnx``: one network from observations to actions, in any framework's export;
+        or ``FILE.py:FUNCTION`` and ``MODULE:FUNCTION``, called with environment and seed at the start of each episode,
+        which returns a function from observation to action. The code of such a file runs: it must be trusted.
+
+    Raises
+    ------
+    PolicyError
+        Where there is no such policy, with what is expected.
+    """
+    if name in BUILT_IN:
+        return BUILT_IN[name]
+    if name.endswith(".onnx"):
+        return _network(Path(name))
+    if ":" in name:
+        return _function(*name.rsplit(":", 1))
+    known = ", ".join(sorted(BUILT_IN))
+    raise PolicyError(f"no policy '{name}': use {known}, a file *.onnx, FILE.py:FUNCTION or MODULE:FUNCTION")
+
+
+def _expert(env: SuturingEnv, seed: int) -> Act:
+    """The scripted expert of the task; what it leaves over is spent standing still."""
+    task = env.task
+    if env.action != "cartesian":
+        raise PolicyError("experts act with action='cartesian'")
+    hand = Hand(env)
+    actions: list[Iterator[NDArray[Any]]] = []
+
+    def act(observation: Any) -> NDArray[Any]:
+        if not actions:
+            actions.append(EXPERTS[task](hand, observation["state"] if isinstance(observation, dict) else observation))
+        try:
+            return next(actions[0], STILL)
+        except ValueError:  # the needle lies where it cannot be grasped: an episode that the expert loses
+            return STILL
+
+    return act
+
+
+def _random(env: SuturingEnv, seed: int) -> Act:
+    rng = np.random.default_rng(seed)
+    return lambda observation: rng.uniform(-1.0, 1.0, 7)
+
+
+BUILT_IN: dict[str, Policy] = {"expert": _expert, "random": _random}
+
+
+def _network(path: Path) -> Policy:
+    """A network whose inputs are observations with a first axis of 1, and whose first output is (1, 7)."""
+    import onnxruntime
+
+    if not path.is_file():
+        raise PolicyError(f"no file '{path}'")
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1  # the same sums in the same order everywhere
+    try:
+        session = onnxruntime.InferenceSession(path.read_bytes(), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has a class of its own for each way in which a file can be wrong
+        raise PolicyError(f"{path} is no network in ONNX: {str(error).splitlines()[0]}") from error
+    inputs = session.get_inputs()
+    types = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(uint8)": np.uint8}
+    for wanted in inputs:
+        if wanted.type not in types:
+            raise PolicyError(f"{path}: input '{wanted.name}' has the type {wanted.type}; use {', '.join(types)}")
+
+    def act(observation: Any) -> NDArray[Any]:
+        seen = observation if isinstance(observation, dict) else {inputs[0].name: observation}
+        missing = [wanted.name for wanted in inputs if wanted.name not in seen]
+        if missing:
+            raise PolicyError(f"{path} wants '{missing[0]}', an observation has {', '.join(seen)}")
+        fed = {wanted.name: np.asarray(seen[wanted.name], types[wanted.type])[None] for wanted in inputs}
+        try:
+            return np.asarray(session.run(None, fed)[0])[0]
+        except Exception as error:  # as above
+            shapes = ", ".join(f"{name} {value.shape}" for name, value in fed.items())
+            raise PolicyError(f"{path} does not take {shapes}: {str(error).splitlines()[0]}") from error
+
+    return lambda env, seed: act
+
+
+def _function(place: str, name: str) -> Policy:
+    try:
+        found = getattr(_module(place), name)
+    except (ImportError, AttributeError, OSError) as error:
+        raise PolicyError(f"no policy '{place}:{name}': {error}") from error
+    if not callable(found):
+        raise PolicyError(f"'{place}:{name}' is no function")
+    return found  # type: ignore[no-any-return]
+
+
+def _module(place: str) -> Any:
+    if not place.endswith(".py"):
+        return importlib.import_module(place)
+    path = Path(place).resolve()
+    if not path.is_file():
+        raise FileNotFoundError(f"no file '{place}'")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module  # dataclasses and pickle look for the module of a class there
+    spec.loader.exec_module(module)
+    return module
+
+
+def checked(action: Any) -> NDArray[np.float32]:
+    """An action (7,) as the environment takes it; PolicyError where it is none."""
+    found = np.asarray(action)
+    if found.shape != (7,) or not np.issubdtype(found.dtype, np.number) or not np.isfinite(found).all():
+        what = f"shape {found.shape}" if found.shape != (7,) else "a value that is not finite"
+        raise PolicyError(f"an action is 7 finite numbers; the policy returned {what}")
+    return found.astype(np.float32)
