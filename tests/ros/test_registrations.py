@@ -84,7 +84,7 @@ def registered(env: dict[str, str], node: str) -> set[str]:
 
 
 def haunt(env: dict[str, str], node: str, uri: str, rng: random.Random) -> None:
-    """Register some topics and services of a node that is not there."""
+    """Register some topics and services of a node that is missing."""
     for topic in rng.sample(list(PUBLISHED), rng.randint(1, len(PUBLISHED))):
         ask(env, "registerPublisher", node, topic, PUBLISHED[topic], uri)
     for topic in rng.sample(SUBSCRIBED, rng.randint(0, len(SUBSCRIBED))):
