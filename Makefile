@@ -134,7 +134,7 @@ addon: developers
 	$(PYTHON) blender_addon/pack.py dist
 
 # all tests of the extension: in the Blender binary, with a window, and in Blender modules from the package index.
-# A module that cannot be had is told here and skipped there; the next run asks for it again.
+# A module that cannot be fetched is named here and skipped there; the next run asks for it again.
 test-blender: developers
 	@for version in $(BPY); do sh .ci/fetch_blender_module.sh $$version build/bpy-$$version; done
 	BLENDER_MODULES="$(BPY:%=build/bpy-%/bin/python)" $(PYTHON) -m pytest --durations=12 tests/blender

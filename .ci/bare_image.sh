@@ -43,8 +43,8 @@ while IFS=$'\t' read -r step text; do
 done < <(python3 "$room/home/dockerfile_steps.py" "$room/home/Dockerfile")
 
 [ "$user" != root ] || fail "the image runs as root"
-told=$(within "$entry $command")
-[[ $told == *"Usage: ligature"* ]] || fail "'$entry $command' shows no help: $told"
+output=$(within "$entry $command")
+[[ $output == *"Usage: ligature"* ]] || fail "'$entry $command' shows no help: $output"
 within "$entry check suturing" || fail "'$entry check suturing'"
 within "$entry bench suturing --seconds 1" || fail "'$entry bench suturing'"
 within "$entry render peg_transfer --camera cameraL --width 320 --out pictures && ls pictures" || fail "'$entry render'"

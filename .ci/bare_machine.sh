@@ -8,7 +8,7 @@ try="bare machine"
 furnish() { git -C "$project" -c safe.directory="$project" archive HEAD | tar -x -C "$1/home/project"; }
 . "$(dirname "$0")/bare_room.sh"
 
-run_to_first_state 1500 inside make run || true # make tells of Ctrl-C by its status
+run_to_first_state 1500 inside make run || true # the status of make shows Ctrl-C
 echo "$try: first state after $first s; the longest silence lasted $silence s"
 [ "$ending" -lt 30 ] || fail "'make run' went on for $ending s after Ctrl-C"
 [ "$silence" -le 10 ] || fail "the terminal was silent for $silence s"

@@ -1,7 +1,7 @@
 # Sourced by scripts that try something in a bare Debian 12 (make, certificates, nothing recommended), with the name of the
 # try in $try and the script's own arguments. In the room: `inside COMMAND…` runs as root, in /home/project.
 #
-# Needs root and mmdebstrap; where the room cannot be had the script says why and ends with 0. BARE_SYSTEM=DIR keeps the
+# Needs root and mmdebstrap; without the room the script prints the reason and ends with 0. BARE_SYSTEM=DIR keeps the
 # bare system in DIR and takes it again. All mounts and processes live in namespaces of their own, so that they end with
 # the script, however it ends. A function `furnish ROOM` puts into the room what the try needs.
 project=$(cd "$(dirname "$0")/.." && pwd)
@@ -66,8 +66,8 @@ run_to_first_state() { # DEADLINE COMMAND…: Ctrl-C after the first state; the 
     # sets, in seconds, $first: till that state, $silence: longest without a line, $ending: from Ctrl-C to the end
     local deadline=$1 begin=$SECONDS before=$SECONDS run gap line
     shift
-    mkfifo "$room/told"
-    "$@" >"$room/told" 2>&1 &
+    mkfifo "$room/output"
+    "$@" >"$room/output" 2>&1 &
     run=$!
     while IFS= read -r -t "$deadline" line; do
         gap=$((SECONDS - before)) before=$SECONDS
@@ -78,7 +78,7 @@ run_to_first_state() { # DEADLINE COMMAND…: Ctrl-C after the first state; the 
             kill -INT -- "-$run"
         fi
         [ $((SECONDS - begin)) -lt "$deadline" ] || break
-    done <"$room/told"
+    done <"$room/output"
     [ -n "$first" ] || { kill -KILL -- "-$run" 2>/dev/null; fail "no first state within $deadline s: $*"; }
     local status=0
     wait "$run" || status=$?

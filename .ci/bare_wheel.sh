@@ -39,11 +39,11 @@ step "creating an environment" user python3 -m venv "$env"
 step "installing the wheel" user sh -c 'pip install --quiet --progress-bar off ./ligature_sim-*.whl'
 step "checking a scene" user ligature check suturing
 step "two arms suture by themselves" user ligature demo --throws 1 --out /home/user/out
-told=$(user ligature run suturing 2>&1) && fail "'ligature run' ran without ROS"
-echo "$told"
-[[ $told == *"apt install "*python3-rosmaster*python3-rospy* ]] || fail "'ligature run' does not name the packages it lacks"
-told=$(user ligature cockpit suturing 2>&1) && fail "'ligature cockpit' ran without viser"
-[[ $told == *"ligature-sim[cockpit]"* ]] || fail "'ligature cockpit' does not name its extra: $told"
+output=$(user ligature run suturing 2>&1) && fail "'ligature run' ran without ROS"
+echo "$output"
+[[ $output == *"apt install "*python3-rosmaster*python3-rospy* ]] || fail "'ligature run' does not name the packages it lacks"
+output=$(user ligature cockpit suturing 2>&1) && fail "'ligature cockpit' ran without viser"
+[[ $output == *"ligature-sim[cockpit]"* ]] || fail "'ligature cockpit' does not name its extra: $output"
 step "installing the extra learn" user sh -c 'pip install --quiet --progress-bar off "$(ls ./ligature_sim-*.whl)[learn]"'
 step "a step of a learning environment" user python -c "$learn"
 

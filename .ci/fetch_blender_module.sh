@@ -1,6 +1,6 @@
 #!/bin/sh
 # Blender of version $1 as a Python module in an environment of its own at $2, within $3 seconds; what is there is kept.
-# One that cannot be had is no failure: the reason is told here and stands in $2.why, and its tests are skipped.
+# A failed download is no failure: the reason is printed and stands in $2.why, and its tests are skipped.
 set -u
 version=$1 folder=$2 seconds=${3:-600}
 if "$folder/bin/python" -c "import bpy, pytest, yaml" 2>/dev/null; then
@@ -23,7 +23,7 @@ else
     case $? in
     0) rm -f "$folder.why" && exit 0 ;;
     124) why="bpy $version was not fetched within $seconds s" ;;
-    *) why="bpy $version could not be had from the package index" ;;
+    *) why="bpy $version could not be fetched from the package index" ;;
     esac
 fi
 echo "$why: its tests are skipped" >&2

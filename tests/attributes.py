@@ -17,7 +17,10 @@ CACHES: dict[str, str] = {
     # what a rod or hole works with within one tick; every row is written before it is read
     "Rod._table": "addresses of arrays",
     "Rod._arrays": "what of it lasts are attributes of the rod, too",
-    "TreeControl._table": "addresses of arrays",
+    "Joints._table": "addresses of arrays",
+    "Motions.table": "addresses of arrays",
+    "Readout._table": "addresses of arrays",
+    "Readout._state_table": "addresses of arrays",
     "Rod._touch_tables": "addresses of arrays",
     "Rod._passage_table": "addresses of arrays",
     "Rod._scratch": "scratch",
@@ -25,7 +28,17 @@ CACHES: dict[str, str] = {
     "Rod._constraint_rows": "follows from constraints, attachments and pads",
     "Rod._motion": "the colliders' array",
     **dict.fromkeys(
-        ("Rod._near", "Rod._met", "Rod._apart", "Rod._movable", "Rod._pushed", "Shapes.node"),
+        (
+            "Rod._near",
+            "Rod._met",
+            "Rod._apart",
+            "Rod._movable",
+            "Rod._pushed",
+            "Rod._pushed_nodes",
+            "Rod._found",
+            "Nodes.met",
+            "Shapes.node",
+        ),
         "gathered anew in the tick after a restore",
     ),
     **dict.fromkeys(
@@ -35,7 +48,7 @@ CACHES: dict[str, str] = {
         ),
         "written for every contact before it is read",
     ),  # fmt: skip
-    "Colliders._R": "scratch",
+    **dict.fromkeys(("Watch.seen", "Watch.fresh", "Watch.R"), "scratch"),
     "Holes._passage_table": "addresses of arrays",
     "Holes._site_table": "addresses of arrays",
     "Holes._path_table": "addresses of arrays",
@@ -118,40 +131,28 @@ CACHES: dict[str, str] = {
     ),
     "Masses._scaled": "follows from the scene",
     "Tissues._reported": "what of the problems was reported",
-    # what is read from Bullet when somebody asks
+    # what is read from Bullet after each tick, or when somebody asks
     **dict.fromkeys(
         (
-            f"Motions.{name}"
-            for name in (
-                "pose",
-                "twist",
-                "_frame",
-                "_speed",
-                "_joints",
-                "position",
-                "velocity",
-                "effort",
-                "reaction",
-                "push",
-                "_load",
-                "_bases",
-                "_paces",
-                "_jointed",
-                "_linked",
-            )
+            *(f"Motions.{name}" for name in ("pose", "twist", "position", "velocity", "effort", "push")),
+            "TreeControl._position",
+            *(
+                f"Trees.{name}"
+                for name in ("pose", "twist", "frame", "speed", "joints", "reaction", "push", "load", "wanted")
+            ),
+            *(f"Trees.{name}" for name in ("read", "linked", "uid")),
         ),
         "read from Bullet, or computed, before it is used",
     ),  # fmt: skip
-    **dict.fromkeys(
-        ("TreeControl._motor", "TreeControl._effort", "TreeControl.position", "TreeControl.velocity"),
-        "parts of `Motions`, or written by every tick",
-    ),
+    **dict.fromkeys(("Axes.motor", "Axes.limit"), "written by every tick before it is used"),
+    **dict.fromkeys(("Trees.answer", "Trees.wanted_at"), "addresses of arrays"),
     **dict.fromkeys(
         (
             "Engine.client",
             "Engine._end",
             "Placement.client",
             "Motions._client",
+            "Motions.handle",
             "TreeControl._client",
             "Lift._client",
             "Closures._client",
@@ -160,21 +161,38 @@ CACHES: dict[str, str] = {
         ),
         "Bullet's own numbers",
     ),  # fmt: skip
-    "Motions._begun": "true from a restore to the next tick, in which nobody has an effort",
+    "Trees.ticks": "ticks since a restore; before the first nobody has an effort",
     "ContactWrenches._owned": "saves asking again",
     # what sensors make of the state
     **dict.fromkeys(
         (
-            "Ghosts._measured_ghost",
-            "Ghosts._measured_body",
-            "Ghosts._room",
-            "Ghosts._inside",
-            "Ghosts._due",
+            *(f"GhostArrays.{name}" for name in ("measured_ghost", "measured_body", "room", "inside", "due")),
+            *(f"Ghosts._{name}" for name in ("measured_ghost", "measured_body", "room", "inside", "due")),
+            "Contacts._tick",
+            "Contacts._found",
+            "Contacts._numbers",
+            "Contacts._groups",
+            "Contacts._information",
             "Ghosts.sensed",
         ),
         "saves asking again; `sense` fills it from the state",
     ),
-    "Mounts.world": "`sense` fills it from the state",
+    **dict.fromkeys(("Mounts.world", "Mounted.world"), "`sense` fills it from the state"),
+    **dict.fromkeys(
+        (
+            "Readout._state",
+            "FieldViews._state",
+            "FieldViews._views",
+            "FieldViews.fresh",
+            "Actuators._written",
+            "Grasps._written_empty",
+        ),
+        "what of the state record is up to date",
+    ),
+    **dict.fromkeys(
+        ("Mounts._table", "Mounts._field_table", "Ghosts._table", "Colliders._table", "Engine.place_table"),
+        "addresses of arrays",
+    ),
     "Contacts.events": "`sense` fills it from the state",
     "ArmSet._records": "what of the state record is up to date",
     "Axes._setpoint": "of an arm whose drives are off it is read from the joints",

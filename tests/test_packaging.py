@@ -13,6 +13,7 @@ from pathlib import Path
 
 import ligature
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -128,6 +129,18 @@ def test_what_users_run_is_locked_apart_from_what_developers_need() -> None:
 
 def test_all_manifests_name_one_version() -> None:
     assert ET.parse(ROOT / "package.xml").findtext("version") == ligature.__version__
-    assert f"## [{ligature.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
-    found = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), flags=re.MULTILINE)
-    assert found and found[1] == ligature.__version__
+    manifest = tomllib.loads((ROOT / "blender_addon" / "blender_manifest.toml").read_text())
+    assert manifest["version"] == ligature.__version__
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == ligature.__version__
+    newest = re.search(r"^## .*$", (ROOT / "CHANGELOG.md").read_text(), flags=re.MULTILINE)
+    assert newest and newest[0] == f"## [{ligature.__version__}] - {citation['date-released']}"
+
+
+def test_pages_name_the_wheel_of_this_version() -> None:
+    named = {
+        (path.name, version)
+        for path in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+        for version in re.findall(r"ligature_sim-(\d[\w.]*)-py3", path.read_text())
+    }
+    assert named and {version for _, version in named} == {ligature.__version__}, named

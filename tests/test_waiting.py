@@ -23,6 +23,9 @@ def test_a_wait_ends_with_its_condition_and_names_it_when_time_is_up() -> None:
     assert 0.09 < time.monotonic() - begin < 5.0
     with pytest.raises(AssertionError, match=r"not within 0.05 s: pigs fly"):
         until(lambda: False, "pigs fly", 0.05)
+    seen: list[int] = []
+    with pytest.raises(AssertionError, match=r"not within 0.05 s: asked [2-9] times"):
+        until(lambda: seen.append(0), lambda: f"asked {len(seen)} times", 0.05)
 
 
 def test_what_still_moves_is_not_steady() -> None:

@@ -15,13 +15,21 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-SUFFIXES = (".py", ".md", ".sh", ".js", ".html", ".glsl", ".vert", ".frag", ".launch", ".toml")
+SUFFIXES = (
+    ".py", ".md", ".sh", ".js", ".html", ".css", ".glsl", ".vert", ".frag", ".launch", ".toml", ".yaml", ".yml", ".xml",
+    ".msg", ".srv", ".cff",
+)  # fmt: skip
 
-FOLDERS = ("simulator", "blender_addon", "docs", "tests", "examples", "scenes", "README.md")
+FOLDERS = (
+    "simulator", "blender_addon", "docs", "tests", "examples", "scenes", "launch", "ros_msgs", ".ci", ".github", "Makefile",
+    "Dockerfile", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "CITATION.cff", "package.xml",
+)  # fmt: skip
 """Folders and files that are searched."""
 
 NAMES = {
     r"tells?|told": "report, log, warn",
+    r"say(s|ing)?|said": "report, log, publish",
+    r"times real time": "real_time_factor",
     r"leads?|led": "command, drive, control; leader, follower",
     r"recall(s|ed)?": "snapshot, restore",
     r"fastest": "max_velocity",
@@ -50,6 +58,9 @@ PHRASES = {
     r"tells (the |its )?(user|operator|reader|caller|you|of|that)": "reports, warns",
     r"(is|are|was|were|be|been|being) led|led (arm|body|bodies|joint)s?": "is commanded, kinematically controlled",
     r"who leads": "leader, operator",
+    r"leads? \w+ arms?|leads? arms?": "commands, drives",
+    r"says? so": "reports it",
+    r"recall(s|ed)?": "snapshot, restore",
     r"driven by poses": "kinematically controlled",
     r"(that|which|who|what) (is|are|was|were) not there": "missing",
     r"makes? no sense": "invalid",
@@ -57,7 +68,7 @@ PHRASES = {
     r"(cannot|can not|could not) be had": "failed, unavailable",
     r"where (it|they|he|she) (lies|lie|lay)": "path, folder",
     r"what outlives": "orphan process, leftover",
-    r"stands? behind (everything|all|others)": "lowers its scheduling priority",
+    r"stands? behind (everything|all|others|physics)": "lowers its scheduling priority",
     r"fastest": "maximum velocity",
     r"hardest": "maximum acceleration",
     r"burdens?": "attached load, payload",
@@ -87,6 +98,7 @@ ALLOWED = {
     ("simulator/ligature/bus/block.py", "patience"): FORMER, ("tests/bus/test_block.py", "patience"): FORMER,
     ("simulator/ligature/cli/main.py", "patience"): FORMER, ("tests/cli/test_commands.py", "patience"): FORMER,
     ("docs/command_line.md", "patience"): FORMER,
+    ("CHANGELOG.md", "patience"): FORMER, ("CHANGELOG.md", "fastest"): FORMER,
     ("simulator/ligature/teleop/config.py", "patience"): FORMER, ("simulator/ligature/teleop/config.py", "fastest"): FORMER,
     ("tests/teleop/test_config.py", "patience"): FORMER, ("tests/teleop/test_config.py", "fastest"): FORMER,
     ("simulator/ligature/bus/record.py", "tell"): "a method of files",
@@ -190,6 +202,9 @@ def test_every_exception_is_used(name: str, word: str) -> None:
         ("hold()  # the command of CRTK\n", []),
         ("class Holds: ...\n", ["Holds"]),
         ("self.memory = give\n", ["memory", "give"]),
+        ("say(what_was_said)\n", ["say", "said"]),
+        ("essays = prosaic = 0\n", []),
+        ("# the terminal says so\n", ["says so"]),
         ("def test_ruler_gives_lengths(): ...\n", []),
         ("def test_error_is_told(): ...\n", ["is told"]),
     ],

@@ -11,11 +11,15 @@ import numpy as np
 Value = TypeVar("Value")
 
 
-def until(condition: Callable[[], Value], what: str = "", seconds: float = 20.0, every: float = 0.01) -> Value:
-    """Wait for ``condition`` to hold; returns what it returned. ``what`` names it for who reads the failure."""
+def until(condition: Callable[[], Value], what: Any = "", seconds: float = 20.0, every: float = 0.01) -> Value:
+    """Wait for ``condition`` to hold; returns what it returned.
+
+    ``what`` names it for who reads the failure, or returns what is to be read then.
+    """
     deadline = time.monotonic() + seconds
     while not (found := condition()):
-        assert time.monotonic() < deadline, f"not within {seconds:g} s: {what or condition}"
+        if time.monotonic() >= deadline:
+            raise AssertionError(f"not within {seconds:g} s: {(what() if callable(what) else what) or condition}")
         time.sleep(every)
     return found
 

@@ -29,7 +29,10 @@ FIRST_REPORT, REPORT_EVERY = 1.0, 4.0
 
 _PACKAGE = Path(__file__).parent
 _KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic)\b", re.MULTILINE)
-_CONSTANTS = ("kernels.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py", "tissue/contact_arrays.py")
+_CONSTANTS = (
+    "kernels.py", "model/state.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
+    "tissue/contact_arrays.py",
+)  # fmt: skip
 """Sources without kernels whose contents are compiled into kernels."""
 
 _log = logging.getLogger(__name__)

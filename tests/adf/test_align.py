@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from ligature.adf import Resolver, read_any
-from ligature.adf.align import aligned
+from ligature.adf.align import GAP, aligned
 from ligature.adf.nodes import parse, plain
 from ligature.adf.update import Item, given_values, items_of, same, updated
 
@@ -31,6 +32,38 @@ def test_an_item_that_goes_costs_no_other(old: list, data: st.DataObject) -> Non
     index = data.draw(st.integers(0, len(old) - 1))
     new = old[:index] + old[index + 1 :]
     assert sum(i is None or j is None or old[i] != new[j] for i, j in aligned(old, new, same)) == 1
+
+
+def cost(old: list, new: list, pairs: list) -> int:
+    """What an alignment changes: `GAP` for what is new or goes, else 20 and 80 times the share of keys that differ."""
+    total = 0
+    for i, j in pairs:
+        if i is None or j is None:
+            total += GAP
+        elif old[i] != new[j]:
+            keys = old[i].keys() | new[j].keys()
+            differing = [key for key in keys if old[i].get(key) != new[j].get(key)]
+            total += 20 + 80 * len(differing) // len(keys)
+    return total
+
+
+def least_cost(old: list, new: list) -> int:
+    """The cost of the best of all alignments, by trying each."""
+    ways = []
+    for k in range(min(len(old), len(new)) + 1):
+        for left in combinations(range(len(old)), k):
+            for right in combinations(range(len(new)), k):
+                gaps = len(old) + len(new) - 2 * k
+                ways.append(GAP * gaps + cost(old, new, list(zip(left, right, strict=True))))
+    return min(ways)
+
+
+OPEN_ITEMS = st.lists(st.dictionaries(st.sampled_from("abc"), st.integers(0, 1), min_size=1), min_size=0, max_size=4)
+
+
+@given(OPEN_ITEMS, OPEN_ITEMS)
+def test_no_other_alignment_changes_less(old: list, new: list) -> None:
+    assert cost(old, new, aligned(old, new, same)) == least_cost(old, new)
 
 
 HEAD = "bodies: []\njoints: []\nvehicles: [V]\nV:\n  name: v\n  chassis: BODY c\n"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import enum
+import json
 import re
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -266,6 +267,10 @@ class Files:
         return folder / "launch.yaml"
 
 
+ABSENT = object()
+"""Stands for a value that the file does not give."""
+
+
 def put(block: dict[str, Any], path: str, value: Any) -> None:
     """Set the key ``path`` of a block."""
     first, _, rest = path.partition(".")
@@ -277,6 +282,8 @@ def put(block: dict[str, Any], path: str, value: Any) -> None:
         if not isinstance(block.get(name), dict):
             block[name] = {}
         put(block[name], rest, value)
+    elif value is ABSENT:
+        block.pop(name, None)
     else:
         block[name] = value
 
@@ -286,7 +293,7 @@ def merge(block: dict[str, Any], more: Mapping[str, Any]) -> None:
         if value is None:
             block.pop(key, None)
         else:
-            block[key] = copy.deepcopy(value)
+            block[key] = json.loads(json.dumps(value))  # blocks that a context shares become separate
 
 
 def loaded(folder: Path, kind: str, key: Key, context: Mapping[str, Any], value: Any) -> Any:
@@ -478,3 +485,25 @@ def test_what_a_list_names_exists(kind: str, key: Key, folder: Path) -> None:
     files.files[f"{kind}.yaml"][key.path].remove("X")
     left = ligature.load(files.write(folder))
     assert differences(full, left)
+
+
+NUMBERS = [(kind, key) for kind, key in USED if key.type in (Type.NUMBER, Type.NUMBER_OR_MAP)]
+
+
+@pytest.mark.parametrize(("kind", "key"), NUMBERS, ids=lambda value: value if isinstance(value, str) else value.path)
+def test_a_number_that_cannot_be_used_is_an_error_or_has_no_effect(kind: str, key: Key, folder: Path) -> None:
+    beyond = [float("nan"), float("inf"), float("-inf")]
+    beyond += [] if key.least is None else [key.least - 1.0, -1e6]
+    beyond += [] if key.most is None else [1.1 * key.most]
+    for context in contexts(kind, key):
+        try:
+            without = loaded(folder, kind, key, context, ABSENT)
+        except AssertionError:
+            continue  # it is required there
+        for value in beyond:
+            try:
+                scene = loaded(folder, kind, key, context, value)
+            except AssertionError:
+                continue
+            assert not differences(without, scene), f"{value} is taken beside {context}"
+            assert any(d.severity >= Severity.WARNING for d in scene.diagnostics), f"{value} is not reported"

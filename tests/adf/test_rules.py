@@ -93,3 +93,16 @@ def test_a_sound_object_draws_no_finding(tmp_path: Path) -> None:
 
 def test_a_listed_object_under_a_slightly_different_name_is_suggested(tmp_path: Path) -> None:
     assert "did you mean 'BODY arm'?" in findings(tmp_path, "bodies: [BODY Arm]\nBODY arm:\n  name: a\n  mass: 1\n")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        OBJECT.format(list="sensors", keys="  type: contact\n  distance threshold: 0\n"),
+        JOINT.format(type="torsion spring", keys="  stiffness: 1\n  joint limits: {low: -1, high: 1}\n"),
+        JOINT.format(type="revolute", keys=""),
+    ],
+)
+def test_what_is_at_the_edge_of_a_rule_is_no_finding(tmp_path: Path, text: str) -> None:
+    found = findings(tmp_path, text, Severity.WARNING)
+    assert "penetration" not in found and "without limits" not in found

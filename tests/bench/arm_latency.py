@@ -19,6 +19,8 @@ import numpy as np
 from ligature.cli.master import master_answers
 from numpy.typing import NDArray
 
+from tests.waiting import until
+
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,8 +84,7 @@ def measure() -> tuple[Array, Array]:
     watcher = Watcher()
     rospy.Subscriber("/PSM1/measured_cp", PoseStamped, watcher.take, queue_size=10, tcp_nodelay=True)
     publisher = rospy.Publisher("/PSM1/servo_cp", PoseStamped, queue_size=10, tcp_nodelay=True)
-    while publisher.get_num_connections() == 0 or not watcher.arrivals:
-        time.sleep(0.05)
+    until(lambda: publisher.get_num_connections() and watcher.arrivals, "PSM1 listens and reports", 60.0)
     latencies = []
     for k in range(1, STEPS + 1):
         goal = PoseStamped(pose=crtk.pose_message(crtk.shifted(start, [STEP * (k % 2), 0.0, 0.0])))
@@ -126,8 +127,7 @@ def main() -> int:
     command = (Path(sys.executable).parent / "ligature", "run", scene, "-p", "500", "--no-cameras")
     run = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     try:
-        while not master_answers(os.environ["ROS_MASTER_URI"]):
-            time.sleep(0.1)
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
         latencies, intervals = measure()
     finally:
         run.terminate()

@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 from ligature.cli.master import master_answers
 
+from tests.waiting import until
+
 ROOT = Path(__file__).resolve().parents[2]
 CORPUS = Path(os.environ.get("LIGATURE_CORPUS", ROOT.parent / "shared" / "corpus")) / "suturing_scene" / "launch.yaml"
 SECONDS = 10.0
@@ -68,8 +70,7 @@ def main() -> int:
     command = [Path(sys.executable).parent / "ligature", "run", *scene, "-p", "1000", "--cameras"]
     run = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     try:
-        while not master_answers(os.environ["ROS_MASTER_URI"]):
-            time.sleep(0.1)
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
         import rospy
         from sensor_msgs.msg import Image
 

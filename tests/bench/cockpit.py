@@ -25,6 +25,7 @@ from ligature.bus import Outbox, Pace
 from ligature.robots.commands import ServoJp, StateCommand
 
 from tests.cockpit.conftest import SMALL, Served
+from tests.waiting import until
 
 VIEWERS = Path(__file__).with_name("cockpit_viewers.py")
 BOUND = 5.0
@@ -75,16 +76,19 @@ def sway(served: Served, outbox: Outbox, seconds: float) -> Round:
     return Round(simulated / took, simulated / (had - physics), (paged - page) / took)
 
 
+def _ready(served: Served, word: str) -> bool:
+    """Whether PSM1 is what ``word`` makes of it; the bench's ring is kept alive."""
+    served.block.rings["spare"].beat()
+    arm = served.arm("PSM1")
+    return bool(arm["homed"] if word == "home" else arm["operating"] == 1)
+
+
 def ready(served: Served, outbox: Outbox) -> None:
     """Enable and home PSM1."""
     arm = served.names.index("PSM1")
     for word in ("enable", "home"):
         outbox.push(StateCommand(arm, word))
-        deadline = time.monotonic() + 60.0
-        while not (served.arm("PSM1")["homed"] if word == "home" else served.arm("PSM1")["operating"] == 1):
-            assert time.monotonic() < deadline, f"PSM1 does not {word}"
-            served.block.rings["spare"].beat()
-            time.sleep(0.05)
+        until(lambda word=word: _ready(served, word), f"PSM1 is ready after '{word}'", 60.0, every=0.05)
 
 
 def compare(viewers: int, rounds: int, speed: float, scene: Path) -> list[tuple[Round, Round]]:

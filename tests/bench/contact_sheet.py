@@ -40,16 +40,27 @@ LEAST_SEEN = 8
 
 
 def scenes() -> Iterator[tuple[str, Scene]]:
-    """Name and scene: launch files whole, and of those that are collections each model alone."""
+    """Name and scene: launch files whole, of those that are collections each model alone, and all other model files."""
     for launch in sorted((ROOT / "scenes").glob("*/launch*.yaml")):
         yield f"{launch.parent.name}/{launch.stem}", ligature.load(launch)
     if (launch := CORPUS / "suturing_scene" / "launch.yaml").exists():
         yield "corpus: suturing_scene", ligature.load(launch, roots=[CORPUS])
+    listed = set()
     if (launch := CORPUS / "multibodies" / "descriptions" / "launch.yaml").exists():
         document = read_any(launch, Resolver([CORPUS]))
         for index, model in enumerate(document.models):  # type: ignore[attr-defined]
             if model.path is not None:  # the corpus holds not all that its launch file lists
+                listed.add(model.path)
                 yield f"corpus: {index} {model.path.stem}", ligature.load(launch, (index,), roots=[CORPUS])
+    for file in sorted(CORPUS.rglob("*.yaml")):
+        if file not in listed and "bodies:" in file.read_text("utf-8", "replace"):
+            try:
+                scene = ligature.load(file, roots=[CORPUS])
+            except ligature.SceneError as error:
+                sys.stdout.write(f"{file.relative_to(CORPUS)}: no scene: {str(error).splitlines()[0]}\n")
+                continue
+            if any(b.visual.visible and (b.visual.mesh or b.visual.shapes) for b in scene.bodies):
+                yield f"corpus: {file.parent.name}/{file.stem}", scene
 
 
 def renderer_of(scene: Scene, files: ShaderFiles) -> Renderer:

@@ -2,7 +2,7 @@
 
 Steps a second for state observations and random actions, resets included, in one process and in two, and how many
 times real time that is; a step is 20 ms of simulated time. Steps for each second of processor time measure the same of a
-machine that has other work.
+machine that has other work; so does the time of a reset.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from ligature.environments.suturing import CONTROL
 
 from tests.bench import ledger
+from tests.bench.resets import median_ms
 from tests.bench.scenes import chain_step_us
 
 SECONDS = 10.0
@@ -30,7 +31,9 @@ def made(name: str) -> gymnasium.Env:
 
 def rate(name: str, processes: int, seconds: float) -> float:
     """Steps a second of all processes together."""
-    envs = gymnasium.vector.AsyncVectorEnv([lambda: made(name)] * processes)
+    assert ligature.environments is not None
+    task = gymnasium.spec(name).kwargs["task"]
+    envs = ligature.environments.make_vec(task, processes, max_steps=MAX_STEPS)
     rng = np.random.default_rng(0)
     envs.reset(seed=0)
     for _ in range(20):
@@ -44,8 +47,8 @@ def rate(name: str, processes: int, seconds: float) -> float:
     return found
 
 
-def rate_alone(name: str, seconds: float) -> tuple[float, float]:
-    """Steps for each second of the wall, and of the processor, of an environment in this process."""
+def rate_alone(name: str, seconds: float) -> tuple[float, float, float]:
+    """Steps for each second of the wall, and of the processor, and milliseconds of it for a reset, in this process."""
     env, rng = made(name), np.random.default_rng(0)
     env.reset(seed=0)
     steps, begin, spent = 0, time.perf_counter(), time.process_time()
@@ -55,8 +58,9 @@ def rate_alone(name: str, seconds: float) -> tuple[float, float]:
         if done or cut:
             env.reset()
     wall, spent = time.perf_counter() - begin, time.process_time() - spent
+    reset = median_ms(env.reset, lambda: [env.step(rng.uniform(-1, 1, 7).astype(np.float32)) for _ in range(10)])
     env.close()
-    return steps / wall, steps / spent
+    return steps / wall, steps / spent, reset
 
 
 def main() -> int:
@@ -66,14 +70,16 @@ def main() -> int:
     load = os.getloadavg()[0]
     for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
         reference = chain_step_us()
-        (one, spent), two = rate_alone(name, seconds), rate(name, 2, seconds)
+        (one, spent, reset), two = rate_alone(name, seconds), rate(name, 2, seconds)
         found[name] = {
-            "steps_per_second": one, "times_real_time": one * CONTROL, "times_real_time_of_processor": spent * CONTROL,
-            "two_processes": two * CONTROL, "ratio": 1e6 / one / reference,
+            "steps_per_second": one, "real_time_factor": one * CONTROL, "real_time_factor_of_processor": spent * CONTROL,
+            "two_processes": two * CONTROL, "ratio": 1e6 / one / reference, "ratio_of_processor": 1e6 / spent / reference,
+            "reset": {"ms": reset, "ratio": 1e3 * reset / reference},
         }  # fmt: skip
         sys.stdout.write(
             f"{name}: {one:.0f} steps/s in one process, {one * CONTROL:.2f} times real time, "
-            f"{spent:.0f} for a second of processor time; {two:.0f} in two, {two * CONTROL:.2f} times\n"
+            f"{spent * CONTROL:.2f} by processor time; {two:.0f} in two, {two * CONTROL:.2f} times; "
+            f"reset {reset:.1f} ms; a step is {1e6 / spent / reference:.1f} references\n"
         )
         sys.stdout.flush()
     ledger.note("environments", found)

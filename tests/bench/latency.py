@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 from ligature.cli.master import master_answers
 
+from tests.waiting import until
+
 ROOT = Path(__file__).resolve().parents[2]
 BODY = "/ambf/env/phantom/CameraFrame"
 COMMANDS = 1000
@@ -35,8 +37,7 @@ def samples(count: int) -> list[float]:
 
     rospy.Subscriber(f"{BODY}/State", RigidBodyState, take, queue_size=1, tcp_nodelay=True)
     publisher = rospy.Publisher(f"{BODY}/Command", RigidBodyCmd, queue_size=1, tcp_nodelay=True)
-    while publisher.get_num_connections() == 0:
-        time.sleep(0.05)
+    until(publisher.get_num_connections, "the simulator listens", 60.0)
     command = RigidBodyCmd(cartesian_cmd_type=1)
     command.pose.orientation.w = 1.0
     rng = np.random.default_rng(1)
@@ -60,8 +61,7 @@ def main() -> int:
         [Path(sys.executable).parent / "ligature", "run", scene, "-p", "1000"], stdout=subprocess.DEVNULL
     )
     try:
-        while not master_answers(os.environ["ROS_MASTER_URI"]):
-            time.sleep(0.1)
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
         time.sleep(4.0)
         values = 1e3 * np.array(samples(COMMANDS))
     finally:

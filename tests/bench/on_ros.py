@@ -15,6 +15,8 @@ from pathlib import Path
 
 from ligature.cli.master import master_answers
 
+from tests.waiting import until
+
 ROOT = Path(__file__).resolve().parents[2]
 CORPUS = Path(os.environ.get("LIGATURE_CORPUS", ROOT.parent / "shared" / "corpus")) / "suturing_scene" / "launch.yaml"
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -75,8 +77,7 @@ def main() -> int:
     command = [Path(sys.executable).parent / "ligature", "run", scene, *models, "-p", str(UPDATES), "-s", UNTHROTTLED]
     run = subprocess.Popen([*command, "--min-hz", "100", "--max-hz", "100", "--no-cameras"], stdout=subprocess.DEVNULL)
     try:
-        while not master_answers(os.environ["ROS_MASTER_URI"]):
-            time.sleep(0.1)
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
         time.sleep(5.0)
         import rospy
 

@@ -131,7 +131,7 @@ def main() -> int:
         simulation = Simulation(scene)
         simulation.step(200)
         view = view_of(scene.cameras[0], simulation.state["camera_world"][0, 0], SIZE)
-        say, state = sys.stdout.write, simulation.state.copy()
+        write, state = sys.stdout.write, simulation.state.copy()
         tiny = Tiny(scene, simulation)
         reference, effort = frames_per_second(lambda tiny=tiny, view=view: tiny.draw(view), SECONDS)
         for samples in (None, 4, 0):
@@ -143,7 +143,7 @@ def main() -> int:
 
             alone, own = frames_per_second(draw, SECONDS)
             loaded, factor = beside_physics(launch, models, draw)
-            say(
+            write(
                 f"{name}, {SIZE[0]}x{SIZE[1]} {'+'.join(PASSES)}, {renderer.triangles} triangles, {LOOKS[samples]}, "
                 f"{renderer.device}: {alone:.1f} frames/s alone ({alone / reference:.1f} times PyBullet's {reference:.1f}), "
                 f"{own:.0f} ms of processor time a frame (PyBullet's {effort:.0f}), "

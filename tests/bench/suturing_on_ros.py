@@ -17,6 +17,7 @@ from pathlib import Path
 from ligature.cli.master import master_answers
 
 from tests.bench.on_ros import ROOT, SETTLING, UNTHROTTLED, UPDATES, Listener, processor_seconds
+from tests.waiting import until
 
 SECONDS = 10.0
 CLOCK = 120
@@ -84,8 +85,7 @@ def main() -> int:
     os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
     master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL)
     try:
-        while not master_answers(os.environ["ROS_MASTER_URI"]):
-            time.sleep(0.1)
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
         import rospy
 
         rospy.init_node("suturing_on_ros", anonymous=True, disable_signals=True)
@@ -93,8 +93,8 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as folder:
             launch = scene_at(HZ, Path(folder))
             for name, cameras, limit in RUNS:
-                said = measure(launch, cameras, limit, seconds)
-                sys.stdout.write(f"suturing, {name}: {said}\n")
+                found = measure(launch, cameras, limit, seconds)
+                sys.stdout.write(f"suturing, {name}: {found}\n")
                 sys.stdout.flush()
         sys.stdout.write(f"load of the machine at the start: {load:.1f}\n")
     finally:

@@ -21,6 +21,7 @@ from ligature.cli.master import master_answers
 from numpy.typing import NDArray
 
 from tests.bench.arm_latency import Watcher
+from tests.waiting import until
 
 Array = NDArray[np.float64]
 
@@ -108,8 +109,7 @@ def main() -> int:
         subprocess.Popen((command, "run", scene, "-l", MODELS, "-p", "500", "--no-cameras"), stdout=subprocess.DEVNULL)
     ]
     try:
-        while not master_answers(os.environ["ROS_MASTER_URI"]):
-            time.sleep(0.1)
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
         with tempfile.TemporaryDirectory() as folder:
             config = Path(folder) / "teleop.yaml"
             config.write_text(CONFIG)

@@ -27,7 +27,8 @@ from ligature.robots.fitting import psm_kinematics
 from ligature.tasks.throws import NeedleArc
 from numpy.typing import NDArray
 
-from tests.ros.drivers import TIMEOUT, Driver, Paddle, Pen, apart, patiently, until, wait_for_listener
+from tests.ros.drivers import TIMEOUT, Driver, Paddle, Pen, apart, patiently, wait_for_listener
+from tests.waiting import until
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
@@ -362,15 +363,15 @@ class Operator(suture.Surgeon):
         """The pen drives the other arm, and then its own again."""
         from std_msgs.msg import String
 
-        say = {
+        to = {
             word: wait_for_listener(rospy.Publisher(f"/console/teleop/{word}", String, queue_size=10), 2)
             for word in ("select", "unselect")
         }
         before = {name: arm.measured() for name, arm in self.psms.items()}
-        say["unselect"].publish("paddle_PSM2")
+        to["unselect"].publish("paddle_PSM2")
         until(lambda: not self.paddle.follows("PSM2"), "the paddle does not let go")
         self.pen.squeeze(False)
-        say["select"].publish("pen_PSM2")
+        to["select"].publish("pen_PSM2")
         self.pen.take(self.psms["PSM2"], self.view("PSM2"))
         self.wait(0.2)
         for name, arm in self.psms.items():
@@ -379,8 +380,8 @@ class Operator(suture.Surgeon):
         up = frame(np.eye(3), (0.0, 0.0, 0.01))
         self.line("PSM2", up @ self.tool("PSM2"))
         self.pen.squeeze(True)
-        say["select"].publish("pen_PSM1")
-        say["select"].publish("paddle_PSM2")
+        to["select"].publish("pen_PSM1")
+        to["select"].publish("paddle_PSM2")
         self.pen.take(self.psms["PSM1"], self.view("PSM1"))
         self.hands["PSM2"] = self.paddle
         self.paddle.take(self.psms["PSM2"], self.view("PSM2"))
@@ -426,24 +427,24 @@ class Operator(suture.Surgeon):
         def mute() -> None:
             self.pen.driver.muted = True
 
-        def says(*values: float) -> Callable[[], None]:
+        def sends(*values: float) -> Callable[[], None]:
             def act() -> None:
-                self.pen.driver.says = np.array(values)
+                self.pen.driver.sent = np.array(values)
 
             return act
 
         cases: dict[str, tuple[Callable[[], None], str]] = {
             "silence": (mute, "silent"),
-            "a leap": (says(5, 5, 5, 0, 0, 0, 1), "leapt"),
-            "NaN": (says(np.nan, 0, 0, 0, 0, 0, 1), "no pose"),
-            "a quaternion of zeros": (says(0, 0, 0, 0, 0, 0, 0), "no pose"),
+            "a leap": (sends(5, 5, 5, 0, 0, 0, 1), "leapt"),
+            "NaN": (sends(np.nan, 0, 0, 0, 0, 0, 1), "no pose"),
+            "a quaternion of zeros": (sends(0, 0, 0, 0, 0, 0, 0), "no pose"),
             "a rival": (lambda: select.publish("paddle_PSM1"), "claims"),
         }
         for what, (act, word) in cases.items():
             took = self.fault(act, word)
             self.note("hold after a fault, ms", took)
             self.done(f"{what}: the arm holds after {took:.0f} ms, and the status states '{self.pen.status('PSM1')}'")
-            self.pen.driver.muted, self.pen.driver.says = False, None
+            self.pen.driver.muted, self.pen.driver.sent = False, None
             time.sleep(0.1)
             self.pen.squeeze(True, grey=True)
             time.sleep(0.3)
@@ -505,8 +506,7 @@ def main() -> int:
     began = time.monotonic()
     programs = [subprocess.Popen(run, stdout=subprocess.DEVNULL)]
     try:
-        while not master_answers(os.environ["ROS_MASTER_URI"]):
-            time.sleep(0.1)
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
         with tempfile.TemporaryDirectory() as folder:
             config = Path(folder) / "teleop.yaml"
             config.write_text(CONFIG)

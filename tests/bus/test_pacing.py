@@ -111,3 +111,11 @@ def test_throttling_that_begins_just_before_an_update_holds_it_back() -> None:
     assert pacer.wait(0.0) == math.inf
     pacer.throttle(Throttle(True, True, 4))
     assert updates(pacer) == 4
+
+
+@pytest.mark.parametrize("skip", [1, 2, 7])
+def test_a_batch_has_as_many_updates_as_the_client_asks_for_down_to_one(skip: int) -> None:
+    pacer = Pacer(0.01)
+    pacer.throttle(Throttle(True, False, skip))
+    pacer.throttle(Throttle(True, True, skip))
+    assert updates(pacer) == skip

@@ -39,7 +39,7 @@ class Run:
         self.simulation.step(2)
         self.block = Block.create(f"ligature-{os.getpid()}-{id(self):x}", self.simulation.state.dtype)
         self.loop = Loop(self.simulation, self.block, self.options)
-        self.said: list[str] = []
+        self.output: list[str] = []
 
     def push(self, *messages: Message) -> None:
         for message in messages:
@@ -53,10 +53,10 @@ class Run:
 
     def hears(self, text: str) -> None:
         deadline = time.monotonic() + 20.0
-        while not any(text in said for said in self.said):
-            assert time.monotonic() < deadline, f"'{text}' is not among {self.said}"
+        while not any(text in output for output in self.output):
+            assert time.monotonic() < deadline, f"'{text}' is not among {self.output}"
             self.loop.turn()
-            self.said += [event.value for event in self.block.events.read() if event.arm == RUN]
+            self.output += [event.value for event in self.block.events.read() if event.arm == RUN]
 
     def close(self) -> None:
         self.block.close()
@@ -107,12 +107,12 @@ def test_two_parts_of_a_run_are_simulated_again_bit_for_bit(start: Callable[...,
         length = run.simulation.time - begun
         run.hears(f"recorded {length:.1f} s to 'recordings/{name.removesuffix('.record')}.record'")
         assert run.block.figures["recording"][0] == 0
-        status, said = again(Path("recordings", f"{name.removesuffix('.record')}.record"))
-        assert status == 0, said
-        assert "the same bits: " in said
-        found = re.search(r"the recording covers the last (\S+) s", said)
+        status, output = again(Path("recordings", f"{name.removesuffix('.record')}.record"))
+        assert status == 0, output
+        assert "the same bits: " in output
+        found = re.search(r"the recording covers the last (\S+) s", output)
         assert found and float(found[1]) == pytest.approx(length, abs=0.01)
-        run.said.clear()
+        run.output.clear()
     assert sorted(path.name for path in Path("recordings").iterdir()) == ["first.record", "second.record"]
 
 
@@ -125,8 +125,8 @@ def test_a_run_that_ends_ends_its_recordings(start: Callable[..., Run]) -> None:
     assert part.end == whole.end == run.simulation.state_hash()
     assert part.begun and not whole.begun
     for file in ("recordings/part.record", "whole.record"):
-        status, said = again(Path(file))
-        assert status == 0, said
+        status, output = again(Path(file))
+        assert status == 0, output
 
 
 def test_a_paused_run_is_recorded_too(start: Callable[..., Run]) -> None:

@@ -42,13 +42,13 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def said(file: Path) -> tuple[int, str]:
+def output(file: Path) -> tuple[int, str]:
     console = Console(file=io.StringIO(), soft_wrap=True)
     return replay(file, None, "", 1.0, console), console.file.getvalue()  # type: ignore[attr-defined]
 
 
 def test_a_record_ends_in_the_same_bits(recorded: Path) -> None:
-    status, text = said(recorded)
+    status, text = output(recorded)
     assert status == 0, text
     assert f"the same bits: {Record.read(recorded).end}" in text
 
@@ -90,15 +90,15 @@ def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) ->
         assert isinstance(command, PlaceJp | ServoJp)
         writer.write(update, replace(command, position=(command.position[0] + 1e-9, *command.position[1:])))
     writer.finish(record.updates, record.end)
-    status, text = said(path)
+    status, text = output(path)
     assert status == 1
     assert "the run ended in another state" in text
 
 
 def test_a_file_that_is_missing_or_cut_off_is_reported(recorded: Path, tmp_path: Path) -> None:
-    assert said(tmp_path / "none.record") == (1, f"{tmp_path / 'none.record'}: No such file or directory\n")
+    assert output(tmp_path / "none.record") == (1, f"{tmp_path / 'none.record'}: No such file or directory\n")
     cut = tmp_path / "cut.record"
     cut.write_bytes(recorded.read_bytes()[:-10])
-    status, text = said(cut)
+    status, text = output(cut)
     assert status == 1
     assert "cut off after 2 commands" in text

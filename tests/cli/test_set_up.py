@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
 
 from tests.conftest import ROOT
+from tests.waiting import until
 
 STEP = ROOT / ".ci" / "step.sh"
 
@@ -39,8 +39,7 @@ def test_a_step_that_fails_shows_the_end_of_what_it_wrote_and_its_status(tmp_pat
 
 def test_ctrl_c_ends_a_step_and_its_program(tmp_path: Path) -> None:
     process = step(tmp_path, "sh", "-c", "echo $$ >pid; exec sleep 600")
-    while not (tmp_path / "pid").is_file() or not (tmp_path / "pid").read_text():
-        time.sleep(0.05)
+    until(lambda: (tmp_path / "pid").is_file() and (tmp_path / "pid").read_text(), "the program runs")
     os.killpg(process.pid, signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode != 0

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from tests.cockpit.conftest import Person, Served, somebody, until
+from tests.waiting import stays
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -97,8 +98,7 @@ def vanish(running: Served, operator: Person, happens: Callable[[list[int]], Non
     until(lambda: any(f"{ARM} holds: {why}" in line for line in running.lines), "the reason is printed")
     before = drag.goal()
     assert abs(before) < REACH - 0.2, "it did not go on to where the slider was dragged"
-    time.sleep(0.3)
-    assert drag.goal() == before
+    stays(lambda: drag.goal() == before, "the arm holds", 0.3)
     assert int(running.state["tick"]) > ticks, "the simulation goes on"
     assert running.arm(ARM)["operating"] == 1
     return drag.held_after

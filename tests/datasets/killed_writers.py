@@ -19,6 +19,8 @@ from ligature.datasets import DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
 from ligature.process import end_with_parent
 
+from tests.waiting import until
+
 SAMPLES = 6
 
 
@@ -59,13 +61,12 @@ def kill_one(simulation: ligature.Simulation, path: Path, number: signal.Signals
 
 def _wait(child: int) -> None:
     """Wait until a writer has ended; one that does not is killed, and reported."""
-    for _ in range(3000):
-        if os.waitpid(child, os.WNOHANG)[0]:
-            return
-        time.sleep(0.01)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    raise TimeoutError("a writer went on for half a minute after its signal")
+    try:
+        until(lambda: os.waitpid(child, os.WNOHANG)[0], "the writer ends", 30.0)
+    except AssertionError as error:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        raise TimeoutError("a writer went on for half a minute after its signal") from error
 
 
 def main() -> int:

@@ -343,6 +343,6 @@ def test_the_doctor_has_nothing_to_say(source: Path, tmp_path: Path) -> None:
         env={**os.environ, "HF_HUB_OFFLINE": "1"},
     )  # fmt: skip
     report = json.loads(done.stdout)
-    said = [m["message"] for check in report["checks"] for m in check["messages"] if m["severity"] != "PASS"]
-    assert said == [] and report["overall_severity"] == "PASS"
+    findings = [m["message"] for check in report["checks"] for m in check["messages"] if m["severity"] != "PASS"]
+    assert findings == [] and report["overall_severity"] == "PASS"
     assert report["total_frames"] == sum(SAMPLES)

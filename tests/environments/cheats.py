@@ -190,7 +190,7 @@ def roll(env: SuturingEnv, policy: Policy, seed: int) -> Outcome:
     return Outcome(total, deed, success, lost, steps)
 
 
-def said(policy: Policy) -> str:
+def described(policy: Policy) -> str:
     """What a policy does."""
     text = (policy.__doc__ or "").split("\n")[0].rstrip(".")
     return text[0].lower() + text[1:]
@@ -203,7 +203,7 @@ def main() -> int:
         env = SuturingEnv(task, max_steps=MOST)
         for policy in (EXPERTS[task], *cheats):
             found = roll(env, policy, seed=3)
-            what = said(policy) if policy in cheats else f"**{said(policy)}**"
+            what = described(policy) if policy in cheats else f"**{described(policy)}**"
             ends = found.lost or ("done" if found.success else "cut")
             rewards = f"{found.total:.2f} | {found.deed:.2f} | {int(found.success)}"
             sys.stdout.write(f"| {task} | {what} | {rewards} | {ends} |\n")

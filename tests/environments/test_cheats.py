@@ -11,7 +11,7 @@ from ligature.environments import SuturingEnv
 from ligature.environments.experts import EXPERTS, SHUT, Hand, Policy
 from ligature.environments.goals import GOALS
 
-from tests.environments.cheats import CHEATS, MOST, QUICK, roll, said
+from tests.environments.cheats import CHEATS, MOST, QUICK, described, roll
 
 LEARNING = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
 
@@ -57,7 +57,7 @@ def test_experts_succeed_and_cheats_fail_wherever_the_needle_lies(env: SuturingE
 
 def test_the_documents_list_every_cheat() -> None:
     text = LEARNING.read_text("utf-8")
-    missing = [said(p) for cheats in CHEATS.values() for p in cheats if f"| {said(p)} |" not in text]
+    missing = [described(p) for cheats in CHEATS.values() for p in cheats if f"| {described(p)} |" not in text]
     assert not missing
 
 

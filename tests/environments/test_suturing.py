@@ -12,8 +12,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ligature.environments import MAX_STEPS, SuturingEnv, make_vec
-from ligature.environments.suturing import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGTH
+from ligature.environments import MAX_STEPS, SuturingEnv, make_vec, suturing
+from ligature.environments.suturing import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGTH, STEP_LENGTH
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.robots.poses import rotation_vector
 
@@ -189,6 +189,59 @@ def test_an_environment_simulates_the_arm_of_its_task_alone() -> None:
     assert [arm.name for arm in scene.arms] == ["PSM1"]
     assert not any("psm2" in body.identity.identifier for body in scene.bodies)
     assert scene.rods, "the needle has its thread"
+
+
+def test_what_takes_no_part_in_a_task_neither_moves_nor_is_there() -> None:
+    env = SuturingEnv("reach", max_steps=None)
+    needle, observation = env.needle, env.reset(seed=1)[0]
+    start, middle = observation[14:21], env._scenery.needle_points(env.simulation.state["body_pose"][0])[1]
+    for _ in range(120):
+        way = env.base_rotation.T @ (middle - observation[27:30]) / STEP_LENGTH
+        way /= max(float(np.abs(way).max()), 1.0)
+        observation, *_ = env.step(np.append(way, np.zeros(4)).astype(np.float32))
+    assert np.linalg.norm(observation[27:30] - middle) < 0.008, "the tool presses on the needle"
+    assert (observation[14:21] == start).all() and not observation[21:27].any()
+    assert env.simulation.scene.bodies[needle].static and not env.simulation.scene.rods
+    env.close()
+
+
+# --- nothing is left of before ----------------------------------------------------------------
+
+EPISODES = st.lists(st.tuples(st.integers(0, 2**31), st.integers(0, 40)), max_size=3)
+
+
+def rolled_out(env: SuturingEnv, seed: int, steps: int) -> tuple[np.ndarray, str]:
+    """What an episode of random actions shows, the jaw closing as often as not, and the state at its end."""
+    rng, seen = np.random.default_rng(seed), [env.reset(seed=seed)[0]]
+    for _ in range(steps):
+        action = rng.uniform(-1, 1, 7).astype(np.float32)
+        action[6] = -1.0 if seed % 2 else action[6]
+        seen.append(env.step(action)[0])
+    return np.array(seen), env.simulation.state_hash(clock=False)
+
+
+@pytest.fixture(scope="module", params=["reach", "pick", "insert"])
+def used(request: pytest.FixtureRequest) -> Iterator[SuturingEnv]:
+    """An environment that all examples use in turn."""
+    env = SuturingEnv(request.param, max_steps=None)
+    yield env
+    env.close()
+
+
+@settings(max_examples=3)
+@given(before=EPISODES, seed=st.integers(0, 2**31), steps=st.integers(1, 25))
+def test_a_used_environment_is_a_fresh_one_to_the_bit(
+    used: SuturingEnv, before: list[tuple[int, int]], seed: int, steps: int
+) -> None:
+    """Whatever it did before, in whatever contacts and grasps, and whenever it was reset."""
+    for earlier in before:
+        rolled_out(used, *earlier)
+    suturing._STARTS.clear()
+    fresh = SuturingEnv(used._options["task"], max_steps=None)
+    (seen, digest), (expected, right) = rolled_out(used, seed, steps), rolled_out(fresh, seed, steps)
+    fresh.close()
+    assert np.array_equal(seen, expected)
+    assert digest == right
 
 
 # --- set-points -----------------------------------------------------------------------------

@@ -54,10 +54,10 @@ class Kill:
     left: tuple[str, ...]
 
     def __str__(self) -> str:
-        said = (
+        words = (
             f"after {self.lived:.2f} s, behind '{self.stage}': {self.processes} processes ended in {self.ended:.2f} s"
         )
-        return said + (f"; LEFT: {', '.join(self.left)}" if self.left else "")
+        return words + (f"; LEFT: {', '.join(self.left)}" if self.left else "")
 
 
 def kill(number: int, scene: Path = SCENE) -> Kill:

@@ -165,7 +165,7 @@ def test_what_the_controller_of_a_body_raises_clears_its_command_and_is_reported
     simulation.close()
 
 
-def test_what_the_joints_of_a_tree_raise_lets_them_go_limp_and_is_reported_once(
+def test_what_the_joints_raise_lets_them_go_limp_and_is_reported_once(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     simulation = Simulation(scene)
@@ -176,8 +176,8 @@ def test_what_the_joints_of_a_tree_raise_lets_them_go_limp_and_is_reported_once(
         raise ZeroDivisionError("broken on purpose")
 
     with monkeypatch.context() as patch:
-        patch.setattr("ligature.physics.control.TreeControl.apply", broken)
-        simulation.step(2)
+        patch.setattr("ligature.physics.joints.act", broken)
+        simulation.step(1)
     assert {problem.code for problem in simulation.problems} == {"failed"}
     count = len(simulation.problems)
     simulation.step(2)

@@ -97,7 +97,7 @@ def test_a_snapshot_amid_a_slip_continues_bit_for_bit(simulate: Make) -> None:
 
 def test_the_checker_knows_the_key(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(SCENE.format(slip=", ligature slip: {frction: 0.5}"))
-    said = "\n".join(str(d) for d in findings(tmp_path / "m.yaml", [], False))
-    assert "unknown key 'ligature slip.frction'" in said
-    assert "friction" in said
-    assert "normal force" in said
+    reported = "\n".join(str(d) for d in findings(tmp_path / "m.yaml", [], False))
+    assert "unknown key 'ligature slip.frction'" in reported
+    assert "friction" in reported
+    assert "normal force" in reported

@@ -6,11 +6,8 @@ import logging
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +18,7 @@ from ligature.mesh.decompose import DecompositionError, convex_pieces, decompose
 from ligature.process import end_with_parent
 
 from tests.mesh.shapes import CUBE, ell
+from tests.waiting import until
 
 
 @pytest.fixture(autouse=True)
@@ -139,20 +137,11 @@ _run_coacd(stored.getvalue(), json.dumps({"threshold": 0.01, "mcts_iterations": 
 def test_coacd_ends_with_the_process_that_waits_for_it(number: int) -> None:
     waiting = subprocess.Popen([sys.executable, "-c", LONG_WORK], preexec_fn=end_with_parent)
     try:
-        worker = _eventually(lambda: _worker_of(waiting.pid))
+        worker = until(lambda: _worker_of(waiting.pid), "the worker runs", 60.0)
     finally:
         waiting.send_signal(number)
         waiting.wait()
-    _eventually(lambda: not _lives(worker))
-
-
-def _eventually(condition: Callable[[], Any]) -> Any:
-    """What ``condition`` returns once it is true."""
-    deadline = time.monotonic() + 60.0
-    while not (found := condition()):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    return found
+    until(lambda: not _lives(worker), "the worker ends", 60.0)
 
 
 def _worker_of(parent: int) -> int | None:

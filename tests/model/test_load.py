@@ -34,7 +34,7 @@ def lab(tmp_path: Path):
     return load
 
 
-def said(scene: Scene, least: Severity = Severity.WARNING) -> str:
+def reported(scene: Scene, least: Severity = Severity.WARNING) -> str:
     return "\n".join(str(d) for d in scene.diagnostics if d.severity >= least)
 
 
@@ -71,7 +71,7 @@ def test_without_mass_the_inertial_block_has_no_effect_and_that_is_stated(lab) -
     scene = lab(m=text)
     assert scene.bodies[0].mass == 1.0
     assert np.allclose(scene.bodies[0].inertia, 2 / 3)
-    assert "has no 'mass'; using 1 kg, and its inertia has no effect" in said(scene)
+    assert "has no 'mass'; using 1 kg, and its inertia has no effect" in reported(scene)
 
 
 def test_a_joint_finds_its_body_in_the_file_before_the_world(lab) -> None:
@@ -93,7 +93,7 @@ def test_an_ambiguous_parent_is_reported_with_its_candidates(lab) -> None:
     joint = f"joints: [J]\nJ: {{name: j, type: fixed, parent: Thr, child: BODY b, {AXES}}}\n"
     scene = lab(m=bodies("Thr1", "Thr2", "b") + joint)
     assert scene.joints == ()
-    assert "joint 'J' is left out: its parent 'Thr' is ambiguous (/ambf/env/BODY Thr1, /ambf/env/BODY Thr2" in said(
+    assert "joint 'J' is left out: its parent 'Thr' is ambiguous (/ambf/env/BODY Thr1, /ambf/env/BODY Thr2" in reported(
         scene
     )
 
@@ -163,7 +163,7 @@ def test_a_camera_that_hangs_on_another_resolves_although_its_own_name_holds_the
 
 def test_a_parent_that_never_comes_is_reported(lab) -> None:
     text = "bodies: [BODY a]\nBODY a: {name: a, mass: 1}\nlights: [L]\nL: {name: L, parent: BODY none}\n"
-    assert "has the parent 'BODY none', which is missing or ambiguous" in said(lab(m=text))
+    assert "has the parent 'BODY none', which is missing or ambiguous" in reported(lab(m=text))
 
 
 def test_cameras_look_along_minus_x_with_z_up(lab) -> None:
@@ -181,7 +181,7 @@ def test_cameras_look_along_minus_x_with_z_up(lab) -> None:
 def test_a_missing_mesh_leaves_the_body_out(lab) -> None:
     scene = lab(m="bodies: [BODY a, BODY b]\nBODY a: {name: a, mass: 1, mesh: no.obj}\nBODY b: {name: b, mass: 1}\n")
     assert [b.identity.key for b in scene.bodies] == ["BODY b"]
-    assert "body 'BODY a': mesh 'no.obj' does not exist; looked for" in said(scene)
+    assert "body 'BODY a': mesh 'no.obj' does not exist; looked for" in reported(scene)
 
 
 def test_a_capsule_along_x_is_turned(lab) -> None:
@@ -199,7 +199,7 @@ def test_a_file_without_bodies_cannot_run(tmp_path: Path) -> None:
 def test_an_index_beyond_the_list_is_reported(lab, tmp_path: Path) -> None:
     lab(m=bodies("a"))
     scene = ligature.load(tmp_path / "launch.yaml", models=[0, 7])
-    assert "model index 7 is out of range; 'multibody configs' lists 1, counted from 0" in said(scene)
+    assert "model index 7 is out of range; 'multibody configs' lists 1, counted from 0" in reported(scene)
 
 
 def chain(extra: str = "") -> str:
@@ -224,7 +224,7 @@ def test_a_chain_of_sprung_capsules_is_one_rod(lab) -> None:
     scene = lab(m=chain())
     assert [rod.bodies for rod in scene.rods] == [(0, 1, 2, 3, 4)]
     assert np.allclose(scene.rods[0].lengths, 0.01)
-    assert "5 bodies from '/ambf/env/T0' on are simulated as one elastic rod" in said(scene, Severity.INFO)
+    assert "5 bodies from '/ambf/env/T0' on are simulated as one elastic rod" in reported(scene, Severity.INFO)
 
 
 @pytest.mark.parametrize("where", ["file", "body", "joint"])

@@ -10,7 +10,7 @@ import pytest
 from ligature.adf import Diagnostic, Severity
 from ligature.cli.check import findings
 from ligature.model.axis import Axis
-from ligature.physics.response import moved_inertia
+from ligature.physics.response import moved_inertias
 
 ZERO, UP = "{x: 0, y: 0, z: 0}", "{x: 0, y: 0, z: 1}"
 BALL = "{name: ball, mass: 0.1, collision shape: SPHERE, collision geometry: {radius: 0.02}}"
@@ -130,13 +130,13 @@ def test_the_moved_inertia_of_two_free_bodies_is_the_reduced_one() -> None:
     hinged, slid = Axis(False, np.eye(3)[2]), Axis(True, np.eye(3)[0])
     masses, inertias = (2.0, 3.0), (np.full(3, 0.2), np.full(3, 0.3))
     frames = (np.eye(4), np.eye(4))
-    assert moved_inertia(masses, inertias, frames, (hinged,), 0) == pytest.approx(0.2 * 0.3 / 0.5)
-    assert moved_inertia(masses, inertias, frames, (slid,), 0) == pytest.approx(2.0 * 3.0 / 5.0)
+    assert moved_inertias(masses, inertias, frames, (hinged,))[0] == pytest.approx(0.2 * 0.3 / 0.5)
+    assert moved_inertias(masses, inertias, frames, (slid,))[0] == pytest.approx(2.0 * 3.0 / 5.0)
 
 
 def test_a_heavy_parent_leaves_a_pinned_body_its_inertia_about_the_pin() -> None:
     arm = np.eye(4)
     arm[0, 3] = 0.1
     hinged = Axis(False, np.eye(3)[2])
-    moved = moved_inertia((1e9, 3.0), (np.full(3, 1e9), np.full(3, 0.01)), (np.eye(4), arm), (hinged,), 0)
+    (moved,) = moved_inertias((1e9, 3.0), (np.full(3, 1e9), np.full(3, 0.01)), (np.eye(4), arm), (hinged,))
     assert moved == pytest.approx(0.01 + 3.0 * 0.1**2, rel=1e-6)

@@ -86,3 +86,41 @@ def test_free_bodies_are_parted_by_contact_without_a_word(tmp_path: Path) -> Non
         assert not [problem for problem in simulation.problems if problem.code == "overlap"]
     finally:
         simulation.close()
+
+
+def xyz(v: object) -> dict[str, float]:
+    return {k: float(c) for k, c in zip("xyz", v, strict=True)}  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_what_joints_let_part_only_nearly_across_the_contact_is_not_thrown(seed: int, tmp_path: Path) -> None:
+    """A box that starts slightly inside a wall, on a slider or an arm that moves along the wall but for a tiny angle."""
+    rng = np.random.default_rng(seed)
+    at = EDGE - 10.0 ** rng.uniform(-4, -2.4)
+    tilt, around = 10.0 ** rng.uniform(-6, 0) * rng.choice((-1, 1)), rng.uniform(0, 6.28)
+    axis = np.array([np.sin(tilt), np.cos(tilt) * np.cos(around), np.cos(tilt) * np.sin(around)])
+    type_, pivot = "prismatic", np.zeros(3)
+    if seed % 2:  # an arm that swings the box along the same direction
+        along, axis = axis, np.cross(axis, rng.normal(size=3))
+        axis /= np.linalg.norm(axis)
+        type_, pivot = "revolute", 0.1 * np.cross(axis, along)
+    wall, held = box("wall", 0.0, 0.0), box("box", at, 10.0 ** rng.uniform(-3, 1))
+    wall["collision geometry"] = {"x": EDGE, "y": 1.0, "z": 1.0}
+    model = {
+        "bodies": ["BODY wall", "BODY base", "BODY box"], "joints": ["JOINT hold"],
+        "BODY wall": wall, "BODY base": {"name": "base", "mass": 0.0}, "BODY box": held,
+        "JOINT hold": {
+            "name": "hold", "type": type_, "parent": "BODY base", "child": "BODY box",
+            "parent pivot": xyz(pivot + (at, 0.0, 0.0)), "child pivot": xyz(pivot),
+            "parent axis": xyz(axis), "child axis": xyz(axis), "joint limits": {"low": -0.3, "high": 0.3},
+        },
+    }  # fmt: skip
+    path = tmp_path / "model.yaml"
+    path.write_text(yaml.safe_dump(model, sort_keys=False))
+    simulation = ligature.Simulation(ligature.load(path))
+    try:
+        for _ in range(100):
+            simulation.step(1)
+            assert np.abs(simulation.state["body_twist"][0, :, :3]).max() < 12.0
+    finally:
+        simulation.close()

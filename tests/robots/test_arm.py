@@ -282,7 +282,7 @@ def test_forward_and_inverse_kinematics_on_demand(ready: PsmArm) -> None:
         ready.inverse_kinematics(np.zeros(4), pose)
 
 
-def test_a_recalled_arm_goes_on_as_the_other_did(ready: PsmArm) -> None:
+def test_a_restored_arm_goes_on_as_the_other_did(ready: PsmArm) -> None:
     ready.move_jp([0.5, 0.2, 0.15, 0, 0, 0])
     advance(ready, 0.3)
     kept = copy.deepcopy(ready.snapshot())

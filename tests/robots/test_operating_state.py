@@ -324,3 +324,13 @@ def test_the_former_name_of_a_rejection_warns_and_catches_it() -> None:
         from ligature.robots.operating_state import Refused
     with pytest.raises(Refused):
         action("dance", State.ENABLED)
+
+
+def test_states_keep_the_numbers_of_records_and_a_state_that_was_handed_out_stays_as_it_is() -> None:
+    assert {state.name: state.value for state in State} == {"DISABLED": 0, "ENABLED": 1, "PAUSED": 2, "FAULT": 3}
+    arm = homed()
+    handed_out = arm.operating_state
+    with pytest.raises(AttributeError):
+        handed_out.state = State.FAULT  # type: ignore[misc]
+    arm.disable()
+    assert handed_out.state == State.ENABLED

@@ -17,6 +17,8 @@ import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion
 from ligature.model.frames import matrix_pose7, pose7_matrix
 
+from tests.waiting import until
+
 TASK_3_JOINTS = [-0.4, -0.22, 0.139, -1.64, -0.37, -0.11]
 TIP_IN_NEEDLE = np.array([0.006617809, 0.006973457, 0.0, 1.0])
 CLOSING = {420006: 0.3, 400006: 0.6}
@@ -83,10 +85,8 @@ class Stage:
 
     def sleep(self, seconds: float) -> None:
         """Let simulated time pass; half a minute of the wall's at most."""
-        end, deadline = self.sim_time + seconds, time.monotonic() + 30.0
-        while self.sim_time < end:
-            assert time.monotonic() < deadline, "simulated time stands still"
-            time.sleep(0.002)
+        end = self.sim_time + seconds
+        until(lambda: self.sim_time >= end, "simulated time goes on", 30.0, every=0.002)
 
     def until(self, condition: Callable[[], Any], seconds: float) -> None:
         """Wait until ``condition`` holds, ``seconds`` simulated seconds at most."""

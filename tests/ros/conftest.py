@@ -62,11 +62,14 @@ class Program:
 
     def wait_for(self, text: str, seconds: float = 60.0) -> None:
         """Wait until a line holds ``text``."""
-        deadline = time.monotonic() + seconds
-        while not any(text in line for line in self.lines):
-            assert time.monotonic() < deadline, f"no '{text}' within {seconds} s in:\n{self.output}"
+
+        def written() -> bool:
+            if any(text in line for line in self.lines):
+                return True
             assert self.process.poll() is None, f"ended with {self.process.poll()}:\n{self.output}"
-            time.sleep(0.02)
+            return False
+
+        until(written, lambda: f"'{text}' in:\n{self.output}", seconds)
 
     def children(self) -> dict[str, int]:
         """Process ids of the simulator's processes by module name."""
@@ -115,13 +118,12 @@ def start_master(port: int, env: dict[str, str]) -> subprocess.Popen[bytes]:
         ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(port)], env=env,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=end_with_parent,
     )  # fmt: skip
-    deadline = time.monotonic() + 20
-    while not master_answers(f"http://127.0.0.1:{port}"):
-        if time.monotonic() > deadline:
-            master.kill()
-            master.wait()
-            raise AssertionError("the ROS master did not answer within 20 s")
-        time.sleep(0.05)
+    try:
+        until(lambda: master_answers(f"http://127.0.0.1:{port}"), "the ROS master answers", every=0.05)
+    except AssertionError:
+        master.kill()
+        master.wait()
+        raise
     return master
 
 

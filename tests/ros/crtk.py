@@ -63,7 +63,7 @@ class Link:
         self.namespace = namespace
         self.children: list[Link] = []
         self._heard: dict[str, Latest] = {}
-        self._said: dict[str, Any] = {}
+        self._publishers: dict[str, Any] = {}
 
     def topic(self, name: str) -> str:
         return f"{self.namespace}/{name}"
@@ -72,13 +72,15 @@ class Link:
         return self._heard.setdefault(name, Latest(self.rospy, self.topic(name), type_))
 
     def talk(self, name: str, type_: Any, latch: bool = False) -> None:
-        self._said[name] = self.rospy.Publisher(self.topic(name), type_, latch=latch, queue_size=10, tcp_nodelay=True)
+        self._publishers[name] = self.rospy.Publisher(
+            self.topic(name), type_, latch=latch, queue_size=10, tcp_nodelay=True
+        )
 
     def publish(self, name: str, message: Any) -> None:
         """Publish a message as it is."""
-        self._said[name].publish(message)
+        self._publishers[name].publish(message)
 
-    def say(self, name: str, message: Any) -> None:
+    def send(self, name: str, message: Any) -> None:
         """Publish a message, stamped with now."""
         if hasattr(message, "header"):
             message.header.stamp = self.rospy.Time.now()
@@ -92,7 +94,7 @@ class Link:
         return message
 
     def unconnected(self) -> list[str]:
-        ends = {**{n: h.subscriber for n, h in self._heard.items()}, **self._said}
+        ends = {**{n: h.subscriber for n, h in self._heard.items()}, **self._publishers}
         mine = [self.topic(name) for name, end in ends.items() if end.get_num_connections() == 0]
         return mine + [topic for child in self.children for topic in child.unconnected()]
 
@@ -107,8 +109,8 @@ class Link:
     def close(self) -> None:
         for heard in self._heard.values():
             heard.subscriber.unregister()
-        for said in self._said.values():
-            said.unregister()
+        for publisher in self._publishers.values():
+            publisher.unregister()
         for child in self.children:
             child.close()
 
@@ -156,7 +158,7 @@ class OperatingStateLink:
         """Send a state command; returns how many events there were before."""
         with self.changed:
             before = len(self.events)
-        self.link.say("state_command", StringStamped(string=word))
+        self.link.send("state_command", StringStamped(string=word))
         return before
 
 
@@ -197,7 +199,7 @@ class Arm(Link):
         self.state = OperatingStateLink(self)
         for topic, type_ in HEARD.items():
             self.listen(topic, type_)
-        for topic, type_ in SAID.items():
+        for topic, type_ in SENT.items():
             self.talk(topic, type_, latch=topic in LATCHED)
 
     def unconnected(self) -> list[str]:
@@ -247,40 +249,40 @@ class Arm(Link):
     # --- motion
 
     def servo_jp(self, position: ArrayLike, velocity: ArrayLike = ()) -> None:
-        self.say("servo_jp", JointState(position=list(np.asarray(position)), velocity=list(np.asarray(velocity))))
+        self.send("servo_jp", JointState(position=list(np.asarray(position)), velocity=list(np.asarray(velocity))))
 
     def servo_jr(self, step: ArrayLike) -> None:
-        self.say("servo_jr", JointState(position=list(np.asarray(step))))
+        self.send("servo_jr", JointState(position=list(np.asarray(step))))
 
     def servo_jf(self, effort: ArrayLike) -> None:
-        self.say("servo_jf", JointState(effort=list(np.asarray(effort))))
+        self.send("servo_jf", JointState(effort=list(np.asarray(effort))))
 
     def servo_cp(self, pose: ArrayLike) -> None:
-        self.say("servo_cp", PoseStamped(pose=pose_message(pose)))
+        self.send("servo_cp", PoseStamped(pose=pose_message(pose)))
 
     def servo_cv(self, twist: ArrayLike) -> None:
         message = TwistStamped()
         v, w = message.twist.linear, message.twist.angular
         v.x, v.y, v.z, w.x, w.y, w.z = np.asarray(twist, dtype=float)
-        self.say("servo_cv", message)
+        self.send("servo_cv", message)
 
     def move_jp(self, goal: ArrayLike) -> Motion:
         motion = Motion(self.state)
-        self.say("move_jp", JointState(position=list(np.asarray(goal))))
+        self.send("move_jp", JointState(position=list(np.asarray(goal))))
         return motion
 
     def move_jr(self, step: ArrayLike) -> Motion:
         motion = Motion(self.state)
-        self.say("move_jr", JointState(position=list(np.asarray(step))))
+        self.send("move_jr", JointState(position=list(np.asarray(step))))
         return motion
 
     def move_cp(self, pose: ArrayLike) -> Motion:
         motion = Motion(self.state)
-        self.say("move_cp", PoseStamped(pose=pose_message(pose)))
+        self.send("move_cp", PoseStamped(pose=pose_message(pose)))
         return motion
 
     def hold(self) -> None:
-        self.say("hold", Empty())
+        self.send("hold", Empty())
 
     # --- services
 
@@ -311,11 +313,11 @@ class Jaw(Link):
         return float(self.hear("setpoint_js").position[0])
 
     def servo_jp(self, angle: float) -> None:
-        self.say("servo_jp", JointState(position=[angle]))
+        self.send("servo_jp", JointState(position=[angle]))
 
     def move_jp(self, angle: float) -> Motion:
         motion = Motion(self._state)
-        self.say("move_jp", JointState(position=[angle]))
+        self.send("move_jp", JointState(position=[angle]))
         return motion
 
     def close_jaw(self) -> Motion:
@@ -383,7 +385,7 @@ HEARD = {
 }  # fmt: skip
 """Topics that every arm publishes, as `Arm` hears them."""
 
-SAID = {
+SENT = {
     "hold": Empty, "free": Empty, "servo_jp": JointState, "servo_jr": JointState, "servo_cp": PoseStamped,
     "servo_jf": JointState, "move_jp": JointState, "move_jr": JointState, "move_cp": PoseStamped,
     "spatial/servo_cf": WrenchStamped, "body/servo_cf": WrenchStamped, "body/set_cf_orientation_absolute": Bool,

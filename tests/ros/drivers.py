@@ -14,6 +14,8 @@ import numpy as np
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7, pose7_matrix
 from numpy.typing import NDArray
 
+from tests.waiting import until
+
 Array = NDArray[np.float64]
 
 PERIOD = 0.005
@@ -53,15 +55,6 @@ float64 w
 """
 
 
-def until(condition: Callable[[], Any], what: Any = "", seconds: float = TIMEOUT) -> Any:
-    """Wait for a condition; ``what`` names it, or is asked when it did not come. Returns its value."""
-    deadline = time.monotonic() + seconds
-    while not (value := condition()):
-        assert time.monotonic() < deadline, what() if callable(what) else what
-        time.sleep(0.005)
-    return value
-
-
 def patiently(ask: Callable[[], Any], seconds: float = TIMEOUT) -> Any:
     """What a client reports, although a busy machine keeps its messages waiting for longer than the client does."""
     deadline = time.monotonic() + seconds
@@ -92,7 +85,7 @@ class Driver:
         self.T = np.eye(4)
         self.grip = 0.0
         self.muted = False
-        self.says: Any = None
+        self.sent: Any = None
         self.spoke = 0.0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._speak, daemon=True)
@@ -106,11 +99,11 @@ class Driver:
         while not self._stop.is_set():
             if not self.muted:
                 self.spoke = time.monotonic()
-                self.say(matrix_pose7(self.T) if self.says is None else self.says)
+                self.send(matrix_pose7(self.T) if self.sent is None else self.sent)
             due = max(due + PERIOD, time.monotonic() - 0.1)
             self._stop.wait(max(0.0, due - time.monotonic()))
 
-    def say(self, values: Any) -> None:
+    def send(self, values: Any) -> None:
         """Publish a pose (7,)."""
         raise NotImplementedError
 
@@ -155,7 +148,7 @@ class Pen(Driver):
         """Press or let go of the buttons."""
         self._buttons.publish(self.buttons_type(grey, white))
 
-    def say(self, values: Any) -> None:
+    def send(self, values: Any) -> None:
         p, q = self._message.pose.position, self._message.pose.orientation
         p.x, p.y, p.z, q.x, q.y, q.z, q.w = values
         self._pose.publish(self._message)
@@ -183,7 +176,7 @@ class Paddle(Driver):
         wait_for_listener(self._publisher)
         self.start()
 
-    def say(self, values: Any) -> None:
+    def send(self, values: Any) -> None:
         paddles = []
         for pose, buttons in ((values, self.buttons), (matrix_pose7(np.eye(4)), [False] * 7)):
             paddle = self._types["razer_hydra/HydraPaddle"]()

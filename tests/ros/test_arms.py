@@ -99,7 +99,7 @@ def test_every_topic_of_an_arm_is_there_with_its_type_and_direction(arms, node, 
     types, published, subscribed = table(node)
     out = {"operating_state": OperatingState, **crtk.HEARD, **crtk.EVENTS, **crtk.READS}
     out |= dict.fromkeys(crtk.BUTTONS[name[:3]], crtk.BUTTON)
-    into = {"state_command": StringStamped, **crtk.SAID}
+    into = {"state_command": StringStamped, **crtk.SENT}
     if name.startswith("PSM"):
         out |= {"jaw/measured_js": JointState, "jaw/setpoint_js": JointState}
         into |= {"jaw/servo_jp": JointState, "jaw/move_jp": JointState, "jaw/servo_jf": JointState}
@@ -442,13 +442,13 @@ def test_ratios_are_echoed_and_slow_moves_down(arm, listen):
     step[0] = 0.2
     top_speed = {}
     for ratio, goal in ((0.25, start + step), (1.0, start)):
-        arm.say("trajectory_j/set_ratio", Float64(ratio))
+        arm.send("trajectory_j/set_ratio", Float64(ratio))
         ratios.wait(lambda message, ratio=ratio: message.data == ratio)
         setpoints.messages.clear()
         assert arm.move_jp(goal).wait()
         top_speed[ratio] = max(abs(message.velocity[0]) for message in setpoints.messages)
     assert top_speed[0.25] < 0.6 * top_speed[1.0]  # half of it where the move is too short for full speed
-    arm.say("trajectory_j/set_ratio", Float64(1.5))
+    arm.send("trajectory_j/set_ratio", Float64(1.5))
     stays(lambda: ratios.messages[-1].data == 1.0, "the ratio of 1")
 
 

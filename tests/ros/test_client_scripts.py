@@ -235,9 +235,9 @@ def test_dvrk_system_test_finds_its_subscribers(simulator, node):
 
     system = System(node)
     system.check_connections(2.0)
-    system.say("set_volume", Float64(0.5))
-    system.say("beep", Float64MultiArray(data=[0.3, 3000.0, 0.5]))
-    system.say("string_to_speech", String("hello"))
+    system.send("set_volume", Float64(0.5))
+    system.send("beep", Float64MultiArray(data=[0.3, 3000.0, 0.5]))
+    system.send("string_to_speech", String("hello"))
     system.close()
 
 
@@ -254,7 +254,7 @@ def test_dvrk_reset_teleoperation_brings_master_and_roll_to_zero(arms, node):
     master, psm = arms["MTML"], arms["PSM1"]
     ready(master)
     ready(psm)
-    console.say("teleop/enable", Bool(False))
+    console.send("teleop/enable", Bool(False))
     zero = np.zeros(7)
     assert master.move_jp(zero).wait()
     at_rest(master, zero)
@@ -262,7 +262,7 @@ def test_dvrk_reset_teleoperation_brings_master_and_roll_to_zero(arms, node):
     goal[3] = 0.0
     assert psm.move_jp(goal).wait()
     at_rest(psm, goal)
-    console.say("teleop/enable", Bool(True))
+    console.send("teleop/enable", Bool(True))
     until(lambda: enabled[-1:] == [True], "teleoperation is enabled", 5.0)
     listener.unregister()
     console.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import subprocess
-import time
 import xmlrpc.client
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 import yaml
 
 from tests.ros.conftest import BIN, Program, free_port
+from tests.waiting import until
 
 pytestmark = [pytest.mark.ros, pytest.mark.corpus]
 NEEDLE = "/ambf/env/phantom/Needle"
@@ -74,8 +74,7 @@ def test_rostopic_echo_shows_the_needle_where_the_file_puts_it(env: dict[str, st
 
 def test_rostopic_hz_reads_the_rate_that_was_asked_for(env: dict[str, str], start: Callable[..., Program]) -> None:
     hz = start("/usr/bin/rostopic", "hz", "-w", "300", f"{NEEDLE}/State", env=env)
-    hz.wait_for("average rate", 20)
-    time.sleep(3)
+    until(lambda: sum("average rate" in line for line in hz.lines) >= 4, "rostopic measures for some seconds")
     hz.end()
     last = [line for line in hz.lines if "average rate" in line][-1]
     assert float(last.rpartition(":")[2]) == pytest.approx(100, abs=5)

@@ -17,7 +17,7 @@ import pytest
 from ligature.model.frames import axis_rotation, frame, matrix_pose7, pose7_matrix
 
 from tests.ros.conftest import BIN
-from tests.waiting import steady, until
+from tests.waiting import stays, steady, until
 
 pytestmark = pytest.mark.ros
 
@@ -73,10 +73,10 @@ class Face:
 
     def command(self, verb: str, T: Any) -> None:
         PoseStamped, _, message = self._types
-        self.link.say(verb, PoseStamped(pose=message(matrix_pose7(T))))
+        self.link.send(verb, PoseStamped(pose=message(matrix_pose7(T))))
 
     def command_joints(self, verb: str, q: Any) -> None:
-        self.link.say(verb, self._types[1](position=list(q)))
+        self.link.send(verb, self._types[1](position=list(q)))
 
 
 @pytest.fixture(scope="module")
@@ -131,8 +131,7 @@ def test_home_inserts_an_arm_that_the_challenge_s_face_drove(arms: Any, faces: A
     until(lambda: abs(face.joints()[0] - 0.2) < 1e-3, "the arm follows", 20.0)
     assert arm.state.now.state == "ENABLED" and not arm.state.now.is_homed
     arm.servo_jp([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
-    time.sleep(0.3)
-    assert abs(face.joints()[0] - 0.2) < 2e-3, "its own face takes no motion before it is homed"
+    stays(lambda: abs(face.joints()[0] - 0.2) < 2e-3, "its own face takes no motion before it is homed", 0.3)
     assert arm.home(20.0)
     until(lambda: abs(arm.measured_jp()[2] - 0.12) < 1e-3, "home inserts", 20.0)
     goal = arm.setpoint_cp()
@@ -152,7 +151,9 @@ def test_what_the_challenge_s_face_rejects_names_its_topic(
     face.command("servo_cp", frame(np.eye(3), (0.0, 0.0, 0.0)))
     text = warning.wait(lambda m: m.data.startswith("CRTK/psm1/servo_cp: ")).data
     assert "PSM1" in text
-    until(lambda: any("/CRTK/psm1/servo_cp: " in line for line in program.lines[before:]), "the terminal says so", 10.0)
+    until(
+        lambda: any("/CRTK/psm1/servo_cp: " in line for line in program.lines[before:]), "the terminal reports it", 10.0
+    )
     assert not any("/PSM1: CRTK" in line or "/PSM1: servo_cp" in line for line in program.lines[before:])
 
 
@@ -213,7 +214,7 @@ def turned_by(arm: Any, T: Any, node: Any, reference: str = "elsewhere") -> None
 
     message = PoseStamped(pose=pose_message(matrix_pose7(T)))
     message.header.frame_id = reference
-    arm.say("set_base_frame", message)
+    arm.send("set_base_frame", message)
     # readings are topics of their own: each of them arrives in the new frame when it arrives
     for reading in ("measured_cp", "setpoint_cp"):
         until(lambda name=reading: arm.hear(name).header.frame_id == reference, f"{reading} in {reference}", 10.0)

@@ -101,7 +101,7 @@ def test_two_simulators_with_prefixes_are_driven_independently(both: dict[str, A
 
     system = crtk.System(node, "left/system")
     system.check_connections(10.0)
-    system.say("power_on", crtk.Empty())
+    system.send("power_on", crtk.Empty())
     left, right = both["left"], both["right"]
     until(lambda: left.state.now.state == "ENABLED", "the left one has power", 20.0)
     assert right.state.now.state == "DISABLED", "the right one has not"
@@ -111,7 +111,7 @@ def test_two_simulators_with_prefixes_are_driven_independently(both: dict[str, A
     assert all(move.wait() for move in moves)
     for side, goal in goals.items():
         until(lambda side=side, goal=goal: np.allclose(both[side].measured_jp(), goal, atol=2e-3), side, 10.0)
-    left.say("servo_jp", crtk.JointState(position=[0.0] * 2 + [0.13, 0.0, 0.0, 0.0]))
+    left.send("servo_jp", crtk.JointState(position=[0.0] * 2 + [0.13, 0.0, 0.0, 0.0]))
     until(lambda: abs(left.measured_jp()[0]) < 2e-3, "the left one goes back", 10.0)
     assert np.allclose(right.measured_jp(), goals["right"], atol=2e-3)
     system.close()

@@ -123,26 +123,26 @@ def test_the_bag_holds_everything(session: Session) -> None:
 
 
 def test_the_record_simulated_again_ends_in_the_same_bits(session: Session) -> None:
-    status, said = replayed(session.record)
-    assert status == 0, said
-    assert "the same bits: " in said
+    status, output = replayed(session.record)
+    assert status == 0, output
+    assert "the same bits: " in output
 
 
 def test_a_record_is_not_replayed_on_another_scene(session: Session) -> None:
     other = ROOT / "scenes" / "suturing_small" / "launch.yaml"
-    status, said = replayed(session.record, other)
+    status, output = replayed(session.record, other)
     assert status == 1
-    assert "starts in another state than the recorded run" in said
+    assert "starts in another state than the recorded run" in output
 
 
 def test_the_task_is_scored_from_the_record_and_from_the_bag(session: Session) -> None:
     scores = []
-    for status, said in (
+    for status, output in (
         scored("insertion", session.record, json=True),
         scored("insertion", session.bag, SCENE, json=True),
     ):
-        assert status == 1, said
-        scores.append(json.loads(said))
+        assert status == 1, output
+        scores.append(json.loads(output))
     assert scores[0]["score"]["why"] == scores[1]["score"]["why"]
     assert {"tissue_force", "thread_tension", "drops", "path_length_PSM1"} <= set(scores[0]["measures"])
     assert scores[0]["measures"]["path_length_PSM1"] > 0.01
@@ -160,9 +160,9 @@ def test_what_cannot_be_scored_is_reported(session: Session, tmp_path: Path) -> 
         (("pose_estimation", session.record), "holds no reported pose"),
         (("insertion", tmp_path / "none.bag"), "No such file"),
     ):
-        status, said = scored(*words)
-        assert status == 2, said
-        assert message in said
+        status, output = scored(*words)
+        assert status == 2, output
+        assert message in output
 
 
 @pytest.mark.slow  # commands come at their own times: a simulator that lags behind is not homed when the move comes

@@ -26,9 +26,9 @@ from tests.ros.drivers import (
     measured,
     patiently,
     settled,
-    until,
     wait_for_listener,
 )
+from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 
@@ -92,7 +92,7 @@ def paddle(drivers: tuple[Pen, Paddle]) -> Paddle:
 @pytest.fixture
 def pen(drivers: tuple[Pen, Paddle], following: Callable[..., None], arms: dict[str, Any]) -> Pen:
     pen = drivers[0]
-    pen.muted, pen.says = False, None
+    pen.muted, pen.sent = False, None
     following(pen, "pen_PSM1")
     settled(arms, "PSM1")
     return pen
@@ -162,7 +162,7 @@ def test_the_white_button_closes_the_jaw(pen: Pen, arms: dict[str, Any]) -> None
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "status_word"),
     [
         ([np.nan, 0, 0, 0, 0, 0, 1], "sends invalid poses"),
         ([0, 0, 0, 0, 0, 0, 0], "sends invalid poses"),
@@ -172,17 +172,17 @@ def test_the_white_button_closes_the_jaw(pen: Pen, arms: dict[str, Any]) -> None
     ids=["nan", "zero quaternion", "leap", "silence"],
 )
 def test_a_device_that_fails_lets_the_arm_hold_and_states_why(
-    pen: Pen, arms: dict[str, Any], listen: Callable[..., Any], values: Any, says: str, teleop: Any
+    pen: Pen, arms: dict[str, Any], listen: Callable[..., Any], values: Any, status_word: str, teleop: Any
 ) -> None:
     from std_msgs.msg import Bool, String
 
     status, other = listen("/pen_PSM1/status", String), listen("/paddle_PSM2/following", Bool)
     before = settled(arms, "PSM1")
-    pen.says, pen.muted = values, values is None
-    status.wait(lambda m: says in m.data, TIMEOUT)
-    pen.says, pen.muted = None, False
+    pen.sent, pen.muted = values, values is None
+    status.wait(lambda m: status_word in m.data, TIMEOUT)
+    pen.sent, pen.muted = None, False
     pen.glide((0.02, 0.0, 0.0), seconds=0.2)
-    assert says in status.messages[-1].data
+    assert status_word in status.messages[-1].data
     far, _ = apart(settled(arms, "PSM1"), before)
     assert far < 0.02
     assert teleop.process.poll() is None

@@ -11,7 +11,7 @@ import pytest
 from ligature.teleop.devices import module
 from ligature.teleop.devices.device import Reading
 
-from tests.ros.drivers import until
+from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from tests.ros.conftest import BIN
-from tests.ros.drivers import apart, camera_of, measured, patiently, settled, until, wait_for_listener
+from tests.ros.drivers import apart, camera_of, measured, patiently, settled, wait_for_listener
+from tests.waiting import stays, until
 
 pytestmark = pytest.mark.ros
 
@@ -127,8 +128,7 @@ def test_locks_and_scale_are_reported_and_move_nothing(
     reported = listen("/MTMR_PSM1/scale", Float64)
     assert reported.wait(lambda m: m.data == 0.4)
     scale.publish(7.0)
-    time.sleep(0.2)
-    assert reported.messages[-1].data == 0.4
+    stays(lambda: reported.messages[-1].data == 0.4, "a scale of 7 is rejected", 0.2)
     assert apart(settled(arms, "PSM1"), before)[0] < 0.05
 
 

@@ -12,7 +12,8 @@ from ligature.model.frames import pose7_matrix
 
 from tests.model.test_proxies import write_scene
 from tests.ros.conftest import BIN
-from tests.ros.drivers import TIMEOUT, Pen, apart, until
+from tests.ros.drivers import TIMEOUT, Pen, apart
+from tests.waiting import until
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300)]
 

@@ -44,6 +44,10 @@ class Bench:
     def motion(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         return self.pose[body].copy(), self.twist[body].copy()
 
+    def read_motions(self, bodies: np.ndarray, out: np.ndarray) -> None:
+        for row, body in zip(out, bodies.tolist(), strict=True):
+            row[:7], row[7:] = self.motion(body)
+
     def driven(self, body: int) -> bool:
         return False
 

@@ -9,6 +9,7 @@ from ligature.adf import Diagnostic
 from ligature.arms.ecm import build_ecm
 from ligature.arms.mtm import build_mtm
 from ligature.arms.psm import build_psm
+from ligature.arms.records import ArmRecords
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem
@@ -16,7 +17,6 @@ from ligature.physics import World
 from ligature.robots.arm import Arm
 from ligature.robots.commands import ArmCommand
 from ligature.robots.operating_state import Rejected
-from ligature.robots.record import ArmRecord
 
 _BUILDERS = {ArmKind.PSM: build_psm, ArmKind.ECM: build_ecm, ArmKind.MTM: build_mtm}
 
@@ -34,7 +34,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         for description in scene.arms:
             self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
         self._by_name = {arm.name: arm for arm in self._arms}
-        self._records = [ArmRecord(arm) for arm in self._arms]
+        self._records = ArmRecords(self._arms)
 
     def __getitem__(self, name: str) -> Arm:
         if name not in self._by_name:
@@ -85,8 +85,12 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
 
     def write_state(self, state: StateRecord) -> None:
         """Write the state of all arms."""
-        for arm, arm_record, record in zip(self._arms, self._records, state["arm"][0], strict=True):
-            self._guarded("write_state", arm, arm_record.write, record)
+        if self._arms:
+            for m, arm in enumerate(self._arms):
+                self._guarded("write_state", arm, self._records.look, m, state)
+            motions = self._world.engine.motions
+            motions.prepare()
+            self._records.write(motions.handle, motions.table)
 
     def take_problems(self) -> list[Diagnostic]:
         """What was found since the last call."""
@@ -114,7 +118,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         """Continue from `snapshot`."""
         for arm, state in zip(self._arms, snapshot, strict=True):
             arm.restore(state)
-        self._records = [ArmRecord(arm) for arm in self._arms]
+        self._records = ArmRecords(self._arms)
 
 
 def _words(error: Exception) -> str:

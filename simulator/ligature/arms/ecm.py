@@ -18,6 +18,7 @@ from ligature.robots.axes import Axes
 from ligature.robots.ecm import Ecm
 from ligature.robots.ecm_arm import EcmArm
 from ligature.robots.fitting import T_TIP_CAMERA, camera_arm_base
+from ligature.robots.plant import NO_AXES, Integers
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,10 @@ class CameraPlant:
     def read(self) -> Array:
         """Joint values, velocities and zero efforts (3, 4)."""
         return self._state
+
+    def source(self) -> tuple[Array, Integers]:
+        """The same."""
+        return self._state, NO_AXES
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Put the camera where the joint values have it."""

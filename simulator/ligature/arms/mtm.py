@@ -8,7 +8,7 @@ from ligature.adf import Diagnostic
 from ligature.model.scene import ArmDescription, Scene
 from ligature.physics import World
 from ligature.robots import mtm_arm
-from ligature.robots.arm import Arm
+from ligature.robots.arm import NO_WRENCH, Arm
 from ligature.robots.axes import Axes
 from ligature.robots.fitting import console_pose, master_side
 from ligature.robots.mtm import Mtm
@@ -29,5 +29,5 @@ def build_mtm(scene: Scene, world: World, description: ArmDescription, problems:
     gripper = Axes(("gripper",), ends, np.full(1, 20.0), np.full(1, 200.0), fingers)
     arm = MtmArm(description.name, kinematics, joints, gripper)
     arm.set_base_frame(console_pose(side), f"{scene.world.frame_prefix}HRSV")
-    arm.set_tip_wrench(lambda: np.zeros(6))
+    arm.set_tip_wrench(NO_WRENCH)
     return arm

@@ -17,6 +17,7 @@ from ligature.robots.arm import Arm
 from ligature.robots.axes import Axes
 from ligature.robots.fitting import psm_kinematics
 from ligature.robots.instruments import Instrument
+from ligature.robots.plant import Integers
 from ligature.robots.psm_arm import PsmArm
 
 Array = NDArray[np.float64]
@@ -65,6 +66,10 @@ class JawPlant:
         """Opening, its speed, and effort (3, 1)."""
         (q1, q2), (qd1, qd2), (tau1, tau2) = self._drive.read().tolist()
         return np.array([[q1 + q2], [qd1 + qd2], [0.5 * (tau1 + tau2)]])
+
+    def source(self) -> tuple[None, Integers]:
+        """Both fingers."""
+        return None, self._drive.source()[1][:, 0].reshape(1, 2)
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Open to ``position`` (1,); below zero the fingers press."""

@@ -21,9 +21,13 @@ class TipWrench:
     def __init__(self, world: World, description: ArmDescription, bodies: Sequence[int], arm: Arm) -> None:
         self._world, self._base, self._bodies, self._arm = world, description.base, tuple(bodies), arm
 
+    def feels(self) -> bool:
+        """Whether there may be any: a quick look."""
+        return self._world.wrenches.any(self._bodies)
+
     def __call__(self) -> Array:
         """Force (N) and moment (N m), (6,)."""
-        if not self._world.wrenches.any(self._bodies):
+        if not self.feels():
             return np.zeros(6)
         T_world_base = pose7_matrix(self._world.pose7(self._base))
         tip = T_world_base @ self._arm.kinematics.forward(self._arm.joints.measured()[0])

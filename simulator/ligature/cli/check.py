@@ -10,7 +10,9 @@ from rich.console import Console
 import ligature
 from ligature.adf import AdfError, Diagnostic, Document, Resolver, Severity, read_any
 from ligature.model import reach
-from ligature.physics import overlaps
+from ligature.model.scene import Scene
+from ligature.physics import overlaps, springs
+from ligature.physics.engine import Engine
 
 _STYLES = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "", Severity.DEBUG: "dim"}
 
@@ -55,7 +57,16 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
         return list(error.diagnostics)
-    return _distinct([*document.diagnostics, *scene.diagnostics, *reach.findings(scene), *overlaps.findings(scene)])
+    return _distinct([*document.diagnostics, *scene.diagnostics, *reach.findings(scene), *_at_start(scene)])
+
+
+def _at_start(scene: Scene) -> list[Diagnostic]:
+    """Findings of the bodies as they start in the physics."""
+    engine = Engine(scene, 1e-3)
+    try:
+        return [*overlaps.findings(engine), *springs.findings(engine)]
+    finally:
+        engine.close()
 
 
 def _has_bodies(document: Document) -> bool:

@@ -20,13 +20,13 @@ def info(file: Path, console: Console) -> int:
         with opened(file) as found:
             attributes, names = found.attrs, episode_names(found)
             closed = "" if attributes.get("closed", True) else "; 'ligature dataset join' makes one file of it"
-            say(f"{attributes['format']} of Ligature {attributes['version']}, scene {attributes['scene']}{closed}")
+            write(f"{attributes['format']} of Ligature {attributes['version']}, scene {attributes['scene']}{closed}")
             arms = ", ".join(found.get("arms", ()))
-            say(f"{len(names)} episodes at {attributes['rate']:g} samples a second, arms {arms}")
+            write(f"{len(names)} episodes at {attributes['rate']:g} samples a second, arms {arms}")
             for name in names:
-                say(f"{name}: {_episode(found[name], list(map(str, attributes['phases'])))}")
+                write(f"{name}: {_episode(found[name], list(map(str, attributes['phases'])))}")
 
-    say = _saying(console)
+    write = _printer(console)
     return _reported(report, console)
 
 
@@ -40,7 +40,7 @@ def _episode(episode: Any, phases: list[str]) -> str:
 
 def join_episodes(file: Path, console: Console) -> int:
     """Make one file of a dataset whose writer was killed."""
-    return _reported(lambda: _saying(console)(f"{file}: {join(file)} episodes in one file"), console)
+    return _reported(lambda: _printer(console)(f"{file}: {join(file)} episodes in one file"), console)
 
 
 def export(source: Path, target: Path, format: str, codec: str, license: str, console: Console) -> int:
@@ -50,17 +50,17 @@ def export(source: Path, target: Path, format: str, codec: str, license: str, co
         from ligature.datasets.lerobot import export as run_export
 
         begin = time.perf_counter()
-        run_export(source, target, format, codec, license, _saying(console))
+        run_export(source, target, format, codec, license, _printer(console))
         size = sum(path.stat().st_size for path in target.rglob("*") if path.is_file())
         seconds = time.perf_counter() - begin
-        _saying(console)(
+        _printer(console)(
             f"{target}: {format}, {size / 1e6:.1f} MB in {seconds:.1f} s ({source.stat().st_size / 1e6:.1f} MB before)"
         )
 
     return _reported(write, console)
 
 
-def _saying(console: Console) -> Callable[[str], None]:
+def _printer(console: Console) -> Callable[[str], None]:
     return lambda text: console.print(text, markup=False)
 
 

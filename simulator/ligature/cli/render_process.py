@@ -22,8 +22,9 @@ from ligature.render.calibration import calibrations
 from ligature.render.sensor import IDEAL
 from ligature.render.shutter import Shutter
 from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
-from ligature.ros.master import MasterWatch, NameTaken
+from ligature.ros.master import MasterWatch
 from ligature.ros.parameters import Follower
+from ligature.ros.registrations import NameTaken
 
 NAP = 0.05
 """Longest sleep in seconds between two looks at the stop signal and the physics process."""

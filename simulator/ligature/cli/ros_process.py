@@ -11,8 +11,8 @@ import sys
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.cli.process import Run, run_process
 from ligature.process import report
-from ligature.ros.master import NameTaken
 from ligature.ros.node import Node
+from ligature.ros.registrations import NameTaken
 
 MASTER_NAP = 0.02
 """Seconds between two questions to a master that does not answer yet."""

@@ -14,7 +14,7 @@ def main() -> None:
 
 
 def _judge(run: Run) -> None:
-    from ligature.ros.master import NameTaken
+    from ligature.ros.registrations import NameTaken
     from ligature.ros.tasks import TaskNode
     from ligature.tasks import MissingBodies
 

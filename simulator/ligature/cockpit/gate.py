@@ -83,7 +83,7 @@ class Gate:
         return found
 
     def complain(self) -> None:
-        """Count a connection that was too many, and say so now and then."""
+        """Count a connection that was too many, and report it now and then."""
         self.rejected += 1
         now = time.monotonic()
         if now - self._crowded > REPORT_PAUSE:

@@ -1,14 +1,14 @@
 """Gymnasium environments; importing it registers ``ligature/Reach-v0`` and the other tasks of `goals`."""
 
-from functools import partial
 from typing import Any
 
 import gymnasium
 
 from ligature.environments.goals import GOALS
 from ligature.environments.suturing import EnvState, SuturingEnv
+from ligature.environments.vector import SuturingVectorEnv
 
-__all__ = ["EnvState", "SuturingEnv", "make_vec", "registered"]
+__all__ = ["EnvState", "SuturingEnv", "SuturingVectorEnv", "make_vec", "registered"]
 
 MAX_STEPS = 200
 """Actions until an episode of a registered environment is cut; ``gymnasium.make`` has ``max_episode_steps``."""
@@ -35,10 +35,10 @@ for _task in GOALS:
     )
 
 
-def make_vec(task: str, n: int, **options: Any) -> gymnasium.vector.AsyncVectorEnv:
+def make_vec(task: str, n: int, *, autoreset: str = "next step", **options: Any) -> SuturingVectorEnv:
     """``n`` environments in as many processes, which write their observations into shared memory.
 
-    An episode that ended begins anew with the next step. Close it, or its processes stay.
+    When one of them ends or raises, all end, and RuntimeError names it. They end with the process that made them, too.
 
     Parameters
     ----------
@@ -46,7 +46,8 @@ def make_vec(task: str, n: int, **options: Any) -> gymnasium.vector.AsyncVectorE
         As for `SuturingEnv`.
     n
         Number of environments, at least 1; as many as the machine has cores is best.
+    autoreset
+        When an environment whose episode ended begins the next one: with the ``next step``, within the ``same step``
+        (``info`` has ``final_obs`` and ``final_info``), or ``off``: ``reset(options={"reset_mask": ...})`` does it.
     """
-    if n < 1:
-        raise ValueError(f"n is a number of environments, at least 1, not {n}")
-    return gymnasium.vector.AsyncVectorEnv([partial(SuturingEnv, task, **options)] * n, shared_memory=True)
+    return SuturingVectorEnv(task, n, autoreset, **options)

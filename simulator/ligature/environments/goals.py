@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.environments.reading import ArmReading
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7, pose7_matrix
 from ligature.robots.psm_arm import PsmArm
 from ligature.simulation import Simulation
@@ -80,7 +81,7 @@ class Goal:
     models
         Models of its launch file that the task needs: one arm, where all of them are simulated for nothing.
     thread
-        Whether the task needs the needle's thread.
+        Whether needle and thread take part; where not, the needle stays where it is, and there is no thread.
     arm
         Name of the arm that does it.
     text
@@ -98,8 +99,14 @@ class Goal:
     """Attributes that last from action to action."""
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """Bring the scene to where all episodes begin from; raises ValueError where that cannot be done."""
+        """Find out what the task needs of a scene at its start; raises ValueError where it cannot be done there."""
         raise NotImplementedError
+
+    def settle(self, simulation: Simulation, arm: PsmArm) -> None:
+        """Bring the scene to where all episodes begin from: the arm above the work, the needle at rest."""
+        arm.place_jp(START)
+        arm.adopt()
+        simulation.step(200)
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
         """Set an episode up."""
@@ -138,8 +145,7 @@ def holds(simulation: Simulation, arm: PsmArm, body: int) -> bool:
 
 def tip_position(simulation: Simulation, arm: PsmArm) -> Array:
     """The control point of an arm's tool (3,), world axes."""
-    base = pose7_matrix(simulation.state["body_pose"][0, _base_of(simulation, arm)])
-    return np.asarray((base @ pose7_matrix(arm.local_measured_cp()))[:3, 3])
+    return ArmReading(simulation, arm).tip_position()
 
 
 def _base_of(simulation: Simulation, arm: PsmArm) -> int:
@@ -153,13 +159,6 @@ def _holes_at(simulation: Simulation, *places: Array) -> set[int]:
     return {int(np.argmin(np.linalg.norm(at - place, axis=1))) for place in places} if len(at) else set()
 
 
-def _stand_ready(simulation: Simulation, arm: PsmArm) -> None:
-    """The arm above the work, the needle at rest."""
-    arm.place_jp(START)
-    arm.adopt()
-    simulation.step(200)
-
-
 class Reach(Goal):
     """Bring the tool's control point to within 2 mm of a random place above the work, and keep it there for 0.2 s."""
 
@@ -170,8 +169,7 @@ class Reach(Goal):
     _KEPT = ("_target", "_there", "_rested")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """The arm above the work."""
-        _stand_ready(simulation, arm)
+        """Nothing: the target follows from where the tool is."""
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
         """A target in a box around where the tool is."""
@@ -208,20 +206,18 @@ class Pick(Goal):
     _KEPT = ("_rest", "_at", "_held", "_high", "_up", "_lifted", "_free")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """The arm above the work."""
+        """Remember the bodies of the task."""
         self._scenery = scenery
-        _stand_ready(simulation, arm)
 
     def begin(self, simulation: Simulation, scenery: Scenery, arm: PsmArm, rng: np.random.Generator) -> None:
-        """The needle near its place, turned any way about the vertical."""
+        """The needle near its place, turned any way about the vertical, at rest as it came to rest there."""
         body = scenery.needle
-        T = simulation.scene.bodies[body].T_world_body
+        T = pose7_matrix(simulation.state["body_pose"][0, body])
         shift = np.append(rng.uniform(-self.SPREAD, self.SPREAD, 2), 0.0)
         turn = axis_rotation((0.0, 0.0, 1.0), float(rng.uniform(-np.pi, np.pi)))
         middle = T[:3, :3] @ scenery.points.mean(axis=0) + T[:3, 3]
         placed = frame(turn @ T[:3, :3], turn @ (T[:3, 3] - middle) + middle + shift)
         simulation.set_pose(body, matrix_pose7(placed))
-        simulation.step(100)
         points = scenery.needle_points(simulation.state["body_pose"][0])
         self._rest, self._at = float(points[:, 2].min()), points[1]
         self._held, self._high = False, False
@@ -269,10 +265,12 @@ class Insert(Goal):
     BEFORE, MORE, LOOK = 0.4, 0.1, 0.15
     SHIFT, TURN = 0.002, 0.08
     OPEN, SHUT = 0.8, -0.35
+    ARRIVAL = 30
+    """Ticks until the needle is within 0.04 mm of where the shifted hand holds it, at 1 mm/s."""
     _KEPT = ("_watch", "_grasped", "_held", "_kept", "_free", "_stage")
 
     def prepare(self, simulation: Simulation, scenery: Scenery, arm: PsmArm) -> None:
-        """The needle between the jaws, its tip before the entry."""
+        """Find how the needle is to be held, and where its tip shall go."""
         scene, self._simulation, self._scenery = simulation.scene, simulation, scenery
         self._body = scene.bodies[scenery.needle]
         self.arc = NeedleArc.of(scene.needles[0], self._body)
@@ -286,16 +284,17 @@ class Insert(Goal):
         grasp = best_grasp(self.arc, self.DEPTHS, arm.kinematics, T_base, way, way[0], entry)
         if grasp is None:
             raise ValueError(f"{arm.name} cannot hold the needle so that it reaches the whole throw")
-        self._take(simulation, arm, way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc))
+        self._first = way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc)
 
     def _ends(self) -> tuple[Array, Array]:
         """Where the tip goes in and out, (3,) each."""
         poses = self._simulation.state["body_pose"][0]
         return poses[self._scenery.entries[0], :3], poses[self._scenery.exits[0], :3]
 
-    def _take(self, simulation: Simulation, arm: PsmArm, T_world_arc: Array, T_base_tool: Array) -> None:
-        """Close the jaws on the needle, put where it is wanted."""
+    def settle(self, simulation: Simulation, arm: PsmArm) -> None:
+        """Close the jaws on the needle, its tip before the entry."""
         assert arm.jaw is not None
+        T_world_arc, T_base_tool = self._first
         arm.place_jp(arm.kinematics.inverse(T_base_tool[None]).q[0])
         arm.adopt()
         arm.jaw.servo_jp([self.OPEN])
@@ -316,7 +315,7 @@ class Insert(Goal):
         turn = rng.uniform(-1.0, 1.0, 3)
         R = axis_rotation(turn / np.linalg.norm(turn), float(rng.uniform(0.0, self.TURN)))
         arm.servo_cp(frame(R @ T[:3, :3], T[:3, 3] + rng.uniform(-self.SHIFT, self.SHIFT, 3)))
-        simulation.step(150)
+        simulation.step(self.ARRIVAL)
         self._watch = PassageWatch(scenery)
         self._grasped, self._held, self._kept, self._free, self._stage = Dwell(), True, 0.0, Dwell(), 0.0
 

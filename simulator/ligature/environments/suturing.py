@@ -5,11 +5,14 @@ Metres, radians, world axes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import gymnasium
 import numpy as np
@@ -18,7 +21,8 @@ from numpy.typing import NDArray
 
 from ligature.bundle import SCENES
 from ligature.camera_simulation import Simulation
-from ligature.environments.goals import GOALS, Goal, Progress, tip_position
+from ligature.environments.goals import GOALS, Goal, Progress
+from ligature.environments.reading import ArmReading
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.load import load
 from ligature.model.scene import Scene
@@ -41,6 +45,8 @@ SUCCESS_REWARD = 1.0
 
 AHEAD_LENGTH, AHEAD_ANGLE, AHEAD_JOINTS = 0.005, 0.25, 5.0 * STEP_JOINTS
 """How far a set-point may be ahead of what is measured: an arm that something stops does not wind up."""
+
+NEAR_COSINE = math.cos(AHEAD_ANGLE)
 
 STATE = 52
 """Numbers of a state observation."""
@@ -109,7 +115,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         ``reach``, ``pick``, ``insert`` or ``puncture`` (`ligature.environments.goals`).
     scene
         A launch file with a PSM and a needle, holes for ``insert`` and soft tissue for ``puncture``; by default what
-        the task needs of a scene of ours, without the other arms, and for ``reach`` without the thread.
+        the task needs of a scene of ours, without the other arms, and for ``reach`` without the thread and with the
+        needle fixed.
     arm
         Name of the arm; by default the one that does the task. Another one brings the whole scene.
     action, observation, reward
@@ -146,7 +153,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
         self._goal: Goal = GOALS[task]()
         arm = arm or self._goal.arm
-        self._simulation = Simulation(_scene(self._goal, arm) if scene is None else load(scene))
+        self._simulation = Simulation(_scene(task, arm) if scene is None else load(scene))
         found = self._simulation.arms[arm]
         if not isinstance(found, PsmArm):
             raise ValueError(f"'{arm}' is not a PSM")
@@ -160,11 +167,26 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         state = spaces.Box(-np.inf, np.inf, (STATE,), np.float64)
         both = spaces.Dict({"image": image, "state": state})
         self.observation_space: spaces.Space[Any] = {"image": image, "state": state, "both": both}[observation]
+        self._reading = ArmReading(self._simulation, found)
+        self._needle_pose, self._needle_twist = (
+            self._simulation.state[name][0, self._scenery.needle] for name in ("body_pose", "body_twist")
+        )
         self._ticks = round(CONTROL / self._simulation.dt)
         self._goal.prepare(self._simulation, self._scenery, self._arm)
-        self._settled = self._simulation.snapshot()
+        self._settled = self._start()
         self._count, self._closed = 0, False
         self._progress: Progress | None = None
+
+    def _start(self) -> Snapshot:
+        """Where all episodes begin from: it follows from scene, task and arm, and is simulated once in a process."""
+        known = _STARTS.setdefault(self._simulation.scene, {})
+        which = type(self._goal), self._arm.name
+        if which in known:
+            self._simulation.restore(known[which])
+        else:
+            self._goal.settle(self._simulation, self._arm)
+            known[which] = self._simulation.snapshot()
+        return known[which]
 
     @property
     def goal(self) -> Goal:
@@ -189,19 +211,17 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     @property
     def base_rotation(self) -> Array:
         """Rotation (3, 3) of the arm's base in the world: actions are along the base's axes, targets in the world's."""
-        base = next(arm.base for arm in self._simulation.scene.arms if arm.name == self._arm.name)
-        return pose7_matrix(self._simulation.state["body_pose"][0, base])[:3, :3]
+        return pose7_matrix(self._reading.base)[:3, :3]
 
     @property
     def base_position(self) -> Array:
         """Where the arm's base is (3,), world axes."""
-        base = next(arm.base for arm in self._simulation.scene.arms if arm.name == self._arm.name)
-        return np.array(self._simulation.state["body_pose"][0, base, :3])
+        return np.array(self._reading.base[:3])
 
     @property
     def setpoint(self) -> Array:
         """Pose (7,) of the tip in the arm's base that is asked for; Cartesian actions are added to it."""
-        return self._arm.local_setpoint_cp()
+        return np.array(self._reading.setpoint)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; ``seed`` begins another series of random starts.
@@ -223,7 +243,9 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         """Act for 20 ms."""
         if self._progress is None:
             raise RuntimeError("step comes after reset: no episode has begun")
-        wanted = np.clip(np.nan_to_num(np.asarray(action, dtype=float)), -1.0, 1.0)
+        wanted = np.array(action, dtype=float)
+        wanted[np.isnan(wanted)] = 0.0
+        wanted = np.minimum(np.maximum(wanted, -1.0), 1.0)
         rejected, bounded = self._act(wanted)
         self._simulation.step(self._ticks)
         self._count += 1
@@ -242,16 +264,21 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             if self._action == "joint":
                 bounded = self._act_on_joints(action[:6] * STEP_JOINTS)
             else:
-                T, bounded = _bounded(pose7_matrix(arm.local_measured_cp()), _stepped(arm, action))
+                T, bounded = self._aim(action)
                 arm.servo_cp(T)
             if arm.jaw is not None:
-                arm.jaw.servo_jp(arm.jaw.setpoint_js().position + STEP_JAW * action[6])
+                arm.jaw.servo_jp(self._reading.jaw_setpoint[:1] + STEP_JAW * action[6])
         except Rejected as rejection:
             return str(rejection), bounded
         return "", bounded
 
+    def _aim(self, action: Array) -> tuple[Array, bool]:
+        """The set-point (4, 4) moved by an action, near the tip, and whether it was held back for that."""
+        forward, reading = self._arm.kinematics.forward, self._reading
+        return _bounded(forward(reading.joints), _stepped(forward(reading.joint_setpoints), action))
+
     def _act_on_joints(self, step: Array) -> bool:
-        measured, wanted = self._arm.measured_js().position, self._arm.setpoint_js().position + step
+        measured, wanted = self._reading.joints, self._reading.joint_setpoints + step
         near = np.clip(wanted, measured - AHEAD_JOINTS, measured + AHEAD_JOINTS)
         self._arm.servo_jp(near)
         return bool((near != wanted).any())
@@ -302,15 +329,12 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def _numbers(self) -> Array:
         """The state, as the table of the class has it."""
-        state, arm, none = self._simulation.state, self._arm, np.zeros(1)
-        now, jaw = arm.measured_js(), None if arm.jaw is None else arm.jaw.measured_js()
-        needle = self._scenery.needle
         assert self._progress is not None
+        arm = self._reading
         return np.concatenate([
-            now.position, none if jaw is None else jaw.position, arm.local_measured_cp(), state["body_pose"][0, needle],
-            state["body_twist"][0, needle], tip_position(self._simulation, arm), self._goal.target(),
-            [self._progress.left], now.velocity, none if jaw is None else jaw.velocity, arm.local_setpoint_cp(),
-            none if arm.jaw is None else arm.jaw.setpoint_js().position, self._goal.marks(),
+            arm.joints, arm.jaw[:1], arm.tip, self._needle_pose, self._needle_twist, arm.tip_position(),
+            self._goal.target(), (self._progress.left,), arm.joint_velocities, arm.jaw[1:2], arm.setpoint,
+            arm.jaw_setpoint[:1], self._goal.marks(),
         ])  # fmt: skip
 
     def _info(self) -> dict[str, Any]:
@@ -340,22 +364,31 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             self._simulation.close()
 
 
-def _scene(goal: Goal, arm: str) -> Scene:
+_STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], str], Snapshot]] = WeakKeyDictionary()
+"""Starts that were simulated, by scene, task and arm; the processes of a vector have them from the one that forks."""
+
+
+@cache
+def _scene(task: str, arm: str) -> Scene:
     """What a task needs of its scene; all of it when another arm than the task's own is asked for."""
+    goal = GOALS[task]
     path = SCENES / goal.scene / "launch.yaml"
     if arm != goal.arm:
         return load(path)
     scene = load(path, goal.models)
-    arms = tuple(found for found in scene.arms if found.name == arm)
-    return replace(scene, arms=arms, rods=scene.rods if goal.thread else ())
+    scene = replace(scene, arms=tuple(found for found in scene.arms if found.name == arm))
+    if goal.thread:
+        return scene
+    fixed = {needle.body for needle in scene.needles}
+    bodies = tuple(replace(body, mass=0.0) if body.index in fixed else body for body in scene.bodies)
+    return replace(scene, bodies=bodies, rods=())
 
 
-def _stepped(arm: PsmArm, action: Array) -> Array:
-    """The set-point (4, 4) moved by an action."""
-    T = pose7_matrix(arm.local_setpoint_cp())
+def _stepped(T: Array, action: Array) -> Array:
+    """The set-point ``T`` (4, 4) moved by an action, in place."""
     T[:3, 3] += STEP_LENGTH * action[:3]
     turn = STEP_ANGLE * action[3:6]
-    angle = float(np.linalg.norm(turn))
+    angle = _length(turn)
     if angle > 0.0:
         T[:3, :3] = T[:3, :3] @ axis_rotation(turn / angle, angle)
     return T
@@ -364,16 +397,23 @@ def _stepped(arm: PsmArm, action: Array) -> Array:
 def _bounded(T_measured: Array, T: Array) -> tuple[Array, bool]:
     """A set-point (4, 4) no farther from what is measured than `AHEAD_LENGTH` and `AHEAD_ANGLE`, and whether it was."""
     ahead = T[:3, 3] - T_measured[:3, 3]
-    turn = rotation_vector(T_measured[:3, :3].T @ T[:3, :3])
-    length, angle = float(np.linalg.norm(ahead)), float(np.linalg.norm(turn))
-    if length <= AHEAD_LENGTH and angle <= AHEAD_ANGLE:
+    length = _length(ahead)
+    near = 0.5 * (float((T_measured[:3, :3] * T[:3, :3]).sum()) - 1.0) >= NEAR_COSINE
+    if length <= AHEAD_LENGTH and near:
         return T, False
     found = T.copy()
     if length > AHEAD_LENGTH:
         found[:3, 3] = T_measured[:3, 3] + ahead * (AHEAD_LENGTH / length)
-    if angle > AHEAD_ANGLE:
-        found[:3, :3] = T_measured[:3, :3] @ axis_rotation(turn / angle, AHEAD_ANGLE)
+    if not near:
+        turn = rotation_vector(T_measured[:3, :3].T @ T[:3, :3])
+        found[:3, :3] = T_measured[:3, :3] @ axis_rotation(turn / _length(turn), AHEAD_ANGLE)
     return found, True
+
+
+def _length(vector: Array) -> float:
+    """Length of a vector (3,)."""
+    x, y, z = vector.tolist()
+    return math.sqrt(x * x + y * y + z * z)
 
 
 def _made(options: Mapping[str, Any], state: EnvState | None) -> SuturingEnv:

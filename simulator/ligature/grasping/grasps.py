@@ -21,7 +21,7 @@ from ligature.grasping.grasp import Patch, warm_up
 from ligature.grasping.impulses import BodyGrasp, ImpulseExchange, begin
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.scene import Jaw, Scene
-from ligature.model.state import StateRecord
+from ligature.model.state import FieldViews, StateRecord
 from ligature.model.subsystem import Subsystem, kept, put_back
 from ligature.physics import World
 from ligature.suture import Rods
@@ -106,6 +106,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._disabled: list[list[int]] = [[] for _ in scene.jaws]
         self._near = [False for _ in scene.jaws]
         self._impulses = ImpulseExchange(world)
+        self._fields, self._written_empty = FieldViews(), False
         if scene.jaws:
             warm_up()
 
@@ -323,6 +324,11 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
 
     def write_state(self, state: StateRecord) -> None:
         """Write the body in every jaw to a state record."""
+        self._fields.of(state)
+        empty = not any(self._jaw_grasps) and not any(self._thread_grasps)
+        if empty and self._written_empty and not self._fields.fresh:
+            return
+        self._written_empty = empty
         for index in range(len(self)):
             held = self._held(index)
             state["jaw_body"][0, index] = -1 if held is None else held.body
@@ -347,6 +353,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
         put_back(self, {name: snapshot[name] for name in _KEPT})
+        self._written_empty = False
         for fingers, state in zip(self._fingers, snapshot["fingers"], strict=True):
             fingers.restore(state)
         self._actuator_grasps.restore(snapshot["actuator_grasps"])

@@ -182,12 +182,9 @@ def _limits(element: Element, kind: JointType) -> tuple[float | None, float | No
 
 
 def _scalar(element: Element, path: str) -> float | None:
-    """A number where the schema also allows a block."""
-    raw = element.raw_value(path)
-    try:
-        return None if raw is None else float(raw)
-    except (TypeError, ValueError):
-        return None
+    """A number where the schema also allows a block; None for a block, and for a number that cannot be used."""
+    value = element.value(path)
+    return None if isinstance(value, dict) else value
 
 
 def _six_dof(element: Element, kind: JointType) -> SixDof | None:

@@ -7,6 +7,8 @@ angular in world axes, the linear part at the centre of mass. SI units.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -167,3 +169,27 @@ def new_state(scene: Scene) -> StateRecord:
     state["actuator_body"] = -1
     state["jaw_body"] = -1
     return state
+
+
+class FieldViews:
+    """Views of the fields ``names`` of a state record: looking one up takes longer than writing it.
+
+    Attributes
+    ----------
+    fresh
+        Whether the record of the last call was another one than that of the call before.
+    """
+
+    def __init__(self, *names: str) -> None:
+        self._names = names
+        self._state: StateRecord | None = None
+        self._views: list[NDArray[Any]] = []
+        self.fresh = True
+
+    def of(self, state: StateRecord) -> list[NDArray[Any]]:
+        """The fields of ``state``, without its leading axis; numbers alone are (1,)."""
+        self.fresh = state is not self._state
+        if self.fresh:
+            self._state = state
+            self._views = [state[name][0] if state[name].ndim > 1 else state[name] for name in self._names]
+        return self._views

@@ -21,7 +21,7 @@ from ligature.model.frames import inverse, matrix_quaternion
 from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Articulation, Body, Closure, JointType, Scene
 from ligature.physics import shapes
-from ligature.physics.response import moved_inertia
+from ligature.physics.response import moved_inertias
 
 Array = NDArray[np.float64]
 
@@ -215,21 +215,18 @@ def _append(
     parent = link_of[chain.inner]
     inertia = _inertia_on(outer, chain.axes, dt)
 
-    def moved(axis: Axis) -> float:
-        if inner.static or outer.static or not axis.sprung:
-            return _effective(outer, inertia, axis, chain.T_outer)
+    moved = [_effective(outer, inertia, axis, chain.T_outer) for axis in chain.axes]
+    if any(axis.sprung for axis in chain.axes):
         frames = (chain.T_inner, chain.T_outer)
-        return moved_inertia(
-            (inner.mass, outer.mass), (inertia_of(inner), inertia), frames, chain.axes, chain.axes.index(axis)
-        )
-
-    for axis in chain.axes[:-1]:
+        least = moved_inertias((inner.mass, outer.mass), (inertia_of(inner), inertia), frames, chain.axes)
+        moved = [float(m) if axis.sprung else e for axis, e, m in zip(chain.axes, moved, least, strict=True)]
+    for axis, mass in zip(chain.axes[:-1], moved, strict=False):
         plan.masses.append(LIGHT * max(outer.mass, 1e-6))
         plan.inertias.append(np.full(3, LIGHT * max(float(inertia.max()), LEAST_INERTIA)))
         plan.shapes.append(shapes.NO_SHAPE)
         plan.add(parent, _joint_type(axis), axis.direction, T_parent_link, np.eye(4))
         parent = len(plan.masses) - 1
-        axes.append((parent, chain.joint, axis, moved(axis)))
+        axes.append((parent, chain.joint, axis, mass))
         T_parent_link = np.eye(4)
     plan.masses.append(outer.mass)
     plan.inertias.append(inertia)
@@ -240,7 +237,7 @@ def _append(
     plan.add(parent, type_, direction, T_parent_link, inverse(chain.T_outer))
     link = len(plan.masses) - 1
     if last is not None:
-        axes.append((link, chain.joint, last, moved(last)))
+        axes.append((link, chain.joint, last, moved[-1]))
     return link
 
 

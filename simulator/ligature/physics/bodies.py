@@ -51,7 +51,6 @@ class Placement:
     def _refresh(self) -> None:
         if self.link < 0:
             self.motions.base(self.tree)
-            self.motions.pace(self.tree)
         else:
             self.motions.links(self.tree)
 
@@ -74,7 +73,7 @@ class Placement:
 
     def slow_down(self, linear: float, angular: float) -> None:
         """Multiply the velocity of a base without links by two factors."""
-        self.motions.pace(self.tree)
+        self.motions.base(self.tree)
         twist = self.motions.twist[self.row]
         before = twist.tolist()
         if before != REST:

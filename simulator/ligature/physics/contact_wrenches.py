@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from ligature.physics.contacts import Contacts
 from ligature.physics.engine import Engine
 from ligature.physics.impulses import Impulses
 from ligature.physics.welds import Welds
@@ -25,6 +25,7 @@ class ContactWrenches:
     def __init__(self, engine: Engine, welds: Welds, impulses: Impulses) -> None:
         self._engine, self._welds, self._impulses = engine, welds, impulses
         self._owned: dict[tuple[int, ...], frozenset[tuple[int, int]]] = {}
+        self._contacts = Contacts(engine)
 
     def any(self, bodies: Sequence[int]) -> bool:
         """Whether `on` may find anything: a quick look."""
@@ -32,16 +33,12 @@ class ContactWrenches:
             return True
         if any(weld.parent in bodies or weld.child in bodies for weld in self._welds):
             return True
-        own = self._own(bodies)
-        return any(
-            (found[1], found[3]) in own and (found[2], found[4]) not in own
-            for uid in {uid for uid, _ in own}
-            for found in pybullet.getContactPoints(bodyA=uid, physicsClientId=self._engine.client)
-        )
+        return self._contacts.touch(tuple(bodies), self._own(bodies))
 
     def rebuild(self) -> None:
         """Forget where bodies were in an engine that was rebuilt."""
         self._owned = {}
+        self._contacts = Contacts(self._engine)
 
     def _own(self, bodies: Sequence[int]) -> frozenset[tuple[int, int]]:
         """Multibody and link of each of ``bodies``."""

@@ -1,222 +1,97 @@
-"""Joint controllers of one tree: PID, velocity and effort commands, and springs, once a tick.
+"""Joint controllers of one tree: which commands its axes follow, and how. Radians, metres, N·m, N.
 
-Positions are radians or metres, efforts N·m or N. The PID follows ADF specification §15.6 with its
-derivative taken implicitly: with velocity output ``v = P e + I ∫e + D ė`` and ``ė = ṫ − v`` the
-joint's velocity is ``v = (P e + I ∫e + D ṫ) / (1 + D)``. Evaluated explicitly, as the reference
-does, a D near 1 chatters at the rate of the loop; the implicit form is the same law without it.
-
-With force output the effort is ``P e + I ∫e + D (ṫ − v)``. It goes to a motor of that strength, whose velocity is the
-one at which the effort vanishes: Bullet's solver finds the effort along with all contacts and loops, so that it is
-the law's where the joint is heavy enough for it to act in full over a tick, and less where it would overshoot.
+The laws themselves are in `ligature.physics.axes`.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from ligature.kernels import compiled
 from ligature.model.commands import CommandType
 from ligature.model.scene import Joint, JointType, OutputType
-from ligature.model.subsystem import kept, put_back
 from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
+from ligature.physics.axes import FORCE, FREE, POSITION, SERVO, VELOCITY, Axes
 from ligature.physics.motions import Motions
-from ligature.tables import opener, table_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-GIVING_FRICTION = 0.005
-"""Effort (N·m or N) that a motor which gives always has, so that it arrives at its set-point."""
-
 KICK_SECONDS = 0.01
 """Time over which the derivative answers a jump of the target: two updates of a usual AMBF session."""
-
-FREE, FORCE, POSITION, VELOCITY = (
-    -1,
-    int(CommandType.FORCE),
-    int(CommandType.POSITION),
-    int(CommandType.VELOCITY),
-)
-SERVO = 3
-"""Mode of a joint that an arm of a robot drives: it follows a set-point and its velocity."""
-
-FREE_SPEED = 1e3
-"""Speed in rad/s or m/s that an effort alone would reach, were it not bounded otherwise."""
-
-STOP_GAIN = 0.2
-"""Share of its way back that a stopped joint goes in a tick."""
-
-SERVO_GAIN = 200.0
-"""Closing speed over following error in 1/s: the set-point is reached with a time constant of 5 ms."""
 
 MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
 
 
-class Axes(NamedTuple):
-    """The single axes of one tree for compiled code, all arrays (n,)."""
-
-    mode: Integers
-    force_output: Flags
-    turns: Flags
-    sprung: Flags
-    p: Array
-    i: Array
-    d: Array
-    stiffness: Array
-    damping: Array
-    rest: Array
-    target: Array
-    pace: Array  # of the target
-    max_velocity: Array
-    max_deceleration: Array
-    position: Array
-    velocity: Array
-    integral: Array
-    kick: Array
-    kick_ticks: Integers
-    motor: Array  # velocities of motors
-    asked: Array  # what a motor with force output exerts at most
-    effort: Array  # what acts beside motors
-
-
-def _no_axes() -> Axes:
-    z, whole, flag = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.bool_)
-    return Axes(
-        mode=whole, force_output=flag, turns=flag, sprung=flag, p=z, i=z, d=z, stiffness=z, damping=z, rest=z,
-        target=z, pace=z, max_velocity=z, max_deceleration=z, position=z, velocity=z, integral=z, kick=z,
-        kick_ticks=whole, motor=z, asked=z, effort=z,
-    )  # fmt: skip
-
-
-open_axes = opener(_no_axes())
-
-
-@compiled
-def outputs(table: Integers, dt: float) -> None:
-    """Motor velocities and efforts of one tick for the axes of a table of `Axes`.
-
-    What it keeps, and the last three arrays change.
-    """
-    axes = open_axes(table)
-    for k in range(axes.mode.shape[0]):
-        axes.motor[k] = axes.asked[k] = axes.effort[k] = 0.0
-        if axes.mode[k] == POSITION:
-            error = axes.target[k] - axes.position[k]
-            if axes.turns[k]:
-                error = (error + np.pi) % (2 * np.pi) - np.pi
-            axes.integral[k] += error * dt
-            pull = axes.p[k] * error + axes.i[k] * axes.integral[k]
-            jump = 0.0
-            if axes.kick_ticks[k] > 0:
-                jump = axes.kick[k]
-                axes.kick_ticks[k] -= 1
-            if axes.force_output[k]:
-                axes.asked[k] = pull + axes.d[k] * (jump - axes.velocity[k])
-                axes.motor[k] = jump + _vanishing(pull, axes.d[k], STOP_GAIN / dt * abs(error))
-            else:
-                axes.motor[k] = (pull + axes.d[k] * jump) / (1.0 + axes.d[k])
-        elif axes.mode[k] == SERVO:
-            error = axes.target[k] - axes.position[k]
-            closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * axes.max_deceleration[k] * abs(error)))
-            axes.motor[k] = min(
-                max(axes.pace[k] + np.copysign(closing, error), -axes.max_velocity[k]), axes.max_velocity[k]
-            )
-        elif axes.mode[k] == VELOCITY:
-            axes.motor[k] = axes.target[k]
-        elif axes.mode[k] == FORCE:
-            axes.effort[k] = axes.target[k]
-        if axes.sprung[k]:
-            axes.effort[k] += axes.stiffness[k] * (axes.rest[k] - axes.position[k]) - axes.damping[k] * axes.velocity[k]
-
-
-@compiled
-def _vanishing(pull: float, damping: float, most: float) -> float:
-    """Velocity at which a damper takes up ``pull``, at most ``most``."""
-    if abs(pull) > damping * most:
-        return np.copysign(most, pull)
-    return pull / damping if damping > 0.0 else 0.0
-
-
 class TreeControl:
-    """State of all single axes of one tree, as arrays in the order of ``tree.axes``."""
+    """The single axes of one tree, in the order of ``tree.axes``.
+
+    Parameters
+    ----------
+    everything
+        The axes of all trees; this object works on its own rows of them.
+    index
+        Of the tree.
+
+    Attributes
+    ----------
+    axes
+        The rows of this tree.
+    first_axis
+        Number of the first of them among those of all trees.
+    """
 
     def __init__(
-        self, client: int, tree: Tree, joints: tuple[Joint, ...], dt: float, motions: Motions, index: int
-    ) -> None:
+        self, client: int, tree: Tree, joints: tuple[Joint, ...], dt: float, motions: Motions, everything: Axes,
+        index: int,
+    ) -> None:  # fmt: skip
         self._client, self.tree, self._dt = client, tree, dt
         self._motions, self._index = motions, index
         self._anchor = tree.root if tree.static else -1
         owners = [joints[joint] for _, joint, _, _ in tree.axes]
         self.links = [link for link, *_ in tree.axes]
         self.row = {joint: i for i, (_, joint, _, _) in enumerate(tree.axes)}
-        n = len(self.links)
-        self._p = np.array([j.controller.p for j in owners])
-        self._i = np.array([j.controller.i for j in owners])
-        self._d = np.array([j.controller.d for j in owners])
-        self._strength = np.array([1000.0 * j.max_motor_impulse for j in owners])
-        self._force_output = np.array([j.output is OutputType.FORCE for j in owners], dtype=bool)
-        self._low = np.array([-np.inf if a.low is None else a.low for _, _, a, _ in tree.axes])
-        self._high = np.array([np.inf if a.high is None else a.high for _, _, a, _ in tree.axes])
-        self._turns = np.array(
-            [j.type is JointType.REVOLUTE and a.low is None for j, (_, _, a, _) in zip(owners, tree.axes, strict=True)],
-            dtype=bool,
-        )
-        self._spring_setup(owners)
-        self.mode = np.full(n, FREE)
-        self.target = np.zeros(n)
-        self._pace = np.zeros(n)
-        self._max_velocity = np.full(n, np.inf)
-        self._max_deceleration = np.full(n, np.inf)
-        self._yield_stiffness = np.zeros(n)
-        self.owned = np.zeros(n, dtype=bool)
-        self._integral = np.zeros(n)
-        self._kick = np.zeros(n)
-        self._kick_ticks = np.zeros(n, dtype=np.int64)
-        self._motor, self._asked, self._effort = np.zeros(n), np.zeros(n), motions.push[motions.slices[index]]
-        self._laden = False
-        self._driven: list[int] = []
-        self._stops: dict[int, float] = {}
-        self._slowed: dict[int, tuple[float, float, float]] = {}
+        self._laden = everything.laden[index : index + 1]
         rows = motions.slices[index]
-        self.position, self.velocity = motions.position[rows], motions.velocity[rows]
-        self._table = table_of(
-            Axes(
-                self.mode, self._force_output, self._turns, self._sprung, self._p, self._i, self._d, self._stiffness,
-                self._damping, self._rest, self.target, self._pace, self._max_velocity, self._max_deceleration,
-                self.position, self.velocity, self._integral, self._kick, self._kick_ticks, self._motor, self._asked,
-                self._effort,
-            )
-        )  # fmt: skip
+        self.first_axis = rows.start
+        own = self.axes = Axes._make([self._laden, *(array[rows] for array in everything[1:])])
+        own.p[:] = [j.controller.p for j in owners]
+        own.i[:] = [j.controller.i for j in owners]
+        own.d[:] = [j.controller.d for j in owners]
+        own.strength[:] = [1000.0 * j.max_motor_impulse for j in owners]
+        own.force_output[:] = [j.output is OutputType.FORCE for j in owners]
+        own.low[:] = [-np.inf if a.low is None else a.low for _, _, a, _ in tree.axes]
+        own.high[:] = [np.inf if a.high is None else a.high for _, _, a, _ in tree.axes]
+        own.turns[:] = [
+            j.type is JointType.REVOLUTE and a.low is None for j, (_, _, a, _) in zip(owners, tree.axes, strict=True)
+        ]
+        self._spring_setup(owners)
+        self.mode, self.target, self.owned = own.mode, own.target, own.owned
+        self._position = motions.position[rows]
         self._sort()
 
     def _spring_setup(self, owners: list[Joint]) -> None:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
-        axes = [axis for _, _, axis, _ in self.tree.axes]
+        axes, own = [axis for _, _, axis, _ in self.tree.axes], self.axes
         moved = np.array([m for *_, m in self.tree.axes])
         crowd = self._crowding(owners)
-        self._stiffness = np.minimum([a.stiffness for a in axes], moved / (STIFFEST * self._dt**2))
-        self._damping = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / (crowd * self._dt))
-        self._rest = np.array([a.rest for a in axes])
-        self._sprung = np.array([a.sprung for a in axes], dtype=bool)
+        own.stiffness[:] = np.minimum([a.stiffness for a in axes], moved / (STIFFEST * self._dt**2))
+        own.damping[:] = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / (crowd * self._dt))
+        own.rest[:] = [a.rest for a in axes]
+        own.sprung[:] = [a.sprung for a in axes]
 
     def _crowding(self, owners: list[Joint]) -> Array:
         """Number (n,) of sprung joints that share a body with that of each axis: their dampers act together."""
         sprung = {j.index: j for j, (_, _, axis, _) in zip(owners, self.tree.axes, strict=True) if axis.sprung}
         at = Counter(body for j in sprung.values() for body in {j.parent, j.child} - {self._anchor})
         return np.array([max(1, at[j.parent], at[j.child]) for j in owners], dtype=float)
-
-    @property
-    def active(self) -> bool:
-        """Whether anything has to be done each tick."""
-        return bool(self._driven or self._pushed)
 
     @property
     def commanded(self) -> bool:
@@ -245,21 +120,21 @@ class TreeControl:
 
     def _aim(self, row: int, value: float) -> None:
         """Take a position command for one axis."""
-        value = min(max(value, self._low[row]), self._high[row])
+        value = min(max(value, self.axes.low[row]), self.axes.high[row])
         if self.mode[row] != POSITION:
             self._motions.joints(self._index)
-            self._integral[row] = 0.0
+            self.axes.integral[row] = 0.0
             # the reference's first derivative of a force is zero, that of a velocity the whole way
-            previous = value if self._force_output[row] else self.position[row]
+            previous = value if self.axes.force_output[row] else self._position[row]
         else:
             previous = self.target[row]
         self._switch(row, POSITION, value)
         jump = self._way(row, value - previous)
         if jump != 0.0:
             ticks = max(1, round(KICK_SECONDS / self._dt))
-            left = self._kick[row] * self._kick_ticks[row]
-            self._kick[row] = (left + jump / self._dt) / ticks
-            self._kick_ticks[row] = ticks
+            left = self.axes.kick[row] * self.axes.kick_ticks[row]
+            self.axes.kick[row] = (left + jump / self._dt) / ticks
+            self.axes.kick_ticks[row] = ticks
 
     def servo(
         self,
@@ -278,13 +153,10 @@ class TreeControl:
         """
         self.owned[rows] = True
         self.target[rows] = position
-        self._pace[rows] = velocity
+        self.axes.pace[rows] = velocity
         if (self.mode[rows] != SERVO).any():
-            self._max_velocity[rows], self._max_deceleration[rows], self._yield_stiffness[rows] = (
-                max_velocity,
-                max_deceleration,
-                yield_stiffness,
-            )
+            self.axes.max_velocity[rows], self.axes.max_deceleration[rows] = max_velocity, max_deceleration
+            self.axes.yield_stiffness[rows] = yield_stiffness
             self._enter(rows, SERVO)
 
     def push(self, rows: Integers, effort: Array) -> None:
@@ -302,8 +174,8 @@ class TreeControl:
 
     def _enter(self, rows: Integers, mode: int) -> None:
         self.mode[rows] = mode
-        self._kick[rows] = 0.0
-        self._kick_ticks[rows] = 0
+        self.axes.kick[rows] = 0.0
+        self.axes.kick_ticks[rows] = 0
         self._sort()
 
     def release(self, joint: int) -> None:
@@ -313,28 +185,37 @@ class TreeControl:
 
     def stop(self, joint: int, position: float, effort: float) -> None:
         """Keep one joint at ``position``, whatever it is commanded to do, until `let`; it reports ``effort``."""
-        row = self.row[joint]
-        fresh = row not in self._stops
-        self._stops[row] = position
-        self._motions.sent[self._motions.slices[self._index].start + row] = effort
-        self._slowed.pop(row, None)
+        row, own = self.row[joint], self.axes
+        fresh = not own.stopped[row]
+        own.stopped[row], own.stop[row] = True, position
+        own.slowed[row] = False
+        self._motions.send(self.first_axis + row, effort)
         if fresh:
             self._sort()
 
     def slow(self, joint: int, low: float, high: float, strength: float) -> None:
         """Keep the velocity of one motor between ``low`` and ``high``, its effort below ``strength``, until `let`."""
-        row = self.row[joint]
-        fresh = row not in self._slowed
-        self._slowed[row] = low, high, strength
+        row, own = self.row[joint], self.axes
+        fresh = not own.slowed[row]
+        own.slowed[row] = True
+        own.lower_speed[row], own.upper_speed[row], own.upper_effort[row] = low, high, strength
         if fresh:
             self._sort()
 
     def let(self, joint: int) -> None:
         """End `stop` and `slow`."""
-        row = self.row[joint]
-        self._motions.sent.pop(self._motions.slices[self._index].start + row, None)
-        if (self._slowed.pop(row, None) or self._stops.pop(row, None)) is not None:
+        row, own = self.row[joint], self.axes
+        self._motions.send(self.first_axis + row, None)
+        if own.slowed[row] or own.stopped[row]:
+            self._clear_bounds(row)
             self._sort()
+
+    def _clear_bounds(self, rows: int | slice) -> None:
+        """Let nothing stop or slow axes; what bounded them is forgotten, too."""
+        own = self.axes
+        own.stopped[rows], own.slowed[rows] = False, False
+        for array in (own.stop, own.lower_speed, own.upper_speed, own.upper_effort):
+            array[rows] = 0.0
 
     def pull(self, joint: int, stiffness: float) -> float:
         """Effort that the command of one joint asks for, were the joint stopped where it is.
@@ -343,15 +224,15 @@ class TreeControl:
         unless it has a yield stiffness; one with a velocity pulls with all its strength.
         """
         row = self.row[joint]
-        mode, behind = self.mode[row], self._way(row, self.target[row] - self.position[row])
+        mode, behind = self.mode[row], self._way(row, self.target[row] - self._position[row])
         if mode == FORCE:
             return float(self.target[row])
         if mode == VELOCITY:
-            return float(np.sign(self.target[row]) * self._strength[row])
+            return float(np.sign(self.target[row]) * self.axes.strength[row])
         if mode == SERVO:
-            return float((self._yield_stiffness[row] or stiffness) * behind)
+            return float((self.axes.yield_stiffness[row] or stiffness) * behind)
         if mode == POSITION:
-            return float(self._asked[row] if self._force_output[row] else stiffness * behind)
+            return float(self.axes.asked[row] if self.axes.force_output[row] else stiffness * behind)
         return 0.0
 
     def _switch(self, row: int, mode: int, target: float) -> None:
@@ -359,14 +240,14 @@ class TreeControl:
         self.mode[row] = mode
         self.target[row] = target
         if mode != POSITION:
-            self._kick[row] = 0.0
-            self._kick_ticks[row] = 0
+            self.axes.kick[row] = 0.0
+            self.axes.kick_ticks[row] = 0
         if mode != before:
             self._sort()
 
     def _way(self, row: int, error: float) -> float:
         """``error``, the shorter way round for a joint that turns without limits."""
-        return float((error + np.pi) % (2 * np.pi) - np.pi) if self._turns[row] else float(error)
+        return float((error + np.pi) % (2 * np.pi) - np.pi) if self.axes.turns[row] else float(error)
 
     def read(self, rows: Integers) -> Array:
         """Positions, velocities and motor efforts (3, k) of the axes ``rows`` (k,) now."""
@@ -380,115 +261,76 @@ class TreeControl:
 
     def carry(self) -> None:
         """From now on the joints bear `Motions.force` of their tree's links, too."""
-        self._laden = True
+        self._laden[0] = True
         self._sort()
 
-    def apply(self) -> None:
-        """Set motors and torques of this tick."""
-        self._motions.joints(self._index)
-        outputs(self._table, self._dt)
-        if self._laden:
-            self._motions.apply_gravity(self._index)
-        for row, (low, high, _) in self._slowed.items():
-            wanted = np.sign(self.target[row]) * FREE_SPEED if self.mode[row] == FORCE else self._motor[row]
-            self._motor[row] = min(max(wanted, low), high)
-        for row, position in self._stops.items():
-            self._motor[row] = STOP_GAIN / self._dt * (position - self.position[row])
-        if self._driven:
+    def send(self) -> None:
+        """Have PyBullet take motors and efforts of this tick, where compiled code cannot."""
+        own, uid, motors, efforts = self.axes, self.tree.uid, *map(np.flatnonzero, (self.axes.driven, self.axes.pushed))
+        links = np.array(self.links)
+        if len(motors):
             pybullet.setJointMotorControlArray(
-                self.tree.uid,
-                self._driven_links,
-                pybullet.VELOCITY_CONTROL,
-                targetVelocities=self._motor[self._driven].tolist(),
-                forces=self._strengths(),
-                physicsClientId=self._client,
-            )
-        if self._pushed:
+                uid, links[motors].tolist(), pybullet.VELOCITY_CONTROL, targetVelocities=own.motor[motors].tolist(),
+                forces=own.limit[motors].tolist(), physicsClientId=self._client,
+            )  # fmt: skip
+        if len(efforts):
+            push = self._motions.push[self._motions.slices[self._index]]
             pybullet.setJointMotorControlArray(
-                self.tree.uid,
-                self._pushed_links,
-                pybullet.TORQUE_CONTROL,
-                forces=self._effort[self._pushed].tolist(),
+                uid, links[efforts].tolist(), pybullet.TORQUE_CONTROL, forces=push[efforts].tolist(),
                 physicsClientId=self._client,
-            )
-
-    def _strengths(self) -> list[float]:
-        """Largest effort of each driven motor; one that yields pulls in proportion to its following error."""
-        if not (self._varies or self._slowed):
-            return self._driven_strength
-        rows = self._driven
-        spring = self._yield_stiffness[rows] * np.abs(self.target[rows] - self.position[rows])
-        strength = self._strength[rows]
-        yielding = np.minimum(spring + GIVING_FRICTION, strength)
-        limits = np.where(self._yield_stiffness[rows] > 0.0, yielding, strength)
-        limits = np.where(self._by_force(rows), np.abs(self._asked[rows]), limits)
-        for i, row in enumerate(rows):
-            if row in self._slowed:
-                low, high, most = self._slowed[row]
-                effort = abs(self.target[row]) if self.mode[row] == FORCE else limits[i]
-                limits[i] = min(effort, most) if low <= self.velocity[row] <= high else strength[i]
-            elif row in self._stops:
-                limits[i] = strength[i]
-        efforts: list[float] = limits.tolist()
-        return efforts
-
-    def _by_force(self, rows: Sequence[int]) -> Flags:
-        """Whether the axes ``rows`` (k,) follow a position by an effort."""
-        return np.asarray((self.mode[rows] == POSITION) & self._force_output[rows], dtype=bool)
+            )  # fmt: skip
 
     def _sort(self) -> None:
         """Sort the axes into those that a motor drives and those that an effort pushes; stop idle motors."""
-        by_motor = (self.mode == VELOCITY) | (self.mode == SERVO) | (self.mode == POSITION)
-        by_effort = self._laden | self._sprung | (self.mode == FORCE)
+        own = self.axes
+        by_motor = (own.mode == VELOCITY) | (own.mode == SERVO) | (own.mode == POSITION)
+        by_effort = self._laden | own.sprung | (own.mode == FORCE)
         # An effort whose speed is bounded is a motor of that strength.
-        stopped = [*self._stops, *(row for row in self._slowed if self.mode[row] == FORCE)]
-        by_motor[stopped], by_effort[stopped] = True, False
-        idle = [self.links[row] for row in self._driven if not by_motor[row]]
+        stopped = own.stopped | (own.slowed & (own.mode == FORCE))
+        by_motor, by_effort = by_motor | stopped, by_effort & ~stopped
+        idle = [self.links[row] for row in np.flatnonzero(own.driven & ~by_motor)]
         if idle:
             pybullet.setJointMotorControlArray(
                 self.tree.uid, idle, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(idle), physicsClientId=self._client
             )
-        if self.links:
-            self._motions.drive(self._index, np.flatnonzero(by_motor).tolist())
-        self._driven, self._pushed = np.flatnonzero(by_motor).tolist(), np.flatnonzero(by_effort).tolist()
-        self._driven_links = [self.links[row] for row in self._driven]
-        self._driven_strength = self._strength[self._driven].tolist()
-        self._pushed_links = [self.links[row] for row in self._pushed]
-        self._varies = bool((self._yield_stiffness[self._driven] > 0.0).any() or self._by_force(self._driven).any())
+        own.driven[:], own.pushed[:] = by_motor, by_effort
+        self._motions.drive(self._index, by_motor)
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
-        return kept(self, _KEPT)
+        return {name: getattr(self.axes, name) for name in _KEPT}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
-        put_back(self, snapshot)
+        for name, values in snapshot.items():
+            getattr(self.axes, name)[:] = values
         self._sort()
 
     def held(self) -> dict[str, Any]:
         """The commands now, for `follow`."""
-        return {name: getattr(self, name).copy() for name in ("mode", *_COMMANDED)}
+        return {name: getattr(self.axes, name).copy() for name in ("mode", *_COMMANDED)}
 
     def follow(self, held: dict[str, Any]) -> None:
         """Begin anew with commands that `held` gave, as if they came now."""
-        self.mode[:] = FREE
-        for array in (self._integral, self._kick, self._kick_ticks, self._asked):
+        own = self.axes
+        own.mode[:] = FREE
+        for array in (own.integral, own.kick, own.kick_ticks, own.asked):
             array[:] = 0
-        self._stops, self._slowed = {}, {}
+        self._clear_bounds(slice(None))
         for name in _COMMANDED:
-            getattr(self, name)[:] = held[name]
+            getattr(own, name)[:] = held[name]
         aimed = held["mode"] == POSITION
-        self.mode[~aimed] = held["mode"][~aimed]
+        own.mode[~aimed] = held["mode"][~aimed]
         for row in np.flatnonzero(aimed).tolist():
             self._aim(row, float(held["target"][row]))
         self._sort()
 
 
-_COMMANDED = ("target", "_pace", "_max_velocity", "_max_deceleration", "_yield_stiffness", "owned")
-"""Attributes of a `TreeControl`, beside the modes, that commands set."""
+_COMMANDED = ("target", "pace", "max_velocity", "max_deceleration", "yield_stiffness", "owned")
+"""Arrays of `Axes`, beside the modes, that commands set."""
 
 _KEPT = (
-    "mode", "target", "_integral", "_kick", "_kick_ticks", "_pace", "_max_velocity", "_max_deceleration",
-    "_yield_stiffness", "owned", "_stops", "_slowed", "_asked",
+    "mode", "target", "integral", "kick", "kick_ticks", "pace", "max_velocity", "max_deceleration", "yield_stiffness",
+    "owned", "stopped", "stop", "slowed", "lower_speed", "upper_speed", "upper_effort", "asked",
 )  # fmt: skip
-"""Attributes of a `TreeControl` that last from tick to tick."""
+"""Arrays of `Axes` that last from tick to tick."""

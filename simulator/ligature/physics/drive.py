@@ -46,6 +46,11 @@ class Drive:
         """Positions, velocities and motor efforts now, (3, n)."""
         return self._control.read(self._rows)
 
+    def source(self) -> tuple[None, NDArray[np.int64]]:
+        """The axes (n, 2) of the joints among all of the world, alone each: the second is -1."""
+        axes = self._rows + self._control.first_axis
+        return None, np.column_stack([axes, np.full(len(axes), -1)])
+
     def servo(self, position: Array, velocity: Array) -> None:
         """Follow set-points that move with ``velocity``."""
         self._control.servo(

@@ -18,8 +18,11 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
+from ligature.physics.bullet import connect
 from ligature.physics.closures import CLOSING
 from ligature.physics.motions import Motions
+from ligature.physics.trees import Places
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 
@@ -31,6 +34,13 @@ LOOP_ITERATIONS = 200
 
 MOVES, STANDS = (1, -1), (2, -3)
 """Bullet's collision group and mask of what moves, and of what stands and meets only what moves: its own defaults."""
+
+MOST_PAIRED = 128
+"""Bodies up to which Bullet compares all pairs of boxes in a tick, which costs nothing up to a hundred.
+
+Its trees of boxes, for more, balance themselves by addresses in memory and by counters that nothing resets: the order
+of pairs, and with it that of contacts in the solver, goes on from whatever moved before.
+"""
 
 NEAR = 0.002
 """Gap in metres up to which Bullet prepares contacts; its 20 mm takes half of the time of a needle on a phantom."""
@@ -49,8 +59,9 @@ def common_gravity(scene: Scene) -> Array:
 class Engine:
     """The trees of ``scene`` in a Bullet client.
 
-    Bullet's contacts and the order of its broad phase cannot be read or set, so whatever begins anew does so in another
-    client, by `rebuild`; whoever keeps one of these attributes over that has those of the client that is gone.
+    Bullet's contacts cannot be read or set, so whatever begins anew begins without: `forget_contacts` where that is
+    all that is remembered, else `rebuild`; whoever keeps one of these attributes over a rebuild has those of the
+    client that is gone.
 
     Attributes
     ----------
@@ -60,24 +71,29 @@ class Engine:
         The scene's articulations in Bullet, in order.
     motions
         Poses, twists, joints of all trees.
-    place_of
-        Where each body outside rods is.
+    place_of, places, place_table
+        Where each body outside rods is; the same as arrays, and their addresses for compiled code.
     body_at
         The body at Bullet's multibody and link.
     gravity
         Bullet's gravity (3,).
+    forgets
+        Whether `forget_contacts` leaves nothing of what was before.
     """
 
     def __init__(self, scene: Scene, dt: float) -> None:
         self.scene, self.dt = scene, dt
         self.cache = CollisionCache()
         self.gravity = common_gravity(scene)
+        self.forgets = sum(len(articulation.links) for articulation in scene.articulations) <= MOST_PAIRED
         self._build()
 
     def _build(self) -> None:
         scene = self.scene
-        self.client = pybullet.connect(pybullet.DIRECT)
+        self.client, handle = connect()
         self._end = weakref.finalize(self, pybullet.disconnect, self.client)
+        if self.forgets:
+            pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=self.client)
         iterations = LOOP_ITERATIONS if scene.closures else SOLVER_ITERATIONS
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self.dt, numSubSteps=0, numSolverIterations=iterations, erp=CLOSING,
@@ -85,12 +101,17 @@ class Engine:
         )  # fmt: skip
         pybullet.setGravity(*self.gravity.tolist(), physicsClientId=self.client)
         self.trees = [build(self.client, self.cache, scene, a, dt=self.dt) for a in scene.articulations]
-        self.motions = Motions(self.client, self.trees)
+        self.motions = Motions(self.client, handle, self.trees)
         self.place_of = {
             body: Placement(self.client, tree, scene.bodies[body], self.motions, k)
             for k, tree in enumerate(self.trees)
             for body in tree.link_of
         }
+        self.places = Places(*np.full((4, len(scene.bodies)), -1))
+        for body, place in self.place_of.items():
+            for array, value in zip(self.places, (place.tree, place.row, place.uid, place.link), strict=True):
+                array[body] = value
+        self.place_table = table_of(self.places)
         self.body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
         self._colliders = [collider for tree in self.trees for collider in _colliders(tree)]
         self.start = self.snapshot()
@@ -104,8 +125,8 @@ class Engine:
     def forget_contacts(self) -> None:
         """Take all shapes out of Bullet's world and put them back in their first order, where they are now.
 
-        Their contacts, pairs and boxes go, with what solvers know from the last tick. In a client that has stepped,
-        the broad phase remembers more; see `rebuild`.
+        Their contacts, pairs and boxes go, with what solvers know from the last tick. Where Bullet compares all pairs,
+        each shape gets its place and number back, and what follows is a function of poses, velocities and commands.
         """
         for uid, link, group, mask in self._colliders:
             pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)
@@ -127,7 +148,8 @@ class Engine:
             links = [link for link, *_ in tree.axes]
             states = pybullet.getJointStates(tree.uid, links, physicsClientId=self.client) if links else []
             trees.append((pose, velocity, [(s[0], s[1]) for s in states]))
-        return {"trees": trees, "sent": dict(self.motions.sent)}
+        arrays = self.motions.trees
+        return {"trees": trees, "sent": (arrays.sent.copy(), arrays.sent_effort.copy())}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Set the motion of all trees; `forget_contacts` is to follow. Bullet's own saved states are not exact."""
@@ -136,8 +158,7 @@ class Engine:
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
-        self.motions.sent.clear()
-        self.motions.sent.update(snapshot["sent"])
+        self.motions.trees.sent[:], self.motions.trees.sent_effort[:] = snapshot["sent"]
         self.motions.forget_all()
 
     def close(self) -> None:

@@ -8,42 +8,40 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
-from ligature.physics.bodies import Placement
 from ligature.physics.control import TreeControl
 from ligature.physics.engine import Engine
+from ligature.physics.trees import push_bodies
 
 Array = NDArray[np.float64]
 
 
-class Lift:
-    """Forces on the bodies of one tree whose gravity is not the common one, at their centres of mass."""
+class Lifts:
+    """Forces on bodies whose gravity is not the common one, at their centres of mass."""
 
-    def __init__(self, client: int, places: Sequence[Placement], forces: Sequence[Array]) -> None:
-        self._client, self._uid = client, places[0].uid
-        self._rows = [place.row for place in places]
-        self._pushes = [(place.link, force.tolist()) for place, force in zip(places, forces, strict=True)]
-        self._motions, self._tree = places[0].motions, places[0].tree
-        self._read = self._motions.base if all(place.link < 0 for place in places) else self._motions.links
+    def __init__(self, engine: Engine, bodies: Sequence[int], forces: Sequence[Array]) -> None:
+        self._engine = engine
+        self._bodies, self._forces = np.array(bodies, dtype=np.int64), np.array(forces).reshape(-1, 3)
 
-    def push(self) -> None:
+    def step(self) -> None:
         """Apply the forces for one tick."""
-        self._read(self._tree)
-        centres = self._motions.pose[self._rows].tolist()
-        for (link, force), at in zip(self._pushes, centres, strict=True):
-            pybullet.applyExternalForce(
-                self._uid, link, force, at[:3], pybullet.WORLD_FRAME, physicsClientId=self._client
-            )
+        engine = self._engine
+        motions = engine.motions
+        if motions.handle:
+            push_bodies(motions.handle, motions.table, engine.place_table, self._bodies, self._forces)
+            return
+        for body, force in zip(self._bodies.tolist(), self._forces, strict=True):
+            engine.place_of[body].push(force)
 
 
-def gravity_lifts(engine: Engine, controls: Sequence[TreeControl]) -> list[Lift]:
+def gravity_lifts(engine: Engine, controls: Sequence[TreeControl]) -> Lifts:
     """What has to be pushed every tick so that every body feels its own gravity.
 
     Where nobody measures the joints' reactions, the joints carry it: efforts of a whole tree are set in one call.
     """
-    lifts = []
+    bodies: list[int] = []
+    lifts: list[Array] = []
     for k, tree in enumerate(engine.trees):
         places = [engine.place_of[body] for body in tree.link_of]
         forces = [place.body.mass * (place.body.gravity - engine.gravity) for place in places]
@@ -54,5 +52,6 @@ def gravity_lifts(engine: Engine, controls: Sequence[TreeControl]) -> list[Lift]
                 engine.motions.force[places[i].row] = forces[i]
             controls[k].carry()
         elif pushed:
-            lifts.append(Lift(engine.client, [places[i] for i in pushed], [forces[i] for i in pushed]))
-    return lifts
+            bodies += [places[i].body.index for i in pushed]
+            lifts += [forces[i] for i in pushed]
+    return Lifts(engine, bodies, lifts)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ligature.model.subsystem import kept, put_back
 from ligature.physics.body_commands import BodyCommands
 from ligature.physics.engine import Engine
+from ligature.physics.trees import load_body
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,14 @@ class Impulses:
         total, given = self._total.get(body), np.concatenate([impulse, moment])
         self._total[body] = given if total is None else total + given
         if self._commands.pushable(body):
-            self._engine.place_of[body].load((given / self._engine.dt).tolist())
+            self._load(body, given / self._engine.dt)
+
+    def _load(self, body: int, wrench: Array) -> None:
+        engine, motions = self._engine, self._engine.motions
+        if motions.handle:
+            load_body(motions.handle, motions.table, engine.place_table, body, wrench)
+        else:
+            engine.place_of[body].load(wrench.tolist())
 
     def pending(self, body: int) -> Array:
         """Impulse and moment (6,) that act in the coming tick so far."""

@@ -9,8 +9,10 @@ import numpy as np
 
 from ligature.model.commands import CommandType
 from ligature.model.scene import Body
-from ligature.physics.control import FREE, TreeControl
+from ligature.physics.axes import FREE, act, axes
+from ligature.physics.control import TreeControl
 from ligature.physics.engine import Engine
+from ligature.tables import table_of
 
 
 class Joints:
@@ -29,12 +31,24 @@ class Joints:
     def rebuild(self) -> None:
         """Begin anew in an engine that was rebuilt: all joints are limp."""
         engine = self._engine
+        self._axes = axes(len(engine.trees), len(engine.motions.position))
+        self._table = table_of(self._axes)
         self.controls = [
-            TreeControl(engine.client, tree, engine.scene.joints, engine.dt, engine.motions, k)
+            TreeControl(engine.client, tree, engine.scene.joints, engine.dt, engine.motions, self._axes, k)
             for k, tree in enumerate(engine.trees)
         ]
         self._control_of = {joint: control for control in self.controls for joint in control.row}
         self.jointed = [control for control in self.controls if control.links]
+
+    def act(self) -> None:
+        """Set motors and efforts of all joints for the coming tick."""
+        motions = self._engine.motions
+        if not motions.handle:
+            motions.everything()
+        act(motions.handle, motions.table, self._table, self._engine.dt)
+        if not motions.handle:
+            for control in self.jointed:
+                control.send()
 
     def held(self) -> list[dict[str, Any]]:
         """The commands of all joints now, for `follow`."""
@@ -71,10 +85,10 @@ class Joints:
             if joint in self._control_of:
                 self._control_of[joint].release(joint)
 
-    def let_go(self, root: int) -> None:
-        """Let all joints of the tree with a root body go limp, those that an arm owns, too."""
-        for control in self.controls:
-            if control.tree.root == root:
+    def let_go(self, root: int | None = None) -> None:
+        """Let all joints of the tree with a root body go limp, or of all trees, those that arms own, too."""
+        for control in self.jointed:
+            if root in (None, control.tree.root):
                 control.let_go(np.arange(len(control.links)))
 
     def commanded(self, bodies: set[int]) -> bool:

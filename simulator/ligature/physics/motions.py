@@ -1,192 +1,73 @@
-"""Where the bodies of a world are and how they move, read from Bullet as rarely as possible.
+"""Where the bodies of a world are and how they move, read from Bullet after each tick.
 
-Bases and joints are read when somebody asks, at most once a tick; the links follow from both by
-forward kinematics, which costs a tenth of asking Bullet. Poses are x y z qx qy qz qw of inertial
-frames I in world axes, twists linear at the centre of mass, then angular; joints in radians or metres.
+Bases and joints are read; the links follow from both by forward kinematics, when somebody asks, which costs a tenth of
+asking Bullet. Poses are x y z qx qy qz qw of inertial frames I in world axes, twists linear at the centre of mass, then
+angular; joints in radians or metres.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from ligature.kernels import compiled
-from ligature.model.poses import compose
+from ligature.physics import trees as kernels
 from ligature.physics.articulation import Tree
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-_TURNS, _SLIDES = int(pybullet.JOINT_REVOLUTE), int(pybullet.JOINT_PRISMATIC)
-
-
-@compiled
-def _follow(
-    begin: int, end: int, rows: Integers, fixed: Array, joints: Array, frame: Array, speed: Array, pose: Array,
-    twist: Array,
-) -> None:  # fmt: skip
-    """Poses and twists of the links in rows ``begin`` … ``end`` of one tree; row ``begin`` is its base.
-
-    ``rows`` (r, 3) are parent row, joint type and index of the joint; ``fixed`` (r, 17) the axis, the link
-    frame in its parent's at zero, and the inertial frame in the link frame; ``frame`` (r, 7) and ``speed`` (r, 6)
-    receive pose and velocity of the link frames' origins.
-    """
-    frame[begin], speed[begin] = pose[begin], twist[begin]
-    for r in range(begin + 1, end):
-        p, kind, joint = rows[r, 0], rows[r, 1], rows[r, 2]
-        f, v = frame[r], speed[r]
-        compose(frame[p], fixed[r, 3:10], f)
-        ax, ay, az = _turned(f, fixed[r, 0], fixed[r, 1], fixed[r, 2])
-        q, qd = 0.0, 0.0
-        if joint >= 0:
-            q, qd = joints[0, joint], joints[1, joint]
-        if kind == _SLIDES:
-            f[0], f[1], f[2] = f[0] + q * ax, f[1] + q * ay, f[2] + q * az
-        _carried(speed[p], f[0] - frame[p, 0], f[1] - frame[p, 1], f[2] - frame[p, 2], v)
-        if kind == _SLIDES:
-            v[0], v[1], v[2] = v[0] + qd * ax, v[1] + qd * ay, v[2] + qd * az
-        elif kind == _TURNS:
-            v[3], v[4], v[5] = v[3] + qd * ax, v[4] + qd * ay, v[5] + qd * az
-            s, c = math.sin(0.5 * q), math.cos(0.5 * q)
-            x, y, z, w = f[3], f[4], f[5], f[6]
-            ax, ay, az = s * ax, s * ay, s * az
-            f[3] = c * x + w * ax + ay * z - az * y
-            f[4] = c * y + w * ay + az * x - ax * z
-            f[5] = c * z + w * az + ax * y - ay * x
-            f[6] = c * w - ax * x - ay * y - az * z
-        compose(f, fixed[r, 10:17], pose[r])
-        _carried(v, pose[r, 0] - f[0], pose[r, 1] - f[1], pose[r, 2] - f[2], twist[r])
-
-
-@compiled
-def _turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float, float]:
-    """The vector p, given in the frame ``pose``, in world axes."""
-    x, y, z, w = pose[3], pose[4], pose[5], pose[6]
-    cx, cy, cz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
-    return px + 2.0 * (y * cz - z * cy), py + 2.0 * (z * cx - x * cz), pz + 2.0 * (x * cy - y * cx)
-
-
-@compiled
-def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
-    """The velocity ``twist`` (6,) at a point that lies r off."""
-    wx, wy, wz = twist[3], twist[4], twist[5]
-    out[0] = twist[0] + wy * rz - wz * ry
-    out[1] = twist[1] + wz * rx - wx * rz
-    out[2] = twist[2] + wx * ry - wy * rx
-    out[3], out[4], out[5] = wx, wy, wz
-
-
-@compiled
-def _apply_gravity(
-    begin: int, end: int, rows: Integers, fixed: Array, frame: Array, pose: Array, force: Array, load: Array,
-    effort: Array,
-) -> None:  # fmt: skip
-    """Add to ``effort`` what forces (r, 3) at the centres of mass of one tree's links do to its joints.
-
-    The rows are those of `_follow`; ``load`` (r, 6) is scratch: force, and moment about the world's origin.
-    """
-    for r in range(begin, end):
-        x, y, z = force[r, 0], force[r, 1], force[r, 2]
-        cx, cy, cz = pose[r, 0], pose[r, 1], pose[r, 2]
-        load[r, 0], load[r, 1], load[r, 2] = x, y, z
-        load[r, 3], load[r, 4], load[r, 5] = cy * z - cz * y, cz * x - cx * z, cx * y - cy * x
-    for r in range(end - 1, begin, -1):
-        p, kind, joint = rows[r, 0], rows[r, 1], rows[r, 2]
-        if joint >= 0:
-            f, at = frame[r], load[r]
-            ax, ay, az = _turned(f, fixed[r, 0], fixed[r, 1], fixed[r, 2])
-            if kind == _SLIDES:
-                effort[joint] += ax * at[0] + ay * at[1] + az * at[2]
-            else:
-                mx = at[3] - (f[1] * at[2] - f[2] * at[1])
-                my = at[4] - (f[2] * at[0] - f[0] * at[2])
-                mz = at[5] - (f[0] * at[1] - f[1] * at[0])
-                effort[joint] += ax * mx + ay * my + az * mz
-        for a in range(6):
-            load[p, a] += load[r, a]
-
-
-@compiled
-def _below(twist: Array, rows: Integers, velocity: Array, limit: float) -> bool:
-    """Whether ``rows`` of ``twist`` (r, 6) and all of ``velocity`` (a,) are finite and below ``limit``."""
-    sound = True
-    for row in rows:
-        for a in range(6):
-            sound = sound and abs(twist[row, a]) < limit
-    for a in range(velocity.shape[0]):
-        sound = sound and abs(velocity[a]) < limit
-    return sound
 
 
 class Motions:
     """Motion of everything in one Bullet world.
 
-    Every tree has one row for its base and one for each link, in order; call `base`, `pace`,
-    `joints` or `links` with the index of a tree before its rows are used.
+    Every tree has one row for its base and one for each link, in order; call `base`, `joints` or `links` with the
+    index of a tree before its rows are used.
 
     Attributes
     ----------
+    trees, table
+        All arrays, and their addresses for compiled code.
     pose, twist
         (r, 7) and (r, 6) of all rows.
     position, velocity, effort
         (a,) of all single axes of all trees.
-    reported
-        Efforts of axes, by index, for which Bullet's motor is not the drive: what is reported instead.
     push
         (a,) efforts that the controllers apply in the coming tick.
     force
         (r, 3) forces at the centres of mass, for `apply_gravity`.
-    reaction
-        (a, 6) force and moment that the joints of these axes carry, where Bullet measures them.
     """
 
-    def __init__(self, client: int, trees: Sequence[Tree]) -> None:
-        self._client = client
-        counts = [1 + len(tree.frames) for tree in trees]
-        self._begin = np.cumsum([0, *counts]).tolist()
-        self._bases_at = np.array(self._begin[:-1], dtype=np.int64)
-        axes = np.cumsum([0, *(len(tree.axes) for tree in trees)]).tolist()
-        self.slices = [slice(a, b) for a, b in zip(axes[:-1], axes[1:], strict=True)]
-        self._links = [[link for link, *_ in tree.axes] for tree in trees]
-        n = self._begin[-1]
-        self._rows = np.full((n, 3), -1, dtype=np.int64)
-        self._fixed = np.zeros((n, 17))
+    def __init__(self, client: int, handle: int, trees: Sequence[Tree]) -> None:
+        self._client, self.handle = client, handle
+        rows = np.cumsum([0, *(1 + len(tree.frames) for tree in trees)])
+        axes = np.cumsum([0, *(len(tree.axes) for tree in trees)])
+        arrays = self.trees = kernels.trees(len(trees), int(rows[-1]), int(axes[-1]))
+        arrays.uid[:] = [tree.uid for tree in trees]
+        arrays.begin[:], arrays.first[:] = rows, axes
+        arrays.going[:], arrays.turning[:] = [not tree.static for tree in trees], [bool(tree.axes) for tree in trees]
+        arrays.link[:] = [link for tree in trees for link, *_ in tree.axes]
+        self._begin = rows.tolist()
+        self.slices = [slice(a, b) for a, b in zip(axes[:-1].tolist(), axes[1:].tolist(), strict=True)]
         for k, tree in enumerate(trees):
             self._lay_out(k, tree)
-        self.pose, self.twist = np.zeros((n, 7)), np.zeros((n, 6))
-        self.force, self._load = np.zeros((n, 3)), np.zeros((n, 6))
-        self._frame, self._speed = np.zeros((n, 7)), np.zeros((n, 6))
-        self._joints = np.zeros((3, axes[-1]))
-        self.position, self.velocity, self.effort = self._joints
-        self.sent: dict[int, float] = {}
-        self.reaction = np.zeros((axes[-1], 6))
-        self.push = np.zeros(axes[-1])
+        self.table = table_of(arrays)
+        self.pose, self.twist, self.force, self.push = arrays.pose, arrays.twist, arrays.force, arrays.push
+        self.position, self.velocity, self.effort = arrays.joints
+        self._links = [[link for link, *_ in tree.axes] for tree in trees]
         self._uids = [tree.uid for tree in trees]
-        self._still = {k for k, tree in enumerate(trees) if tree.static}
-        self._rigid = {k for k, tree in enumerate(trees) if not tree.axes}
-        self._bare = {k for k, tree in enumerate(trees) if not tree.frames}
-        self._going = [k for k in range(len(trees)) if k not in self._still]
-        self._turning = [k for k in range(len(trees)) if k not in self._rigid]
-        self._bases: set[int] = set()
-        self._paces: set[int] = set()
-        self._jointed: set[int] = set()
-        self._linked: set[int] = set()
-        self._measured = [False] * len(trees)
-        self._limp: list[Integers] = [np.arange(rows.start, rows.stop) for rows in self.slices]
-        self._begun = False
 
     def _lay_out(self, tree_index: int, tree: Tree) -> None:
         """Fill the rows of one tree's links."""
         begin = self._begin[tree_index]
-        joint_of = {link: self.slices[tree_index].start + i for i, link in enumerate(self._links[tree_index])}
+        first = self.slices[tree_index].start
+        joint_of = {link: first + i for i, (link, *_) in enumerate(tree.axes)}
         for link, frame in enumerate(tree.frames):
             row = begin + 1 + link
-            self._rows[row] = begin + frame.parent, frame.type, joint_of.get(link, -1)
-            self._fixed[row] = np.concatenate([frame.axis, frame.parent_link, frame.link_inertial])
+            self.trees.rows[row] = begin + frame.parent, frame.type, joint_of.get(link, -1)
+            self.trees.fixed[row] = np.concatenate([frame.axis, frame.parent_link, frame.link_inertial])
 
     def row(self, tree: int, link: int) -> int:
         """Row of a link; -1 is the base."""
@@ -195,104 +76,105 @@ class Motions:
     def apply_gravity(self, tree: int) -> None:
         """Add what `force` does to the joints of a tree to `push`."""
         self.links(tree)
-        _apply_gravity(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._frame,
-            self.pose, self.force,
-               self._load, self.push)  # fmt: skip
+        kernels.load_one(self.table, tree)
 
-    def drive(self, tree: int, axes: Sequence[int]) -> None:
-        """From now on motors drive ``axes`` of a tree, and no others: Bullet keeps the last effort of a motor."""
-        rows = self.slices[tree]
-        self._limp[tree] = np.setdiff1d(np.arange(rows.start, rows.stop), rows.start + np.array(axes, dtype=np.int64))
+    def drive(self, tree: int, driven: NDArray[np.bool_]) -> None:
+        """From now on motors drive the axes of a tree that are ``driven``: Bullet keeps the last effort of a motor."""
+        self.trees.limp[self.slices[tree]] = ~driven
+
+    def send(self, axis: int, effort: float | None) -> None:
+        """From now on an axis of the world reports another effort than its motor's; None ends that."""
+        self.trees.sent[axis], self.trees.sent_effort[axis] = effort is not None, effort or 0.0
 
     def measure(self, tree: int) -> None:
-        """Fill `reaction` for the axes of a tree from now on."""
-        self._measured[tree] = True
+        """Fill `Trees.reaction` for the axes of a tree from now on."""
+        self.trees.measured[tree] = True
+
+    # --- the tick ---------------------------------------------------------------------------
+
+    def step(self, limit: float) -> bool:
+        """Advance Bullet by a tick; whether the velocities of all bases and joints are finite and below ``limit``."""
+        if self.handle:
+            return bool(kernels.step_world(self.handle, self.table, limit))
+        pybullet.stepSimulation(physicsClientId=self._client)
+        kernels.expire(self.table)
+        self.read_all()
+        return bool(kernels.sound(self.table, limit))
 
     def begin(self) -> None:
         """No tick is over yet, so that no motor has an effort and no joint a reaction: Bullet has those of before."""
-        self._begun = True
+        self.trees.ticks[0] = 0
         self.forget_all()
-
-    def expire(self) -> None:
-        """The world moved on: read again when asked."""
-        self._begun = False
-        self._bases &= self._still
-        self._paces &= self._still
-        self._jointed &= self._rigid
-        self._linked &= self._still & self._rigid
 
     def forget(self, tree: int) -> None:
         """A tree was put elsewhere."""
-        for known in (self._bases, self._paces, self._jointed, self._linked):
-            known.discard(tree)
-        if tree in self._still:
-            self._read_still(tree)
-
-    def _read_still(self, tree: int) -> None:
-        """Read a base that stays, now: Bullet turns it by a last bit in every tick."""
-        self.base(tree)
-        self.pace(tree)
+        self.trees.read[tree] = self.trees.linked[tree] = False
+        if not self.trees.going[tree]:
+            self._read_base(tree)
 
     def forget_all(self) -> None:
         """Everything was put elsewhere."""
-        for known in (self._bases, self._paces, self._jointed, self._linked):
-            known.clear()
-        for tree in sorted(self._still):
-            self._read_still(tree)
+        for tree in range(len(self._uids)):
+            self.forget(tree)
+
+    # --- reading ----------------------------------------------------------------------------
 
     def base(self, tree: int) -> None:
-        """Bring the pose of the base up to date."""
-        if tree not in self._bases:
-            self._bases.add(tree)
-            at, around = pybullet.getBasePositionAndOrientation(self._uids[tree], physicsClientId=self._client)
-            self.pose[self._begin[tree]] = at + around
-
-    def pace(self, tree: int) -> None:
-        """Bring the twist of the base up to date."""
-        if tree not in self._paces:
-            self._paces.add(tree)
-            linear, angular = pybullet.getBaseVelocity(self._uids[tree], physicsClientId=self._client)
-            self.twist[self._begin[tree]] = linear + angular
+        """Bring pose and twist of the base up to date."""
+        if not self.trees.read[tree]:
+            self._read(tree)
 
     def joints(self, tree: int) -> Array:
         """Bring the joints of a tree up to date; returns position, velocity and effort (3, k) of its axes."""
-        if tree not in self._jointed:
-            self._jointed.add(tree)
-            links, rows = self._links[tree], self.slices[tree]
-            if links:
-                states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
-                self.position[rows], self.velocity[rows], reaction, self.effort[rows] = zip(*states, strict=True)
-                self.effort[rows if self._begun else self._limp[tree]] = 0.0
-                for axis, effort in self.sent.items():
-                    self.effort[axis] = effort
-                if self._measured[tree]:
-                    self.reaction[rows] = np.zeros(6) if self._begun else reaction
-        return self._joints[:, self.slices[tree]]
+        if not self.trees.read[tree]:
+            self._read(tree)
+        return self.trees.joints[:, self.slices[tree]]
 
     def links(self, tree: int) -> None:
         """Bring all rows of a tree up to date."""
-        if tree not in self._linked:
-            self._linked.add(tree)
+        if not self.trees.linked[tree]:
             self.base(tree)
-            self.pace(tree)
-            self.joints(tree)
-            if tree in self._bare:
-                return
-            _follow(self._begin[tree], self._begin[tree + 1], self._rows, self._fixed, self._joints, self._frame,
-                    self._speed, self.pose, self.twist)  # fmt: skip
+            kernels.link_one(self.table, tree)
 
     def everything(self) -> None:
         """Bring all rows up to date."""
-        for tree in range(len(self._uids)):
-            self.links(tree)
+        self.read_all()
+        kernels.link_trees(self.table)
 
-    def sound(self, limit: float) -> bool:
-        """Whether the velocities of all bases and joints are finite and below ``limit``."""
-        for tree in self._going:
-            self.pace(tree)
-        for tree in self._turning:
-            self.joints(tree)
-        return bool(_below(self.twist, self._bases_at, self.velocity, limit))
+    def prepare(self) -> None:
+        """Read for compiled code what it cannot read itself: that takes a handle."""
+        if not self.handle:
+            self.read_all()
+
+    def read_all(self) -> None:
+        """Bring all bases and joints up to date."""
+        if not self.trees.read.all():
+            for tree in np.flatnonzero(~self.trees.read).tolist():
+                self._read(tree)
+
+    def _read(self, tree: int) -> None:
+        """Read base and joints; a base that stands was read when it was put there."""
+        if self.handle:
+            kernels.read_one(self.handle, self.table, tree)
+            return
+        arrays = self.trees
+        if arrays.going[tree]:
+            self._read_base(tree)
+        links, rows = self._links[tree], self.slices[tree]
+        if links:
+            states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
+            self.position[rows], self.velocity[rows], reaction, effort = zip(*states, strict=True)
+            silent = (arrays.ticks[0] == 0) | arrays.limp[rows]
+            self.effort[rows] = np.where(arrays.sent[rows], arrays.sent_effort[rows], np.where(silent, 0.0, effort))
+            if arrays.measured[tree]:
+                arrays.reaction[rows] = np.zeros(6) if arrays.ticks[0] == 0 else reaction
+        arrays.read[tree] = True
+
+    def _read_base(self, tree: int) -> None:
+        """Read the base. One that stands is read only when it is put there: Bullet turns it by a last bit a tick."""
+        at, around = pybullet.getBasePositionAndOrientation(self._uids[tree], physicsClientId=self._client)
+        linear, angular = pybullet.getBaseVelocity(self._uids[tree], physicsClientId=self._client)
+        self.pose[self._begin[tree]], self.twist[self._begin[tree]] = at + around, linear + angular
 
     def speeds(self, tree: int) -> list[float]:
         """Velocities of a tree's base and joints."""

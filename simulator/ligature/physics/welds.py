@@ -69,8 +69,13 @@ class Welds:
         in_parent = inverse(self._engine.scene.bodies[weld.parent].T_body_inertial) @ weld.T_parent_frame
         return fixed_wrench(self._engine.client, weld.constraint, pose, in_parent, point)
 
+    def loosen(self) -> None:
+        """Take all welds out of Bullet, for `repeat` or `restore`."""
+        for weld in self:
+            pybullet.removeConstraint(weld.constraint, physicsClientId=self._engine.client)
+
     def repeat(self) -> None:
-        """Make all welds again in an engine that was rebuilt."""
+        """Make all welds again in an engine that was rebuilt, or after `loosen`."""
         for weld in self:
             weld.constraint = self._constrain(weld.parent, weld.child, weld.T_parent_frame, weld.T_child_frame)
 
@@ -93,6 +98,6 @@ class Welds:
         return self._next_handle, dict(self._welds)
 
     def restore(self, snapshot: tuple[int, dict[int, Weld]]) -> None:
-        """Continue from `snapshot` in an engine that was rebuilt."""
+        """Continue from `snapshot` in an engine that was rebuilt, or after `loosen`."""
         self._next_handle, self._welds = snapshot
         self.repeat()

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
@@ -18,12 +17,11 @@ from ligature.model.commands import BodyCommand
 from ligature.model.scene import Body, Scene
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem
-from ligature.physics.articulation import is_alone
-from ligature.physics.bodies import Placement
 from ligature.physics.body_commands import BodyCommands
 from ligature.physics.closures import Closures
 from ligature.physics.collisions import Collisions
 from ligature.physics.contact_wrenches import ContactWrenches
+from ligature.physics.damping import Damping
 from ligature.physics.divergence import MAX_SPEED, diverged, joined
 from ligature.physics.drive import Drive
 from ligature.physics.engine import Engine
@@ -35,6 +33,7 @@ from ligature.physics.mobility import mobility
 from ligature.physics.parting import Parting
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
+from ligature.physics.trees import read_bodies
 from ligature.physics.welds import Welds
 
 Array = NDArray[np.float64]
@@ -127,32 +126,27 @@ class World(Subsystem):
     def _set_up(self) -> None:
         """Make what acts on bodies within a tick, for the engine's present client."""
         engine = self.engine
+        self._broken = False
         self._lifts = gravity_lifts(engine, self.joints.controls)
-        self._damped = self._damping_factors()
+        self._damping = Damping(engine)
         self._closures = Closures(engine.client, self.scene, engine.trees, engine.place_of, engine.motions, self.dt)
         self._readout = Readout(engine.client, self.scene, engine.trees, engine.motions, engine.place_of)
         self._parting = Parting(engine.client, self.dt)
         engine.forget_contacts()
 
     def _begin(self) -> None:
-        """Begin anew in another Bullet client: in the same one its broad phase would go on where it was."""
+        """Make ready to begin anew; in another Bullet client where this one would remember, or does not work."""
+        if self.engine.forgets and not self._broken:
+            self.welds.loosen()
+            self._closures.begin()
+            self._parting.begin()
+            return
         self.engine.rebuild()
         self.joints.rebuild()
         self.collisions.rebuild()
         self._set_up()
         self.queries.rebuild()
         self.wrenches.rebuild()
-
-    def _damping_factors(self) -> list[tuple[Placement, float, float]]:
-        """Lone bodies with the factors of a tick on their linear and angular velocity (§12.1)."""
-        factors = []
-        for tree in self.engine.trees:
-            if is_alone(tree, self.scene.bodies):
-                body = self.scene.bodies[tree.root]
-                linear, angular = (1 - body.linear_damping) ** self.dt, (1 - body.angular_damping) ** self.dt
-                if linear < 1.0 or angular < 1.0:
-                    factors.append((self.engine.place_of[tree.root], linear, angular))
-        return factors
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
@@ -202,16 +196,13 @@ class World(Subsystem):
     def pre_step(self) -> None:
         """Controllers, springs and gravity of the coming tick."""
         self.impulses.clear()
-        for control in self.joints.jointed:
-            if control.active:
-                try:
-                    control.apply()
-                except Exception as error:  # no command ends a run
-                    self._clear(control.tree.root, error)
-        for place, linear, angular in self._damped:
-            place.slow_down(linear, angular)
-        for lift in self._lifts:
-            lift.push()
+        try:
+            self.joints.act()
+        except Exception as error:  # no command ends a run
+            self.report(failure("the controllers of all joints", error))
+            self.joints.let_go()
+        self._damping.step()
+        self._lifts.step()
         for body, command in self.commands.all:
             try:
                 command.apply()
@@ -219,26 +210,25 @@ class World(Subsystem):
                 self._clear(body, error)
 
     def _clear(self, body: int, error: Exception) -> None:
-        """Clear the commands of a body, or of all joints of the tree of a root, whose controller failed."""
+        """Clear the commands of a body, and of all joints of its tree, whose controller failed."""
         self.report(failure(f"the controller of '{self.scene.bodies[body].identity.identifier}'", error))
         self.release(body)
         self.joints.let_go(body)
 
     def step(self, tick: int = 0) -> None:
         """Advance Bullet by one tick, and put back what diverged in it."""
-        motions = self.engine.motions
         self._closures.pace()
         # here, for a grasp that ended in this tick took the added mass back: its lift would throw a needle at 5 m/s
         self.masses.lift()
-        pybullet.stepSimulation(physicsClientId=self.engine.client)
+        sound = self.engine.motions.step(MAX_SPEED)
         self._parting.step()
         self.collisions.step(tick)
-        motions.expire()
-        if not motions.sound(MAX_SPEED):
+        if not sound:
             self._heal()
 
     def _heal(self) -> None:
         """Put trees that diverged back to where the scene starts, with all that loops join to them."""
+        self._broken = True
         found = diverged(self.engine)
         for k in found:
             name = self.scene.bodies[self.engine.trees[k].root].identity.identifier
@@ -275,6 +265,12 @@ class World(Subsystem):
     def read_motion(self, body: int, pose: Array, twist: Array) -> None:
         """Fill ``pose`` (7,) of a body's inertial frame I, and its ``twist`` (6,)."""
         self.engine.place_of[body].read_inertial(pose, twist)
+
+    def read_motions(self, bodies: NDArray[np.int64], out: Array) -> None:
+        """Fill ``out`` (n, 13): poses (7,) of the inertial frames of ``bodies`` (n,), and twists (6,)."""
+        engine, motions = self.engine, self.engine.motions
+        motions.prepare()
+        read_bodies(motions.handle, motions.table, engine.place_table, bodies, out)
 
     def set_pose(self, body: int, pose: Array) -> None:
         """Put the root body of a tree at ``pose`` (7,) at rest; raises ValueError for a link of an arm."""
@@ -325,7 +321,7 @@ class World(Subsystem):
     def reset(self) -> None:
         """Put every body back to its initial pose, at rest.
 
-        Bullet's world is built anew, for its contacts would go on. Commands hold, as if they were sent again; so do the
+        Bullet's contacts are forgotten, for they would go on. Commands hold, as if they were sent again; so do the
         constraints of actuators.
         """
         held = self.joints.held()
@@ -341,6 +337,7 @@ class World(Subsystem):
 
     def recover(self) -> None:
         """Put every body back, and clear all commands."""
+        self._broken = True
         self.clear_commands()
         self.reset()
 
@@ -352,7 +349,7 @@ class World(Subsystem):
         }
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        """Continue from `snapshot` in another Bullet client."""
+        """Forget Bullet's contacts and continue from `snapshot`."""
         self._begin()
         for name, part in self._parts().items():
             part.restore(snapshot[name])

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
-from ligature.robots.axes import Axes
+from ligature.robots.axes import Axes, Mode
 from ligature.robots.device import Device
 from ligature.robots.impedance import CartesianImpedance
 from ligature.robots.inverse import InverseResult, Reason
@@ -36,6 +36,21 @@ def damped_inverse(jacobian: Array, twist: Array) -> Array:
     damped = jacobian @ jacobian.T + PULL_BACK**2 * np.eye(len(twist))
     velocity: Array = jacobian.T @ np.linalg.solve(damped, twist)
     return velocity
+
+
+class NoWrench:
+    """The wrench on a tip that nothing touches."""
+
+    def feels(self) -> bool:
+        """Whether there may be any: never."""
+        return False
+
+    def __call__(self) -> Array:
+        """Zeros (6,)."""
+        return np.zeros(6)
+
+
+NO_WRENCH = NoWrench()
 
 
 class JointState(NamedTuple):
@@ -64,6 +79,9 @@ class Kinematics(Protocol):
 
     def jacobian_spatial(self, q: ArrayLike) -> Array:
         """Spatial Jacobian (6, n)."""
+
+    def tables(self) -> tuple[Array, bool, Array]:
+        """Table of the chain, whether it is Craig's, and the tip (4, 4)."""
 
     def describe(
         self, base: Array, absolute: bool, measured: Array, setpoint: Array, wrench: Array,
@@ -98,6 +116,19 @@ class Arm(Device):
     _KEPT = (
         *Device._KEPT, "reference", "gravity_compensation", "cf_orientation_absolute", "_T_reference_base", "_pushing",
     )  # fmt: skip
+
+    def outline(self) -> tuple[Any, ...]:
+        """What commands alone change of what the arm reports: the same as long as none of it does."""
+        axes, base = self.joints, id(self._T_reference_base)
+        return (
+            self._state, self._homed, self._busy, axes.mode, axes.ratio_v, axes.ratio_a, self.reference, base,
+            self.kinematics, self.cf_orientation_absolute, self._tip_wrench,
+        )  # fmt: skip
+
+    @property
+    def tip_wrench(self) -> Callable[[], Array] | None:
+        """What measures the wrench on the tip, see `set_tip_wrench`; None where it follows from the drives."""
+        return NO_WRENCH if self._tip_wrench is None and self.joints.mode is Mode.OFF else self._tip_wrench
 
     def _hold_all(self) -> None:
         self._pushing = None

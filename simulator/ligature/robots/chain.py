@@ -133,10 +133,14 @@ class Chain:
         the reference frame and of the base, then the wrench in those of the tip, or of the base where it is
         ``absolute``, and of the reference frame; ``jacobians`` (2, 6, m) the body and the spatial one.
         """
-        _describe(
+        describe_tip(
             self._table, self._modified, self._tip, base, absolute, measured, setpoint, wrench, js, poses, vectors,
             jacobians,
         )  # fmt: skip
+
+    def tables(self) -> tuple[Array, bool, Array]:
+        """What `describe_tip` takes of a chain: its table, whether that is Craig's, and the tip (4, 4)."""
+        return self._table, self._modified, self._tip
 
     def _rows(self, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:
         """``q`` as rows (m, n) of its own, and the shape that its leading axes had."""
@@ -254,7 +258,7 @@ def _into_tip(T: Array, J: Array, j: int) -> None:
 
 
 @compiled
-def _describe(
+def describe_tip(
     table: Array, modified: bool, tip: Array, base: Array, absolute: bool, measured: Array, setpoint: Array,
     wrench: Array, js: Array, poses: Array, vectors: Array, jacobians: Array,
 ) -> None:  # fmt: skip

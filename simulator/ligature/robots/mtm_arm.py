@@ -55,6 +55,10 @@ class MtmArm(Arm):
 
     _KEPT = (*Arm._KEPT, "_closed", "_locked")
 
+    def outline(self) -> tuple[Any, ...]:
+        """See `Arm.outline`; the gripper's mode, too."""
+        return *super().outline(), self.gripper.mode
+
     def gripper_measured_js(self) -> JointState:
         """Opening of the gripper, its speed and effort, each (1,)."""
         return JointState(*self.gripper.measured().copy())

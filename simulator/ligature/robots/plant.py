@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+NO_AXES: Integers = np.zeros((0, 2), dtype=np.int64)
+"""The axes of the physics of a plant that keeps its own state."""
 
 
 class Plant(Protocol):
@@ -18,6 +22,13 @@ class Plant(Protocol):
 
     def read(self) -> Array:
         """Positions, velocities and efforts now, (3, n)."""
+
+    def source(self) -> tuple[Array | None, Integers]:
+        """Where compiled code finds these, as long as the plant lives.
+
+        Either the plant's own state (3, n), or axes (n, 2) of the physics: the second of each is -1, or that of another
+        finger, which shares the opening.
+        """
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Follow set-points that move with ``velocity``."""
@@ -64,6 +75,10 @@ class IdealPlant:
     def read(self) -> Array:
         """Position, velocity and effort (3, joints)."""
         return self._state
+
+    def source(self) -> tuple[Array | None, Integers]:
+        """The state."""
+        return self._state, NO_AXES
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Move to a position and velocity at once."""

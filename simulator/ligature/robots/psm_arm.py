@@ -5,6 +5,8 @@ Metres, radians; the jaw angle is the opening between its two fingers.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -92,6 +94,10 @@ class PsmArm(Arm):
     def tool_type(self) -> str:
         """Name and model number of the instrument."""
         return self.kinematics.instrument.type
+
+    def outline(self) -> tuple[Any, ...]:
+        """See `Arm.outline`; the jaw's mode and the tool, too."""
+        return *super().outline(), self.tool_present, None if self._jaw_axes is None else self._jaw_axes.mode
 
     @property
     def depth(self) -> float:

@@ -23,7 +23,7 @@ from ligature.model.naming import topic_name
 from ligature.model.optics import EYES, R_CAMERA_OPTICAL, Calibration, eye_offset
 from ligature.model.scene import Camera, Scene
 from ligature.ros import pictures
-from ligature.ros.master import node_name, require_free
+from ligature.ros.master import node_name
 from ligature.ros.names import WORLD_FRAME, tf_topics
 from ligature.ros.start import start_node
 
@@ -121,12 +121,11 @@ class CameraTopics:
 class CameraNode:
     """Every camera in ``shown``, as ROS topics and frames; ``everything`` gives images and clouds of all of them.
 
-    Raises `ligature.ros.master.NameTaken` when the cameras of another simulator are there already.
+    Raises `ligature.ros.registrations.NameTaken` when the cameras of another simulator are there already.
     """
 
     def __init__(self, scene: Scene, shown: Sequence[Camera], everything: bool) -> None:
         name = f"{node_name(scene.world.topic)}_cameras"
-        require_free(f"/{name}")
         start_node(name)
         prefix = scene.world.frame_prefix
         frames = [prefix + name for name in frame_names(scene.cameras)]

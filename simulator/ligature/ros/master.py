@@ -1,4 +1,4 @@
-"""The ROS master: is the name free, and does it still know this node.
+"""The ROS master: names of simulators, and does it still know this node.
 
 A master that hangs or restarts must not hold up publishing, so it is watched on a thread of its own. Of our rooms the
 client needs this too, so nothing of the simulator is imported here.
@@ -50,23 +50,6 @@ def is_simulator(node: str) -> bool:
     return _SIMULATORS.match(node) is not None and not node.endswith(WATCHER)
 
 
-class NameTaken(RuntimeError):
-    """Another simulator of the same world runs on this master; the message lists what to do."""
-
-
-def require_free(name: str) -> None:
-    """Raise `NameTaken` when a living node has ``name``; ROS would let the two end each other in turns."""
-    try:
-        uri = rosgraph.Master("/ligature_start").lookupNode(name)
-    except NO_ANSWER:
-        return
-    if _answers(uri):
-        raise NameTaken(
-            f"another simulator runs on this ROS master (node {name} at {uri}); end it, give this one a prefix"
-            " with '--ns', or set ROS_MASTER_URI to another master"
-        )
-
-
 class Hasty(xmlrpc.client.Transport):
     """A transport that gives up after `TIMEOUT`."""
 
@@ -75,22 +58,6 @@ class Hasty(xmlrpc.client.Transport):
         connection = super().make_connection(host)
         connection.timeout = TIMEOUT
         return connection
-
-
-def lives(node: str) -> bool:
-    """Whether the node of this name answers; one that was killed is still known to the master."""
-    try:
-        return _answers(rosgraph.Master("/ligature_look").lookupNode(node))
-    except NO_ANSWER:
-        return False
-
-
-def _answers(uri: str) -> bool:
-    try:
-        code, _, _ = xmlrpc.client.ServerProxy(uri, Hasty()).getPid("/ligature_start")  # type: ignore[misc]
-    except (*NO_ANSWER, ValueError):
-        return False
-    return bool(code == 1)
 
 
 class MasterWatch(threading.Thread):

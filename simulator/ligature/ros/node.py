@@ -9,11 +9,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import rosgraph.names
 import rospy
+from rospy.impl.registration import get_topic_manager
 
 from ligature.bus import Block, Outbox
 from ligature.bus.stop import Stop
@@ -24,10 +26,11 @@ from ligature.ros import conversion, names, tissue
 from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
 from ligature.ros.intake import oversized
-from ligature.ros.master import MasterWatch, node_name, require_free
+from ligature.ros.master import NO_ANSWER, MasterWatch, node_name
 from ligature.ros.parameters import Parameters
 from ligature.ros.publisher import Publisher
 from ligature.ros.reception import Reception
+from ligature.ros.registrations import dead_neighbours
 from ligature.ros.schedule import Key, Outlet, Schedule
 from ligature.ros.start import start_node
 
@@ -37,7 +40,7 @@ HOUSEKEEPING = 0.02
 
 
 class Node:
-    """The simulator on ROS; raises `ligature.ros.master.NameTaken` when another one is there already."""
+    """The simulator on ROS; raises `ligature.ros.registrations.NameTaken` when another one is there already."""
 
     def __init__(
         self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool
@@ -48,7 +51,6 @@ class Node:
         self._ring = self._block.rings["ros"]
         self._woken = threading.Event()
         name = node_name(scene.world.topic)
-        require_free(f"/{name}")
         start_node(name)
         self._outbox = Outbox(self._ring)
         self._reception = Reception(scene, self._outbox, self._wake)
@@ -70,6 +72,7 @@ class Node:
     def run(self, stop: Stop, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
         self._master.start()
+        threading.Thread(target=_report_dead_neighbours, name="dead neighbours", daemon=True).start()
         published, housekeeping = False, 0.0
         if self._block.read(self._state):
             self._arms.start(self._state[0])
@@ -162,3 +165,12 @@ class Node:
         self._world.loop_hz = float(figures["loop_hz"][0])
         self._diagnostics.publish(now)
         return self._block.active
+
+
+def _report_dead_neighbours() -> None:
+    """Log which nodes that do not answer are registered for topics of this one; each may take seconds to find out."""
+    manager = get_topic_manager()
+    topics = [topic for topic, _ in (*manager.get_publications(), *manager.get_subscriptions())]
+    with suppress(*NO_ANSWER):  # the watch of the master reports it
+        for line in dead_neighbours(rospy.get_name(), topics):
+            rospy.logwarn(line)

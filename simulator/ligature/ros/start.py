@@ -11,6 +11,7 @@ import rospy.impl.tcpros_base as tcpros
 from rosgraph.xmlrpc import ThreadingXMLRPCServer
 
 from ligature.ros.intake import bound_messages
+from ligature.ros.registrations import claim
 
 WAITING = 512
 """Connections that may wait; the kernel's own limit is in /proc/sys/net/core/somaxconn."""
@@ -19,10 +20,13 @@ WAITING = 512
 def start_node(name: str) -> None:
     """Make this process the node ``name``, which takes `WAITING` connections at once and no message of any length.
 
-    Signals stay the caller's.
+    Signals stay the caller's. Raises `ligature.ros.registrations.NameTaken`.
     """
+    removed = claim(f"/{name}")
     ThreadingXMLRPCServer.request_queue_size = WAITING
     bound_messages()
     rospy.init_node(name, disable_signals=True)
+    if removed:
+        rospy.logwarn(removed)
     tcpros.start_tcpros_server()
     tcpros._tcpros_server.tcp_ros_server.server_sock.listen(WAITING)

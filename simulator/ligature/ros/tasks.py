@@ -24,7 +24,7 @@ from ligature.bus.stop import Stop
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from ligature.ros.bags import REPORTS, reported_pose
-from ligature.ros.master import NO_ANSWER, MasterWatch, node_name, require_free
+from ligature.ros.master import NO_ANSWER, MasterWatch, node_name
 from ligature.ros.start import start_node
 from ligature.tasks.attempt import TASKS, Attempt
 
@@ -42,7 +42,7 @@ QUEUE = 10
 class TaskNode:
     """Judges one attempt after the other at ``task``; ``log`` receives lines for a person.
 
-    Raises `ligature.tasks.MissingBodies`, and `ligature.ros.master.NameTaken`.
+    Raises `ligature.tasks.MissingBodies`, and `ligature.ros.registrations.NameTaken`.
     """
 
     def __init__(self, scene: Scene, block: Block, task: str, log: Callable[[str], None]) -> None:
@@ -51,7 +51,6 @@ class TaskNode:
         self._block = block
         self._lock = threading.Lock()
         name = f"{node_name(scene.world.topic)}_tasks"
-        require_free(f"/{name}")
         start_node(name)
         root = f"{scene.world.root}ligature/tasks/{task}"
         self._score = rospy.Publisher(f"{root}/score", DiagnosticStatus, queue_size=QUEUE, latch=True)

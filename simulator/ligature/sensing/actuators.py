@@ -18,7 +18,7 @@ from ligature.model.commands import ActuatorCommand
 from ligature.model.frames import pose7_matrix
 from ligature.model.lookup import find_by_text
 from ligature.model.scene import Scene, SensorType
-from ligature.model.state import StateRecord
+from ligature.model.state import FieldViews, StateRecord
 from ligature.model.subsystem import Subsystem
 from ligature.sensing.queries import Attachable
 from ligature.sensing.rays import Rays
@@ -42,6 +42,7 @@ class Actuators(Subsystem):
         self._bodies = bodies
         self._rays = rays
         self._attached: list[_Attached | None] = [None] * len(scene.actuators)
+        self._fields, self._written = FieldViews("actuator_body", "actuator_active"), list[int]()
         self._identifiers = [body.identity.identifier for body in scene.bodies]
 
     @property
@@ -78,8 +79,11 @@ class Actuators(Subsystem):
 
     def write_state(self, state: StateRecord) -> None:
         """Write the body that every actuator holds."""
-        held = np.array(self.held, dtype=np.int32)
-        state["actuator_body"][0], state["actuator_active"][0] = held, held >= 0
+        held, (bodies, active) = self.held, self._fields.of(state)
+        if held != self._written or self._fields.fresh:
+            self._written = held
+            bodies[:] = held
+            active[:] = bodies >= 0
 
     def reset(self) -> None:
         """Keep welded bodies; threads and grasped bodies were released."""
@@ -96,7 +100,7 @@ class Actuators(Subsystem):
 
     def restore(self, snapshot: list[_Attached | None]) -> None:
         """Continue from `snapshot`."""
-        self._attached = snapshot
+        self._attached, self._written = snapshot, []
 
     def _name(self, actuator: int) -> str:
         return self._scene.actuators[actuator].identity.identifier

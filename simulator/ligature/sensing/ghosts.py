@@ -6,6 +6,8 @@ World axes, metres. A body overlaps a ghost when one of its contact distances to
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,11 +17,14 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
 from ligature.model.scene import Scene
 from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Shape, Sphere, TriMesh
-from ligature.model.state import StateRecord
+from ligature.model.state import FieldViews, StateRecord
 from ligature.model.subsystem import Subsystem
 from ligature.sensing.queries import Queries
+from ligature.tables import opener, table_of
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 SAMPLES = 5
 """Points along a rod element that are tested; neighbours are closer than the element's diameter."""
@@ -38,22 +43,62 @@ CONFIDENCE = 0.5
 """Share of a measured distance to rely on; the engine's distances are not exact."""
 
 
+class GhostArrays(NamedTuple):
+    """Ghosts and what they may sense: g ghosts of v convex pieces, n bodies with shapes, e elements of rods."""
+
+    kinds: Integers  # (v,) of the pieces
+    sizes: Array  # (v, 3)
+    planes: Array  # (p, 4) of all hulls
+    plane_range: Integers  # (v, 2)
+    local: Array  # (v, 7) in the ghost's frame
+    bounds: Array  # (v,) radius of the ball around a piece
+    owner: Integers  # (v,) its ghost
+    elements: Integers  # (e,) bodies that are elements of rods
+    half_lengths: Array  # (e,)
+    radii: Array  # (e,)
+    solid: Integers  # (n,) other bodies
+    ghost_reach: Array  # (g,) radius of the ball around a ghost
+    reach: Array  # (n,) and around a body
+    measured_ghost: Array  # (g, n, 7) poses at which a pair was measured last
+    measured_body: Array  # (g, n, 7)
+    room: Array  # (g, n) how far the two may move until they have to be measured again
+    inside: Flags  # (g, n)
+    due: Flags  # (g, n) whether a pair has to be measured
+
+
+_open_ghosts = opener(
+    GhostArrays(
+        *(
+            np.zeros((1,) * rank, kind)
+            for rank, kind in [
+                (1, np.int64), (2, float), (2, float), (2, np.int64), (2, float), (1, float), (1, np.int64),
+                (1, np.int64), (1, float), (1, float), (1, np.int64), (1, float), (1, float), (3, float), (3, float),
+                (2, float), (2, np.bool_), (2, np.bool_),
+            ]
+        )
+    )
+)  # fmt: skip
+
+
+@compiled
+def _find_inside(table: Integers, ghost_world: Array, body_pose: Array, sensed: Flags) -> None:
+    """Fill ``sensed`` (g, b): the bodies inside as they were measured, and the elements that touch a piece."""
+    g = _open_ghosts(table)
+    for i in range(g.solid.shape[0]):
+        for k in range(sensed.shape[0]):
+            sensed[k, g.solid[i]] = g.inside[k, i]
+    if g.elements.shape[0] > 0:
+        _elements_inside(
+            g.kinds, g.sizes, g.planes, g.plane_range, g.local, g.bounds, g.owner, ghost_world, body_pose, g.elements,
+            g.half_lengths, g.radii, sensed,
+        )  # fmt: skip
+
+
 @compiled
 def _elements_inside(
-    kinds: NDArray[np.int64],
-    sizes: Array,
-    planes: Array,
-    plane_range: NDArray[np.int64],
-    local: Array,
-    bounds: Array,
-    owner: NDArray[np.int64],
-    ghost_world: Array,
-    body_pose: Array,
-    elements: NDArray[np.int64],
-    half_lengths: Array,
-    radii: Array,
-    sensed: NDArray[np.bool_],
-) -> None:
+    kinds: Integers, sizes: Array, planes: Array, plane_range: Integers, local: Array, bounds: Array, owner: Integers,
+    ghost_world: Array, body_pose: Array, elements: Integers, half_lengths: Array, radii: Array, sensed: Flags,
+) -> None:  # fmt: skip
     """Set ``sensed[g, b]`` for every element b (axis local Z) that touches a piece of ghost g, clear it for others."""
     for g in range(sensed.shape[0]):
         for b in elements:
@@ -93,23 +138,15 @@ def _invert(pose: Array, out: Array) -> None:
 
 
 @compiled
-def _pairs_to_measure(
-    ghost_world: Array,
-    body_pose: Array,
-    solid: NDArray[np.int64],
-    ghost_reach: Array,
-    reach: Array,
-    measured_ghost: Array,
-    measured_body: Array,
-    room: Array,
-    inside: NDArray[np.bool_],
-    due: NDArray[np.bool_],
-) -> bool:
-    """Flag in ``due`` the pairs that are near each other and may have met or parted since their last measurement.
+def _pairs_to_measure(table: Integers, ghost_world: Array, body_pose: Array) -> bool:
+    """Flag as due the pairs that are near each other and may have met or parted since their last measurement.
 
-    ``room`` (g, n) is how far the two may move until then; it is used up for pairs far from each other, which are not
-    ``inside``.
+    Pairs far from each other are not inside, and have no room left.
     """
+    ghosts = _open_ghosts(table)
+    due, inside, room, solid = ghosts.due, ghosts.inside, ghosts.room, ghosts.solid
+    ghost_reach, reach = ghosts.ghost_reach, ghosts.reach
+    measured_ghost, measured_body = ghosts.measured_ghost, ghosts.measured_body
     found = False
     for g in range(due.shape[0]):
         for i in range(due.shape[1]):
@@ -165,6 +202,7 @@ class Ghosts(Subsystem):
     def __init__(self, scene: Scene, queries: Queries) -> None:
         self._queries = queries
         self._probes = [queries.add_probe(g.colliders, g.collision_margin) for g in scene.ghosts]
+        self._fields = FieldViews("ghost_world", "body_pose", "ghost_sensed")
         self._lay_out_volumes(scene)
         self._elements = np.array(sorted(scene.rod_bodies), dtype=np.int64)
         lengths = {b: length for rod in scene.rods for b, length in zip(rod.bodies, rod.lengths, strict=True)}
@@ -181,6 +219,8 @@ class Ghosts(Subsystem):
         self._measured_ghost, self._measured_body = np.zeros((*shape, 7)), np.zeros((*shape, 7))
         self._room = np.full(shape, -1.0)
         self._inside, self._due = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        self._arrays = GhostArrays(*(np.ascontiguousarray(getattr(self, f"_{name}")) for name in GhostArrays._fields))
+        self._table = table_of(self._arrays)
 
     def _lay_out_volumes(self, scene: Scene) -> None:
         """The convex pieces of all ghosts, as arrays for the test against rod elements."""
@@ -199,8 +239,10 @@ class Ghosts(Subsystem):
 
     def sense(self, state: StateRecord) -> None:
         """Find the bodies in the ghosts, and write them."""
-        self.update(state["ghost_world"][0], state["body_pose"][0])
-        state["ghost_sensed"][0] = self.sensed
+        if self._probes:
+            ghost_world, body_pose, sensed = self._fields.of(state)
+            self.update(ghost_world, body_pose)
+            sensed[:] = self.sensed
 
     def reset(self) -> None:
         """Nothing: overlaps follow from the poses."""
@@ -215,18 +257,9 @@ class Ghosts(Subsystem):
         """Update ``sensed``; ``ghost_world`` (ghosts, 7) and ``body_pose`` (bodies, 7) in world axes."""
         if not self._probes:
             return
-        measuring = _pairs_to_measure(
-            ghost_world, body_pose, self._solid, self._ghost_reach, self._reach, self._measured_ghost,
-            self._measured_body, self._room, self._inside, self._due,
-        )  # fmt: skip
-        if measuring:
+        if _pairs_to_measure(self._table, ghost_world, body_pose):
             self._measure_pairs(ghost_world, body_pose[self._solid])
-        self.sensed[:, self._solid] = self._inside
-        if len(self._elements):
-            _elements_inside(
-                self._kinds, self._sizes, self._planes, self._plane_range, self._local, self._bounds, self._owner,
-                ghost_world, body_pose, self._elements, self._half_lengths, self._radii, self.sensed,
-            )  # fmt: skip
+        _find_inside(self._table, ghost_world, body_pose, self.sensed)
 
     def _measure_pairs(self, ghost_world: Array, bodies: Array) -> None:
         for ghost in np.flatnonzero(self._due.any(axis=1)):

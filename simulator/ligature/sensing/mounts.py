@@ -7,38 +7,74 @@ parent camera, light or ghost), ``world`` in world axes. Lengths in metres.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.kernels import compiled
+from ligature.kernels import kernel
 from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
 from ligature.model.scene import Attachment, Scene
-from ligature.model.state import StateRecord
+from ligature.model.state import FieldViews, StateRecord
 from ligature.model.subsystem import Subsystem
+from ligature.tables import opener, table_of
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 KINDS = ("ghost", "camera", "light")
 
 
-@compiled
-def _update(
-    body_pose: NDArray[np.float64],
-    local: NDArray[np.float64],
-    parents: NDArray[np.int64],
-    order: NDArray[np.int64],
-    world: NDArray[np.float64],
-) -> None:
-    n_bodies = body_pose.shape[0]
-    for i in order:
-        parent = parents[i]
+class Mounted(NamedTuple):
+    """The mounted objects, n of them."""
+
+    local: Array  # (n, 7) in the parent's frame
+    parents: Integers  # (n,) among bodies followed by mounted objects; -1 is the world
+    order: Integers  # (n,) parents first
+    world: Array  # (n, 7)
+
+
+class Fields(NamedTuple):
+    """What of the state record objects are placed by, and what is written."""
+
+    body_pose: Array
+    ghost_world: Array
+    camera_world: Array
+    light_world: Array
+    camera_pose: Array
+    light_pose: Array
+
+
+_one = np.zeros(1, dtype=np.int64)
+_open_mounted = opener(Mounted(np.zeros((1, 7)), _one, _one, np.zeros((1, 7))))
+_open_fields = opener(Fields(*np.zeros((6, 1, 7))))
+
+
+@kernel
+def _place_all(mounted_table: Integers, field_table: Integers) -> None:
+    """Move every object with its parent, and write the poses: ghosts come first, then cameras, then lights."""
+    m, out = _open_mounted(mounted_table), _open_fields(field_table)
+    bodies = out.body_pose.shape[0]
+    for i in m.order:
+        parent = m.parents[i]
         if parent < 0:
-            world[i] = local[i]
-        elif parent < n_bodies:
-            compose(body_pose[parent], local[i], world[i])
+            for a in range(7):
+                m.world[i, a] = m.local[i, a]
+        elif parent < bodies:
+            compose(out.body_pose[parent], m.local[i], m.world[i])
         else:
-            compose(world[parent - n_bodies], local[i], world[i])
+            compose(m.world[parent - bodies], m.local[i], m.world[i])
+    ghosts, cameras = out.ghost_world.shape[0], out.camera_world.shape[0]
+    for i in range(m.world.shape[0]):
+        for a in range(7):
+            if i < ghosts:
+                out.ghost_world[i, a] = m.world[i, a]
+            elif i < ghosts + cameras:
+                out.camera_world[i - ghosts, a], out.camera_pose[i - ghosts, a] = m.world[i, a], m.local[i, a]
+            else:
+                k = i - ghosts - cameras
+                out.light_world[k, a], out.light_pose[k, a] = m.world[i, a], m.local[i, a]
 
 
 class Mounts(Subsystem):
@@ -59,14 +95,12 @@ class Mounts(Subsystem):
         self._initial = np.array([matrix_pose7(a.T_parent_object) for a in mounts]).reshape(-1, 7)
         self.local = self._initial.copy()
         self.world = self._initial.copy()
+        self._table = table_of(Mounted(self.local, self._parents, self._order, self.world))
+        self._fields, self._field_table = FieldViews(*Fields._fields), np.zeros(0, dtype=np.int64)
 
     def of(self, kind: str) -> slice:
         """Rows of the objects of ``kind`` (ghost, camera or light) in ``local`` and ``world``."""
         return self._slices[kind]
-
-    def update(self, body_pose: NDArray[np.float64]) -> None:
-        """Move every object with its parent; ``body_pose`` (bodies, 7) in world axes."""
-        _update(body_pose, self.local, self._parents, self._order, self.world)
 
     def place(self, kind: str, index: int, pose: tuple[float, ...] | None) -> None:
         """Put one object at ``pose`` (7,) in its parent's frame; None leaves it where it is."""
@@ -76,21 +110,20 @@ class Mounts(Subsystem):
     def adopt(self, kind: str, index: int, body: int | None) -> None:
         """Mount one object on ``body``, or on the world; its pose in the parent's frame stays."""
         self._parents[self._slices[kind].start + index] = -1 if body is None else body
-        self._order = self._parents_first()
+        self._order[:] = self._parents_first()
 
     def reset(self) -> None:
         """Put every object back to the pose and parent that the scene states."""
         self.local[:] = self._initial
         self._parents[:] = self._initial_parents
-        self._order = self._parents_first()
+        self._order[:] = self._parents_first()
 
     def sense(self, state: StateRecord) -> None:
         """Move every object with its parent, and write the poses."""
-        self.update(state["body_pose"][0])
-        state["ghost_world"][0] = self.world[self.of("ghost")]
-        for kind in ("camera", "light"):
-            state[f"{kind}_pose"][0] = self.local[self.of(kind)]
-            state[f"{kind}_world"][0] = self.world[self.of(kind)]
+        fields = self._fields.of(state)
+        if self._fields.fresh:
+            self._field_table = table_of(Fields(*fields))
+        _place_all(self._table, self._field_table)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """Everything that lasts from tick to tick."""
@@ -99,7 +132,7 @@ class Mounts(Subsystem):
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Continue from `snapshot`."""
         self.local[:], self._parents[:] = snapshot["local"], snapshot["parents"]
-        self._order = self._parents_first()
+        self._order[:] = self._parents_first()
 
     def _parent_index(self, attachment: Attachment) -> int:
         """Index of the parent among bodies followed by mounted objects; -1 for the world."""

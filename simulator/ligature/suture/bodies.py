@@ -19,6 +19,9 @@ class Bodies(Protocol):
     def motion(self, body: int) -> tuple[Array, Array]:
         """Pose (7,) of a body's inertial frame and its twist (6,), linear part at the centre of mass."""
 
+    def read_motions(self, bodies: NDArray[np.int64], out: Array) -> None:
+        """Fill ``out`` (n, 13) with what `motion` returns of ``bodies`` (n,): poses, then twists."""
+
     def driven(self, body: int) -> bool:
         """Whether a body is kinematically controlled: a command moves it against all forces."""
 

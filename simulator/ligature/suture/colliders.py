@@ -14,10 +14,10 @@ from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, HUL
 from ligature.model.frames import inverse, matrix_pose7
 from ligature.model.scene import Scene
 from ligature.model.shapes import Box, Capsule, Cone, Cylinder, Hull, Plane, Shape, Sphere, TriMesh
-from ligature.model.subsystem import kept, put_back
 from ligature.suture.bodies import Bodies
 from ligature.suture.layout import Shapes
-from ligature.suture.placing import survey
+from ligature.suture.placing import look, watch
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 
@@ -53,33 +53,31 @@ class Colliders:
         n = len(parts)
         body = np.array([part[0] for part in parts], dtype=np.int64)
         self._dt = dt
-        self._local = np.array([matrix_pose7(part[1]) for part in parts]).reshape(n, 7)
-        self._extent = np.array([part[5] for part in parts]).reshape(n, 2, 3)
+        self.bodies = sorted(set(body.tolist()))
+        self._indices = np.array(self.bodies, dtype=np.int64)
+        own = self._watch = watch(len(self.bodies), n)
+        own.local[:] = np.array([matrix_pose7(part[1]) for part in parts]).reshape(n, 7)
+        own.extent[:] = np.array([part[5] for part in parts]).reshape(n, 2, 3)
+        for k, b in enumerate(self.bodies):
+            own.ranges[k] = np.flatnonzero(body == b)[[0, -1]] + [0, 1]
+        own.static[:] = own.still[:] = [scene.bodies[b].static for b in self.bodies]
+        self._table = table_of(own)
         planes = [part[4] for part in parts]
         ends = np.cumsum([0] + [len(p) for p in planes])
-        self.bodies = sorted(set(body.tolist()))
-        self._ranges = np.array([[*np.flatnonzero(body == b)[[0, -1]]] for b in self.bodies], dtype=np.int64)
-        self._ranges = self._ranges.reshape(-1, 2) + np.array([0, 1])
-        self._slices = {b: slice(*r) for b, r in zip(self.bodies, self._ranges.tolist(), strict=True)}
+        self._slices = {b: slice(*r) for b, r in zip(self.bodies, own.ranges.tolist(), strict=True)}
         self.row_of = {b: k for k, b in enumerate(self.bodies)}
-        self._static = [scene.bodies[b].static for b in self.bodies]
-        self._still = list(self._static)
         self._common = {
             "kind": np.array([part[2] for part in parts], dtype=np.int64),
             "size": np.array([part[3] for part in parts]).reshape(n, 3),
             "planes": np.vstack(planes) if planes else np.zeros((0, 4)),
             "plane_range": np.column_stack([ends[:-1], ends[1:]]).astype(np.int64),
-            "pose": np.zeros((n, 7)),
-            "box": np.zeros((n, 2, 3)),
-            "sweep": np.zeros(n),
+            "pose": own.pose,
+            "box": own.box,
+            "sweep": own.sweep,
             "friction": np.array([scene.bodies[b].friction for b in body]),
         }
-        self._near, self._due, self._placed = np.zeros((3, len(self.bodies)), dtype=np.bool_)
-        self._watched: list[int] = []
         self._nearby: list[int] = []
-        self.motion = np.zeros((len(self.bodies), 13))
-        self._R = np.zeros((3, 3))
-        self._turn = -1
+        self.motion = own.motion
 
     def shapes(self, elements: int) -> Shapes:
         """The parts as a rod of ``elements`` elements sees them; all rods share poses."""
@@ -100,74 +98,41 @@ class Colliders:
 
         The list is another one as soon as it holds other bodies.
         """
-        n = len(self.bodies)
-        if self._turn < 0:
-            fresh = list(range(n))
-            self._placed[:] = False
-        else:
-            fresh = [k for k in self._watched if not self._still[k]]
-            fresh += [k for k in ((self._turn + i) % n for i in range(min(LOOKS, n))) if k not in fresh]
-        self._turn = (self._turn + LOOKS) % n if n and self._turn >= 0 else 0
-        for k in fresh:
-            self._read(bodies, k)
-        if self._survey(corners):
-            self._watched = np.flatnonzero(self._near).tolist()
-            self._nearby = [self.bodies[k] for k in self._watched]
-            late = [k for k in self._watched if k not in fresh and not self._still[k]]
-            for k in late:
-                self._read(bodies, k)
-            if late:
-                self._survey(corners)
-                self._near[self._watched] = True
+        if self.bodies:
+            bodies.read_motions(self._indices, self._watch.seen)
+            if look(self._table, corners, self._dt, LOOKS, NEAR):
+                self._list_near()
         return self._nearby
-
-    def _survey(self, corners: Array) -> bool:
-        common = self._common
-        changed: bool = survey(
-            self._due, self._ranges, self._local, self._extent, self.motion, self._dt, common["pose"], common["box"],
-            common["sweep"], corners, NEAR, self._near, self._R,
-        )  # fmt: skip
-        return changed
-
-    def _read(self, bodies: Bodies, k: int) -> None:
-        pose, twist = bodies.motion(self.bodies[k])
-        motion = self.motion[k]
-        if self._static[k]:
-            # A body without mass moves by commands alone; while it does, it is read every tick.
-            self._still[k] = not self._placed[k] or bool((motion[:7] == pose).all())
-            if self._placed[k] and self._still[k]:
-                return
-        motion[:7], motion[7:] = pose, twist
-        self._due[k] = self._placed[k] = True
 
     def restart(self) -> None:
         """Read all poses in the next update."""
-        self._turn = -1
+        self._watch.turn[0] = -1
 
     def reset(self) -> None:
         """As at the start: nothing was read."""
+        self._nearby = []
+        for name in _KEPT:
+            getattr(self._watch, name)[:] = 0
+        self._watch.still[:] = self._watch.static
         self.restart()
-        self._still[:] = self._static
-        self._watched, self._nearby = [], []
-        for array in (self._near, self._due, self._placed, self.motion, *(self._common[name] for name in _PLACED)):
-            array[:] = 0
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick: what is near, and when and where it was read."""
-        return {**kept(self, _KEPT), "parts": {name: self._common[name] for name in _PLACED}}
+        return {name: getattr(self._watch, name) for name in _KEPT}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
-        put_back(self, {name: snapshot[name] for name in _KEPT})
-        for name in _PLACED:
-            self._common[name][:] = snapshot["parts"][name]
+        for name, values in snapshot.items():
+            getattr(self._watch, name)[:] = values
+        self._list_near()
+
+    def _list_near(self) -> None:
+        """List the bodies that are near, anew."""
+        self._nearby = [self.bodies[k] for k in np.flatnonzero(self._watch.near).tolist()]
 
 
-_KEPT = ("_turn", "_still", "_near", "_due", "_placed", "_watched", "_nearby", "motion")
-"""Attributes of `Colliders` that last from tick to tick."""
-
-_PLACED = ("pose", "box", "sweep")
-"""Arrays of all parts that follow their bodies."""
+_KEPT = ("turn", "still", "near", "due", "placed", "motion", "pose", "box", "sweep")
+"""Arrays of `Watch` that last from tick to tick."""
 
 
 def shape_arrays(shape: Shape) -> tuple[int, Array, Array, Array]:

@@ -49,8 +49,8 @@ def detect(
     """
     constraints = new.count[0]
     capacity = new.node.shape[0]
-    _world_segments(first, n, nodes, work, dt)
-    missed = _touch_bodies(first, n, nodes, shapes, new, work, tension, capacity, dt)
+    _world_segments(first, n, nodes, work, tension, dt)
+    missed = _touch_bodies(first, n, nodes, shapes, new, work, capacity, dt)
     settled = new.count[0]
     missed += _touch_self(first, n, nodes, shapes, new, work, capacity, self_skip)
     _sort(new, settled)
@@ -59,8 +59,8 @@ def detect(
 
 
 @inlined
-def _world_segments(first: int, n: int, nodes: Nodes, work: Work, dt: float) -> None:
-    """Segment, reach and box of every element; the box covers what the tick may sweep."""
+def _world_segments(first: int, n: int, nodes: Nodes, work: Work, tension: Array, dt: float) -> None:
+    """Segment, reach and box of every element, and of groups of them; a box covers what the tick may sweep."""
     for e in range(n):
         i = first + e
         R = work.R[i]
@@ -86,6 +86,17 @@ def _world_segments(first: int, n: int, nodes: Nodes, work: Work, dt: float) -> 
         for a in range(3):
             work.box[e, 0, a] = min(p[0, a], p[1, a]) - size
             work.box[e, 1, a] = max(p[0, a], p[1, a]) + size
+        # A light taut element is thrown farther in a tick than its motion shows.
+        work.thrown[e] = min(abs(tension[e]) * dt * dt / nodes.mass[i], MAX_TENSION_REACH * nodes.radius[i])
+    for g in range((n + GROUP - 1) // GROUP):
+        box, work.group_thrown[g] = work.group_box[g], 0.0
+        for a in range(3):
+            box[0, a], box[1, a] = 1e300, -1e300
+        for e in range(g * GROUP, min(n, (g + 1) * GROUP)):
+            work.group_thrown[g] = max(work.group_thrown[g], work.thrown[e])
+            for a in range(3):
+                box[0, a] = min(box[0, a], work.box[e, 0, a])
+                box[1, a] = max(box[1, a], work.box[e, 1, a])
 
 
 @inlined
@@ -95,41 +106,56 @@ def _distance(a: Array, b: Array) -> float:
 
 @inlined
 def _touch_bodies(
-    first: int, n: int, nodes: Nodes, shapes: Shapes, new: Touches, work: Work, tension: Array, capacity: int, dt: float
+    first: int, n: int, nodes: Nodes, shapes: Shapes, new: Touches, work: Work, capacity: int, dt: float
 ) -> int:
+    """Contacts of elements with parts of bodies, boxes of groups first."""
     missed = 0
-    p, normal, R = work.three[0], work.three[1], work.R[nodes.x.shape[0]]
+    R, groups = work.R[nodes.x.shape[0]], (n + GROUP - 1) // GROUP
     for c in range(shapes.node.shape[0]):
-        k = shapes.node[c]
-        if k < 0:
+        if shapes.node[c] < 0:
             continue
-        pose = shapes.pose[c]
-        matrix_of(pose[3], pose[4], pose[5], pose[6], R)
-        planes = shapes.planes[shapes.plane_range[c, 0] : shapes.plane_range[c, 1]]
-        sweep = shapes.sweep[c]
-        for e in range(n):
-            box = work.box[e]
-            # A light taut element is thrown farther in a tick than its motion shows.
-            thrown = min(abs(tension[e]) * dt * dt / nodes.mass[first + e], MAX_TENSION_REACH * nodes.radius[first + e])
-            margin = sweep + thrown
-            outside = False
-            for a in range(3):
-                if box[0, a] > shapes.box[c, 1, a] + margin or box[1, a] < shapes.box[c, 0, a] - margin:
-                    outside = True
-            if outside or shapes.skip[c, e]:
+        pose, sweep, turned = shapes.pose[c], shapes.sweep[c], False
+        for g in range(groups):
+            if _outside(work.group_box[g], shapes.box[c], sweep + work.group_thrown[g]):
                 continue
-            segment = work.segment[e]
-            reach = nodes.radius[first + e] + work.reach[e] + margin
-            s, d = _deepest(shapes.kind[c], shapes.size[c], planes, pose, R, segment, reach,
-                            nodes.radius[first + e], p, normal)  # fmt: skip
-            nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
-            if d > reach or _recede(nodes, work, e, k, s, d - nodes.radius[first + e] - thrown, nx, ny, nz, dt):
-                continue
-            if new.count[0] == capacity:
-                missed += 1
-                continue
-            _record(first, nodes, new, work, e, k, c, s, d, 0.0, nx, ny, nz, shapes.friction[c], dt)
+            if not turned:
+                matrix_of(pose[3], pose[4], pose[5], pose[6], R)
+                turned = True
+            for e in range(g * GROUP, min(n, (g + 1) * GROUP)):
+                if not (_outside(work.box[e], shapes.box[c], sweep + work.thrown[e]) or shapes.skip[c, e]):
+                    missed += _touch_part(first, nodes, shapes, new, work, capacity, c, e, R, dt)
     return missed
+
+
+@inlined
+def _outside(box: Array, part: Array, margin: float) -> bool:
+    """Whether a box (2, 3) lies farther than ``margin`` from another along one axis."""
+    outside = False
+    for a in range(3):
+        if box[0, a] > part[1, a] + margin or box[1, a] < part[0, a] - margin:
+            outside = True
+    return outside
+
+
+@inlined
+def _touch_part(
+    first: int, nodes: Nodes, shapes: Shapes, new: Touches, work: Work, capacity: int, c: int, e: int, R: Array,
+    dt: float,
+) -> int:  # fmt: skip
+    """Record the contact of element ``e`` with part ``c``, turned by ``R`` (3, 3), if there is one; 1 without room."""
+    p, normal, k = work.three[0], work.three[1], shapes.node[c]
+    planes = shapes.planes[shapes.plane_range[c, 0] : shapes.plane_range[c, 1]]
+    thrown, radius = work.thrown[e], nodes.radius[first + e]
+    reach = radius + work.reach[e] + (shapes.sweep[c] + thrown)
+    s, d = _deepest(shapes.kind[c], shapes.size[c], planes, shapes.pose[c], R, work.segment[e], reach, radius, p,
+                    normal)  # fmt: skip
+    nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
+    if d > reach or _recede(nodes, work, e, k, s, d - radius - thrown, nx, ny, nz, dt):
+        return 0
+    if new.count[0] == capacity:
+        return 1
+    _record(first, nodes, new, work, e, k, c, s, d, 0.0, nx, ny, nz, shapes.friction[c], dt)
+    return 0
 
 
 @inlined
@@ -263,14 +289,6 @@ def _touch_self(
     missed = 0
     groups = (n + GROUP - 1) // GROUP
     offset = shapes.node.shape[0]
-    for g in range(groups):
-        box = work.group_box[g]
-        for a in range(3):
-            box[0, a], box[1, a] = 1e300, -1e300
-        for e in range(g * GROUP, min(n, (g + 1) * GROUP)):
-            for a in range(3):
-                box[0, a] = min(box[0, a], work.box[e, 0, a])
-                box[1, a] = max(box[1, a], work.box[e, 1, a])
     for g in range(groups):
         for h in range(g, groups):
             if not _overlap(work.group_box[g], work.group_box[h]):

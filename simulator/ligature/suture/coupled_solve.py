@@ -36,6 +36,8 @@ def gather(n: int, total: int, nodes: Nodes, touches: Touches, work: Work) -> tu
     low, high = n, -1
     for i in range(n, total):
         work.pushed[i] = False
+        if not nodes.met[i]:
+            continue
         for a in range(6):
             work.d[i, a] = 0.0
             work.pushed[i] = work.pushed[i] or work.g[i, a] != 0.0

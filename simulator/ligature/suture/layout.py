@@ -24,6 +24,7 @@ class Nodes(NamedTuple):
     mass: Array  # (N,)
     inertia: Array  # (N, 3) principal moments
     fixed: NDArray[np.bool_]  # (N,) kinematically controlled: no force moves it
+    met: NDArray[np.bool_]  # (N,) whether it takes part: bodies far from the rod do not
     gravity: Array  # (N, 3)
     keep: Array  # (N, 2) fraction of linear and angular speed that damping leaves after a tick
     x: Array  # (N, 3) centre of mass
@@ -130,7 +131,9 @@ class Work(NamedTuple):
     reach: Array  # (elements,) distance within which contacts are looked for
     clear: Array  # (elements,) distance that counts as touching although nothing moves
     box: Array  # (elements, 2, 3)
-    group_box: Array  # (elements, 2, 3)
+    thrown: Array  # (elements,) how far tension may throw it beyond its motion
+    group_box: Array  # (elements, 2, 3) of `ligature.suture.contacts.GROUP` elements
+    group_thrown: Array  # (elements,)
 
 
 class Constants(NamedTuple):
@@ -174,7 +177,8 @@ def nodes(total: int) -> Nodes:
     """``total`` nodes of mass 1 at the origin, at rest."""
     z = np.zeros
     return Nodes(
-        mass=np.ones(total), inertia=np.ones((total, 3)), fixed=np.zeros(total, np.bool_), gravity=z((total, 3)),
+        mass=np.ones(total), inertia=np.ones((total, 3)), fixed=np.zeros(total, np.bool_),
+        met=np.ones(total, np.bool_), gravity=z((total, 3)),
         keep=np.ones((total, 2)), x=z((total, 3)), q=np.tile([0.0, 0.0, 0.0, 1.0], (total, 1)), v=z((total, 3)),
         w=z((total, 3)), radius=z(total), friction=np.ones(total), axis=z((total, 2, 3)),
     )  # fmt: skip
@@ -211,7 +215,8 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         sum6=z(6), kept_x=z((total, 3)), kept_q=z((total, 4)), kept_v=z((total, 3)), kept_w=z((total, 3)),
         kept_angle=z((j, 3)), kept_load=z((j, 6)),
         three=z((3, 3)), segment=z((elements, 2, 3)), ahead=z((elements, 2, 3)), reach=z(elements),
-        clear=z(elements), box=z((elements, 2, 3)), group_box=z((elements, 2, 3)),
+        clear=z(elements), box=z((elements, 2, 3)), thrown=z(elements), group_box=z((elements, 2, 3)),
+        group_thrown=z(elements),
     )  # fmt: skip
 
 

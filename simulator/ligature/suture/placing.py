@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.suture.rotations import matrix_of, multiply, rotate
+from ligature.tables import opener
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -25,34 +27,109 @@ def _compose(pose: Array, local: Array, out_p: Array, out_q: Array, R: Array) ->
     )
 
 
-@kernel
-def survey(
-    due: Flags, ranges: Integers, local: Array, extent: Array, motion: Array, dt: float, out_pose: Array,
-    out_box: Array, out_sweep: Array, corners: Array, margin: float, near: Flags, R: Array,
-) -> bool:  # fmt: skip
-    """Place the parts of the bodies that are ``due`` (b,), and flag in ``near`` (b,) those within ``margin`` of a box.
+class Watch(NamedTuple):
+    """The bodies around rods and their convex parts: b bodies, S parts."""
 
-    ``motion`` (b, 13) are pose and twist of the bodies' inertial frames, ``ranges`` (b, 2) their rows among
-    the parts; ``local`` (S, 7) are the parts' poses in those frames and ``extent`` (S, 2, 3) their boxes in their own.
-    ``corners`` (2, 3) is the box around all rods. Returns whether a flag changed; ``due`` is cleared.
+    ranges: Integers  # (b, 2) rows of a body among the parts
+    local: Array  # (S, 7) poses of the parts in their bodies' inertial frames
+    extent: Array  # (S, 2, 3) their boxes in their own frames
+    static: Flags  # (b,)
+    turn: Integers  # (1,) the body that is read next although it is far; -1 reads all
+    still: Flags  # (b,) whether it need not be read
+    near: Flags  # (b,)
+    due: Flags  # (b,) whether it was read but its parts are not placed yet
+    placed: Flags  # (b,) whether it was ever read
+    motion: Array  # (b, 13) pose and twist as they were last read
+    pose: Array  # (S, 7)
+    box: Array  # (S, 2, 3)
+    sweep: Array  # (S,)
+    seen: Array  # (b, 13) pose and twist now
+    fresh: Flags  # (2, b) scratch: what is read in this tick, what is near
+    R: Array  # (3, 3) scratch
+
+
+def watch(bodies: int, parts: int) -> Watch:
+    """Arrays for this many bodies and parts; nothing was read."""
+    z, no = np.zeros, np.bool_
+    return Watch(
+        ranges=z((bodies, 2), np.int64), local=z((parts, 7)), extent=z((parts, 2, 3)), static=z(bodies, no),
+        turn=np.full(1, -1), still=z(bodies, no), near=z(bodies, no), due=z(bodies, no), placed=z(bodies, no),
+        motion=z((bodies, 13)), pose=z((parts, 7)), box=z((parts, 2, 3)), sweep=z(parts), seen=z((bodies, 13)),
+        fresh=z((2, bodies), no), R=z((3, 3)),
+    )  # fmt: skip
+
+
+open_watch = opener(watch(1, 1))
+
+
+@kernel
+def look(table: Integers, corners: Array, dt: float, looks: int, margin: float) -> bool:
+    """Read the bodies within ``margin`` of the box ``corners`` (2, 3) and ``looks`` others in turn, and place them.
+
+    Returns whether other bodies are near now.
     """
+    w = open_watch(table)
+    bodies, turn = w.ranges.shape[0], w.turn[0]
+    for k in range(bodies):
+        w.fresh[0, k] = turn < 0 or (w.near[k] and not w.still[k])
+        w.placed[k] = w.placed[k] and turn >= 0
+    if turn >= 0:
+        for i in range(min(looks, bodies)):
+            w.fresh[0, (turn + i) % bodies] = True
+    w.turn[0] = (turn + looks) % bodies if turn >= 0 else 0
+    for k in range(bodies):
+        if w.fresh[0, k]:
+            _read(w, k)
+    if not _survey(w, corners, dt, margin):
+        return False
+    late = False
+    for k in range(bodies):
+        w.fresh[1, k] = w.near[k]
+        if w.near[k] and not w.fresh[0, k] and not w.still[k]:
+            late = True
+            _read(w, k)
+    if late:
+        _survey(w, corners, dt, margin)
+        for k in range(bodies):
+            w.near[k] = w.near[k] or w.fresh[1, k]
+    return True
+
+
+@inlined
+def _read(w: Watch, k: int) -> None:
+    """Take down where body ``k`` is. One without mass moves by commands alone; while it does, it is read every tick."""
+    if w.static[k]:
+        moved = False
+        for a in range(7):
+            moved = moved or w.motion[k, a] != w.seen[k, a]
+        w.still[k] = not w.placed[k] or not moved
+        if w.placed[k] and w.still[k]:
+            return
+    for a in range(13):
+        w.motion[k, a] = w.seen[k, a]
+    w.due[k] = w.placed[k] = True
+
+
+@inlined
+def _survey(w: Watch, corners: Array, dt: float, margin: float) -> bool:
+    """Place the parts of the bodies that are due, and flag those near the box; whether a flag changed."""
     changed = False
-    for b in range(ranges.shape[0]):
-        begin, end = ranges[b, 0], ranges[b, 1]
-        if due[b]:
-            due[b] = False
-            _place_parts(begin, end, local, extent, motion[b], dt, out_pose, out_box, out_sweep, R)
+    for b in range(w.ranges.shape[0]):
+        begin, end = w.ranges[b, 0], w.ranges[b, 1]
+        if w.due[b]:
+            w.due[b] = False
+            _place_parts(begin, end, w.local, w.extent, w.motion[b], dt, w.pose, w.box, w.sweep, w.R)
         close = False
         for c in range(begin, end):
             apart = False
             for a in range(3):
-                if out_box[c, 0, a] > corners[1, a] + margin or out_box[c, 1, a] < corners[0, a] - margin:
+                if w.box[c, 0, a] > corners[1, a] + margin or w.box[c, 1, a] < corners[0, a] - margin:
                     apart = True
             if not apart:
                 close = True
                 break
-        changed = changed or close != near[b]
-        near[b] = close
+        changed = changed or close != w.near[b]
+        w.near[b] = close
     return changed
 
 
@@ -111,6 +188,19 @@ def write_elements(
         for a in range(3):
             twists[b, a], twists[b, 3 + a] = v[i, a], w[i, a]
         tensions[b] = tension[e]
+
+
+@kernel
+def find_pushed(impulse: Array, nodes: Integers, out: Integers) -> int:
+    """How many of ``nodes`` (n,) have an ``impulse`` (N, 6); ``out`` (n,) receives their places among them."""
+    count = 0
+    for k in range(nodes.shape[0]):
+        for a in range(6):
+            if impulse[nodes[k], a] != 0.0:
+                out[count] = k
+                count += 1
+                break
+    return count
 
 
 @kernel

@@ -21,7 +21,7 @@ from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import Attachment, RodDescription, frame_quaternions
 from ligature.suture.passages import Passages, passages
-from ligature.suture.placing import bounds, sound, write_elements
+from ligature.suture.placing import bounds, find_pushed, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.springs import springs
 from ligature.suture.substeps import run_tick
@@ -152,6 +152,7 @@ class Rod:
         self._apart: list[int] = []
         self._movable: list[tuple[int, int]] = []
         self._pushed: list[tuple[int, int]] = []
+        self._pushed_nodes, self._found = np.zeros((2, 0), dtype=np.int64)
         self._pulled: dict[int, tuple[Array, float, Array]] = {}
         self._attached = [attachment.body for attachment in description.attachments]
         self._corners = np.zeros((2, 3))
@@ -401,6 +402,10 @@ class Rod:
         partners = [(body, self.node_of[body]) for body in (*near, *self._apart)]
         self._movable = [(body, node) for body, node in partners if not self._fixed[body]]
         self._pushed = [(body, node) for body, node in partners if self._mobile[body]]
+        self._pushed_nodes = np.array([node for _, node in self._pushed], dtype=np.int64)
+        self._found = np.zeros(len(self._pushed), dtype=np.int64)
+        self._nodes.met[self._chain :] = False
+        self._nodes.met[[node for _, node in partners]] = True
 
     def attach(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
         """Attach frame a of an element to frame b of a partner, (4, 4) in their frames B."""
@@ -460,8 +465,8 @@ class Rod:
 
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
-        pushed = [(body, self.impulse[node]) for body, node in self._pushed]
-        return [(body, impulse) for body, impulse in pushed if impulse.any()]
+        count = find_pushed(self.impulse, self._pushed_nodes, self._found)
+        return [(body, self.impulse[node]) for body, node in (self._pushed[k] for k in self._found[:count].tolist())]
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds the impulse on each partner."""

@@ -45,6 +45,8 @@ def predict(total: int, nodes: Nodes, work: Work, dt: float, damped: bool) -> No
     Damping of a whole tick is taken off in its ``damped`` step.
     """
     for i in range(total):
+        if not nodes.met[i]:
+            continue
         slow, still = (nodes.keep[i, 0], nodes.keep[i, 1]) if damped else (1.0, 1.0)
         for a in range(3):
             work.x[i, a] = nodes.x[i, a]
@@ -95,7 +97,8 @@ def linearise(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: 
     """Levers, axes and rows of all joints at the present poses."""
     per_dt2 = 1.0 / (dt * dt)
     for i in range(total):
-        matrix_of(nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3], work.R[i])
+        if nodes.met[i]:
+            matrix_of(nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3], work.R[i])
     for j in range(n - 1):
         for side in range(2):
             px, py, pz = joints.pivot[j, side, 0], joints.pivot[j, side, 1], joints.pivot[j, side, 2]
@@ -120,6 +123,8 @@ def linearise(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: 
 def assemble(n: int, total: int, nodes: Nodes, joints: Joints, work: Work) -> None:
     """Node matrices H (inertia, stiffness of the tension) and loads g (of the free motion)."""
     for i in range(total):
+        if not nodes.met[i]:
+            continue
         H, R = work.H[i], work.R[i]
         m = nodes.mass[i]
         for a in range(6):
@@ -190,7 +195,7 @@ def correct(n: int, total: int, nodes: Nodes, work: Work) -> float:
     largest = math.sqrt(largest)
     scale = 1.0 if largest < MAX_SWING else MAX_SWING / largest
     for i in range(total):
-        if nodes.fixed[i]:
+        if nodes.fixed[i] or not nodes.met[i]:
             continue
         for a in range(3):
             nodes.x[i, a] += scale * work.d[i, a]
@@ -202,7 +207,7 @@ def correct(n: int, total: int, nodes: Nodes, work: Work) -> float:
 def finish(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: float) -> None:
     """Velocities from the motion of the tick, and the joint angles that damping starts from next."""
     for i in range(total):
-        if nodes.fixed[i]:
+        if nodes.fixed[i] or not nodes.met[i]:
             continue
         x, y, z, w = multiply(
             nodes.q[i, 0], nodes.q[i, 1], nodes.q[i, 2], nodes.q[i, 3],

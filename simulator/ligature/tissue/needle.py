@@ -19,7 +19,7 @@ from ligature.tissue.layout import MOST_PATHS, MOST_POINTS, Paths, Points, open_
 from ligature.tissue.location import cross_surface
 from ligature.tissue.rows import (
     MOST_ROWS,
-    Rows,
+    Bristles,
     expand_rows,
     reduce_rows,
     row_arrays,
@@ -85,7 +85,7 @@ class NeedleArrays(NamedTuple):
     """All that a tick of a needle works on."""
 
     held: Held
-    rows: Rows
+    rows: Bristles
     shape: Array  # (14,) tip, tangent, normal to the centre of its arc, curvature, length, centre of mass
     H: Array  # (6, 6) of its own equations H δ = g
     g: Array  # (6,)
@@ -254,7 +254,7 @@ def follow_tip(points: Points, paths: Paths, held: Held, dt: float) -> int:
 
 
 @inlined
-def _find_bases(points: Points, held: Held, rows: Rows, s: float) -> None:
+def _find_bases(points: Points, held: Held, rows: Bristles, s: float) -> None:
     """Where the needle's points would be at the end of this tick without its own forces."""
     contact = held.tip[2]
     for u in range(points.filled[0]):
@@ -269,7 +269,7 @@ def _find_bases(points: Points, held: Held, rows: Rows, s: float) -> None:
 
 
 @kernel
-def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s: float) -> int:
+def gather(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Array, s: float) -> int:
     """Make the rows of a tick; returns how many."""
     m = 0
     where, tip_path, contact = held.tip[0], held.tip[1], held.tip[2]
@@ -366,7 +366,7 @@ def gather(points: Points, paths: Paths, held: Held, rows: Rows, shape: Array, s
 
 
 @kernel
-def conclude(points: Points, paths: Paths, held: Held, rows: Rows, m: int, delta: Array, clip: bool) -> bool:
+def conclude(points: Points, paths: Paths, held: Held, rows: Bristles, m: int, delta: Array, clip: bool) -> bool:
     """Keep what the rows leave: forces on the tissue, anchors, tears, what was cut; True if the tip got through."""
     through = False
     held.load[0], held.load[1], held.load[2] = 0.0, 0.0, 0.0

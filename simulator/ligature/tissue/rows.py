@@ -30,7 +30,7 @@ MOST_PASSES = 12
 """Repetitions for the limits at most."""
 
 
-class Rows(NamedTuple):
+class Bristles(NamedTuple):
     """Scratch of a needle's tick: up to M rows."""
 
     kind: Integers  # (M,)
@@ -55,11 +55,11 @@ class Rows(NamedTuple):
     base: Array  # (N, 3) where they would put its points at the end of the tick
 
 
-def row_arrays(points: int, capacity: int) -> Rows:
+def row_arrays(points: int, capacity: int) -> Bristles:
     """Scratch for ``capacity`` rows."""
     M, z = capacity, np.zeros
     i = lambda: np.zeros(M, np.int64)  # noqa: E731
-    return Rows(
+    return Bristles(
         i(), i(), z((M, 3)), z((M, 6)), z(M), z(M), z(M), z(M), i(), z(M), z((M, M)), z((M, M)), z((7, M)), i(),
         z((6, 6)), z(6), z((6, 6)), z(6), z((points, 3)), z((points, 3)),
     )  # fmt: skip
@@ -67,7 +67,7 @@ def row_arrays(points: int, capacity: int) -> Rows:
 
 @inlined
 def set_row(
-    rows: Rows, m: int, kind: int, point: int, ex: float, ey: float, ez: float, rx: float, ry: float, rz: float
+    rows: Bristles, m: int, kind: int, point: int, ex: float, ey: float, ez: float, rx: float, ry: float, rz: float
 ) -> None:
     """Let row ``m`` be the direction (ex, ey, ez) at the lever (rx, ry, rz) from the centre of mass."""
     e, J = rows.e[m], rows.J[m]
@@ -78,7 +78,7 @@ def set_row(
 
 
 @inlined
-def reduce_rows(rows: Rows, m: int) -> int:
+def reduce_rows(rows: Bristles, m: int) -> int:
     """Stiffness and load of the rows on the needle for the limits as they are; elastic rows, -1 where it failed."""
     n = 0
     for a in range(m):
@@ -128,7 +128,7 @@ def reduce_rows(rows: Rows, m: int) -> int:
 
 
 @inlined
-def expand_rows(rows: Rows, n: int, delta: Array) -> None:
+def expand_rows(rows: Bristles, n: int, delta: Array) -> None:
     """Forces of the ``n`` elastic rows after `reduce_rows` for a motion ``delta`` (6,) of the needle."""
     for p in range(n - 1, -1, -1):
         total = rows.X[6, p]
@@ -140,7 +140,7 @@ def expand_rows(rows: Rows, n: int, delta: Array) -> None:
 
 
 @kernel
-def solve_rows(rows: Rows, m: int, H: Array, g: Array, delta: Array) -> int:
+def solve_rows(rows: Bristles, m: int, H: Array, g: Array, delta: Array) -> int:
     """Forces of the rows and motion ``delta`` (6,) of the needle.
 
     Returns 1 when `reduce_rows` has seen the limits as they are now, 0 when they changed last, -1 where it failed.
@@ -176,7 +176,7 @@ def solve_rows(rows: Rows, m: int, H: Array, g: Array, delta: Array) -> int:
 
 
 @inlined
-def stretch_of(rows: Rows, m: int, a: int, delta: Array) -> float:
+def stretch_of(rows: Bristles, m: int, a: int, delta: Array) -> float:
     """Stretch of row ``a``, its bristle's and the tissue's, after the motion ``delta`` (6,) and with the forces."""
     stretch = rows.rest[a]
     for i in range(6):
@@ -187,7 +187,7 @@ def stretch_of(rows: Rows, m: int, a: int, delta: Array) -> float:
 
 
 @inlined
-def sum_up(rows: Rows, m: int, wrench: Array) -> None:
+def sum_up(rows: Bristles, m: int, wrench: Array) -> None:
     """Force and moment of all rows on the needle."""
     for i in range(6):
         wrench[i] = 0.0

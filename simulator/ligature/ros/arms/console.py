@@ -44,7 +44,7 @@ class Console:
     ) -> None:
         self._arms = [outlet.index for outlet in outlets]
         self._push, self._silent = push, silent
-        self._said: list[Latched] = []
+        self._published: list[Latched] = []
         console = f"{prefix}console"
         self._enabled = self._latched(f"{console}/teleop/enabled", Bool)
         self._scale = self._latched(f"{console}/teleop/scale", Float64)
@@ -83,12 +83,12 @@ class Console:
 
     def close(self) -> None:
         """Fall silent: another console publishes. What switches the power of arms is heard all the same."""
-        for topic in self._said:
+        for topic in self._published:
             topic.close()
 
     def _latched(self, topic: str, type_: type) -> Latched:
-        self._said.append(Latched(topic, type_, self._silent))
-        return self._said[-1]
+        self._published.append(Latched(topic, type_, self._silent))
+        return self._published[-1]
 
     def _listen(self, topic: str, type_: type, take: Callable[[Any], None]) -> None:
         rospy.Subscriber(topic, type_, take, queue_size=QUEUE)

@@ -17,7 +17,8 @@ import rosgraph
 import rospy
 from rosgraph.xmlrpc import XmlRpcHandler, XmlRpcNode
 
-from ligature.ros.master import NO_ANSWER, WATCHER, Hasty, is_simulator, lives
+from ligature.ros.master import NO_ANSWER, WATCHER, Hasty, is_simulator
+from ligature.ros.registrations import lives
 
 PERIOD = 5.0
 """Seconds between two looks without a call of the master, which may have been restarted."""

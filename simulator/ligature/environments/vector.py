@@ -1,0 +1,151 @@
+"""Environments in processes of their own, which write what they observe into shared memory."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode
+from gymnasium.vector.async_vector_env import AsyncState
+
+from ligature.environments.suturing import SuturingEnv
+
+AUTORESET = {"next step": AutoresetMode.NEXT_STEP, "same step": AutoresetMode.SAME_STEP, "off": AutoresetMode.DISABLED}
+"""When an environment whose episode ended begins the next one; see Gymnasium's ``AutoresetMode``."""
+
+PARENT_NAP = 0.5
+"""Seconds between two looks of a worker at whether its parent lives."""
+
+DEATH_WAIT = 2.0
+"""Seconds to wait for the status of a process whose pipe is shut."""
+
+
+@dataclass(frozen=True)
+class _Made:
+    """Makes an environment in a worker, or one in the process ``parent`` to ask for its spaces."""
+
+    task: str
+    options: dict[str, Any]
+    parent: int
+
+    def __call__(self) -> SuturingEnv:
+        if os.getpid() != self.parent:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent closes its workers
+            threading.Thread(target=self._end_with_parent, name="parent", daemon=True).start()
+        return SuturingEnv(self.task, **self.options)
+
+    def _end_with_parent(self) -> None:
+        """End this process once its parent has: workers hold each other's pipes open, so that none notices."""
+        while os.getppid() == self.parent:
+            time.sleep(PARENT_NAP)
+        os._exit(0)
+
+
+class SuturingVectorEnv(AsyncVectorEnv):
+    """Gymnasium's vector of environments in processes, which says which of them ended and leaves none behind.
+
+    Parameters
+    ----------
+    task, n, autoreset, options
+        As for `ligature.environments.make_vec`.
+    """
+
+    def __init__(self, task: str, n: int, autoreset: str = "next step", **options: Any) -> None:
+        if n < 1:
+            raise ValueError(f"n is a number of environments, at least 1, not {n}")
+        if autoreset not in AUTORESET:
+            raise ValueError(f"autoreset is one of {', '.join(map(repr, AUTORESET))}, not {autoreset!r}")
+        made = _Made(task, options, os.getpid())
+        super().__init__([made] * n, shared_memory=True, autoreset_mode=AUTORESET[autoreset])
+
+    def _check_spaces(self) -> None:
+        with self._watched():
+            super()._check_spaces()
+
+    def reset_async(self, *arguments: Any, **options: Any) -> None:
+        """Have all environments begin anew; ``AsyncVectorEnv`` says what this and the methods below take."""
+        with self._watched():
+            super().reset_async(*arguments, **options)
+
+    def reset_wait(self, *arguments: Any, **options: Any) -> Any:
+        """Observations and infos once all have begun anew."""
+        with self._watched():
+            return super().reset_wait(*arguments, **options)
+
+    def step_async(self, actions: Any) -> None:
+        """Send each environment its action."""
+        with self._watched():
+            super().step_async(actions)
+
+    def step_wait(self, *arguments: Any, **options: Any) -> Any:
+        """What all environments answer to their actions."""
+        with self._watched():
+            return super().step_wait(*arguments, **options)
+
+    def call_async(self, name: str, *arguments: Any, **options: Any) -> None:
+        """Call a method of each environment, or ask for an attribute."""
+        with self._watched():
+            super().call_async(name, *arguments, **options)
+
+    def call_wait(self, *arguments: Any, **options: Any) -> Any:
+        """What all environments answer to the call."""
+        with self._watched():
+            return super().call_wait(*arguments, **options)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each environment."""
+        with self._watched():
+            super().set_attr(name, values)
+
+    def close_extras(self, timeout: float | None = None, terminate: bool = False, **_: Any) -> None:
+        """End all processes; where one has ended, or ends now, the others are not asked first."""
+        if any(process.exitcode is not None for process in self.processes):
+            self._state, terminate = AsyncState.DEFAULT, True
+        try:
+            super().close_extras(timeout, terminate)
+        except (EOFError, ConnectionError):
+            super().close_extras(timeout, True)
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Report a process that ended, and end the others with it."""
+        try:
+            yield
+        except (EOFError, ConnectionError) as error:
+            self._report(error)
+
+    def _report(self, error: Exception) -> NoReturn:
+        deadline = time.monotonic() + DEATH_WAIT
+        while all(process.exitcode is None for process in self.processes) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        ended = [
+            f"environment {k} of {self.num_envs} (process {process.pid}) {_how(process.exitcode)}"
+            for k, process in enumerate(self.processes)
+            if process.exitcode is not None
+        ]
+        self._state = AsyncState.DEFAULT
+        self.close(terminate=True)
+        raise RuntimeError(f"{'; '.join(ended) or 'an environment'}: the vector is closed, make another") from error
+
+    def _raise_if_errors(self, successes: list[bool] | tuple[bool]) -> None:
+        """Raise RuntimeError for what an environment raised, and end all."""
+        try:
+            super()._raise_if_errors(successes)
+        except Exception as error:
+            failed = [k for k, success in enumerate(successes) if not success]
+            self.close(terminate=True)
+            raise RuntimeError(
+                f"environment {failed[-1]} of {self.num_envs} raised {type(error).__name__}: {error}"
+            ) from error
+
+
+def _how(status: int) -> str:
+    """How a process ended."""
+    return f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"

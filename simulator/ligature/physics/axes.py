@@ -1,0 +1,239 @@
+"""The law of every single axis of all joints, once a tick, as one compiled call. Radians, metres, N·m, N.
+
+The PID follows ADF specification §15.6 with its derivative taken implicitly: with velocity output
+``v = P e + I ∫e + D ė`` and ``ė = ṫ − v`` the joint's velocity is ``v = (P e + I ∫e + D ṫ) / (1 + D)``. Evaluated
+explicitly, as the reference does, a D near 1 chatters at the rate of the loop; the implicit form is the same law
+without it.
+
+With force output the effort is ``P e + I ∫e + D (ṫ − v)``. It goes to a motor of that strength, whose velocity is the
+one at which the effort vanishes: Bullet's solver finds the effort along with all contacts and loops, so that it is
+the law's where the joint is heavy enough for it to act in full over a tick, and less where it would overshoot.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.kernels import inlined, kernel
+from ligature.model.commands import CommandType
+from ligature.physics.bullet import (
+    TORQUE_CONTROL,
+    VELOCITY_CONTROL,
+    VELOCITY_GAIN,
+    init_motors,
+    set_effort,
+    set_gain,
+    set_strength,
+    set_velocity,
+    submit,
+)
+from ligature.physics.trees import BASE_U, Trees, follow, load_joints, open_trees, read_tree
+from ligature.tables import opener
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+FREE, FORCE, POSITION, VELOCITY = (
+    -1,
+    int(CommandType.FORCE),
+    int(CommandType.POSITION),
+    int(CommandType.VELOCITY),
+)
+SERVO = 3
+"""Mode of a joint that an arm of a robot drives: it follows a set-point and its velocity."""
+
+GIVING_FRICTION = 0.005
+"""Effort (N·m or N) that a motor which gives always has, so that it arrives at its set-point."""
+
+FREE_SPEED = 1e3
+"""Speed in rad/s or m/s that an effort alone would reach, were it not bounded otherwise."""
+
+STOP_GAIN = 0.2
+"""Share of its way back that a stopped joint goes in a tick."""
+
+SERVO_GAIN = 200.0
+"""Closing speed over following error in 1/s: the set-point is reached with a time constant of 5 ms."""
+
+
+class Axes(NamedTuple):
+    """The single axes of all trees, (a,) each, tree by tree, and what holds for trees (k,)."""
+
+    laden: Flags  # (k,) whether the joints of a tree bear `Trees.force`
+    mode: Integers
+    force_output: Flags
+    turns: Flags
+    sprung: Flags
+    owned: Flags  # by an arm that is enabled
+    driven: Flags  # by a motor
+    pushed: Flags  # by an effort
+    p: Array
+    i: Array
+    d: Array
+    strength: Array  # largest effort of the motor
+    low: Array  # limits of positions that are commanded
+    high: Array
+    stiffness: Array  # of springs
+    damping: Array
+    rest: Array
+    target: Array
+    pace: Array  # of the target
+    max_velocity: Array
+    max_deceleration: Array
+    yield_stiffness: Array
+    integral: Array
+    kick: Array
+    kick_ticks: Integers
+    stopped: Flags  # kept at a position
+    stop: Array
+    slowed: Flags  # velocity and strength of the motor are bounded
+    lower_speed: Array
+    upper_speed: Array
+    upper_effort: Array
+    motor: Array  # velocities of motors
+    asked: Array  # what a motor with force output exerts at most
+    limit: Array  # largest efforts of motors in the coming tick
+
+
+_KINDS = {
+    **dict.fromkeys(("mode", "kick_ticks"), np.int64),
+    **dict.fromkeys(("force_output", "turns", "sprung", "owned", "driven", "pushed", "stopped", "slowed"), np.bool_),
+}
+"""Kinds of the arrays that do not hold real numbers."""
+
+
+def axes(trees: int, count: int) -> Axes:
+    """Arrays for ``count`` axes of this number of trees, all limp."""
+    arrays = {name: np.zeros(count, _KINDS.get(name, np.float64)) for name in Axes._fields}
+    arrays["laden"] = np.zeros(trees, np.bool_)
+    for name in ("max_velocity", "max_deceleration"):
+        arrays[name][:] = np.inf
+    arrays["mode"][:] = FREE
+    return Axes._make(arrays.values())
+
+
+open_axes = opener(axes(1, 1))
+
+
+@kernel
+def act(handle: int, tree_table: Integers, axis_table: Integers, dt: float) -> None:
+    """Motor velocities and efforts of the coming tick for all axes; with a handle, Bullet gets them.
+
+    Without one the trees must have been read, and linked where they are laden.
+    """
+    trees, axes = open_trees(tree_table), open_axes(axis_table)
+    for k in range(trees.uid.shape[0]):
+        begin, end = trees.first[k], trees.first[k + 1]
+        motors, efforts = 0, 0
+        for i in range(begin, end):
+            motors += axes.driven[i]
+            efforts += axes.pushed[i]
+        if motors + efforts == 0:
+            continue
+        if handle != 0 and not trees.read[k]:
+            read_tree(handle, trees, k)
+        for i in range(begin, end):
+            _follow_law(axes, trees, i, dt)
+        if axes.laden[k]:
+            if not trees.linked[k]:
+                follow(trees, k)
+            load_joints(trees, k)
+        for i in range(begin, end):
+            _bound(axes, trees, i, dt)
+        if handle != 0 and motors > 0:
+            _send_motors(handle, trees, axes, k)
+        if handle != 0 and efforts > 0:
+            _send_efforts(handle, trees, axes, k)
+
+
+@inlined
+def _follow_law(axes: Axes, trees: Trees, k: int, dt: float) -> None:
+    """Velocity of the motor and effort that command and spring of one axis ask for; its integral and kick go on."""
+    position, velocity = trees.joints[0, k], trees.joints[1, k]
+    axes.motor[k] = axes.asked[k] = trees.push[k] = 0.0
+    if axes.mode[k] == POSITION:
+        error = axes.target[k] - position
+        if axes.turns[k]:
+            error = (error + np.pi) % (2 * np.pi) - np.pi
+        axes.integral[k] += error * dt
+        pull = axes.p[k] * error + axes.i[k] * axes.integral[k]
+        jump = 0.0
+        if axes.kick_ticks[k] > 0:
+            jump = axes.kick[k]
+            axes.kick_ticks[k] -= 1
+        if axes.force_output[k]:
+            axes.asked[k] = pull + axes.d[k] * (jump - velocity)
+            axes.motor[k] = jump + _vanishing(pull, axes.d[k], STOP_GAIN / dt * abs(error))
+        else:
+            axes.motor[k] = (pull + axes.d[k] * jump) / (1.0 + axes.d[k])
+    elif axes.mode[k] == SERVO:
+        error = axes.target[k] - position
+        closing = min(SERVO_GAIN * abs(error), np.sqrt(2.0 * axes.max_deceleration[k] * abs(error)))
+        axes.motor[k] = min(
+            max(axes.pace[k] + np.copysign(closing, error), -axes.max_velocity[k]), axes.max_velocity[k]
+        )
+    elif axes.mode[k] == VELOCITY:
+        axes.motor[k] = axes.target[k]
+    elif axes.mode[k] == FORCE:
+        trees.push[k] = axes.target[k]
+    if axes.sprung[k]:
+        trees.push[k] += axes.stiffness[k] * (axes.rest[k] - position) - axes.damping[k] * velocity
+
+
+@inlined
+def _vanishing(pull: float, damping: float, most: float) -> float:
+    """Velocity at which a damper takes up ``pull``, at most ``most``."""
+    if abs(pull) > damping * most:
+        return np.copysign(most, pull)
+    return pull / damping if damping > 0.0 else 0.0
+
+
+@inlined
+def _bound(axes: Axes, trees: Trees, k: int, dt: float) -> None:
+    """Largest effort of one motor: one that yields pulls in proportion to its following error; stops and bounds."""
+    position, velocity, strength = trees.joints[0, k], trees.joints[1, k], axes.strength[k]
+    limit = strength
+    if axes.yield_stiffness[k] > 0.0:
+        limit = min(axes.yield_stiffness[k] * abs(axes.target[k] - position) + GIVING_FRICTION, strength)
+    if axes.mode[k] == POSITION and axes.force_output[k]:
+        limit = abs(axes.asked[k])
+    if axes.slowed[k]:
+        effort, wanted = limit, axes.motor[k]
+        if axes.mode[k] == FORCE:
+            effort, wanted = abs(axes.target[k]), np.sign(axes.target[k]) * FREE_SPEED
+        axes.motor[k] = min(max(wanted, axes.lower_speed[k]), axes.upper_speed[k])
+        within = axes.lower_speed[k] <= velocity <= axes.upper_speed[k]
+        limit = min(effort, axes.upper_effort[k]) if within else strength
+    if axes.stopped[k]:
+        axes.motor[k] = STOP_GAIN / dt * (axes.stop[k] - position)
+        if not axes.slowed[k]:
+            limit = strength
+    axes.limit[k] = limit
+
+
+@inlined
+def _send_motors(handle: int, trees: Trees, axes: Axes, k: int) -> None:
+    """Set the motors of tree ``k``."""
+    begin, end = trees.first[k], trees.first[k + 1]
+    command = init_motors(handle, trees.uid[k], VELOCITY_CONTROL)
+    for i in range(begin, end):
+        if axes.driven[i]:
+            at = BASE_U + i - begin
+            set_velocity(command, at, axes.motor[i])
+            set_gain(command, at, VELOCITY_GAIN)
+            set_strength(command, at, axes.limit[i])
+    submit(handle, command)
+
+
+@inlined
+def _send_efforts(handle: int, trees: Trees, axes: Axes, k: int) -> None:
+    """Set the efforts of tree ``k``."""
+    begin, end = trees.first[k], trees.first[k + 1]
+    command = init_motors(handle, trees.uid[k], TORQUE_CONTROL)
+    for i in range(begin, end):
+        if axes.pushed[i]:
+            set_effort(command, BASE_U + i - begin, trees.push[i])
+    submit(handle, command)

@@ -1,0 +1,189 @@
+"""Bullet's own C interface inside PyBullet, for compiled code: no Python object for each joint of each tick.
+
+PyBullet's functions make a tuple for each joint that they read and parse a list for each that they set, and whoever
+calls them does as much again: a third of a tick. Compiled code calls the functions beneath, with the same arguments in
+the same order, so that Bullet gets the same numbers. Handles of Bullet are whole numbers here: addresses.
+
+PyBullet lists its clients at an address that it tells nobody. The first `connect` finds it: the word of PyBullet's
+memory that holds a client afterwards and was 0 before. Where it is not found, handles are 0, and the callers use
+PyBullet.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import llvmlite.binding
+import numpy as np
+import pybullet
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+Integers = NDArray[np.int64]
+
+VELOCITY_CONTROL, TORQUE_CONTROL = int(pybullet.VELOCITY_CONTROL), int(pybullet.TORQUE_CONTROL)
+
+WORLD_FRAME = int(pybullet.WORLD_FRAME)
+
+VELOCITY_GAIN = 1.0
+"""Gain of a velocity motor, which PyBullet sets unless told otherwise."""
+
+_address, _int, _real = types.intp, types.int32, types.float64
+
+_FUNCTIONS = {
+    "b3SubmitClientCommandAndWaitStatus": _address(_address, _address),
+    "b3InitStepSimulationCommand": _address(_address),
+    "b3RequestActualStateCommandInit": _address(_address, _int),
+    "b3GetStatusActualState2": _int(*([_address] * 13)),
+    "b3JointControlCommandInit2": _address(_address, _int, _int),
+    "b3JointControlSetDesiredVelocity": _int(_address, _int, _real),
+    "b3JointControlSetKd": _int(_address, _int, _real),
+    "b3JointControlSetMaximumForce": _int(_address, _int, _real),
+    "b3JointControlSetDesiredForceTorque": _int(_address, _int, _real),
+    "b3CreatePoseCommandInit": _address(_address, _int),
+    "b3CreatePoseCommandSetBaseLinearVelocity": _int(_address, _address),
+    "b3CreatePoseCommandSetBaseAngularVelocity": _int(_address, _address),
+    "b3ApplyExternalForceCommandInit": _address(_address),
+    "b3ApplyExternalForce": types.void(_address, _int, _int, _address, _address, _int),
+    "b3ApplyExternalTorque": types.void(_address, _int, _int, _address, _int),
+    "b3InitRequestContactPointInformation": _address(_address),
+    "b3GetContactPointInformation": types.void(_address, _address),
+}  # fmt: skip
+"""What compiled code calls, by its name in Bullet's header `PhysicsClientC_API.h`."""
+
+_file = os.path.realpath(pybullet.__file__)
+_library = ctypes.CDLL(_file)
+
+
+def _external(name: str) -> Any:
+    """A function of Bullet for compiled code."""
+    with contextlib.suppress(AttributeError):  # then no handle is found, and nobody calls it
+        llvmlite.binding.add_symbol(name, ctypes.cast(getattr(_library, name), ctypes.c_void_p).value)
+    return types.ExternalFunction(name, _FUNCTIONS[name])
+
+
+submit = _external("b3SubmitClientCommandAndWaitStatus")
+init_step = _external("b3InitStepSimulationCommand")
+init_state_request = _external("b3RequestActualStateCommandInit")
+get_state = _external("b3GetStatusActualState2")
+init_motors = _external("b3JointControlCommandInit2")
+set_velocity = _external("b3JointControlSetDesiredVelocity")
+set_gain = _external("b3JointControlSetKd")
+set_strength = _external("b3JointControlSetMaximumForce")
+set_effort = _external("b3JointControlSetDesiredForceTorque")
+init_motion = _external("b3CreatePoseCommandInit")
+set_linear_velocity = _external("b3CreatePoseCommandSetBaseLinearVelocity")
+set_angular_velocity = _external("b3CreatePoseCommandSetBaseAngularVelocity")
+init_forces = _external("b3ApplyExternalForceCommandInit")
+add_force = _external("b3ApplyExternalForce")
+add_torque = _external("b3ApplyExternalTorque")
+init_contact_request = _external("b3InitRequestContactPointInformation")
+get_contacts = _external("b3GetContactPointInformation")
+
+
+@intrinsic  # type: ignore[misc]
+def real_at(typing_context: Any, address: Any, index: Any) -> Any:
+    """The real number at ``index`` of those at an address."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        numbers = builder.inttoptr(arguments[0], ir.PointerType(ir.DoubleType()))
+        return builder.load(builder.gep(numbers, [arguments[1]]))
+
+    return types.float64(types.intp, types.intp), build
+
+
+@intrinsic  # type: ignore[misc]
+def whole_at(typing_context: Any, address: Any) -> Any:
+    """The whole number of 32 bits at an address."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        number = builder.load(builder.inttoptr(arguments[0], ir.PointerType(ir.IntType(32))))
+        return builder.sext(number, ir.IntType(64))
+
+    return types.int64(types.intp), build
+
+
+# --- handles ------------------------------------------------------------------------------------
+
+
+def connect() -> tuple[int, int]:
+    """A new client in this process: PyBullet's number of it, and its handle for compiled code; 0 is none."""
+    missing = [name for name in _FUNCTIONS if not hasattr(_library, name)]
+    if _Clients.begin is None and not missing:
+        return _connect_watched()
+    client = int(pybullet.connect(pybullet.DIRECT))
+    return client, 0 if missing else _handle(client)
+
+
+class _Clients:
+    """Where PyBullet lists its clients: address of the first, 0 when it was not found, None before the search."""
+
+    begin: int | None = None
+
+
+def _connect_watched() -> tuple[int, int]:
+    """Connect, and find out where PyBullet notes that."""
+    segments = list(_segments())
+    before = [words.copy() for words in segments]
+    client = int(pybullet.connect(pybullet.DIRECT))
+    found = [
+        words.ctypes.data + 8 * int(k)
+        for words, old in zip(segments, before, strict=True)
+        for k in np.flatnonzero((words != old) & (old == 0))
+        if _is_client(int(words[k]))
+    ]
+    _Clients.begin = found[0] - 8 * client if len(found) == 1 else 0
+    return client, _handle(client)
+
+
+def _handle(client: int) -> int:
+    """The handle of a client, 0 where it is not known."""
+    if not _Clients.begin:
+        return 0
+    handle = ctypes.c_int64.from_address(_Clients.begin + 8 * client).value
+    return handle if _is_client(handle) else 0
+
+
+def _segments() -> Iterator[Integers]:
+    """The words of the library's variables; those that begin as 0 have no name of a file, and follow the others."""
+    end = 0
+    with contextlib.suppress(OSError), open("/proc/self/maps") as lines:
+        for line in lines:
+            span, access, *_, path = (*line.split(maxsplit=5), "")[:6]
+            low, high = (int(number, 16) for number in span.split("-"))
+            if access.startswith("rw") and (path.strip() == _file or (low == end and not path.strip())):
+                end = high
+                yield np.ctypeslib.as_array((ctypes.c_int64 * ((high - low) // 8)).from_address(low))
+
+
+def _is_client(address: int) -> bool:
+    """Whether an object of the class of clients is at an address, which may be none."""
+    return address % 8 == 0 and address > 0 and _word(address) == _class_of_clients()
+
+
+def _word(address: int) -> int | None:
+    """The word at an address, None where there is no memory."""
+    try:
+        with open("/proc/self/mem", "rb", buffering=0) as own:
+            own.seek(address)
+            return int.from_bytes(own.read(8), "little")
+    except (OSError, ValueError, OverflowError):
+        return None
+
+
+@cache
+def _class_of_clients() -> int | None:
+    """What the first word of every client holds: the address of its class's functions."""
+    make, end = _library.b3ConnectPhysicsDirect, _library.b3DisconnectSharedMemory
+    make.restype, end.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
+    example = make()
+    first = _word(example)
+    end(example)
+    return first

@@ -1,0 +1,32 @@
+"""Damping of bodies that move alone, exact: Bullet's of multibodies has a quadratic part besides the linear one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ligature.physics.articulation import is_alone
+from ligature.physics.engine import Engine
+from ligature.physics.trees import slow_down
+
+
+class Damping:
+    """The damping of lone bodies of an engine in a tick (ADF specification §12.1)."""
+
+    def __init__(self, engine: Engine) -> None:
+        bodies, dt = engine.scene.bodies, engine.dt
+        alone = [k for k, tree in enumerate(engine.trees) if is_alone(tree, bodies)]
+        roots = [bodies[engine.trees[k].root] for k in alone]
+        factors = np.array([((1 - b.linear_damping) ** dt, (1 - b.angular_damping) ** dt) for b in roots])
+        factors = factors.reshape(-1, 2)
+        damped = (factors < 1.0).any(axis=1)
+        self._trees, self._factors = np.array(alone, dtype=np.int64)[damped], factors[damped]
+        self._places = [engine.place_of[engine.trees[k].root] for k in self._trees]
+        self._motions = engine.motions
+
+    def step(self) -> None:
+        """Slow them down by a tick's part."""
+        if self._motions.handle:
+            slow_down(self._motions.handle, self._motions.table, self._trees, self._factors)
+        else:
+            for place, (linear, angular) in zip(self._places, self._factors.tolist(), strict=True):
+                place.slow_down(linear, angular)

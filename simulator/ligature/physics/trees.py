@@ -1,0 +1,366 @@
+"""The trees of a world as arrays for compiled code: read from Bullet, moved along with their joints, loaded.
+
+Every tree has one row for its base and one for each link, in order, and its single axes follow each other, too. Poses
+are x y z qx qy qz qw of inertial frames I in world axes, twists linear at the centre of mass, then angular; joints in
+radians or metres.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from ligature.kernels import inlined, kernel
+from ligature.model.poses import compose
+from ligature.physics.bullet import (
+    WORLD_FRAME,
+    add_force,
+    add_torque,
+    get_state,
+    init_forces,
+    init_motion,
+    init_state_request,
+    init_step,
+    real_at,
+    set_angular_velocity,
+    set_linear_velocity,
+    submit,
+)
+from ligature.tables import opener
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+_TURNS, _SLIDES = int(pybullet.JOINT_REVOLUTE), int(pybullet.JOINT_PRISMATIC)
+
+BASE_Q, BASE_U = 7, 6
+"""Numbers of the base before those of the first axis, among Bullet's coordinates and velocities."""
+
+
+class Trees(NamedTuple):
+    """The trees of a world: k trees, r rows, a axes."""
+
+    uid: Integers  # (k,) Bullet's number of the multibody
+    begin: Integers  # (k + 1,) first row of each tree, and the end
+    first: Integers  # (k + 1,) first axis of each tree, and the end
+    going: Flags  # (k,) whether the base moves
+    turning: Flags  # (k,) whether there are axes
+    measured: Flags  # (k,) whether Bullet measures what the joints carry
+    read: Flags  # (k,) whether base and joints are those that Bullet has
+    linked: Flags  # (k,) whether the links are where base and joints have them
+    ticks: Integers  # (1,) ticks since bodies were put where they began; before the first, no motor has an effort
+    link: Integers  # (a,) Bullet's link of each axis
+    limp: Flags  # (a,) whether no motor drives it
+    sent: Flags  # (a,) whether it reports another effort than its motor's, and that
+    sent_effort: Array  # (a,)
+    rows: Integers  # (r, 3) parent row, type and axis of the joint
+    fixed: Array  # (r, 17) axis of the joint, link frame in its parent's at zero, inertial frame in the link frame
+    pose: Array  # (r, 7)
+    twist: Array  # (r, 6)
+    frame: Array  # (r, 7) pose and velocity of the link frames' origins
+    speed: Array  # (r, 6)
+    joints: Array  # (3, a) position, velocity, effort
+    reaction: Array  # (a, 6)
+    force: Array  # (r, 3) at the centres of mass
+    load: Array  # (r, 6) scratch: force, and moment about the world's origin
+    push: Array  # (a,)
+    answer: Integers  # (5,) its own address, and where Bullet puts what `read_tree` asks for
+    wanted: Array  # (9,) what is on its way to Bullet: a twist, or force, torque and point
+    wanted_at: Integers  # (1,) its address
+
+
+def trees(count: int, rows: int, axes: int) -> Trees:
+    """Arrays for ``count`` trees with these numbers of rows and axes."""
+    z, whole, no = np.zeros, np.int64, np.bool_
+    answer, wanted = z(5, whole), z(9)
+    answer[0] = answer.ctypes.data
+    return Trees(
+        uid=z(count, whole), begin=z(count + 1, whole), first=z(count + 1, whole), going=z(count, no),
+        turning=z(count, no), measured=z(count, no), read=z(count, no), linked=z(count, no), ticks=z(1, whole),
+        link=z(axes, whole), limp=np.ones(axes, no), sent=z(axes, no), sent_effort=z(axes),
+        rows=np.full((rows, 3), -1), fixed=z((rows, 17)), pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)),
+        speed=z((rows, 6)), joints=z((3, axes)), reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)),
+        push=z(axes), answer=answer, wanted=wanted, wanted_at=np.array([wanted.ctypes.data]),
+    )  # fmt: skip
+
+
+open_trees = opener(trees(1, 1, 1))
+
+
+@inlined
+def read_tree(handle: int, trees: Trees, k: int) -> None:
+    """Read base and joints of tree ``k`` from Bullet; a base that stands is not read."""
+    out = trees.answer[0]
+    status = submit(handle, init_state_request(handle, trees.uid[k]))
+    get_state(status, 0, 0, 0, 0, 0, out + 8, out + 16, out + 24, 0, out + 32, 0, 0)
+    q, u, reactions, efforts = trees.answer[1], trees.answer[2], trees.answer[3], trees.answer[4]
+    if trees.going[k]:
+        row = trees.begin[k]
+        for a in range(7):
+            trees.pose[row, a] = real_at(q, a)
+        for a in range(6):
+            trees.twist[row, a] = real_at(u, a)
+    first = trees.first[k]
+    for i in range(first, trees.first[k + 1]):
+        link = trees.link[i]
+        trees.joints[0, i] = real_at(q, BASE_Q + i - first)
+        trees.joints[1, i] = real_at(u, BASE_U + i - first)
+        silent = trees.ticks[0] == 0 or trees.limp[i]
+        trees.joints[2, i] = trees.sent_effort[i] if trees.sent[i] else 0.0 if silent else real_at(efforts, link)
+        if trees.measured[k]:
+            for a in range(6):
+                trees.reaction[i, a] = 0.0 if trees.ticks[0] == 0 else real_at(reactions, 6 * link + a)
+    trees.read[k] = True
+
+
+@kernel
+def read_one(handle: int, table: Integers, k: int) -> None:
+    """Read base and joints of tree ``k`` of a table of `Trees`."""
+    read_tree(handle, open_trees(table), k)
+
+
+@kernel
+def step_world(handle: int, table: Integers, limit: float) -> bool:
+    """Advance Bullet by a tick, and read all trees; whether all speeds are finite and below ``limit``."""
+    trees = open_trees(table)
+    submit(handle, init_step(handle))
+    pass_tick(trees)
+    for k in range(trees.uid.shape[0]):
+        if not trees.read[k]:
+            read_tree(handle, trees, k)
+    return below(trees, limit)
+
+
+@inlined
+def pass_tick(trees: Trees) -> None:
+    """A tick is over: what moves is elsewhere."""
+    trees.ticks[0] += 1
+    for k in range(trees.uid.shape[0]):
+        if trees.going[k] or trees.turning[k]:
+            trees.read[k] = trees.linked[k] = False
+
+
+@inlined
+def below(trees: Trees, limit: float) -> bool:
+    """Whether all velocities of bases and joints are finite and below ``limit``."""
+    sound = True
+    for k in range(trees.uid.shape[0]):
+        for a in range(6):
+            sound = sound and abs(trees.twist[trees.begin[k], a]) < limit
+    for i in range(trees.link.shape[0]):
+        sound = sound and abs(trees.joints[1, i]) < limit
+    return sound
+
+
+@kernel
+def expire(table: Integers) -> None:
+    """`pass_tick` for a table of `Trees`."""
+    pass_tick(open_trees(table))
+
+
+@kernel
+def sound(table: Integers, limit: float) -> bool:
+    """`below` for a table of `Trees`."""
+    return below(open_trees(table), limit)
+
+
+@kernel
+def link_trees(table: Integers) -> None:
+    """Bring the links of all trees to where bases and joints have them; these are up to date."""
+    trees = open_trees(table)
+    for k in range(trees.uid.shape[0]):
+        if not trees.linked[k]:
+            follow(trees, k)
+
+
+@kernel
+def link_one(table: Integers, k: int) -> None:
+    """`follow` for a table of `Trees`."""
+    follow(open_trees(table), k)
+
+
+@kernel
+def load_one(table: Integers, k: int) -> None:
+    """`load_joints` for a table of `Trees`."""
+    load_joints(open_trees(table), k)
+
+
+@kernel
+def slow_down(handle: int, table: Integers, slowed: Integers, factors: Array) -> None:
+    """Multiply linear and angular velocity of the trees ``slowed`` (n,), which have no links, by ``factors`` (n, 2)."""
+    trees = open_trees(table)
+    for i in range(slowed.shape[0]):
+        k = slowed[i]
+        if not trees.read[k]:
+            read_tree(handle, trees, k)
+        twist, moves = trees.twist[trees.begin[k]], False
+        for a in range(6):
+            moves = moves or twist[a] != 0.0
+            trees.wanted[a] = factors[i, a // 3] * twist[a]
+        if moves:
+            for a in range(6):
+                twist[a] = trees.wanted[a]
+            command = init_motion(handle, trees.uid[k])
+            set_linear_velocity(command, trees.wanted_at[0])
+            set_angular_velocity(command, trees.wanted_at[0] + 24)
+            submit(handle, command)
+
+
+@inlined
+def bring_up(handle: int, trees: Trees, k: int, link: bool) -> None:
+    """Bring base and joints of tree ``k`` up to date, and its ``link``s; without a handle the former are."""
+    if handle != 0 and not trees.read[k]:
+        read_tree(handle, trees, k)
+    if link and not trees.linked[k]:
+        follow(trees, k)
+
+
+class Places(NamedTuple):
+    """Where bodies are among the trees, by the body's index: b bodies; the tree of an element of a rod is -1."""
+
+    tree: Integers  # (b,)
+    row: Integers  # (b,)
+    uid: Integers  # (b,) Bullet's multibody, and the link in it
+    link: Integers  # (b,)
+
+
+open_places = opener(Places(*(np.zeros((4, 1), dtype=np.int64))))
+
+
+@kernel
+def read_bodies(handle: int, tree_table: Integers, place_table: Integers, bodies: Integers, out: Array) -> None:
+    """Poses of the inertial frames of ``bodies`` (n,), and twists, to ``out`` (n, 13)."""
+    trees, places = open_trees(tree_table), open_places(place_table)
+    for i in range(bodies.shape[0]):
+        body = bodies[i]
+        row = places.row[body]
+        bring_up(handle, trees, places.tree[body], places.link[body] >= 0)
+        for a in range(7):
+            out[i, a] = trees.pose[row, a]
+        for a in range(6):
+            out[i, 7 + a] = trees.twist[row, a]
+
+
+@kernel
+def load_body(handle: int, tree_table: Integers, place_table: Integers, body: int, wrench: Array) -> None:
+    """Apply force and torque (6,) at the centre of mass of a body in the coming tick."""
+    trees, places = open_trees(tree_table), open_places(place_table)
+    bring_up(handle, trees, places.tree[body], places.link[body] >= 0)
+    for a in range(6):
+        trees.wanted[a] = wrench[a]
+    submit(handle, _push(handle, trees, places, body))
+    command = init_forces(handle)  # a command of its own: Bullet puts the second of two over the first
+    add_torque(command, places.uid[body], places.link[body], trees.wanted_at[0] + 24, WORLD_FRAME)
+    submit(handle, command)
+
+
+@kernel
+def push_bodies(handle: int, tree_table: Integers, place_table: Integers, bodies: Integers, forces: Array) -> None:
+    """Apply ``forces`` (n, 3) at the centres of mass of ``bodies`` (n,) in the coming tick."""
+    trees, places = open_trees(tree_table), open_places(place_table)
+    for i in range(bodies.shape[0]):
+        body = bodies[i]
+        bring_up(handle, trees, places.tree[body], places.link[body] >= 0)
+        for a in range(3):
+            trees.wanted[a] = forces[i, a]
+        submit(handle, _push(handle, trees, places, body))
+
+
+@inlined
+def _push(handle: int, trees: Trees, places: Places, body: int) -> int:
+    """Bullet's command that applies the wanted force at the centre of mass of a body."""
+    for a in range(3):
+        trees.wanted[6 + a] = trees.pose[places.row[body], a]
+    command = init_forces(handle)
+    at = trees.wanted_at[0]
+    add_force(command, places.uid[body], places.link[body], at, at + 48, WORLD_FRAME)
+    return command
+
+
+# --- links --------------------------------------------------------------------------------------
+
+
+@inlined
+def follow(trees: Trees, k: int) -> None:
+    """Poses and twists of the links of tree ``k``."""
+    frame, speed, pose, twist = trees.frame, trees.speed, trees.pose, trees.twist
+    begin = trees.begin[k]
+    for a in range(7):
+        frame[begin, a] = pose[begin, a]
+    for a in range(6):
+        speed[begin, a] = twist[begin, a]
+    for r in range(begin + 1, trees.begin[k + 1]):
+        p, kind, joint = trees.rows[r, 0], trees.rows[r, 1], trees.rows[r, 2]
+        f, v, fixed = frame[r], speed[r], trees.fixed[r]
+        compose(frame[p], fixed[3:10], f)
+        ax, ay, az = _turned(f, fixed[0], fixed[1], fixed[2])
+        q, qd = 0.0, 0.0
+        if joint >= 0:
+            q, qd = trees.joints[0, joint], trees.joints[1, joint]
+        if kind == _SLIDES:
+            f[0], f[1], f[2] = f[0] + q * ax, f[1] + q * ay, f[2] + q * az
+        _carried(speed[p], f[0] - frame[p, 0], f[1] - frame[p, 1], f[2] - frame[p, 2], v)
+        if kind == _SLIDES:
+            v[0], v[1], v[2] = v[0] + qd * ax, v[1] + qd * ay, v[2] + qd * az
+        elif kind == _TURNS:
+            v[3], v[4], v[5] = v[3] + qd * ax, v[4] + qd * ay, v[5] + qd * az
+            s, c = math.sin(0.5 * q), math.cos(0.5 * q)
+            x, y, z, w = f[3], f[4], f[5], f[6]
+            ax, ay, az = s * ax, s * ay, s * az
+            f[3] = c * x + w * ax + ay * z - az * y
+            f[4] = c * y + w * ay + az * x - ax * z
+            f[5] = c * z + w * az + ax * y - ay * x
+            f[6] = c * w - ax * x - ay * y - az * z
+        compose(f, fixed[10:17], pose[r])
+        _carried(v, pose[r, 0] - f[0], pose[r, 1] - f[1], pose[r, 2] - f[2], twist[r])
+    trees.linked[k] = True
+
+
+@inlined
+def _turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float, float]:
+    """The vector p, given in the frame ``pose``, in world axes."""
+    x, y, z, w = pose[3], pose[4], pose[5], pose[6]
+    cx, cy, cz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
+    return px + 2.0 * (y * cz - z * cy), py + 2.0 * (z * cx - x * cz), pz + 2.0 * (x * cy - y * cx)
+
+
+@inlined
+def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
+    """The velocity ``twist`` (6,) at a point that lies r off."""
+    wx, wy, wz = twist[3], twist[4], twist[5]
+    out[0] = twist[0] + wy * rz - wz * ry
+    out[1] = twist[1] + wz * rx - wx * rz
+    out[2] = twist[2] + wx * ry - wy * rx
+    out[3], out[4], out[5] = wx, wy, wz
+
+
+@inlined
+def load_joints(trees: Trees, k: int) -> None:
+    """Add to ``push`` what the forces on the links of tree ``k``, which are up to date, do to its joints."""
+    rows, fixed, frame, pose = trees.rows, trees.fixed, trees.frame, trees.pose
+    force, load, effort = trees.force, trees.load, trees.push
+    begin, end = trees.begin[k], trees.begin[k + 1]
+    for r in range(begin, end):
+        x, y, z = force[r, 0], force[r, 1], force[r, 2]
+        cx, cy, cz = pose[r, 0], pose[r, 1], pose[r, 2]
+        load[r, 0], load[r, 1], load[r, 2] = x, y, z
+        load[r, 3], load[r, 4], load[r, 5] = cy * z - cz * y, cz * x - cx * z, cx * y - cy * x
+    for r in range(end - 1, begin, -1):
+        p, kind, joint = rows[r, 0], rows[r, 1], rows[r, 2]
+        if joint >= 0:
+            f, at = frame[r], load[r]
+            ax, ay, az = _turned(f, fixed[r, 0], fixed[r, 1], fixed[r, 2])
+            if kind == _SLIDES:
+                effort[joint] += ax * at[0] + ay * at[1] + az * at[2]
+            else:
+                mx = at[3] - (f[1] * at[2] - f[2] * at[1])
+                my = at[4] - (f[2] * at[0] - f[0] * at[2])
+                mz = at[5] - (f[0] * at[1] - f[1] * at[0])
+                effort[joint] += ax * mx + ay * my + az * mz
+        for a in range(6):
+            load[p, a] += load[r, a]

@@ -1,0 +1,195 @@
+"""A run on a ROS master of others, where killed nodes are still registered: under its names, for its topics."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+from xmlrpc.client import ServerProxy
+
+import pytest
+from ligature.ros.registrations import NameTaken, claim, dead_neighbours, lives, registrations
+
+from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
+from tests.waiting import until
+
+pytestmark = pytest.mark.ros
+
+OURS = ("/ligature", "/ligature_rivals")
+OTHERS = ("/ambf", "/rqt_gui", "/dvrk_console")
+PUBLISHED = {
+    "/ambf/env/World/State": "ambf_msgs/WorldState",
+    "/ambf/env/phantom/Needle/State": "ambf_msgs/RigidBodyState",
+    "/PSM1/measured_cp": "geometry_msgs/PoseStamped",
+    "/PSM1/operating_state": "crtk_msgs/operating_state",
+    "/scene/of/before/State": "ambf_msgs/RigidBodyState",
+}
+SUBSCRIBED = ("/ambf/env/World/Command", "/PSM2/servo_cp", "/scene/of/before/Command", "/PSM1/measured_js")
+SERVICES = ("query_cp", "local/query_cp")
+"""Below the name of a node: of a service that two nodes register the master keeps the first one in part."""
+
+INNOCENT = """
+import rospy, time
+from std_msgs.msg import String
+rospy.init_node("innocent", disable_signals=True)
+rospy.Publisher("/chatter", String, queue_size=1)
+print("ready", rospy.get_node_uri(), flush=True)
+while not rospy.is_shutdown(): time.sleep(0.05)
+"""
+
+
+@pytest.fixture
+def env(ros_env: dict[str, str]) -> Iterator[dict[str, str]]:
+    """Environment of a master of its own, which is not the simulator's."""
+    port = free_port()
+    master = start_master(port, ros_env)
+    yield dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{port}")
+    master.terminate()
+    master.wait()
+
+
+@pytest.fixture
+def begin(env: dict[str, str]) -> Iterator[Callable[..., Program]]:
+    """Starts programs on that master, which end with the test."""
+    programs: list[Program] = []
+
+    def run(*command: object) -> Program:
+        programs.append(Program([str(word) for word in command], env))
+        return programs[-1]
+
+    yield run
+    for program in reversed(programs):
+        program.end(30.0)
+
+
+def ask(env: dict[str, str], method: str, *arguments: Any) -> Any:
+    code, text, value = getattr(ServerProxy(env["ROS_MASTER_URI"]), method)(*arguments)  # type: ignore[misc]
+    assert code == 1, text
+    return value
+
+
+def listed(env: dict[str, str], node: str) -> list[str]:
+    """Topics that the master has of a node as published, then as subscribed, then its services."""
+    return [name for kind in ask(env, "getSystemState", "/test") for name, nodes in kind if node in nodes]
+
+
+def registered(env: dict[str, str], node: str) -> set[str]:
+    """`listed`, each once."""
+    return set(listed(env, node))
+
+
+def haunt(env: dict[str, str], node: str, uri: str, rng: random.Random) -> None:
+    """Register some topics and services of a node that is not there."""
+    for topic in rng.sample(list(PUBLISHED), rng.randint(1, len(PUBLISHED))):
+        ask(env, "registerPublisher", node, topic, PUBLISHED[topic], uri)
+    for topic in rng.sample(SUBSCRIBED, rng.randint(0, len(SUBSCRIBED))):
+        ask(env, "registerSubscriber", node, topic, "*", uri)
+    for service in rng.sample(SERVICES, rng.randint(0, len(SERVICES))):
+        ask(env, "registerService", node, f"{node}/{service}", "rosrpc://127.0.0.1:1", uri)
+
+
+def started(begin: Callable[..., Program]) -> Program:
+    program = begin(BIN / "ligature", "run", SMALL, "-p", "200")
+    program.wait_for("first state published", 250.0)
+    return program
+
+
+def heard(env: dict[str, str], begin: Callable[..., Program], topic: str) -> None:
+    """Wait for a message that another program gets."""
+    echo = begin("/usr/bin/rostopic", "echo", "-n", "1", topic)
+    until(lambda: "---" in echo.output, f"a message on {topic}; {echo.output}", 20.0)
+
+
+def innocent(begin: Callable[..., Program]) -> tuple[Program, str]:
+    """A living node of another name, and its address."""
+    program = begin(sys.executable, "-c", INNOCENT)
+    program.wait_for("ready")
+    return program, program.lines[-1].split()[1]
+
+
+@pytest.fixture
+def asked(env: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """This process asks the master of ``env``."""
+    monkeypatch.setenv("ROS_MASTER_URI", env["ROS_MASTER_URI"])
+
+
+@pytest.mark.usefixtures("asked")
+def test_what_killed_nodes_left_is_removed_under_the_own_name_and_reported_under_others(
+    env: dict[str, str], begin: Callable[..., Program]
+) -> None:
+    program, reused = innocent(begin)
+    nobody = f"http://127.0.0.1:{free_port()}/"
+    for seed in range(30):
+        rng = random.Random(seed)
+        own, other = ({node for node in names if rng.random() < 0.6} for names in (OURS, OTHERS))
+        for node in (*own, *other):
+            haunt(env, node, rng.choice((nobody, reused)), rng)
+        expected = sum(len(listed(env, node)) for node in own)
+        line = claim("/ligature")
+        assert (f"({expected} topics and services) was removed" in line) if expected else line == "", seed
+        assert not any(registered(env, node) for node in own)
+        lines = dead_neighbours("/ligature", [*PUBLISHED, *SUBSCRIBED])
+        assert len(lines) == len(other)
+        for node in other:
+            (line,) = (line for line in lines if line.startswith(f"node {node} does not answer"))
+            shared = registered(env, node) & {*PUBLISHED, *SUBSCRIBED}
+            assert f"for {len(shared)} topics of this run" in line
+            assert registered(env, node), "what belongs to others stays"
+            for held in registrations([node]):
+                held.remove()
+    time.sleep(0.5)
+    assert program.process.poll() is None, "who was given the address of a killed node was shut down"
+    assert lives("/innocent") and not lives("/ligature")
+    with pytest.raises(NameTaken, match="node /innocent at http"):
+        claim("/innocent")
+
+
+@pytest.mark.usefixtures("asked")
+def test_a_node_that_takes_connections_and_never_answers_counts_as_killed(env: dict[str, str]) -> None:
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+        ask(env, "registerPublisher", "/ligature", "/ambf/env/World/State", "ambf_msgs/WorldState", uri)
+        begin = time.monotonic()
+        assert "(1 topics and services)" in claim("/ligature")
+        assert time.monotonic() - begin < 10.0
+
+
+def test_a_run_starts_among_registrations_of_killed_nodes(env: dict[str, str], begin: Callable[..., Program]) -> None:
+    program, reused = innocent(begin)
+    rng = random.Random(1)
+    for node in ("/ligature", "/ligature_rivals", "/ambf"):
+        haunt(env, node, reused, rng)
+    ask(env, "registerPublisher", "/dvrk_console", "/PSM1/measured_cp", "geometry_msgs/PoseStamped", reused)
+    run = started(begin)
+    assert "node /ligature was killed; " in run.output
+    run.wait_for("node /ambf does not answer, but the ROS master still has it for", 60.0)
+    assert "node /dvrk_console publishes" not in run.output, "a ghost has no precedence"
+    assert "/PSM1/measured_cp" in registered(env, "/ligature")
+    assert not any(name.startswith("/scene/of/before") for name in registered(env, "/ligature"))
+    heard(env, begin, "/ambf/env/World/State")
+    assert program.process.poll() is None
+
+
+def test_a_run_follows_one_that_was_killed_on_a_master_that_goes_on(
+    env: dict[str, str], begin: Callable[..., Program]
+) -> None:
+    first = started(begin)
+    children = first.children()
+    os.kill(first.process.pid, signal.SIGSTOP)  # so that it restarts nothing
+    for pid in children.values():
+        os.kill(pid, signal.SIGKILL)
+    os.kill(first.process.pid, signal.SIGKILL)
+    before = registered(env, "/ligature")
+    assert len(before) > 50
+    second = started(begin)
+    assert "node /ligature was killed; " in second.output
+    assert registered(env, "/ligature") >= before
+    heard(env, begin, "/PSM1/measured_cp")
+    assert "does not answer" not in second.output
