@@ -14,7 +14,6 @@ from ligature.model.soft import TissueBody
 from ligature.model.state import MAX_INSERTIONS, MAX_PUNCTURES, StateRecord
 from ligature.soft.contacts import BodyContacts
 from ligature.soft.frame import Frame, open_frame
-from ligature.soft.lying import LyingThread
 from ligature.soft.needle import ScenePiercer
 from ligature.soft.thread import SceneThread
 from ligature.suture.bodies import SutureBodies
@@ -54,7 +53,6 @@ class Piece:
         self._carried = [p for p in self.piercers if p.rod is not None]
         self._alone = [p for p in self.piercers if p.rod is None]
         self.threads = [SceneThread(p.rod, p, self.block, self.frame) for p in self._carried if p.rod is not None]
-        self.lying = [LyingThread(rod, self.block, self._body.friction) for rod in rods]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
         self.wrench, self.peak = np.zeros(6), np.zeros(1)
         self._read()
@@ -73,9 +71,6 @@ class Piece:
             piercer.begin(self._bodies, self.frame)
         for thread in self.threads:
             thread.begin(self._dt)
-        for lying in self.lying:
-            within = [e for thread in self.threads if thread.rod is lying.rod for e in thread.elements]
-            lying.begin(self.frame, within, self._dt)
 
     def end(self) -> None:
         """What comes after: forces of needles and threads, the reaction on the rigid body, the tissue's own motion."""
@@ -83,8 +78,6 @@ class Piece:
             piercer.end(self.frame)
         for thread in self.threads:
             thread.end(self._dt)
-        for lying in self.lying:
-            lying.end(self.frame, self._dt)
         for piercer in self._alone:
             piercer.couple(self._bodies, self.frame)
         self._react()
@@ -97,8 +90,6 @@ class Piece:
     def _react(self) -> None:
         """Add up what acts on the tissue; its rigid body moves by that."""
         add_up(self.block.interface.table, self.frame.table, self.wrench, self.peak)
-        for lying in self.lying:
-            self.wrench += lying.wrench
         if self._body.static or not self.wrench.any():
             return
         centre = self._bodies.motion(self._body.index)[0][:3] - self.frame.p
@@ -171,8 +162,6 @@ class Piece:
         self.contacts.reset()
         for piercer in self.piercers:
             piercer.reset()
-        for lying in self.lying:
-            lying.reset()
         self.wrench[:], self.peak[:] = 0.0, 0.0
         self._read()
         self.frame.restart()
@@ -182,7 +171,6 @@ class Piece:
         return {
             "block": self.block.snapshot(), "frame": self.frame.snapshot(), "contacts": self.contacts.snapshot(),
             "piercers": [piercer.snapshot() for piercer in self.piercers],
-            "lying": [lying.snapshot() for lying in self.lying],
             "gravity": self.block.elastic.gravity.copy(), "wrench": self.wrench.copy(), "peak": self.peak.copy(),
         }  # fmt: skip
 
@@ -193,8 +181,6 @@ class Piece:
         self.contacts.restore(snapshot["contacts"])
         for piercer, kept in zip(self.piercers, snapshot["piercers"], strict=True):
             piercer.restore(kept)
-        for lying, face in zip(self.lying, snapshot["lying"], strict=True):
-            lying.restore(face)
         self.block.elastic.gravity[:] = snapshot["gravity"]
         self.wrench[:], self.peak[:] = snapshot["wrench"], snapshot["peak"]
         self._read()

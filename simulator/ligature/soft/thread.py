@@ -71,13 +71,6 @@ class SceneThread:
         """Element of the rod that a segment of the thread is."""
         return len(self.rod.description.mass) - 1 - segment if self._turned else segment
 
-    @property
-    def elements(self) -> list[int]:
-        """Elements of the rod in paths, and those beside them."""
-        segments = self.inside.segments.tolist()
-        near = {self.element(segment) + beside for segment in segments for beside in (-1, 0, 1)}
-        return sorted(near & set(range(len(self.rod.description.mass))))
-
     def begin(self, dt: float) -> None:
         """Hand the rod what the tissue does to it."""
         self.inside.draw_in(self._piercer.inside)

@@ -92,11 +92,6 @@ class ThreadInTissue:
         h.engaged[i], h.at[i], h.anchor[i] = 1, at, at
         h.torn[i], h.side[i] = 0.0, 0
 
-    @property
-    def segments(self) -> Integers:
-        """Segments of the thread that nodes held when its springs were last found, (k,)."""
-        return self._strand.rows.segment[: int(self._strand.rows.filled[0])]
-
     def springs(self, points: Array) -> Springs:
         """Springs of a tick that begins with the thread's points at ``points`` (n, 3)."""
         self._settles = 0
