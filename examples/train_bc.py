@@ -43,7 +43,7 @@ class Policy(nn.Module):
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         """Actions for observations."""
         # what is constant has a scale of 0 and tells nothing; beyond five deviations nothing was seen
-        seen = ((observation - self.mean) * self.scale).clamp(-5.0, 5.0)
+        seen = ((observation - self.mean) * self.scale).clip(-5.0, 5.0)
         return torch.tanh(self.body(seen))
 
 
@@ -65,7 +65,7 @@ def train(observations: np.ndarray, actions: np.ndarray, epochs: int, seed: int)
     torch.set_num_threads(1)
     seen, wanted = torch.from_numpy(observations), torch.from_numpy(actions)
     deviation = seen.std(dim=0)
-    scale = torch.where(deviation > STILL, 1.0 / deviation.clamp(min=STILL), torch.zeros_like(deviation))
+    scale = torch.where(deviation > STILL, 1.0 / deviation.clip(min=STILL), torch.zeros_like(deviation))
     policy = Policy(seen.mean(dim=0), scale)
     batches = -(-len(seen) // BATCH)
     optimiser = torch.optim.AdamW(policy.parameters(), lr=1e-3, weight_decay=1e-4)

@@ -52,7 +52,7 @@ class Actor(nn.Module):
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         """Actions for observations."""
-        seen = ((observation - self.mean) / self.deviation).clamp(-self.limit, self.limit)
+        seen = ((observation - self.mean) / self.deviation).clip(-self.limit, self.limit)
         return torch.tanh(self.mu(self.body(seen)))
 
 

@@ -29,7 +29,7 @@ class Arm:
             for name, kind in (("state_command", StringStamped), ("move_jp", JointState), ("move_cp", PoseStamped))
         }
 
-    def say(self, name, message):
+    def send(self, name, message):
         """Send a command once somebody listens."""
         publisher = self.commands[name]
         while publisher.get_num_connections() == 0:
@@ -51,16 +51,16 @@ class Arms(unittest.TestCase):
         arm = Arm()
         self.assertTrue(until(lambda: arm.state and arm.joints and arm.tip))
         for command, done in (("enable", lambda: arm.state.state == "ENABLED"), ("home", lambda: arm.state.is_homed)):
-            arm.say("state_command", StringStamped(string=command))
+            arm.send("state_command", StringStamped(string=command))
             self.assertTrue(until(done), f"{command}: {arm.state}")
         goal = [0.1, -0.1, 0.12, 0.2, 0.1, -0.1]
-        arm.say("move_jp", JointState(position=goal))
+        arm.send("move_jp", JointState(position=goal))
         self.assertTrue(until(lambda: max(abs(a - b) for a, b in zip(arm.joints.position, goal)) < 1e-3))
         self.assertTrue(until(lambda: not arm.state.is_busy))
         step = PoseStamped(pose=arm.tip.pose)
         step.pose.position.z += 0.01
         wanted = step.pose.position.z
-        arm.say("move_cp", step)
+        arm.send("move_cp", step)
         self.assertTrue(until(lambda: abs(arm.tip.pose.position.z - wanted) < 5e-4))
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Lifts the needle by a pose command, step by step: the simulator advances when the test says so, and not otherwise."""
+"""Lifts the needle by a pose command; the simulator advances when the test asks for it, and not otherwise."""
 
 import unittest
 
@@ -47,7 +47,7 @@ class Objects(unittest.TestCase):
     def setUp(self):
         self.assertTrue(rospy.wait_for_message("/ligature/ready", Bool, COMPILING).data)
 
-    def test_a_needle_goes_where_it_is_told_step_by_step(self):
+    def test_a_needle_goes_where_it_is_commanded_step_by_step(self):
         world, command = World(), rospy.Publisher(f"{NEEDLE}/Command", RigidBodyCmd, queue_size=1)
         pose = rospy.wait_for_message(f"{NEEDLE}/State", RigidBodyState, TIMEOUT).pose
         goal = RigidBodyCmd(cartesian_cmd_type=RigidBodyCmd.TYPE_POSITION, pose=pose)

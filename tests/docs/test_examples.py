@@ -20,8 +20,8 @@ from tests.conftest import ROOT
 from tests.docs.pages import ALL, PAGES, blocks
 
 BIN = Path(sys.executable).parent
-ROS_PAGES = {"clients.md"}
-"""Their programs need a master and a running simulator; `tests/ros/test_client.py` makes the same calls."""
+ROS_PAGES = {"clients.md", "rostest.md"}
+"""Their programs need a master and a running simulator; `tests/ros/test_client.py` and `test_rostest.py` make the same calls."""
 
 RUN = [
     page

@@ -109,7 +109,7 @@ def test_whatever_is_in_a_file_it_is_a_network_or_an_error(
 
 
 @pytest.mark.parametrize("answer", [np.zeros(6), np.zeros((1, 7)), np.full(7, np.nan), None, "left", [0.0] * 8])
-def test_what_is_no_action_is_told(answer: Any) -> None:
+def test_what_is_no_action_is_reported(answer: Any) -> None:
     with pytest.raises(PolicyError, match="an action is 7 finite numbers"):
         checked(answer)
 
@@ -191,13 +191,13 @@ def test_the_command_writes_what_it_prints(network: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["nobody", "--env", "reach"], "no policy 'nobody'"),
         (["random", "--env", "knit"], "task must be one of"),
         (["expert", "--env", "reach", "--action", "joint"], "experts act with action='cartesian'"),
     ],
 )
-def test_the_command_says_what_is_wrong(arguments: list[str], said: str) -> None:
+def test_the_command_says_what_is_wrong(arguments: list[str], message: str) -> None:
     done = CliRunner().invoke(app, ["evaluate", *arguments, "--episodes", "1"])
-    assert done.exit_code == 2 and said in done.output, done.output
+    assert done.exit_code == 2 and message in done.output, done.output

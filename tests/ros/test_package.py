@@ -113,14 +113,18 @@ def test_the_install_space_without_our_python_packages_names_what_to_install(
 
 @pytest.mark.slow
 @pytest.mark.timeout(2800)
-def test_run_tests_runs_the_rostest_of_the_first_task(workspace: Path) -> None:
+def test_run_tests_runs_the_rostests(workspace: Path) -> None:
     # configured anew, since the first configuration writes down an environment without the packages that it builds
     done = make(workspace, "--force-cmake", "run_tests", timeout=2600.0)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    (result,) = (workspace / "build" / "test_results" / "ligature").glob("rosunit-first_task.xml")
-    suite = ET.parse(result).getroot()
-    counts = {key: int(suite.get(key, 0)) for key in ("tests", "failures", "errors")}
-    assert counts == {"tests": 1, "failures": 0, "errors": 0}, result.read_text()
+    results = sorted((workspace / "build" / "test_results" / "ligature").glob("rosunit-*.xml"))
+    assert [path.stem for path in results] == [
+        f"rosunit-{name}" for name in ("arms", "objects", "score", "teleoperation")
+    ]
+    for path in results:
+        suite = ET.parse(path).getroot()
+        counts = {key: int(suite.get(key, 0)) for key in ("tests", "failures", "errors")}
+        assert counts == {"tests": 1, "failures": 0, "errors": 0}, path.read_text()
 
 
 def test_the_manifest_names_every_ros_package_that_is_imported() -> None:

@@ -26,7 +26,7 @@ def test_an_example_passes(name: str, ros_env: dict[str, str], tmp_path: Path) -
 
 
 @pytest.mark.parametrize("prefix", ["", "/left"])
-def test_ready_is_told_to_whoever_asks_later(start: Callable[..., Program], node: Any, prefix: str) -> None:
+def test_ready_reaches_whoever_asks_later(start: Callable[..., Program], node: Any, prefix: str) -> None:
     """Latched, and not before states can be had."""
     from ambf_msgs.msg import RigidBodyState
     from std_msgs.msg import Bool

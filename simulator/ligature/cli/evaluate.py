@@ -54,12 +54,12 @@ def _run(
     policy: str, options: Mapping[str, Any], seeds: range, max_steps: int, jobs: int, console: Console
 ) -> list[Episode]:
     episodes: list[Episode] = []
-    begin = said = time.perf_counter()
+    begin = reported = time.perf_counter()
     for episode in run_episodes(policy, options, seeds, max_steps, jobs):
         episodes.append(episode)
         now = time.perf_counter()
-        if now - said > EVERY or len(episodes) == len(seeds):
-            said, done = now, sum(e.success for e in episodes)
+        if now - reported > EVERY or len(episodes) == len(seeds):
+            reported, done = now, sum(e.success for e in episodes)
             console.print(f"{len(episodes)} of {len(seeds)} episodes, {done} succeeded, {now - begin:.0f} s")
     return episodes
 

@@ -25,7 +25,7 @@ STILL = np.zeros(7, dtype=np.float32)
 
 
 class PolicyError(ValueError):
-    """A policy that cannot be had, or that answers with something other than an action."""
+    """A policy that is unavailable, or that answers with something other than an action."""
 
 
 def load_policy(name: str) -> Policy:

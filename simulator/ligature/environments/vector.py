@@ -49,7 +49,7 @@ class _Made:
 
 
 class SuturingVectorEnv(AsyncVectorEnv):
-    """Gymnasium's vector of environments in processes, which says which of them ended and leaves none behind.
+    """Gymnasium's vector of environments in processes, which reports which of them ended and leaves none behind.
 
     Parameters
     ----------
@@ -69,43 +69,43 @@ class SuturingVectorEnv(AsyncVectorEnv):
         with self._watched():
             super()._check_spaces()
 
-    def reset_async(self, *arguments: Any, **options: Any) -> None:
-        """Have all environments begin anew; ``AsyncVectorEnv`` says what this and the methods below take."""
+    def reset_async(self, *args: Any, **kwargs: Any) -> None:
+        """Have all environments begin anew; ``AsyncVectorEnv`` lists what this and the methods below take."""
         with self._watched():
-            super().reset_async(*arguments, **options)
+            super().reset_async(*args, **kwargs)
 
-    def reset_wait(self, *arguments: Any, **options: Any) -> Any:
+    def reset_wait(self, *args: Any, **kwargs: Any) -> Any:
         """Observations and infos once all have begun anew."""
         with self._watched():
-            return super().reset_wait(*arguments, **options)
+            return super().reset_wait(*args, **kwargs)
 
     def step_async(self, actions: Any) -> None:
         """Send each environment its action."""
         with self._watched():
             super().step_async(actions)
 
-    def step_wait(self, *arguments: Any, **options: Any) -> Any:
+    def step_wait(self, *args: Any, **kwargs: Any) -> Any:
         """What all environments answer to their actions."""
         with self._watched():
-            return super().step_wait(*arguments, **options)
+            return super().step_wait(*args, **kwargs)
 
-    def call_async(self, name: str, *arguments: Any, **options: Any) -> None:
-        """Call a method of each environment, or ask for an attribute."""
+    def call_async(self, name: str, *args: Any, **kwargs: Any) -> None:
+        """Call the method ``name`` of each environment, or ask for the attribute."""
         with self._watched():
-            super().call_async(name, *arguments, **options)
+            super().call_async(name, *args, **kwargs)
 
-    def call_wait(self, *arguments: Any, **options: Any) -> Any:
+    def call_wait(self, *args: Any, **kwargs: Any) -> Any:
         """What all environments answer to the call."""
         with self._watched():
-            return super().call_wait(*arguments, **options)
+            return super().call_wait(*args, **kwargs)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of each environment."""
+        """Set the attribute ``name`` of each environment to its one of ``values``."""
         with self._watched():
             super().set_attr(name, values)
 
     def close_extras(self, timeout: float | None = None, terminate: bool = False, **_: Any) -> None:
-        """End all processes; where one has ended, or ends now, the others are not asked first."""
+        """End all processes within ``timeout`` seconds, or unasked (``terminate``), as when one has ended."""
         if any(process.exitcode is not None for process in self.processes):
             self._state, terminate = AsyncState.DEFAULT, True
         try:
