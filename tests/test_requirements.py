@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.conftest import ROOT
 
-OPTIONAL = {"av", "mujoco", "pyarrow", "ray"}
+OPTIONAL = {"av", "mujoco", "onnxruntime", "pyarrow", "ray"}
 """Imported where they are used, with a line that names the package to install."""
 
 BLENDER = {"bpy", "bmesh", "bpy_extras", "addon_utils", "mathutils", "gpu", "gpu_extras", "blf"}

@@ -46,6 +46,9 @@ SUCCESS_REWARD = 1.0
 AHEAD_LENGTH, AHEAD_ANGLE, AHEAD_JOINTS = 0.005, 0.25, 5.0 * STEP_JOINTS
 """How far a set-point may be ahead of what is measured: an arm that something stops does not wind up."""
 
+LEAP = 0.5
+"""Radians and metres that a joint's set-point may go in an action: a step of the tip takes a tenth of that."""
+
 NEAR_COSINE = math.cos(AHEAD_ANGLE)
 
 STATE = 52
@@ -289,18 +292,24 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             if self._action == "joint":
                 bounded = self._act_on_joints(action[:6] * STEP_JOINTS)
             else:
-                T, bounded = self._aim(action)
-                arm.servo_cp(T)
+                bounded = self._act_on_tip(action)
             if arm.jaw is not None:
                 arm.jaw.servo_jp(self._reading.jaw_setpoint[:1] + STEP_JAW * action[6])
         except Rejected as rejection:
             return str(rejection), bounded
         return "", bounded
 
-    def _aim(self, action: Array) -> tuple[Array, bool]:
-        """The set-point (4, 4) moved by an action, near the tip, and whether it was held back for that."""
+    def _act_on_tip(self, action: Array) -> bool:
+        """Move the set-point by an action, near the tip; whether it was held back for that."""
         forward, reading = self._arm.kinematics.forward, self._reading
-        return _bounded(forward(reading.joints), _stepped(forward(reading.joint_setpoints), action))
+        before = reading.joint_setpoints.copy()
+        T, bounded = _bounded(forward(reading.joints), _stepped(forward(before), action))
+        self._arm.servo_cp(T)
+        if np.abs(self._arm.setpoint_js().position - before).max() <= LEAP:
+            return bounded
+        # beyond the limits of the wrist the same pose has other joints, and on the way there the tip is elsewhere
+        self._arm.servo_jp(before)
+        return True
 
     def _act_on_joints(self, step: Array) -> bool:
         measured, wanted = self._reading.joints, self._reading.joint_setpoints + step
@@ -424,19 +433,23 @@ def _stepped(T: Array, action: Array) -> Array:
     return T
 
 
+def _is_near(T_measured: Array, T: Array) -> bool:
+    """Whether a set-point (4, 4) is within `AHEAD_LENGTH` and `AHEAD_ANGLE` of what is measured."""
+    cosine = 0.5 * (float((T_measured[:3, :3] * T[:3, :3]).sum()) - 1.0)
+    return _length(T[:3, 3] - T_measured[:3, 3]) <= AHEAD_LENGTH and cosine >= NEAR_COSINE
+
+
 def _bounded(T_measured: Array, T: Array) -> tuple[Array, bool]:
     """A set-point (4, 4) no farther from what is measured than `AHEAD_LENGTH` and `AHEAD_ANGLE`, and whether it was."""
-    ahead = T[:3, 3] - T_measured[:3, 3]
-    length = _length(ahead)
-    near = 0.5 * (float((T_measured[:3, :3] * T[:3, :3]).sum()) - 1.0) >= NEAR_COSINE
-    if length <= AHEAD_LENGTH and near:
+    if _is_near(T_measured, T):
         return T, False
-    found = T.copy()
+    ahead, found = T[:3, 3] - T_measured[:3, 3], T.copy()
+    length, turn = _length(ahead), rotation_vector(T_measured[:3, :3].T @ T[:3, :3])
+    angle = _length(turn)
     if length > AHEAD_LENGTH:
         found[:3, 3] = T_measured[:3, 3] + ahead * (AHEAD_LENGTH / length)
-    if not near:
-        turn = rotation_vector(T_measured[:3, :3].T @ T[:3, :3])
-        found[:3, :3] = T_measured[:3, :3] @ axis_rotation(turn / _length(turn), AHEAD_ANGLE)
+    if angle > AHEAD_ANGLE:
+        found[:3, :3] = T_measured[:3, :3] @ axis_rotation(turn / angle, AHEAD_ANGLE)
     return found, True
 
 
