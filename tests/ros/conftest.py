@@ -236,3 +236,27 @@ def publish(node: Any) -> Iterator[Callable[..., Any]]:
     yield make
     for publisher in publishers:
         publisher.unregister()
+
+
+@pytest.fixture
+def env(ros_env: dict[str, str]) -> Iterator[dict[str, str]]:
+    """Environment of a master of its own, which is not the simulator's."""
+    port = free_port()
+    master = start_master(port, ros_env)
+    yield dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{port}", PYTHONPATH=f"{ROOT}:{ros_env['PYTHONPATH']}")
+    master.terminate()
+    master.wait()
+
+
+@pytest.fixture
+def begin(env: dict[str, str]) -> Iterator[Callable[..., Program]]:
+    """Starts programs on that master, which end with the test."""
+    programs: list[Program] = []
+
+    def run(*command: object) -> Program:
+        programs.append(Program([str(word) for word in command], env))
+        return programs[-1]
+
+    yield run
+    for program in reversed(programs):
+        program.end(30.0)

@@ -8,14 +8,14 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 from xmlrpc.client import ServerProxy
 
 import pytest
 from ligature.ros.registrations import NameTaken, claim, dead_neighbours, lives, registrations
 
-from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
+from tests.ros.conftest import BIN, SMALL, Program, free_port
 from tests.waiting import until
 
 pytestmark = pytest.mark.ros
@@ -41,30 +41,6 @@ rospy.Publisher("/chatter", String, queue_size=1)
 print("ready", rospy.get_node_uri(), flush=True)
 while not rospy.is_shutdown(): time.sleep(0.05)
 """
-
-
-@pytest.fixture
-def env(ros_env: dict[str, str]) -> Iterator[dict[str, str]]:
-    """Environment of a master of its own, which is not the simulator's."""
-    port = free_port()
-    master = start_master(port, ros_env)
-    yield dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{port}")
-    master.terminate()
-    master.wait()
-
-
-@pytest.fixture
-def begin(env: dict[str, str]) -> Iterator[Callable[..., Program]]:
-    """Starts programs on that master, which end with the test."""
-    programs: list[Program] = []
-
-    def run(*command: object) -> Program:
-        programs.append(Program([str(word) for word in command], env))
-        return programs[-1]
-
-    yield run
-    for program in reversed(programs):
-        program.end(30.0)
 
 
 def ask(env: dict[str, str], method: str, *arguments: Any) -> Any:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.ros.conftest import BIN, ROOT, Program, free_port, start_master
+from tests.ros.conftest import BIN, Program
 from tests.waiting import until
 
 pytestmark = pytest.mark.ros
@@ -55,30 +55,6 @@ TOPICS = [
     "/MTMR/measured_cv", "/console/teleop/enabled", "/system/volume",
 ]  # fmt: skip
 OURS = ["/MTML/measured_cp", "/PSM1/measured_cp", "/PSM1/operating_state"]
-
-
-@pytest.fixture
-def env(ros_env: dict[str, str]) -> Iterator[dict[str, str]]:
-    """Environment of a master of its own."""
-    port = free_port()
-    master = start_master(port, ros_env)
-    yield dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{port}", PYTHONPATH=f"{ROOT}:{ros_env['PYTHONPATH']}")
-    master.terminate()
-    master.wait()
-
-
-@pytest.fixture
-def begin(env: dict[str, str]) -> Iterator[Callable[..., Program]]:
-    """Starts programs on that master, which end with the test."""
-    programs: list[Program] = []
-
-    def run(*command: object) -> Program:
-        programs.append(Program([str(word) for word in command], env))
-        return programs[-1]
-
-    yield run
-    for program in reversed(programs):
-        program.end(30.0)
 
 
 def real_console(begin: Callable[..., Program], *arms: str) -> Program:

@@ -13,14 +13,12 @@ from rich.console import Console
 from ligature import __version__
 from ligature.cli.evaluation_page import write_page
 from ligature.environments import SuturingEnv
-from ligature.environments.evaluation import MEASURES, Episode, report, run_episode, run_episodes
+from ligature.environments.evaluation import MEASURES, UNITS, Episode, report, run_episode, run_episodes
 from ligature.environments.policies import PolicyError, load_policy
 from ligature.render.files import write_json, write_png
 
 EVERY = 10.0
 """Seconds between two lines of progress."""
-
-UNITS = {"time": "s", "path_length": "m", "peak_force": "N", "tissue_force": "N", "reward": "", "time_to_success": "s"}
 
 
 def evaluate(

@@ -7,6 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from ligature.environments.evaluation import UNITS
+
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 70rem; padding: 0 1rem; }
 table { border-collapse: collapse; margin: 1rem 0; }
@@ -18,7 +20,6 @@ figure { display: inline-block; margin: .3rem; }
 img { width: 320px; display: block; }
 """
 
-UNITS = {"time": "s", "path_length": "m", "peak_force": "N", "tissue_force": "N", "time_to_success": "s"}
 SHARES = ("success", "lost")
 
 

@@ -64,6 +64,9 @@ class Episode:
 MEASURES = ("time", "path_length", "peak_force", "tissue_force", "reward")
 """What has means and intervals, beside success and drops."""
 
+UNITS = {"time": "s", "time_to_success": "s", "path_length": "m", "peak_force": "N", "tissue_force": "N", "reward": ""}
+"""Of what a summary has means of."""
+
 
 def run_episode(
     env: SuturingEnv, policy: Policy, seed: int, max_steps: int, look: Callable[[int], None] = lambda step: None

@@ -42,12 +42,6 @@ class TissueBlock:
         Length of a tick, s.
     ticks
         Ticks of a tissue step.
-
-    Attributes
-    ----------
-    pushed
-        Forces on the nodes beside those on points of contact, added up over the ticks of this step, (n, 3) N; they move
-        the nodes in the next one.
     """
 
     def __init__(
@@ -66,7 +60,6 @@ class TissueBlock:
         self.ages = np.zeros(len(self.paths.count), dtype=np.int64)
         self.needles: list[NeedleInTissue] = []
         self.threads: list[ThreadInTissue] = []
-        self.pushed = np.zeros_like(self.elastic.x)
         self._begin()
 
     def add_needle(self, curvature: float, length: float, radius: float) -> NeedleInTissue:
@@ -153,10 +146,9 @@ class TissueBlock:
         self.make_room()
 
     def _begin(self) -> None:
-        self.pushed /= self.interface.ticks
-        self.lips.expect(self.pushed)
-        self.elastic.begin(self.pushed)
-        self.pushed[:] = 0.0
+        external = np.zeros_like(self.elastic.x)
+        self.lips.expect(external)
+        self.elastic.begin(external)
         self.interface.begin()
 
     # --- state --------------------------------------------------------------------------------
@@ -173,7 +165,7 @@ class TissueBlock:
         self.interface.reset()
         for array in self.paths:
             array[:] = 0
-        self.ages[:], self.pushed[:] = 0, 0.0
+        self.ages[:] = 0
         self.paths.length[:] = np.inf
         for _, line in self._lines():
             line.reset()
@@ -183,7 +175,6 @@ class TissueBlock:
         """Everything that lasts from tick to tick, as named arrays."""
         kept = {name: getattr(self.elastic, name).copy() for name in KEPT}
         kept["lip_force"], kept["ages"] = self.lips.force.copy(), self.ages.copy()
-        kept["pushed"] = self.pushed.copy()
         kept.update({f"point_{name}": array for name, array in self.interface.snapshot().items()})
         kept.update({f"path_{name}": array.copy() for name, array in zip(self.paths._fields, self.paths, strict=True)})
         for prefix, line in self._lines():
@@ -201,7 +192,6 @@ class TissueBlock:
         for name in KEPT:
             getattr(self.elastic, name)[:] = snapshot[name]
         self.lips.force[:], self.ages[:] = snapshot["lip_force"], snapshot["ages"]
-        self.pushed[:] = snapshot["pushed"]
         self.interface.restore(_with_prefix(snapshot, "point_"))
         for name, array in zip(self.paths._fields, self.paths, strict=True):
             array[:] = snapshot[f"path_{name}"]
