@@ -24,13 +24,28 @@ from ligature.tasks.throws import PAD, UP, Throw, pose_of
 from ligature.tasks.wounds import ClosureScore, Stitch, Wound, torn
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from suture import ABOVE, BEYOND, MEETING, OPEN, SHUT, STREAM, Failure, Film, Surgeon, scatter  # noqa: E402
+from suture import (  # noqa: E402
+    ABOVE,
+    BEYOND,
+    HOLD_DEPTHS,
+    MEETING,
+    OPEN,
+    SHUT,
+    STREAM,
+    Failure,
+    Film,
+    Surgeon,
+    scatter,
+)
 
 Array = np.ndarray
 
 SCENE = Path(__file__).resolve().parents[1] / "scenes" / "soft_suturing" / "launch.yaml"
 OUT, MOST_TURN, TURN = 0.004, 0.4, 0.05
 """Metres by which the tip must stand over the tissue, and radians by which the needle turns on for that: most, each."""
+
+STANDS_OUT = 0.0064
+"""Metres of needle that are in neither lip nor hand when it has been driven; bites of wide wounds are less for that."""
 
 TAILS = (0.02, 0.016, 0.012)
 """Metres of thread between the first entry and the hand that holds its tail, one after the other where it misses."""
@@ -47,7 +62,7 @@ BEHIND = 0.015
 LEANS = np.radians(np.arange(-60, 61, 15))
 """Angles by which a tool may lean about the thread that it takes."""
 
-TIGHT, MOST_PULL, PACE, MOST_WAY = 0.2e-3, 3.0, 0.015, 0.09
+TIGHT, MOST_PULL, PACE, MOST_WAY = 0.2e-3, 8.0, 0.015, 0.09
 """Gap at which a stitch is tight, tension that the thread may get, speed of the hands, and how far each goes."""
 
 
@@ -74,6 +89,8 @@ class TissueSurgeon(Surgeon):
         self.force = 0.0
         super().__init__(simulation, watch, 0)
         self.open_gap = max(self.gaps())
+        reach = 2.0 * self.arc.radius * np.sin(0.5 * (max(HOLD_DEPTHS) - STANDS_OUT) / self.arc.radius)
+        self.width = min(plan.width, 0.5 * (reach - self.open_gap))
         places = self._state["body_pose"][list(self.monitor.scenery.thread), :3]
         self._spacing = float(np.linalg.norm(np.diff(places, axis=0), axis=1).mean())
 
@@ -89,8 +106,9 @@ class TissueSurgeon(Surgeon):
 
     def ends(self, pair: int) -> tuple[Array, Array]:
         """Where a stitch goes in and out, (3,) each."""
-        place, width = self.plan.places[pair - 1], self.plan.width
-        return self.wound.point(self._state, -1, place, width), self.wound.point(self._state, 1, place, width)
+        place = self.plan.places[pair - 1]
+        near, far = (self.wound.point(self._state, side, place, self.width) for side in (-1, 1))
+        return near, far
 
     def meeting(self, throw: Throw) -> Array:
         """The tail towards the arm that drives, the tip towards the one that pulls, so that they need not cross."""
@@ -222,7 +240,7 @@ class TissueSurgeon(Surgeon):
         state, places = self._state, self.plan.places
         after = [self.wound.stitch(state, place) for place, _ in zip(places, self.made, strict=False)]
         return ClosureScore(
-            (self.plan.stitches, self.plan.width), tuple(s for s in self.made if s is not None), self.open_gap,
+            (self.plan.stitches, self.width), tuple(s for s in self.made if s is not None), self.open_gap,
             tuple(self.gaps()), torn(self.made, after), self.force, self.monitor.measures().thread_tension,
             self.simulation.time,
         )  # fmt: skip
