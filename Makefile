@@ -111,7 +111,7 @@ demo: setup
 # the animation of the README and the pictures of docs/demonstration.md
 film: setup
 	.venv/bin/ligature demo --out build/film
-	.venv/bin/ligature demo --stitches 1 --out build/film/tissue
+	.venv/bin/ligature demo --tissue --out build/film/tissue
 	.venv/bin/ligature render scenes/peg_transfer/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/peg_transfer
 	.venv/bin/ligature render scenes/needle_pick/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/needle_pick
 	cp build/film/suture.webp docs/pictures/suture.webp

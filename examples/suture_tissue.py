@@ -68,16 +68,10 @@ TIGHT, MOST_PULL, PACE, MOST_WAY = 0.2e-3, 8.0, 0.015, 0.09
 
 @dataclass(frozen=True)
 class Plan:
-    """Which bites to take: ``stitches`` of them, ``width`` metres of each lip, ``spacing`` metres apart."""
+    """Which bite to take: ``width`` metres of each lip at most, ``place`` metres along the wound from its middle."""
 
-    stitches: int = 1
     width: float = 0.0045
-    spacing: float = 0.008
-
-    @property
-    def places(self) -> list[float]:
-        """Places of the stitches along the wound, from its middle."""
-        return [self.spacing * (k - 0.5 * (self.stitches - 1)) for k in range(self.stitches)]
+    place: float = 0.0
 
 
 class TissueSurgeon(Surgeon):
@@ -85,10 +79,10 @@ class TissueSurgeon(Surgeon):
 
     def __init__(self, simulation: ligature.Simulation, plan: Plan, watch: Callable[[], object] = lambda: None) -> None:
         self.plan, self.wound = plan, Wound.of(simulation.scene)
-        self.made: list[Stitch | None] = []
+        self.made: Stitch | None = None
         self.force = 0.0
         super().__init__(simulation, watch, 0)
-        self.open_gap = max(self.gaps())
+        self.open_gap = self.gap()
         reach = 2.0 * self.arc.radius * np.sin(0.5 * (max(HOLD_DEPTHS) - STANDS_OUT) / self.arc.radius)
         self.width = min(plan.width, 0.5 * (reach - self.open_gap))
         places = self._state["body_pose"][list(self.monitor.scenery.thread), :3]
@@ -105,9 +99,8 @@ class TissueSurgeon(Surgeon):
             self.force = max(self.force, float(self._state["tissue_peak"][self.wound.tissue.index]))
 
     def ends(self, pair: int) -> tuple[Array, Array]:
-        """Where a stitch goes in and out, (3,) each."""
-        place = self.plan.places[pair - 1]
-        near, far = (self.wound.point(self._state, side, place, self.width) for side in (-1, 1))
+        """Where the stitch goes in and out, (3,) each."""
+        near, far = (self.wound.point(self._state, side, self.plan.place, self.width) for side in (-1, 1))
         return near, far
 
     def meeting(self, throw: Throw) -> Array:
@@ -200,7 +193,7 @@ class TissueSurgeon(Surgeon):
         goals = [self.tool(name) for name in names]
         targets = [middle + side * CROSS * across + up * UP for side, up in zip((1.0, -1.0), OVER, strict=True)]
         for _ in range(round(MOST_WAY / (PACE * STREAM))):
-            if max(self.gaps()) < TIGHT or self.tension() > MOST_PULL:
+            if self.gap() < TIGHT or self.tension() > MOST_PULL:
                 break
             for name, goal, target in zip(names, goals, targets, strict=True):
                 way = target - goal[:3, 3] - PAD * goal[:3, 2]
@@ -216,33 +209,30 @@ class TissueSurgeon(Surgeon):
         """Largest tension of the thread, N."""
         return float(np.abs(self._state["rod_tension"][list(self.monitor.scenery.thread)]).max())
 
-    def gaps(self) -> list[float]:
-        """Width of the wound at each stitch of the plan."""
-        return [self.wound.gap(self._state, place) for place in self.plan.places]
+    def gap(self) -> float:
+        """Width of the wound at the stitch."""
+        return self.wound.gap(self._state, self.plan.place)
 
     # --- the suture ---------------------------------------------------------------------------
 
     def suture_wound(self, driver: str = "PSM2", puller: str = "PSM1") -> None:
-        """All stitches of the plan, and the wound drawn together."""
+        """A stitch through both lips, and the wound drawn together."""
         self.prepare()
-        self.pick_up(puller, self.throw(1))
-        for number, place in enumerate(self.plan.places, 1):
-            throw = self.throw(number)
-            self.hand_over(puller, driver, throw)
-            self.drive(driver, throw)
-            self.made.append(self.wound.stitch(self._state, place))
-            self.pull_out(puller, driver, throw)
+        throw = self.throw(1)
+        self.pick_up(puller, throw)
+        self.hand_over(puller, driver, throw)
+        self.drive(driver, throw)
+        self.made = self.wound.stitch(self._state, self.plan.place)
+        self.pull_out(puller, driver, throw)
         self.take_thread(driver, self.ends(1)[0])
         self.draw_tight((driver, puller))
 
     def score(self) -> ClosureScore:
         """How well it went until now."""
-        state, places = self._state, self.plan.places
-        after = [self.wound.stitch(state, place) for place, _ in zip(places, self.made, strict=False)]
+        now = self.wound.stitch(self._state, self.plan.place)
         return ClosureScore(
-            (self.plan.stitches, self.width), tuple(s for s in self.made if s is not None), self.open_gap,
-            tuple(self.gaps()), torn(self.made, after), self.force, self.monitor.measures().thread_tension,
-            self.simulation.time,
+            (1, self.width), () if self.made is None else (self.made,), self.open_gap, (self.gap(),),
+            torn([self.made], [now]), self.force, self.monitor.measures().thread_tension, self.simulation.time,
         )  # fmt: skip
 
 
@@ -263,9 +253,8 @@ def operate(
 def main() -> int:
     """Make a suture and print how well it went."""
     arguments = argparse.ArgumentParser(description="Two arms suture a wound in soft tissue by themselves.")
-    arguments.add_argument("--stitches", type=int, choices=(1, 2, 3), default=1)
-    arguments.add_argument("--width", type=float, default=0.0045, help="metres of each lip that a stitch takes")
-    arguments.add_argument("--spacing", type=float, default=0.008, help="metres between stitches")
+    arguments.add_argument("--width", type=float, default=0.0045, help="metres of each lip that the stitch takes")
+    arguments.add_argument("--place", type=float, default=0.0, help="metres along the wound, from its middle")
     arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
     arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file")
@@ -274,7 +263,7 @@ def main() -> int:
     scatter(simulation, given.seed)
     film = Film(simulation, given.out) if given.out else None
     started = time.perf_counter()
-    score, measures, stopped = operate(simulation, Plan(given.stitches, given.width, given.spacing), film)
+    score, measures, stopped = operate(simulation, Plan(given.width, given.place), film)
     took = time.perf_counter() - started
     lines = [
         *score.lines(),

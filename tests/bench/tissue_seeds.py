@@ -1,6 +1,6 @@
 """Sutures soft tissue by the demonstration, over wounds, stiffnesses and places of the needle, and keeps how each went.
 
-    python -m tests.bench.tissue_seeds [N] [START] [--stitches S] [--into FILE] [--table]
+    python -m tests.bench.tissue_seeds [N] [START] [--into FILE] [--table]
 
 Each seed from START on draws where the needle lies, how wide the wound gapes (2 to 6 mm) and how stiff the pad is (50 to
 300 kPa); seed 0 is the scene's own. A line of JSON a seed goes to FILE (default `build/tissue_seeds.jsonl`); seeds that
@@ -57,17 +57,17 @@ def scene_of(gap: float, youngs: float, folder: Path) -> ligature.Scene:
     return ligature.load(folder / "launch.yaml", roots=[scenes])
 
 
-def attempt(seed: int, stitches: int) -> Row:
+def attempt(seed: int) -> Row:
     """One suture in a world of its own, and what came of it."""
     gap, youngs = drawn(seed)
     with tempfile.TemporaryDirectory() as folder:
         simulation = ligature.Simulation(scene_of(gap, youngs, Path(folder)))
     suture_tissue.scatter(simulation, seed)
     started = time.perf_counter()
-    score, measures, stopped = suture_tissue.operate(simulation, suture_tissue.Plan(stitches))
+    score, measures, stopped = suture_tissue.operate(simulation, suture_tissue.Plan())
     report = score.report()
     return {
-        "seed": seed, "stitches": stitches, "wound": round(1e3 * gap, 2), "youngs": round(1e-3 * youngs, 1),
+        "seed": seed, "wound": round(1e3 * gap, 2), "youngs": round(1e-3 * youngs, 1),
         "success": score.success and not stopped, "why": stopped,
         "made": [[round(1e3 * x, 2) for x in stitch.figures] for stitch in score.stitches],
         **{name: round(1e3 * report[name], 3) for name in ("gap", "asymmetry", "step", "tear")},
@@ -77,22 +77,22 @@ def attempt(seed: int, stitches: int) -> Row:
     }  # fmt: skip
 
 
-def read(file: Path) -> dict[tuple[int, int], Row]:
-    """The newest row of each number of stitches and seed."""
+def read(file: Path) -> dict[int, Row]:
+    """The newest row of each seed."""
     rows = map(json.loads, file.read_text(encoding="utf-8").splitlines() if file.exists() else ())
-    return {(row["stitches"], row["seed"]): row for row in rows}
+    return {row["seed"]: row for row in rows}
 
 
 def table(rows: list[Row]) -> Iterator[str]:
     """Markdown: a line a seed, and how many were closed."""
-    yield "| stitches | seed | wound, mm | pad, kPa | gap after, mm | widths, mm | depths, mm | tear, mm | thread, N |"
-    yield "|---|---|---|---|---|---|---|---|---|"
-    for row in sorted(rows, key=lambda row: (row["stitches"], row["seed"])):
+    yield "| seed | wound, mm | pad, kPa | gap after, mm | widths, mm | depths, mm | tear, mm | thread, N |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for row in sorted(rows, key=lambda row: row["seed"]):
         widths = "; ".join(f"{m[0]:.1f}, {m[1]:.1f}" for m in row["made"])
         depths = "; ".join(f"{m[2]:.1f}, {m[3]:.1f}" for m in row["made"])
         gap = f"{row['gap']:.2f}" if row["success"] else f"{row['gap']:.2f} ({row['why'] or 'open'})"
         yield (
-            f"| {row['stitches']} | {row['seed']} | {row['wound']:.1f} | {row['youngs']:.0f} | {gap} | {widths} | {depths} "
+            f"| {row['seed']} | {row['wound']:.1f} | {row['youngs']:.0f} | {gap} | {widths} | {depths} "
             f"| {row['tear']:.1f} | {row['tension']:.1f} |"
         )
     yield f"\n{sum(row['success'] for row in rows)} of {len(rows)} closed"
@@ -103,15 +103,14 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description="Sutures soft tissue over many wounds.")
     arguments.add_argument("count", type=int, nargs="?", default=100)
     arguments.add_argument("start", type=int, nargs="?", default=0)
-    arguments.add_argument("--stitches", type=int, default=1)
     arguments.add_argument("--into", type=Path, default=ROOT / "build" / "tissue_seeds.jsonl")
     arguments.add_argument("--table", action="store_true", help="only print the table of what is there")
     given = arguments.parse_args()
     given.into.parent.mkdir(parents=True, exist_ok=True)
     for seed in () if given.table else range(given.start, given.start + given.count):
-        if (given.stitches, seed) in read(given.into):
+        if seed in read(given.into):
             continue
-        row = attempt(seed, given.stitches)
+        row = attempt(seed)
         with given.into.open("a", encoding="utf-8") as kept:
             kept.write(json.dumps(row) + "\n")
         sys.stdout.write(json.dumps(row) + "\n")

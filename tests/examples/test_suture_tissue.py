@@ -20,14 +20,15 @@ from suture import BEFORE, BEYOND, HOLD_DEPTHS, PULL_DEPTHS  # noqa: E402
 @pytest.fixture(scope="module")
 def surgeon() -> suture_tissue.TissueSurgeon:
     simulation = ligature.Simulation(ligature.load(suture_tissue.SCENE))
-    return suture_tissue.TissueSurgeon(simulation, suture_tissue.Plan(3))
+    return suture_tissue.TissueSurgeon(simulation, suture_tissue.Plan())
 
 
-def test_bites_take_the_same_of_both_lips_at_their_places(surgeon: suture_tissue.TissueSurgeon) -> None:
+def test_a_bite_takes_the_same_of_both_lips_at_its_place(surgeon: suture_tissue.TissueSurgeon) -> None:
     assert surgeon.width == pytest.approx(0.0045)
     middle = surgeon.simulation.bodies["Pad"].pose[:2]
-    for number, place in enumerate((-0.008, 0.0, 0.008), 1):
-        entry, exit = surgeon.ends(number)
+    for place in (-0.008, 0.0, 0.008):
+        surgeon.plan = suture_tissue.Plan(place=place)
+        entry, exit = surgeon.ends(1)
         np.testing.assert_allclose((entry + exit)[:2] / 2, middle + [0.0, place], atol=1e-4)
         assert np.linalg.norm(exit - entry) == pytest.approx(0.004 + 2 * 0.0045, abs=1e-4)
 
@@ -42,8 +43,9 @@ def test_a_wide_wound_gets_smaller_bites_so_that_the_needle_is_long_enough() -> 
 
 def test_both_arms_reach_every_bite_and_the_place_where_they_meet(surgeon: suture_tissue.TissueSurgeon) -> None:
     arc = surgeon.arc
-    for number in (1, 2, 3):
-        throw, entry = surgeon.throw(number), surgeon.ends(number)[0]
+    for place in (-0.008, 0.0, 0.008):
+        surgeon.plan = suture_tissue.Plan(place=place)
+        throw, entry = surgeon.throw(1), surgeon.ends(1)[0]
         tip, rest = throw.towards_exit + BEYOND, arc.end - arc.begin
         ways = {
             "PSM2": (HOLD_DEPTHS, np.linspace(-BEFORE, tip, 6)),
@@ -53,13 +55,13 @@ def test_both_arms_reach_every_bite_and_the_place_where_they_meet(surgeon: sutur
             way = [throw.arc_at(a, arc) for a in turns]
             kinematics, base = surgeon.arms[name].kinematics, surgeon._base[name]
             meeting = surgeon.meeting(throw)
-            assert throws.best_grasp(arc, depths, kinematics, base, way, meeting, entry), (number, name)
+            assert throws.best_grasp(arc, depths, kinematics, base, way, meeting, entry), (place, name)
 
 
 @pytest.mark.slow
 def test_one_stitch_closes_the_wound_without_tearing_it() -> None:
     simulation = ligature.Simulation(ligature.load(suture_tissue.SCENE))
-    score, measures, stopped = suture_tissue.operate(simulation, suture_tissue.Plan(1))
+    score, measures, stopped = suture_tissue.operate(simulation, suture_tissue.Plan())
     assert stopped == ""
     assert score.success, score.lines()
     assert score.open_gap == pytest.approx(0.004, abs=1e-5) and max(score.gaps) < 0.3e-3

@@ -19,21 +19,21 @@ EXAMPLE = EXAMPLES / "suture.py"
 
 def demo(
     throws: int, seed: int, out: Path, dataset: Path | None, console: Console, episodes: int = 1,
-    sampling: Sampling | None = None, stitches: int = 0,
+    sampling: Sampling | None = None, tissue: bool = False,
 ) -> int:  # fmt: skip
     """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status.
 
-    With ``stitches`` it is the one that sutures soft tissue.
+    With ``tissue`` it is the one that sutures soft tissue.
     """
-    example = EXAMPLE.with_name("suture_tissue.py") if stitches else EXAMPLE
-    if stitches and dataset is not None:
-        console.print("--dataset writes sutures through holes; leave out --stitches, or --dataset")
+    example = EXAMPLE.with_name("suture_tissue.py") if tissue else EXAMPLE
+    if tissue and dataset is not None:
+        console.print("--dataset writes sutures through holes; leave out --tissue, or --dataset")
         return 2
     if not example.is_file():
         console.print(f"the demonstration '{example}' is missing; install Ligature again")
         return 2
     if dataset is None:
-        count = ["--stitches", str(stitches)] if stitches else ["--throws", str(throws)]
+        count = [] if tissue else ["--throws", str(throws)]
         command = [sys.executable, str(example), *count, "--seed", str(seed), "--out", str(out)]
     else:
         words = [str(dataset), "--throws", str(throws), "--seed", str(seed), "--episodes", str(episodes)]

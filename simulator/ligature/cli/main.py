@@ -381,9 +381,7 @@ def demo(
     throws: Annotated[
         int, typer.Option(help="Number of throws, beginning at the first pair of holes.", min=1, max=4)
     ] = 2,
-    stitches: Annotated[
-        int, typer.Option(help="Suture soft tissue without holes instead, with this many stitches.", min=0, max=3)
-    ] = 0,
+    tissue: Annotated[bool, typer.Option("--tissue", help="Suture soft tissue without holes instead.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the needle's pose; 0 keeps the pose of the scene.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
     dataset: Annotated[Optional[Path], typer.Option(help="HDF5 dataset to write instead of pictures.")] = None,  # noqa: UP045
@@ -396,7 +394,7 @@ def demo(
     from ligature.cli.demo import demo as run_demo
 
     sampling, console = _sampling(dataset, rate, size, camera), Console(highlight=False, soft_wrap=True)
-    raise typer.Exit(run_demo(throws, seed, out, dataset, console, episodes, sampling, stitches))
+    raise typer.Exit(run_demo(throws, seed, out, dataset, console, episodes, sampling, tissue))
 
 
 @app.command()
