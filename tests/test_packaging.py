@@ -161,6 +161,7 @@ def test_every_extra_for_users_is_imported_by_the_test_of_newest_packages() -> N
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # some gigabytes to fetch and unpack
 def test_the_newest_packages_that_the_bounds_allow_work_together(distributions: Path, tmp_path: Path) -> None:
     """As pip installs them for a stranger today; a package may want another of a version that pip does not know of."""
     python = tmp_path / "venv" / "bin" / "python"
