@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.bench.structure import Arrows, arrows, circles, imports, layers, reached, sources
+from tests.bench.walks import Walk, returns, stretches
 
 MODULES = sources(".")
 
@@ -64,3 +67,14 @@ def test_what_imports_stands_over_what_it_imports_but_in_circles(graph: Arrows) 
     for begin, ends in graph.items():
         for end in ends:
             assert any({begin, end} <= group for group in groups) or heights[begin] > heights[end]
+
+
+def test_a_walk_notes_functions_when_they_are_called_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "one.py").write_text("import two\ndef f():\n    two.g()\n    h()\n    two.g()\ndef h(): two.k()\n")
+    (tmp_path / "two.py").write_text("def g(): return [x for x in 'ab']\ndef k(): pass\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    one = importlib.import_module("one")
+    found = Walk(tmp_path).follow(one.f)
+    assert found == [("one", "f"), ("two", "g"), ("one", "h"), ("two", "k")]
+    assert stretches(found) == ["one", "two", "one", "two"]
+    assert returns(stretches(found)) == {"one": 1, "two": 1}
