@@ -18,9 +18,9 @@ import pytest
 from tests.conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "docs" / "site"))
-from reference import ROOMS as ROOMS_OF_THE_REFERENCE  # noqa: E402
+import reference  # noqa: E402
 
-ROOMS = ["ligature", *(f"ligature.{name}" for name in ROOMS_OF_THE_REFERENCE)]
+ROOMS = ["ligature", *(f"ligature.{name}" for name in reference.ROOMS)]
 EVIDENT = {"self", "cls", "args", "kwargs"}
 
 
@@ -61,6 +61,12 @@ def unexplained(thing: Any) -> list[str]:
         for name in parameters(thing)
         if not re.search(rf"``[^`]*\b{name}\b[^`]*``|^(\w+, )*{name}(, \w+)*$", text, re.MULTILINE)
     ]
+
+
+def test_the_page_of_the_package_documents_all_that_it_exports() -> None:
+    documented = re.findall(r"auto(?:class|function):: (ligature\.\w+)", reference.package())
+    assert documented == sorted(documented, key=lambda name: name != "ligature.load")
+    assert set(documented) == {f"ligature.{name}" for name in importlib.import_module("ligature").__all__}
 
 
 def test_the_surface_is_not_empty() -> None:
