@@ -114,11 +114,6 @@ class Tree:
     damping: tuple[float, float] = (0.0, 0.0)
     """Linear and angular damping by Bullet, in 1/s."""
 
-    @property
-    def moving_links(self) -> list[int]:
-        """Links that carry a body."""
-        return [link for link in self.link_of.values() if link >= 0]
-
     def place(self, body: int) -> tuple[int, int]:
         """Bullet's id and link of a body."""
         link = self.link_of[body]
