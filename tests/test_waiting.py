@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from tests.waiting import stays, steady, until
+
+HERE = Path(__file__).parent
 
 
 def later(seconds: float) -> threading.Event:
@@ -42,3 +46,28 @@ def test_what_must_stay_may_not_end() -> None:
     event = later(0.05)
     with pytest.raises(AssertionError, match="no longer: quiet"):
         stays(lambda: not event.is_set(), "quiet", 5.0)
+
+
+MOST_SLEEPS = 61
+"""Calls of `sleep` outside benches and `tests.waiting`. They pace what a test sends, or let a span pass that a claim is about; whoever
+waits for something uses `until`, `steady` or `stays`. Lower it when one goes."""
+
+
+def sleeps(text: str) -> int:
+    """Calls of `sleep` in a text, also in programs that it holds as strings; simulated time that passes is a condition."""
+    return len(re.findall(r"(?<!def )(?<!stage\.)\bsleep\(", text))
+
+
+def test_no_test_sleeps_where_it_could_wait() -> None:
+    files = [
+        path
+        for path in HERE.rglob("*.py")
+        if "bench" not in path.parts and path.stem not in ("waiting", "test_waiting")
+    ]
+    count = {path.relative_to(HERE).as_posix(): sleeps(path.read_text(encoding="utf-8")) for path in files}
+    assert sum(count.values()) <= MOST_SLEEPS, {name: number for name, number in count.items() if number}
+
+
+def test_sleeps_are_counted() -> None:
+    assert sleeps("import time\ntime.sleep(1)\nprogram = 'while True: sleep(0.1)'\n") == 2
+    assert sleeps("def sleep(self): ...\nstage.sleep(0.1)\nasleep(1)\n") == 0

@@ -21,6 +21,7 @@ sys.path.insert(0, str(SITE))
 import reference  # noqa: E402
 
 _OUTSIDE = re.compile(r"\]\(\.\./([^)#\s]+)(#[^)\s]*)?\)")
+_UNIT = re.compile(r"(?<=\d) (?=(?:s|ms|µs|m|mm|N|g|kg|Hz|kHz|MB|GB)\b)")
 _ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md", "README.md": "index.md"}
 
 
@@ -54,7 +55,12 @@ def _linked(text: str, folder: Path) -> str:
             shutil.copy(source, copy)
         return f"](files/{name})"
 
-    return _OUTSIDE.sub(link, text)
+    return "".join(map(_unbroken, _OUTSIDE.sub(link, text).splitlines(keepends=True)))
+
+
+def _unbroken(line: str) -> str:
+    """A line whose numbers, in a row of a table, stay with their units: narrow columns break at every space."""
+    return _UNIT.sub("\N{NO-BREAK SPACE}", line) if line.startswith("|") else line
 
 
 def build(out: Path, builder: str = "html") -> int:

@@ -205,8 +205,11 @@ def api(room: str) -> str:
 
 
 def package() -> str:
-    """The page of the package itself."""
-    return "# ligature\n\n```{eval-rst}\n.. automodule:: ligature\n```\n"
+    """The page of the package itself, name by name: it imports what it exports at the first use."""
+    module = importlib.import_module("ligature")
+    kinds = {name: "class" if isinstance(getattr(module, name), type) else "function" for name in module.__all__}
+    directives = "\n".join(f".. auto{kinds[name]}:: ligature.{name}" for name in ("load", *sorted({*kinds} - {"load"})))
+    return f"# ligature\n\n```{{eval-rst}}\n.. automodule:: ligature\n   :no-members:\n\n{directives}\n```\n"
 
 
 def _exported(name: str) -> set[str]:

@@ -66,6 +66,20 @@ def test_no_other_alignment_changes_less(old: list, new: list) -> None:
     assert cost(old, new, aligned(old, new, same)) == least_cost(old, new)
 
 
+@st.composite
+def edited(draw: st.DrawFn) -> tuple[list, list]:
+    """A list and the same with other items in its middle."""
+    begin, end = (draw(OPEN_ITEMS.filter(lambda items: 1 <= len(items) <= 2)) for _ in range(2))
+    middles = (draw(OPEN_ITEMS.filter(lambda items: len(items) <= 2)) for _ in range(2))
+    old, new = ([*begin, *middle, *end] for middle in middles)
+    return old, new
+
+
+@given(edited())
+def test_no_other_alignment_of_an_edited_list_changes_less(lists: tuple[list, list]) -> None:
+    assert cost(*lists, aligned(*lists, same)) == least_cost(*lists)
+
+
 HEAD = "bodies: []\njoints: []\nvehicles: [V]\nV:\n  name: v\n  chassis: BODY c\n"
 STYLES = {
     "blocks": "  wheels:\n  # the first\n  - body: A   # left\n    width: 0.10\n    radius: 0.50\n    mine: {kept: yes}\n"

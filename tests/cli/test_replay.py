@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from ligature.bus.record import Header, Record, RecordWriter
 from ligature.cli.options import RunOptions
-from ligature.cli.replay import Sampled, replay
-from ligature.cli.sampling import Sampling
+from ligature.cli.replay import replay
+from ligature.cli.sampling import Sampled, Sampling
 from ligature.robots.commands import VERBS, PlaceJp, ServoJp
 from rich.console import Console
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ligature.bus.record import Record
-from ligature.cli.replay import resimulate
+from ligature.cli.resimulation import resimulate
 
 from tests.cockpit.conftest import TIMEOUT, Person, Served, projected, tip, until
 from tests.waiting import stays, steady

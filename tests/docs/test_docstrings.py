@@ -6,6 +6,7 @@ The form (summary, sections) is checked by ruff's pydocstyle rules in numpy's co
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
@@ -18,9 +19,9 @@ import pytest
 from tests.conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "docs" / "site"))
-from reference import ROOMS as ROOMS_OF_THE_REFERENCE  # noqa: E402
+import reference  # noqa: E402
 
-ROOMS = ["ligature", *(f"ligature.{name}" for name in ROOMS_OF_THE_REFERENCE)]
+ROOMS = ["ligature", *(f"ligature.{name}" for name in reference.ROOMS)]
 EVIDENT = {"self", "cls", "args", "kwargs"}
 
 
@@ -63,6 +64,12 @@ def unexplained(thing: Any) -> list[str]:
     ]
 
 
+def test_the_page_of_the_package_documents_all_that_it_exports() -> None:
+    documented = re.findall(r"auto(?:class|function):: (ligature\.\w+)", reference.package())
+    assert documented == sorted(documented, key=lambda name: name != "ligature.load")
+    assert set(documented) == {f"ligature.{name}" for name in importlib.import_module("ligature").__all__}
+
+
 def test_the_surface_is_not_empty() -> None:
     assert len(SURFACE) > 100
 
@@ -75,3 +82,19 @@ def test_public_object_explains_its_parameters(name: str) -> None:
     few = parameters(thing)
     if len(few) > 1:
         assert unexplained(thing) == []
+
+
+@pytest.mark.parametrize("name", [name for name, thing in SURFACE.items() if not inspect.isclass(thing)])
+def test_what_lists_parameters_describes_what_it_returns(name: str) -> None:
+    text = inspect.getdoc(SURFACE[name]) or ""
+    if "Parameters\n---" in text and inspect.signature(SURFACE[name]).return_annotation not in ("None", None):
+        assert "Returns\n---" in text
+
+
+@pytest.mark.parametrize("name", SURFACE)
+def test_no_property_begins_with_what_reads_as_a_type(name: str) -> None:
+    """Sphinx takes what precedes a colon in the first line for the type of an attribute."""
+    for key, member in vars(SURFACE[name]).items() if inspect.isclass(SURFACE[name]) else ():
+        if isinstance(member, property | functools.cached_property) and not key.startswith("_"):
+            first = (inspect.getdoc(member) or "").partition("\n")[0]
+            assert not re.search(r"\w: ", re.sub(r"``[^`]*``", "", first)), f"{key}: {first}"

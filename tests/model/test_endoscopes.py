@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import ligature
@@ -27,6 +28,20 @@ def test_a_camera_keeps_its_place_and_gets_the_lens() -> None:
     assert fitted.resolution == (1920, 1080)
     assert (fitted.attachment, fitted.near, fitted.far) == (camera.attachment, camera.near, camera.far)
     assert fitted.field_of_view == pytest.approx(0.551, abs=1e-3)
+
+
+def test_a_stereo_camera_gets_the_eyes_of_the_scope_and_a_single_one_none() -> None:
+    camera = ligature.load(SCENE).cameras[0]
+    pair, single = (replace(camera, stereo=eyes) for eyes in ((0.06, 0.5), None))
+    assert seen_through(pair, "Si_HD").stereo == (0.0054, 0.1)
+    assert seen_through(single, "Si_HD").stereo is None
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("Classic_SD", (640, 480)), ("Classic_HD", (1280, 720)), ("Si_HD", (1920, 1080))]
+)
+def test_pictures_have_the_size_of_the_video_standard(name: str, size: tuple[int, int]) -> None:
+    assert ENDOSCOPES[name].resolution == size
 
 
 def test_an_unknown_endoscope_is_named_with_those_there_are() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import ligature
 import pytest
+from ligature.adf import Severity
 from ligature.cli.options import RunOptions
 from ligature.model.material import MATERIALS
 
@@ -31,7 +32,9 @@ def test_a_body_is_soft_by_key_or_name(tmp_path: Path, name: str, material: str,
     (tmp_path / "m.yaml").write_text(RIGID)
     assert not ligature.load(tmp_path / "m.yaml").tissues
     options = RunOptions(str(tmp_path / "m.yaml"), soft=(name + material,))
-    (tissue,) = RunOptions.from_text(options.to_text()).load().tissues
+    scene = RunOptions.from_text(options.to_text()).load()
+    (tissue,) = scene.tissues
+    assert not [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
     assert tissue.body == 0
     assert tissue.form.materials == (MATERIALS[expected],)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from ligature import Scene, Simulation
 from ligature.adf import Severity
+from ligature.model.sutures import USP_MILLIMETRES
 
 NEEDLE = (
     "bodies: [BODY Needle]\nsutures: [SUTURE silk]\nnamespace: /ambf/env/\n"
@@ -38,6 +39,38 @@ def test_one_block_becomes_one_rod_of_the_given_data(tmp_path: Path) -> None:
     assert six.stiffness[3] == pytest.approx(1e8 * np.pi * rod.radius**4 / 4 / 0.005)
     assert scene.bodies[rod.bodies[3]].identity.identifier == "/ambf/env/SUTURE silk_003"
     assert all(scene.bodies[b].identity.passive for b in rod.bodies)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+def test_a_round_thread_twists_more_easily_than_it_bends_by_one_plus_the_poisson_ratio(
+    tmp_path: Path, poisson: float
+) -> None:
+    """G J / (E I) of a circular section, with J = 2 I and G = E / (2 (1 + ν))."""
+    scene = load(tmp_path, NEEDLE + SILK.replace("density:", f"poisson ratio: {poisson}, density:"))
+    six = scene.joints[scene.rods[0].joints[0]].six_dof
+    assert six is not None
+    assert six.stiffness[5] == pytest.approx(six.stiffness[3] / (1.0 + poisson))
+    assert six.stiffness[4] == six.stiffness[3]
+
+
+USP_LIMITS = {
+    "10-0": (0.020, 0.029), "9-0": (0.030, 0.039), "8-0": (0.040, 0.049), "7-0": (0.050, 0.069), "6-0": (0.070, 0.099),
+    "5-0": (0.100, 0.149), "4-0": (0.150, 0.199), "3-0": (0.200, 0.249), "2-0": (0.300, 0.339), "0": (0.350, 0.399),
+    "1": (0.400, 0.499), "2": (0.500, 0.599),
+}  # fmt: skip
+"""Limits on the average diameter in millimetres, United States Pharmacopeia, chapter 861."""
+
+
+def test_every_usp_size_is_the_middle_of_its_range() -> None:
+    assert pytest.approx({size: sum(limits) / 2 for size, limits in USP_LIMITS.items()}, abs=1e-9) == USP_MILLIMETRES
+
+
+def test_a_colour_holds_for_the_whole_thread_and_half_of_it_in_the_shade(tmp_path: Path) -> None:
+    scene = load(tmp_path, NEEDLE + SILK.replace("density:", "color rgba: {r: 0.8, g: 0.6, b: 0.4, a: 0.5}, density:"))
+    for body in scene.rods[0].bodies:
+        colour = scene.bodies[body].visual.colour
+        assert (colour.diffuse, colour.alpha) == ((0.8, 0.6, 0.4), 0.5)
+        assert colour.ambient == pytest.approx((0.4, 0.3, 0.2))
 
 
 def test_it_hangs_from_its_needle(tmp_path: Path) -> None:

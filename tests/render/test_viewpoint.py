@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ligature.model.frames import matrix_pose7, pose7_matrix
-from ligature.model.parts import camera_frame
+from ligature.model.mounted import camera_frame
 from ligature.render.viewpoint import Viewpoint
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from tests.ros.conftest import BIN, ROOT, SMALL, Listener, Program, free_port
-from tests.waiting import steady, until
+from tests.waiting import stays, steady, until
 
 pytestmark = pytest.mark.ros
 NEEDLE = "/ambf/env/phantom/Needle"
@@ -117,8 +117,8 @@ def test_targets_hold_for_ever_without_being_set_again(client: Any) -> None:
     arm = client.get_obj_handle("psm1/baselink")
     for index, value in enumerate(JOINTS):
         arm.set_joint_pos(index, value)
-    time.sleep(2.0)  # four times the simulator's time-out
-    assert arm.get_all_joint_pos() == pytest.approx(JOINTS, abs=2e-3)
+    wait_for(lambda: arm.get_all_joint_pos() == pytest.approx(JOINTS, abs=2e-3))
+    stays(lambda: arm.get_all_joint_pos() == pytest.approx(JOINTS, abs=2e-3), seconds=2.0)  # four times the time-out
 
 
 def test_commands_go_out_at_the_rate_given_to_connect_for_active_objects_only(
@@ -224,8 +224,7 @@ def test_an_actuator_grasps_what_the_ghosts_name_and_lets_go(client: Any, name: 
     assert ghost.get_all_sensed_obj_names() == [] or "/ambf/env/" in ghost.get_sensed_obj_name(0)
     actuator.actuate(name)
     wait_for(lambda: actuator._state.actuated)
-    time.sleep(0.7)  # longer than the simulator's time-out
-    assert actuator._state.actuated
+    stays(lambda: actuator._state.actuated, seconds=0.7)  # longer than the simulator's time-out
     actuator.deactuate()
     wait_for(lambda: not actuator._state.actuated)
 

@@ -11,6 +11,7 @@ import pytest
 
 from tests.cockpit.conftest import somebody, until
 from tests.ros.conftest import BIN, Listener
+from tests.waiting import stays
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(600)]
 
@@ -103,5 +104,4 @@ def test_the_page_shows_ros_and_selects_a_pair(simulator: Any, remote: Any) -> N
         person.find("//*[normalize-space(text())='ROS topics']").click()
         person.sees("topics are published")
         person.sees("/PSM1/operating_state")
-    time.sleep(0.1)
-    assert simulator.process.poll() is None
+    stays(lambda: simulator.process.poll() is None, "the simulator goes on", 0.1)

@@ -187,9 +187,9 @@ def test_a_ratio_that_no_trajectory_bears_and_homing_leave_the_run_alive(
     state = listen("/PSM1/operating_state", OperatingState)
     publish("/PSM1/trajectory_j/set_ratio", Float64).publish(Float64(1e-5))
     words = publish("/PSM1/state_command", StringStamped)
-    for word in ("disable", "home"):
-        words.publish(StringStamped(string=word))
-        time.sleep(0.5)
+    words.publish(StringStamped(string="disable"))
+    state.wait(lambda message: message.state == "DISABLED", 20.0)
+    words.publish(StringStamped(string="home"))
     state.wait(lambda message: message.state in ("FAULT", "ENABLED"), 20.0)
     assert simulator.process.poll() is None, simulator.output
 

@@ -14,7 +14,7 @@ from ligature.cli.master import master_answers
 
 from tests.fuzz.kills import STAGES, kill
 from tests.ros.conftest import BIN, SMALL, Program, free_port, start_master
-from tests.waiting import until
+from tests.waiting import stays, until
 
 pytestmark = pytest.mark.ros
 WORLD = "/ambf/env/World/State"
@@ -107,7 +107,7 @@ def test_a_restarted_master_finds_the_simulator_again(
     program.wait_for("first state published")
     master.kill()
     master.wait()
-    time.sleep(1.5)
+    stays(lambda: program.process.poll() is None, "the simulator goes on without a master", 1.5)
     master = start_master(port, own_env)
     try:
         client = watch(own_env)

@@ -16,7 +16,7 @@ import pytest
 from ligature.ros.registrations import NameTaken, claim, dead_neighbours, lives, registrations
 
 from tests.ros.conftest import BIN, SMALL, Program, free_port
-from tests.waiting import until
+from tests.waiting import stays, until
 
 pytestmark = pytest.mark.ros
 
@@ -118,8 +118,7 @@ def test_what_killed_nodes_left_is_removed_under_the_own_name_and_reported_under
             assert registered(env, node), "what belongs to others stays"
             for held in registrations([node]):
                 held.remove()
-    time.sleep(0.5)
-    assert program.process.poll() is None, "who was given the address of a killed node was shut down"
+    stays(lambda: program.process.poll() is None, "who was given the address of a killed node is not shut down", 0.5)
     assert lives("/innocent") and not lives("/ligature")
     with pytest.raises(NameTaken, match="node /innocent at http"):
         claim("/innocent")

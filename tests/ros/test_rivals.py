@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -42,9 +41,12 @@ for topic in topics:
         queue_size=1000, tcp_nodelay=True,
     )
 print("listening", flush=True)
-end = time.monotonic() + float(sys.argv[1])
+end, complete = time.monotonic() + float(sys.argv[1]), False
 while time.monotonic() < end:
     time.sleep(0.05)
+    if not complete and {topic for _, topic, _ in list(heard)} >= {topic for topic in topics if "measured" in topic}:
+        complete = True
+        print("every arm was heard", flush=True)
 for at, topic, who in heard:
     print("heard", at, topic, who, flush=True)
 print("done", flush=True)
@@ -99,8 +101,7 @@ def test_of_arms_that_are_there_already_no_message_is_ours(begin: Callable[..., 
 def test_an_arm_falls_silent_when_a_real_one_appears(begin: Callable[..., Program], arms_scene: Path) -> None:
     program = simulator(begin, arms_scene)
     listener = begin(sys.executable, "-c", LISTENER, 12.0, *TOPICS, *OURS)
-    listener.wait_for("listening")
-    time.sleep(2.0)
+    listener.wait_for("every arm was heard")
     real_console(begin, "MTMR")
     program.wait_for("the simulated MTMR stays silent", 5.0)
     listener.wait_for("done", 60.0)

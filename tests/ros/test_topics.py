@@ -204,8 +204,9 @@ def test_resets_put_bodies_back_and_time_goes_on(listen: Callable[..., Any], pub
     for _ in range(100):
         mover.publish(command)
         time.sleep(0.01)
-    assert needle.messages[-1].pose.position.z > start.pose.position.z - 0.05 + 0.03
-    time.sleep(0.7)
+    lifted = needle.messages[-1].pose.position.z
+    assert lifted > start.pose.position.z - 0.05 + 0.03
+    needle.wait(lambda m: m.pose.position.z < lifted - 0.01, 5.0)  # the command has run out
     time_before = needle.messages[-1].sim_time
     publish(f"{WORLD}/Command/Reset/Bodies", Empty).publish(Empty())
     needle.wait(lambda m: abs(m.pose.position.x - 0.005) < 1e-3 and m.pose.position.z < 0.7165, 5.0)
@@ -221,9 +222,8 @@ def test_a_client_steps_the_world_by_the_edges_of_its_clock(
     publisher = publish(f"{WORLD}/Command", WorldCmd)
     clock = True
     publisher.publish(WorldCmd(enable_step_throttling=True, step_clock=clock, n_skip_steps=5))
-    time.sleep(0.2)
     world.wait()
-    steps = [int(steady(lambda: world.messages[-1].sim_step, 0.1))]
+    steps = [int(steady(lambda: world.messages[-1].sim_step, 0.3))]
     for _ in range(8):
         clock = not clock
         publisher.publish(WorldCmd(enable_step_throttling=True, step_clock=clock, n_skip_steps=5))

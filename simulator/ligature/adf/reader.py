@@ -88,6 +88,11 @@ def read_any(path: Path, resolver: Resolver, strict: bool = False) -> Document:
     strict
         Reject what AMBF rejects, instead of the sane reading with a warning.
 
+    Returns
+    -------
+    Document
+        Of the class of its kind, such as `LaunchDocument`; what is wrong in it is in ``diagnostics``.
+
     Raises
     ------
     AdfError

@@ -17,8 +17,6 @@ from ligature.adf.frames import Array
 DIGITS = 7
 """Significant digits of coordinates: what single precision holds."""
 
-FULL_SHININESS = 128.0
-
 
 class MeshWriteError(ValueError):
     """A mesh that cannot be written; the message is the reason."""

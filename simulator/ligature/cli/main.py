@@ -461,8 +461,8 @@ def replay(
     text: Annotated[str, typer.Option(help="For a dataset: the task as an instruction in words.")] = "",
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
-    from ligature.cli.replay import Sampled
     from ligature.cli.replay import replay as run_replay
+    from ligature.cli.sampling import Sampled
 
     if joints not in ("", "measured", "setpoint"):
         raise typer.BadParameter(f"--joints is 'measured' or 'setpoint', not '{joints}'")

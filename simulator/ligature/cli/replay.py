@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -14,68 +12,8 @@ import ligature
 from ligature.bus.record import Record, is_record
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.cli.options import RunOptions
-from ligature.cli.sampling import Sampling
-
-TICK = 1e-3
-
-
-class Differs(ValueError):
-    """A scene that is not the one that a record was made with."""
-
-
-def resimulate(
-    record: Record, scene: Path | None, watch: Callable[[ligature.Simulation], None] = lambda _: None
-) -> ligature.Simulation:
-    """Simulate a recorded run again; ``scene`` replaces the launch file that the record names.
-
-    ``watch`` sees the simulation where what was asked to be recorded begins, and after each update from there on.
-    Raises `ligature.SceneError`, and `Differs` when the scene does not begin as the recorded one did, or goes on
-    otherwise.
-    """
-    options = RunOptions.from_text(record.header.options)
-    if scene is not None:
-        options = replace(options, scene=str(scene))
-    simulation = ligature.Simulation(options.load(), TICK, 1.0 / options.rate)
-    ticks = simulation.ticks_per_update
-    simulation.step(ticks)
-    if simulation.state_hash() != record.header.begin:
-        simulation.close()
-        raise Differs(
-            f"'{options.scene}' starts in another state than the recorded run: the scene or the version changed"
-        )
-
-    watched = False
-
-    def update() -> None:
-        simulation.step(ticks)
-        if watched:
-            watch(simulation)
-
-    def started() -> None:
-        nonlocal watched
-        watched = True
-        if record.begun not in ("", simulation.state_hash()):
-            simulation.close()
-            raise Differs("the run diverges before the recording begins: the version changed")
-        watch(simulation)
-
-    record.replay(update, simulation.apply, started)
-    return simulation
-
-
-@dataclass(frozen=True)
-class Sampled:
-    """A dataset that a record is written to, and what is known of how the run went.
-
-    ``task`` is judged by the simulation, by default that of the recorded run; ``success`` is what the operator found;
-    ``text`` is the instruction.
-    """
-
-    path: Path
-    sampling: Sampling = Sampling()
-    task: str = ""
-    success: bool | None = None
-    text: str = ""
+from ligature.cli.resimulation import TICK, resimulate
+from ligature.cli.sampling import Sampled
 
 
 def replay(

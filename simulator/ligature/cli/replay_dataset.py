@@ -8,8 +8,8 @@ from pathlib import Path
 import ligature
 from ligature.bus.record import Record
 from ligature.cli.options import RunOptions
-from ligature.cli.replay import Sampled, resimulate
-from ligature.cli.score import EVERY
+from ligature.cli.resimulation import looks, resimulate
+from ligature.cli.sampling import Sampled
 from ligature.datasets import DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
 from ligature.datasets.labels import ACTIVITIES, ActivityWatch, phase_of
@@ -33,8 +33,7 @@ class _Sampler:
             self._begin(simulation)
         assert self._writer is not None
         state = simulation.state[0]
-        tick = round(simulation.time / simulation.dt)
-        if self._attempt is not None and tick % round(EVERY / simulation.dt) < simulation.ticks_per_update:
+        if self._attempt is not None and looks(simulation):
             self._attempt.observe(state)
         self._writer.sample(phase_of(self._activities.activities(state)))
 

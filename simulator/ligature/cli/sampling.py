@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 SMALLEST, LARGEST = 16, 8192
 """Pixels of a side of a picture."""
@@ -22,6 +23,21 @@ class Sampling:
         size = f"{self.size[0]}x{self.size[1]}"
         cameras = [word for name in self.cameras for word in ("--camera", name)]
         return ["--rate", f"{self.rate:g}", "--size", size, *(cameras or ["--no-cameras"])]
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A dataset that a record is written to, and what is known of how the run went.
+
+    ``task`` is judged by the simulation, by default that of the recorded run; ``success`` is what the operator found;
+    ``text`` is the instruction.
+    """
+
+    path: Path
+    sampling: Sampling = Sampling()
+    task: str = ""
+    success: bool | None = None
+    text: str = ""
 
 
 def picture_size(text: str) -> tuple[int, int]:

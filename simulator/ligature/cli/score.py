@@ -13,9 +13,6 @@ import ligature
 from ligature.bus.record import Record, is_record
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 
-EVERY = 0.005
-"""Simulated seconds between two looks at a run that is simulated again."""
-
 
 def score(task: str, file: Path | None, scene: Path | None, timeout: float, json: bool, console: Console) -> int:
     """Print score and measures; status 0 when the task was done, 1 when it was not, 2 when nothing could be judged."""
@@ -58,7 +55,7 @@ def _live(task: str, timeout: float) -> Figures:
 
 def _recorded(task: str, file: Path, scene: Path | None) -> Figures:
     """Judged at the end of a run that is simulated again, with everything measured."""
-    from ligature.cli.replay import resimulate
+    from ligature.cli.resimulation import looks, resimulate
     from ligature.tasks import Attempt
 
     record, attempts = Record.read(file), list[Attempt]()
@@ -66,7 +63,7 @@ def _recorded(task: str, file: Path, scene: Path | None) -> Figures:
     def watch(simulation: ligature.Simulation) -> None:
         if not attempts:
             attempts.append(Attempt(simulation.scene, task))
-        if round(simulation.time / simulation.dt) % round(EVERY / simulation.dt) < simulation.ticks_per_update:
+        if looks(simulation):
             attempts[0].observe(simulation.state[0])
 
     if task == "pose_estimation":

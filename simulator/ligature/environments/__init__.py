@@ -49,5 +49,10 @@ def make_vec(task: str, n: int, *, autoreset: str = "next step", **options: Any)
     autoreset
         When an environment whose episode ended begins the next one: with the ``next step``, within the ``same step``
         (``info`` has ``final_obs`` and ``final_info``), or ``off``: ``reset(options={"reset_mask": ...})`` does it.
+
+    Returns
+    -------
+    SuturingVectorEnv
+        As gymnasium's vector environments; observations (n, ...).
     """
     return SuturingVectorEnv(task, n, autoreset, **options)

@@ -17,9 +17,6 @@ from scipy.stats import binomtest, bootstrap
 from ligature.environments.policies import Policy, checked, load_policy
 from ligature.environments.suturing import CONTROL, SuturingEnv
 
-HELD_OUT = 1_000_000
-"""First seed of an evaluation by default: whoever trains uses seeds below it."""
-
 CONFIDENCE = 0.95
 
 RESAMPLES = 2000

@@ -201,7 +201,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     @property
     def simulation(self) -> Simulation:
-        """What is simulated: the ground truth, for scripted experts and for datasets."""
+        """The simulation, which is the ground truth for scripted experts and for datasets."""
         return self._simulation
 
     @property
@@ -221,7 +221,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     @property
     def action(self) -> str:
-        """What actions are: ``cartesian`` or ``joint``."""
+        """What actions are, ``cartesian`` or ``joint``."""
         return self._action
 
     @property
@@ -238,7 +238,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     @property
     def base_rotation(self) -> Array:
-        """Rotation (3, 3) of the arm's base in the world: actions are along the base's axes, targets in the world's."""
+        """Rotation (3, 3) of the arm's base in the world; actions are along the base's axes, targets in the world's."""
         return pose7_matrix(self._reading.base)[:3, :3]
 
     @property

@@ -57,6 +57,11 @@ def collision_parts(
     report
         Takes findings: parts that make no piece and are left out, hulls without volume.
 
+    Returns
+    -------
+    tuple
+        The pieces, in the order of the mesh's parts.
+
     Raises
     ------
     MeshError

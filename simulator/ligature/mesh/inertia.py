@@ -59,6 +59,11 @@ def mass_properties(vertices: Array, faces: NDArray[np.int32], density: float = 
         Indices (m, 3) of the corners of each triangle.
     density
         In kg/m³.
+
+    Returns
+    -------
+    MassProperties
+        In m³, kg, metres and kg m².
     """
     vertices, faces = weld(np.asarray(vertices, dtype=float), np.asarray(faces))
     if not len(faces):

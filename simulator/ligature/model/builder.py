@@ -7,7 +7,6 @@ left out; the rest goes on.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -19,29 +18,26 @@ from ligature.model import proxies, trees
 from ligature.model.arms import find_arms
 from ligature.model.assembly import assemble
 from ligature.model.conversion import ModelParts, Mounts, Part, converted, mounts
-from ligature.model.frames import Array, inverse
+from ligature.model.frames import Array
 from ligature.model.geometry import GeometryError
 from ligature.model.holes import find_holes
 from ligature.model.jaws import find_jaws
+from ligature.model.joints import fixed_joint, joint_of
 from ligature.model.lookup import candidates
 from ligature.model.lost import LostBodies
 from ligature.model.mounted import actuator_of
 from ligature.model.naming import Names, merged
 from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
-from ligature.model.parts import joint_of
-from ligature.model.piercing import Hole, Needle
-from ligature.model.rods import joined, rod_chains, without_joints_between
+from ligature.model.rods import find_rods
 from ligature.model.scene import (
     Actuator,
-    Attachment,
     Body,
     Camera,
     Ghost,
     Identity,
     InputDevice,
     Joint,
-    JointType,
     Light,
     Model,
     Scene,
@@ -52,6 +48,7 @@ from ligature.model.scene import (
 from ligature.model.shapes import ShaderFiles
 from ligature.model.softening import Softening
 from ligature.model.sutures import thread
+from ligature.model.tissue import tissue_findings
 
 KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
 
@@ -142,34 +139,26 @@ class SceneBuilder:
     def finish(self) -> Scene:
         """The scene of everything added."""
         self._arrivals.report_orphans()
+        ghosts, cameras, lights = (
+            self._arrivals.attached(kind, self._list(kind)) for kind in ("ghost", "camera", "light")
+        )
         self._lost.name_what_goes_along(self.diagnostics)
         self.diagnostics += self._arrivals.diagnostics
-        rods, between = without_joints_between(
-            rod_chains(self.bodies, self.joints, frozenset(self._no_rod)), self.joints
-        )
-        moved_elements, found = joined(rods, self.bodies, self.joints)
+        rods, placed, found = find_rods(self.bodies, self.joints, self.sensors, frozenset(self._no_rod))
         self.diagnostics += found
-        for index, pose in moved_elements.items():
-            self.bodies[index] = replace(self.bodies[index], T_world_body=pose)
         rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
         rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
-        self._report_joints_between(between)
-        self._report_sensors(rod_bodies)
-        forest, loops = trees.articulations(self.bodies, self.joints, rod_bodies, rod_joints)
-        start, closures, moved = assemble(self.bodies, self.joints, forest, loops)
-        self.diagnostics += moved
-        for rod in rods:
-            message = f"{len(rod.bodies)} bodies from '{rod.name}' on are simulated as one elastic rod"
-            mark = self.bodies[rod.bodies[0]].identity.mark
-            self.report(Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature rod: false'", "rod"))
-        bodies = self._finished_bodies()
+        bodies = trees.connected(placed, self.joints, self._linked, self._silent_files, self._groups)
+        forest, loops = trees.articulations(bodies, self.joints, rod_bodies, rod_joints)
+        start, closures, found = assemble(bodies, self.joints, forest, loops)
+        self.diagnostics += found
         movable = [joint for joint in self.joints if joint.index not in {*loops, *rod_joints}]
-        arms, findings = find_arms(bodies, movable, self.world.extra.get("ligature arms"))
-        self.diagnostics += findings
-        ghosts = self._attached("ghost", self.ghosts)
-        needles = find_needles(bodies, self.joints, forest, rods)
-        holes = find_holes(ghosts, bodies)
-        self._report_piercing(needles, holes)
+        arms, found = find_arms(bodies, movable, self.world.extra.get("ligature arms"))
+        self.diagnostics += found
+        needles, found = find_needles(bodies, self.joints, forest, rods)
+        self.diagnostics += found + tissue_findings(bodies)
+        holes, found = find_holes(ghosts, bodies)
+        self.diagnostics += found
         return Scene(
             name=self.name,
             world=self.world,
@@ -179,8 +168,8 @@ class SceneBuilder:
             ghosts=ghosts,
             sensors=tuple(self.sensors),
             actuators=tuple(self.actuators),
-            cameras=self._attached("camera", self.cameras),
-            lights=self._attached("light", self.lights),
+            cameras=cameras,
+            lights=lights,
             input_devices=tuple(self.devices),
             articulations=forest,
             loops=loops,
@@ -194,41 +183,6 @@ class SceneBuilder:
             diagnostics=tuple(self.diagnostics),
             roots=self.resolver.roots,
         )
-
-    def _report_joints_between(self, joints: Iterable[Joint]) -> None:
-        """Joints between two elements of rods: a rod attaches to bodies only."""
-        for joint in joints:
-            message = f"joint '{joint.identity.key}' connects two rod elements; ignoring it"
-            hint = "connect an element and a body, or set 'ligature rod: false' for one of the two chains"
-            self.report(Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "rod"))
-
-    def _report_sensors(self, rod_bodies: frozenset[int]) -> None:
-        """Resistance sensors on rods push what they touch and not the rod."""
-        for sensor in self.sensors:
-            if sensor.type is SensorType.RESISTANCE and sensor.parent in rod_bodies:
-                message = f"resistance sensor '{sensor.identity.key}' applies no force to the rod that carries it"
-                hint = "mount it on a body, or set 'ligature rod: false'"
-                self.report(Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod"))
-
-    def _report_piercing(self, needles: tuple[Needle, ...], holes: tuple[Hole, ...]) -> None:
-        """Name the recognised needles and tissue holes."""
-        for needle in needles:
-            identity, arc = self.bodies[needle.body].identity, needle.arc
-            size = f"{1e3 * arc.length:.1f} mm long, radius {1e3 * arc.radius:.1f} mm"
-            message = f"'{identity.identifier}' is a needle, {size}"
-            self.report(
-                Diagnostic(Severity.INFO, message, identity.mark, "opt out with 'ligature needle: false'", "needle")
-            )
-        for body in self.bodies:
-            if body.tissue is not None:
-                grid = body.tissue.grid
-                edges = " x ".join(f"{1e3 * edge:.2g}" for edge in np.median(grid.sizes, axis=0))
-                message = f"'{body.identity.identifier}' is soft tissue: {len(grid.nodes)} nodes, cells of {edges} mm"
-                self.report(Diagnostic(Severity.INFO, message, body.identity.mark, "docs/tissue.md", "tissue"))
-        for hole in holes:
-            message = f"'{hole.name}' is a tissue hole: it holds what passes through it"
-            mark = self.ghosts[hole.ghost].identity.mark
-            self.report(Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature hole: false'", "hole"))
 
     def _list(self, kind: str) -> list[Any]:
         lists: dict[str, list[Any]] = {
@@ -398,7 +352,7 @@ class SceneBuilder:
                 )
             elif not tissue.static:
                 identity = replace(tissue.identity, key=f"{element.key} carrier", passive=True)
-                self.joints.append(_fixed_joint(len(self.joints), identity, carrier, tissue))
+                self.joints.append(fixed_joint(len(self.joints), identity, carrier, tissue))
                 self._names["joint"].identifiers.append(identity.identifier)
                 self._linked.append((parent, child))
 
@@ -435,29 +389,3 @@ class SceneBuilder:
             )
         )
         return None
-
-    def _finished_bodies(self) -> tuple[Body, ...]:
-        vectors = trees.command_vectors(len(self.bodies), self.joints)
-        silent = trees.silent_pairs(len(self.bodies), self._linked, self._silent_files, self._groups)
-        return tuple(
-            replace(body, joints=joints, children=children, no_collision_with=silent[body.index])
-            for body, (joints, children) in zip(self.bodies, vectors, strict=True)
-        )
-
-    def _attached(self, kind: str, items: list[Any]) -> tuple[Any, ...]:
-        """The objects with their parents settled."""
-        settled = []
-        for item in items:
-            parent = self._arrivals.parents.get((kind, item.index))
-            settled.append(replace(item, attachment=Attachment(parent, item.attachment.T_parent_object)))
-        return tuple(settled)
-
-
-def _fixed_joint(index: int, identity: Identity, parent: Body, child: Body) -> Joint:
-    """A joint that holds ``child`` to ``parent`` as both stand."""
-    T_parent_child = inverse(parent.T_world_body) @ child.T_world_body
-    T_a = inverse(parent.T_body_inertial) @ T_parent_child @ child.T_body_inertial
-    return Joint(
-        index, identity, JointType.FIXED, parent.index, child.index, axis=T_a[:3, 2], T_parent_a=T_a,
-        T_child_b=np.eye(4), T_parent_child_zero=T_parent_child, passive=True,
-    )  # fmt: skip

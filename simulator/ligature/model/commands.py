@@ -102,7 +102,7 @@ class ActuatorCommand(Command, code=2):
 
     @property
     def slot(self) -> Hashable:
-        """To attach and to release are different things: neither replaces the other."""
+        """To attach and to release are different things, of which neither replaces the other."""
         return self.object, self.actuate
 
 

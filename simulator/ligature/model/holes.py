@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import inverse
 from ligature.model.piercing import Hole
 from ligature.model.scene import Body, Ghost
@@ -26,9 +27,10 @@ Z_TO = {0: [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 1: [[0.0, 1.0, 0
 """Rotations whose columns are the axes of a frame with z along axis 0, 1 or 2."""
 
 
-def find_holes(ghosts: Sequence[Ghost], bodies: Sequence[Body]) -> tuple[Hole, ...]:
-    """The holes of a scene; their parents must be settled."""
+def find_holes(ghosts: Sequence[Ghost], bodies: Sequence[Body]) -> tuple[tuple[Hole, ...], list[Diagnostic]]:
+    """The holes of a scene, whose parents must be settled, and a finding that names each."""
     found: list[Hole] = []
+    findings: list[Diagnostic] = []
     for ghost in ghosts:
         parent = ghost.attachment.parent
         if ghost.hole is False or parent is None or parent[0] != "body" or not ghost.colliders:
@@ -42,7 +44,10 @@ def find_holes(ghosts: Sequence[Ghost], bodies: Sequence[Body]) -> tuple[Hole, .
             found.append(
                 Hole(len(found), ghost.identity.identifier, ghost.index, body.index, T_body_hole, half, ghost.tissue)
             )
-    return tuple(found)
+            message = f"'{ghost.identity.identifier}' is a tissue hole: it holds what passes through it"
+            hint = "opt out with 'ligature hole: false'"
+            findings.append(Diagnostic(Severity.INFO, message, ghost.identity.mark, hint, "hole"))
+    return tuple(found), findings
 
 
 def _opening(shape: Shape) -> tuple[Array, Array]:

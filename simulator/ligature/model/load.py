@@ -72,6 +72,11 @@ def load(
     soft
         Rigid bodies that are to be soft tissue, ``BODY`` or ``BODY=MATERIAL`` (`ligature.model.softening`).
 
+    Returns
+    -------
+    Scene
+        Immutable; what is wrong in its files and does not keep it from running is in ``diagnostics``.
+
     Raises
     ------
     SceneError

@@ -15,9 +15,8 @@ from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
 from ligature.adf.schema.keys import FARTHEST
 from ligature.mesh import load_mesh
-from ligature.model.frames import Array, axis_rotation, pose_matrix
+from ligature.model.frames import Array, axis_rotation, frame, pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
-from ligature.model.parts import camera_frame, light_frame
 from ligature.model.piercing import Tissue
 from ligature.model.scene import Actuator, Attachment, Body, Camera, Ghost, Identity, Light, SensorType, Slip
 
@@ -211,3 +210,26 @@ def _intrinsics(element: Element) -> dict[str, float] | None:
         if values[name] is None:
             values[name] = 100.0 if focal is None else focal
     return {name: 0.0 if value is None else float(value) for name, value in values.items()}
+
+
+def camera_frame(location: Array, target: Array, up: Array) -> Array:
+    """Camera frame (4, 4) in its parent's: it looks along -X at ``target``, +Z is up (§18.1).
+
+    A camera that looks at itself or along ``up`` stays at the parent's origin, as in the reference.
+    """
+    x = location - target
+    y = np.cross(up, x)
+    if np.linalg.norm(x) < 1e-12 or np.linalg.norm(y) < 1e-12:
+        return np.eye(4)
+    x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+    return frame(np.column_stack([x, y, np.cross(x, y)]), location)
+
+
+def light_frame(location: Array, direction: Array | None, rpy: tuple[float, float, float]) -> Array:
+    """Light frame (4, 4) in its parent's: it shines along +X, the other axes as the reference publishes (§19)."""
+    if direction is None or np.linalg.norm(direction) < 0.01:
+        return pose_matrix(location, rpy)
+    x = direction / np.linalg.norm(direction)
+    y = np.cross(x, (0.0, 1.0, 0.0) if abs(x[1]) < 0.999 else (0.0, 0.0, 1.0))
+    y /= np.linalg.norm(y)
+    return frame(np.column_stack([x, y, np.cross(x, y)]), location)

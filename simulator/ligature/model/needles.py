@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import inverse
 from ligature.model.piercing import Arc, Needle
 from ligature.model.scene import Articulation, Body, Joint, RodChain
@@ -67,8 +68,8 @@ def _circle(points: Array) -> tuple[float, float, float]:
 
 def find_needles(
     bodies: Sequence[Body], joints: Sequence[Joint], forest: Sequence[Articulation], rods: Sequence[RodChain]
-) -> tuple[Needle, ...]:
-    """The needles among the bodies that no joint but a thread's holds."""
+) -> tuple[tuple[Needle, ...], list[Diagnostic]]:
+    """The needles among the bodies that no joint but a thread's holds, and a finding that names each."""
     alone = [tree.links[0].body for tree in forest if len(tree.links) == 1]
     anchors = [joints[j] for rod in rods for j in rod.anchors]
     found = []
@@ -79,7 +80,13 @@ def find_needles(
         arc = _centre_line(body, [_tail(joint, index) for joint in anchors if index in (joint.parent, joint.child)])
         if arc is not None:
             found.append(Needle(index, arc))
-    return tuple(found)
+    return tuple(found), [_finding(needle, bodies[needle.body]) for needle in found]
+
+
+def _finding(needle: Needle, body: Body) -> Diagnostic:
+    size = f"{1e3 * needle.arc.length:.1f} mm long, radius {1e3 * needle.arc.radius:.1f} mm"
+    message, hint = f"'{body.identity.identifier}' is a needle, {size}", "opt out with 'ligature needle: false'"
+    return Diagnostic(Severity.INFO, message, body.identity.mark, hint, "needle")
 
 
 def _tail(joint: Joint, body: int) -> Array:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ligature.adf import Diagnostic, Mark, Severity
 from ligature.model.lookup import candidates
@@ -47,6 +49,13 @@ class Arrivals:
                     "parent",
                 )
             )
+
+    def attached(self, kind: str, items: Iterable[Any]) -> tuple[Any, ...]:
+        """The ghosts, cameras or lights with the parents that they found."""
+        return tuple(
+            replace(item, attachment=replace(item.attachment, parent=self.parents.get((kind, item.index))))
+            for item in items
+        )
 
     def _settle(self, newcomer: Key, identifier: str) -> None:
         for waiter, (_, text, mark) in list(self.waiting.items()):

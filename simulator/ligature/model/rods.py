@@ -7,21 +7,61 @@ or a joint keeps it as bodies. Metres.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import Array
-from ligature.model.scene import Body, Joint, JointType, RodChain
+from ligature.model.scene import Body, Joint, JointType, RodChain, Sensor, SensorType
 from ligature.model.shapes import Capsule, Cylinder, Sphere
 
 LEAST_ELEMENTS = 4
 
 
-def rod_chains(bodies: Sequence[Body], joints: Sequence[Joint], opted_out: frozenset[int]) -> tuple[RodChain, ...]:
-    """The chains of a scene; ``opted_out`` are bodies that must stay bodies."""
+def find_rods(
+    bodies: Sequence[Body], joints: Sequence[Joint], sensors: Iterable[Sensor], opted_out: frozenset[int]
+) -> tuple[tuple[RodChain, ...], list[Body], list[Diagnostic]]:
+    """The rods of a scene, its bodies with elements where their joints hold them, and what is to be reported.
+
+    ``opted_out`` are bodies that must stay bodies.
+    """
+    rods, between = _without_joints_between(_chains(bodies, joints, opted_out), joints)
+    moved, findings = _joined(rods, bodies, joints)
+    placed = [replace(b, T_world_body=moved[b.index]) if b.index in moved else b for b in bodies]
+    findings += [_finding_of_joint(joint) for joint in between]
+    elements = {body for rod in rods for body in rod.bodies}
+    findings += [
+        _finding_of_sensor(sensor)
+        for sensor in sensors
+        if sensor.type is SensorType.RESISTANCE and sensor.parent in elements
+    ]
+    return rods, placed, findings + [_finding_of_rod(rod, bodies) for rod in rods]
+
+
+def _finding_of_joint(joint: Joint) -> Diagnostic:
+    """A joint between two elements of rods has no effect: a rod attaches to bodies only."""
+    message = f"joint '{joint.identity.key}' connects two rod elements; ignoring it"
+    hint = "connect an element and a body, or set 'ligature rod: false' for one of the two chains"
+    return Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "rod")
+
+
+def _finding_of_sensor(sensor: Sensor) -> Diagnostic:
+    """A resistance sensor on a rod pushes what it touches and not the rod."""
+    message = f"resistance sensor '{sensor.identity.key}' applies no force to the rod that carries it"
+    hint = "mount it on a body, or set 'ligature rod: false'"
+    return Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod")
+
+
+def _finding_of_rod(rod: RodChain, bodies: Sequence[Body]) -> Diagnostic:
+    message = f"{len(rod.bodies)} bodies from '{rod.name}' on are simulated as one elastic rod"
+    mark = bodies[rod.bodies[0]].identity.mark
+    return Diagnostic(Severity.INFO, message, mark, "opt out with 'ligature rod: false'", "rod")
+
+
+def _chains(bodies: Sequence[Body], joints: Sequence[Joint], opted_out: frozenset[int]) -> tuple[RodChain, ...]:
+    """The chains of a scene."""
     fit = {b.index for b in bodies if b.index not in opted_out and not b.static and _round(b)}
     springs = [j for j in joints if _bends(j) and j.parent in fit and j.child in fit]
     neighbours: dict[int, list[Joint]] = {}
@@ -42,7 +82,7 @@ def rod_chains(bodies: Sequence[Body], joints: Sequence[Joint], opted_out: froze
     return tuple(chains)
 
 
-def without_joints_between(
+def _without_joints_between(
     chains: Sequence[RodChain], joints: Sequence[Joint]
 ) -> tuple[tuple[RodChain, ...], tuple[Joint, ...]]:
     """The chains with the anchors that a rod can have, to bodies outside all rods, and the joints that are none."""
@@ -52,7 +92,7 @@ def without_joints_between(
     return kept, tuple(joints[j] for j in sorted(between))
 
 
-def joined(
+def _joined(
     chains: Sequence[RodChain], bodies: Sequence[Body], joints: Sequence[Joint]
 ) -> tuple[dict[int, Array], list[Diagnostic]]:
     """Where elements start that their joints hold further off than an element is long, by body (4, 4), with a report.

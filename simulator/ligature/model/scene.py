@@ -433,12 +433,12 @@ class WorldSettings:
 
     @property
     def frame_prefix(self) -> str:
-        """What frames of this scene begin with on ROS: empty, or such as ``left/``."""
+        """What frames of this scene begin with on ROS, such as ``left/``; empty without a prefix."""
         return "".join(f"{part}/" for part in self.prefix.split("/") if part)
 
     @property
     def root(self) -> str:
-        """What topics beside those of objects begin with on ROS: ``/``, or such as ``/left/``."""
+        """What topics beside those of objects begin with on ROS, ``/`` or such as ``/left/``."""
         return "/" + self.frame_prefix
 
 
@@ -532,7 +532,7 @@ class Scene:
 
     @cached_property
     def drawn_names(self) -> dict[int, str]:
-        """Identifier by the number that pictures show: bodies from 1 on, then ghosts; 0 is the background."""
+        """Identifiers of bodies, from 1 on, then of ghosts, by the numbers that pictures show; 0 is the background."""
         things = [body.identity for body in self.bodies] + [ghost.identity for ghost in self.ghosts]
         return {number: identity.identifier for number, identity in enumerate(things, 1)}
 

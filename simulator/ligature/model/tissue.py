@@ -5,7 +5,7 @@ SI units, frames as in `ligature.model.scene`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ from ligature.model.solids import surface_of
 
 if TYPE_CHECKING:
     from ligature.mesh.grid import Grid
+    from ligature.model.scene import Body
     from ligature.model.shapes import Collider, Visual
 
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
@@ -84,10 +85,16 @@ def inertial_of(form: TissueForm, mass: float, T_body_inertial: Array | None) ->
     return T_body_inertial, mass * (square.sum() - square)
 
 
-def surface_friction(element: Element) -> float:
-    """Friction coefficient of a body's surface."""
-    own = element.value("ligature tissue.surface friction")
-    return element.number("friction.static") if own is None else float(own)
+def tissue_findings(bodies: Iterable[Body]) -> list[Diagnostic]:
+    """Findings that name the bodies of tissue and the size of their grids."""
+    findings = []
+    for body in bodies:
+        if body.tissue is not None:
+            grid = body.tissue.grid
+            edges = " x ".join(f"{1e3 * edge:.2g}" for edge in np.median(grid.sizes, axis=0))
+            message = f"'{body.identity.identifier}' is soft tissue: {len(grid.nodes)} nodes, cells of {edges} mm"
+            findings.append(Diagnostic(Severity.INFO, message, body.identity.mark, "docs/tissue.md", "tissue"))
+    return findings
 
 
 def _material(element: Element, prefix: str, below: TissueMaterial | None) -> TissueMaterial:

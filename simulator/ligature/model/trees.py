@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ligature.model.axes import axes_of
 from ligature.model.scene import Articulation, Body, Joint, JointType, Link
@@ -131,3 +131,19 @@ def silent_pairs(
     for i, mine in grouped:
         silent[i].update(j for j, theirs in grouped if j != i and not mine & theirs)
     return [frozenset(s) for s in silent]
+
+
+def connected(
+    bodies: Sequence[Body],
+    joints: Sequence[Joint],
+    linked: Iterable[tuple[int, int]],
+    files: Iterable[Sequence[int]],
+    groups: Sequence[tuple[int, ...]],
+) -> tuple[Body, ...]:
+    """The bodies with the joints and bodies that they command, and those that they do not collide with."""
+    vectors = command_vectors(len(bodies), joints)
+    silent = silent_pairs(len(bodies), linked, files, groups)
+    return tuple(
+        replace(body, joints=commanded, children=children, no_collision_with=silent[body.index])
+        for body, (commanded, children) in zip(bodies, vectors, strict=True)
+    )

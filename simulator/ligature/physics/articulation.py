@@ -44,8 +44,12 @@ STIFFEST, MOST_DAMPED = 16.0, 0.8
 
 @dataclass
 class _Plan:
-    """Columns of pybullet.createMultiBody, one entry a link."""
+    """Columns of pybullet.createMultiBody, one entry a link; the link of each body, and the axis of each link."""
 
+    dt: float
+    link_of: dict[int, int]
+    T_link_inertial: dict[int, Array]
+    axes: list[tuple[int, int, Axis, float]] = field(default_factory=list)
     masses: list[float] = field(default_factory=list)
     inertias: list[Array] = field(default_factory=list)
     shapes: list[int] = field(default_factory=list)
@@ -57,7 +61,37 @@ class _Plan:
     types: list[int] = field(default_factory=list)
     directions: list[list[float]] = field(default_factory=list)
 
-    def add(self, parent: int, type_: int, axis: Array, T_parent_link: Array, T_link_inertial: Array) -> None:
+    def append(self, outer: Body, inner: Body, chain: Chain, shape: int) -> int:
+        """Add the links of one joint and of the body ``outer`` that it carries; the last of them."""
+        T_parent_link = self.T_link_inertial[chain.inner] @ chain.T_inner
+        parent = self.link_of[chain.inner]
+        inertia = _inertia_on(outer, chain.axes, self.dt)
+        moved = [_effective(outer, inertia, axis, chain.T_outer) for axis in chain.axes]
+        if any(axis.sprung for axis in chain.axes):
+            frames = (chain.T_inner, chain.T_outer)
+            least = moved_inertias((inner.mass, outer.mass), (inertia_of(inner), inertia), frames, chain.axes)
+            moved = [float(m) if axis.sprung else e for axis, e, m in zip(chain.axes, moved, least, strict=True)]
+        for axis, mass in zip(chain.axes[:-1], moved, strict=False):
+            self.masses.append(LIGHT * max(outer.mass, 1e-6))
+            self.inertias.append(np.full(3, LIGHT * max(float(inertia.max()), LEAST_INERTIA)))
+            self.shapes.append(shapes.NO_SHAPE)
+            self._add(parent, _joint_type(axis), axis.direction, T_parent_link, np.eye(4))
+            parent = len(self.masses) - 1
+            self.axes.append((parent, chain.joint, axis, mass))
+            T_parent_link = np.eye(4)
+        self.masses.append(outer.mass)
+        self.inertias.append(inertia)
+        self.shapes.append(shape)
+        last = chain.axes[-1] if chain.axes else None
+        type_ = pybullet.JOINT_FIXED if last is None else _joint_type(last)
+        direction = np.array([0.0, 0.0, 1.0]) if last is None else last.direction
+        self._add(parent, type_, direction, T_parent_link, inverse(chain.T_outer))
+        link = len(self.masses) - 1
+        if last is not None:
+            self.axes.append((link, chain.joint, last, moved[-1]))
+        return link
+
+    def _add(self, parent: int, type_: int, axis: Array, T_parent_link: Array, T_link_inertial: Array) -> None:
         self.parents.append(parent + 1)
         self.types.append(type_)
         self.directions.append(axis.tolist())
@@ -114,11 +148,6 @@ class Tree:
     damping: tuple[float, float] = (0.0, 0.0)
     """Linear and angular damping by Bullet, in 1/s."""
 
-    @property
-    def moving_links(self) -> list[int]:
-        """Links that carry a body."""
-        return [link for link in self.link_of.values() if link >= 0]
-
     def place(self, body: int) -> tuple[int, int]:
         """Bullet's id and link of a body."""
         link = self.link_of[body]
@@ -139,10 +168,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
     """Create the multibody of ``articulation`` at the poses of the scene's files, for ticks of ``dt``."""
     bodies, joints = _shared_out(scene), scene.joints
     root = bodies[articulation.links[0].body]
-    plan = _Plan()
-    link_of = {root.index: -1}
-    T_link_inertial = {root.index: np.eye(4)}
-    axes: list[tuple[int, int, Axis, float]] = []
+    plan = _Plan(dt, {root.index: -1}, {root.index: np.eye(4)})
     start: list[float] = []
     for link in articulation.links[1:]:
         assert link.joint is not None
@@ -150,18 +176,14 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         chain = chain_of(joints[link.joint], joints[link.joint].child == outer.index)
         T_link_body = inverse(outer.T_body_inertial @ chain.T_outer)
         shape = shapes.create(client, cache, outer.colliders, T_link_body, True, outer.collision_margin)
-        link_of[outer.index] = _append(
-            plan, outer, bodies[chain.inner], chain, shape, link_of, T_link_inertial, axes, dt
-        )
-        T_link_inertial[outer.index] = inverse(chain.T_outer)
+        plan.link_of[outer.index] = plan.append(outer, bodies[chain.inner], chain, shape)
+        plan.T_link_inertial[outer.index] = inverse(chain.T_outer)
         start += _positions(scene, chain)
     ends = {}
     for closure in scene.closures:
-        if closure.inner in link_of and needs_link(scene, closure):
+        if closure.inner in plan.link_of and needs_link(scene, closure):
             end, chain = _end(scene, bodies, closure)
-            ends[closure.joint] = _append(
-                plan, end, bodies[chain.inner], chain, shapes.NO_SHAPE, link_of, T_link_inertial, axes, dt
-            )
+            ends[closure.joint] = plan.append(end, bodies[chain.inner], chain, shapes.NO_SHAPE)
             start += [0.0] * len(closure.free) + _positions(scene, chain)
     T_world_inertial = scene.start.roots[root.index] @ root.T_body_inertial
     at = {
@@ -192,53 +214,19 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         **at,
     )
     tree = Tree(
-        uid, uid if stand is None else stand, root.index, link_of, axes, root.static, plan.frames(), start, ends
+        uid,
+        uid if stand is None else stand,
+        root.index,
+        plan.link_of,
+        plan.axes,
+        root.static,
+        plan.frames(),
+        start,
+        ends,
     )
     _set_dynamics(client, tree, plan, bodies)
     tree.put_joints(client)
     return tree
-
-
-def _append(
-    plan: _Plan,
-    outer: Body,
-    inner: Body,
-    chain: Chain,
-    shape: int,
-    link_of: dict[int, int],
-    T_link_inertial: dict[int, Array],
-    axes: list[tuple[int, int, Axis, float]],
-    dt: float,
-) -> int:
-    """Add the links of one joint and of the body ``outer`` that it carries; the last of them."""
-    T_parent_link = T_link_inertial[chain.inner] @ chain.T_inner
-    parent = link_of[chain.inner]
-    inertia = _inertia_on(outer, chain.axes, dt)
-
-    moved = [_effective(outer, inertia, axis, chain.T_outer) for axis in chain.axes]
-    if any(axis.sprung for axis in chain.axes):
-        frames = (chain.T_inner, chain.T_outer)
-        least = moved_inertias((inner.mass, outer.mass), (inertia_of(inner), inertia), frames, chain.axes)
-        moved = [float(m) if axis.sprung else e for axis, e, m in zip(chain.axes, moved, least, strict=True)]
-    for axis, mass in zip(chain.axes[:-1], moved, strict=False):
-        plan.masses.append(LIGHT * max(outer.mass, 1e-6))
-        plan.inertias.append(np.full(3, LIGHT * max(float(inertia.max()), LEAST_INERTIA)))
-        plan.shapes.append(shapes.NO_SHAPE)
-        plan.add(parent, _joint_type(axis), axis.direction, T_parent_link, np.eye(4))
-        parent = len(plan.masses) - 1
-        axes.append((parent, chain.joint, axis, mass))
-        T_parent_link = np.eye(4)
-    plan.masses.append(outer.mass)
-    plan.inertias.append(inertia)
-    plan.shapes.append(shape)
-    last = chain.axes[-1] if chain.axes else None
-    type_ = pybullet.JOINT_FIXED if last is None else _joint_type(last)
-    direction = np.array([0.0, 0.0, 1.0]) if last is None else last.direction
-    plan.add(parent, type_, direction, T_parent_link, inverse(chain.T_outer))
-    link = len(plan.masses) - 1
-    if last is not None:
-        axes.append((link, chain.joint, last, moved[-1]))
-    return link
 
 
 def _positions(scene: Scene, chain: Chain) -> list[float]:

@@ -122,6 +122,7 @@ class World(Subsystem):
         self.queries = BulletQueries(self.engine)
         self.wrenches = ContactWrenches(self.engine, self.welds, self.impulses)
         self._set_up()
+        self.engine.forget_contacts()
 
     def _set_up(self) -> None:
         """Make what acts on bodies within a tick, for the engine's present client."""
@@ -132,10 +133,12 @@ class World(Subsystem):
         self._closures = Closures(engine.client, self.scene, engine.trees, engine.place_of, engine.motions, self.dt)
         self._readout = Readout(engine.client, self.scene, engine.trees, engine.motions, engine.place_of)
         self._parting = Parting(engine.client, self.dt)
-        engine.forget_contacts()
 
     def _begin(self) -> None:
-        """Make ready to begin anew; in another Bullet client where this one would remember, or does not work."""
+        """Make ready to begin anew; in another Bullet client where this one would remember, or does not work.
+
+        Bodies are then put where they begin, and at last contacts are forgotten.
+        """
         if self.engine.forgets and not self._broken:
             self.welds.loosen()
             self._closures.begin()

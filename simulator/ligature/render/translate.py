@@ -27,7 +27,6 @@ _LATER_KEYWORD = re.compile(
     r"\b(common|partition|active|filter|switch|case|default|uint|smooth|flat|noperspective)\b"
     r"(?!\s+(?:in|out|varying|centroid)\b)"
 )
-_LATER_QUALIFIER = re.compile(r"\blayout\s*\(|\b(?:flat|smooth|noperspective)\s+(?:in|out)\b|\buint\s+\w+\s*[;=]")
 _FRAGMENT_ARRAY = re.compile(r"\bgl_FragData\b")
 
 _CORE = frozenset(

@@ -309,11 +309,6 @@ class Arm(Device):
         pushed: Array = np.linalg.lstsq(jacobian.T, -effort, rcond=1e-6)[0]
         return turned(self.kinematics.forward(q)[:3, :3], pushed)
 
-    @property
-    def senses_wrench(self) -> bool:
-        """Whether the wrench on the tip is measured there; otherwise it follows from the joints."""
-        return self._tip_wrench is not None
-
     def body_measured_cf(self) -> Array:
         """The same in axes of the tip; in base axes after `body_set_cf_orientation_absolute`."""
         wrench = self.spatial_measured_cf()

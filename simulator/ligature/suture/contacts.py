@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
-from ligature.suture.layout import SLIPS, Nodes, Shapes, Touches, Work
+from ligature.suture.layout import FrictionMode, Nodes, Shapes, Touches, Work
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 
 Array = NDArray[np.float64]
@@ -269,7 +269,7 @@ def _record(
     new.bilateral[c] = False
     new.press[c] = 0.0
     new.closed[c] = False
-    new.mode[c], new.switches[c] = SLIPS, 0
+    new.mode[c], new.switches[c] = FrictionMode.SLIPS, 0
     for a in range(3):
         new.slip[c, a] = 0.0
 

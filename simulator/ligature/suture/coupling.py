@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
-from ligature.suture.layout import SLIPS, STICKS, YIELDS, Nodes, Touches, Work
+from ligature.suture.layout import FrictionMode, Nodes, Touches, Work
 from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
 
 Array = NDArray[np.float64]
@@ -134,10 +134,10 @@ def _friction(
     """Stiffness of the bristle of contact ``c`` across its motion and along it, and the factor of its force."""
     limit = touches.friction[c] * touches.press[c] * dt * dt
     size = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if touches.mode[c] == STICKS or size * scale <= limit:
+    if touches.mode[c] == FrictionMode.STICKS or size * scale <= limit:
         return scale, scale, scale
     s = limit / size
-    return s, (s if touches.mode[c] == YIELDS else 0.0), s
+    return s, (s if touches.mode[c] == FrictionMode.YIELDS else 0.0), s
 
 
 @inlined
@@ -230,7 +230,7 @@ def settle_contacts(nodes: Nodes, touches: Touches, work: Work, stiffness: float
             # The next solve finds its normal force; until then it slides freely.
             touches.closed[c] = True
             touches.press[c] = 0.0
-            touches.mode[c] = SLIPS
+            touches.mode[c] = FrictionMode.SLIPS
             changed = True
     return changed
 
@@ -243,18 +243,18 @@ def _settle_friction(touches: Touches, c: int, w: Array, press: float, stiffness
     touches.press[c] = press
     size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     force = size * stiffness
-    if touches.mode[c] == STICKS:
+    if touches.mode[c] == FrictionMode.STICKS:
         if force <= limit * STICTION:
             return False
         touches.switches[c] += 1
-        touches.mode[c] = SLIPS if touches.switches[c] < MAX_SWITCHES else YIELDS
+        touches.mode[c] = FrictionMode.SLIPS if touches.switches[c] < MAX_SWITCHES else FrictionMode.YIELDS
         return True
     begun = touches.begun[c]
     first = math.sqrt(begun[0] ** 2 + begun[1] ** 2 + begun[2] ** 2)
     onward = (begun[0] * w[0] + begun[1] * w[1] + begun[2] * w[2]) / first if first > 0.0 else 0.0
-    if touches.mode[c] == SLIPS and onward * stiffness < limit:
+    if touches.mode[c] == FrictionMode.SLIPS and onward * stiffness < limit:
         touches.switches[c] += 1
-        touches.mode[c] = STICKS if touches.switches[c] < MAX_SWITCHES else YIELDS
+        touches.mode[c] = FrictionMode.STICKS if touches.switches[c] < MAX_SWITCHES else FrictionMode.YIELDS
         return True
     return onward < 0.98 * size or abs(limit - before) > PRESSURE * limit
 
@@ -266,12 +266,12 @@ def conclude_contacts(touches: Touches, stiffness: float) -> None:
         slip, w = touches.slip[c], touches.ended[c]
         if not touches.closed[c] or rigid(touches, c):
             touches.press[c] = 0.0
-            touches.mode[c] = SLIPS
+            touches.mode[c] = FrictionMode.SLIPS
             for a in range(3):
                 slip[a] = 0.0
             continue
         size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
         limit = touches.friction[c] * touches.press[c] / stiffness
-        touches.mode[c] = SLIPS if size > limit else STICKS
+        touches.mode[c] = FrictionMode.SLIPS if size > limit else FrictionMode.STICKS
         scale = limit / size if size > limit else 1.0
         slip[0], slip[1], slip[2] = scale * w[0], scale * w[1], scale * w[2]

@@ -7,6 +7,7 @@ j + 1. Multipliers and their rows are scaled by dtÂ²: a force f appears as f dtÂ
 
 from __future__ import annotations
 
+import enum
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SLIPS, STICKS, YIELDS = 0, 1, 2
-"""Modes of friction in a solve: a constant force, a spring, a spring as stiff as the Coulomb limit allows."""
+
+class FrictionMode(enum.IntEnum):
+    """What friction is in a solve."""
+
+    SLIPS = 0
+    """A constant force, the Coulomb limit."""
+    STICKS = 1
+    """A spring."""
+    YIELDS = 2
+    """A spring as stiff as the Coulomb limit allows."""
 
 
 class Nodes(NamedTuple):
@@ -68,7 +77,7 @@ class Touches(NamedTuple):
     slip: Array  # (C, 3) tangential displacement that friction resists
     press: Array  # (C,) normal force, N
     closed: NDArray[np.bool_]  # (C,)
-    mode: NDArray[np.int64]  # (C,) of friction: `SLIPS`, `STICKS` or `YIELDS`
+    mode: NDArray[np.int64]  # (C,) a `FrictionMode`
     switches: NDArray[np.int64]  # (C,) of the mode in this tick
     room: Array  # (C,) gap beyond the target at which the last solve began
     begun: Array  # (C, 3) slip there

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.suture.chain import invert_spd6
-from ligature.suture.layout import SLIPS, STICKS, YIELDS, Nodes, Work
+from ligature.suture.layout import FrictionMode, Nodes, Work
 from ligature.suture.passages import Passages
 from ligature.suture.rotations import cross, matrix_of, multiply, quaternion_of, rotation_vector
 from ligature.suture.tracking import open_passages
@@ -48,9 +48,9 @@ def _set_row(p: Passages, c: int, r: int, stretch: float) -> None:
     """Spring of row ``r`` in its mode, the row being stretched as given."""
     k, limit = p.stiffness[c, r], p.limit[c, r]
     p.secant[c, r], p.bias[c, r] = k, 0.0
-    if p.mode[c, r] == SLIPS:
+    if p.mode[c, r] == FrictionMode.SLIPS:
         p.secant[c, r], p.bias[c, r] = 0.0, (limit if stretch > 0.0 else -limit)
-    elif p.mode[c, r] == YIELDS and abs(k * stretch) > limit:
+    elif p.mode[c, r] == FrictionMode.YIELDS and abs(k * stretch) > limit:
         p.secant[c, r] = limit / abs(stretch)
 
 
@@ -203,14 +203,14 @@ def _settle_passage(p: Passages, c: int, x: Array, q: Array, elapsed: float) -> 
             recoil += p.recoil[c, r, j] * p.force[c, j]
         stretch = p.stretch[c, r] + p.d[r] - elapsed * p.drift[c, r] + elapsed * elapsed * recoil
         before = p.mode[c, r]
-        if before == YIELDS:
+        if before == FrictionMode.YIELDS:
             continue
-        now = SLIPS if abs(k * stretch) > limit else STICKS
+        now = FrictionMode.SLIPS if abs(k * stretch) > limit else FrictionMode.STICKS
         onward = p.bias[c, r] * stretch >= 0.0
-        if now == before and (now == STICKS or onward):
+        if now == before and (now == FrictionMode.STICKS or onward):
             continue
         p.switches[c] += 1
-        p.mode[c, r] = now if p.switches[c] < MAX_SWITCHES else YIELDS
+        p.mode[c, r] = now if p.switches[c] < MAX_SWITCHES else FrictionMode.YIELDS
         _set_row(p, c, r, stretch)
         changed = True
     return changed

@@ -44,7 +44,7 @@ class Passages(NamedTuple):
     stiffness: Array  # (C, 6)
     damping: Array  # (C, 6)
     limit: Array  # (C, 6) of the elastic load; beyond it the puncture moves
-    mode: Integers  # (C, 6) as in `ligature.suture.layout`
+    mode: Integers  # (C, 6) a `FrictionMode` each
     switches: Integers  # (C,) of modes in this tick
     secant: Array  # (C, 6) stiffness in use
     bias: Array  # (C, 6) load in use at no stretch

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined
-from ligature.suture.layout import SLIPS, Nodes, Touches, Work
+from ligature.suture.layout import FrictionMode, Nodes, Touches, Work
 from ligature.suture.rotations import matrix_of, rotate, rotate_back
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ def _grasp(nodes: Nodes, work: Work, old: Touches, touches: Touches, g: int, i: 
     touches.arm[c, 0], touches.arm[c, 1] = 0.0, 0.0
     touches.bilateral[c], touches.closed[c] = True, True
     touches.friction[c], touches.press[c] = 1.0, points[2, 0, 0]
-    touches.mode[c], touches.switches[c] = SLIPS, 0
+    touches.mode[c], touches.switches[c] = FrictionMode.SLIPS, 0
     for o in range(old.count[0]):
         if not old.bilateral[o]:
             break

@@ -108,10 +108,6 @@ class Rods:
             if rod.hangs_on(body):
                 rod.carry(T)
 
-    def element_of(self, body: int) -> int:
-        """Number of a body's element in its rod."""
-        return self._of_body[body][1]
-
     def pose7(self, body: int) -> Array:
         """Pose (7,) of an element's body frame now."""
         rod, element = self._of_body[body]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture import passages as arrays
-from ligature.suture.layout import SLIPS, STICKS
+from ligature.suture.layout import FrictionMode
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.tables import opener
 
@@ -88,7 +88,7 @@ def _enter(
     px, py, pz = rotate_back(p.B, x - pose[0], y - pose[1], z - pose[2])
     p.point[c, 0], p.point[c, 1], p.point[c, 2] = px, py, pz
     for r in range(6):
-        p.mode[c, r] = STICKS
+        p.mode[c, r] = FrictionMode.STICKS
         p.force[c, r] = 0.0
     return c
 
@@ -356,11 +356,11 @@ def _tear(p: arrays.Passages, c: int) -> None:
     A, E = p.axes[c], p.stretch[c]
     rx, ry, rz = 0.0, 0.0, 0.0
     for r in range(6):
-        p.mode[c, r] = STICKS
+        p.mode[c, r] = FrictionMode.STICKS
         k = p.stiffness[c, r]
         if k == 0.0 or abs(k * E[r]) <= p.limit[c, r]:
             continue
-        p.mode[c, r] = SLIPS
+        p.mode[c, r] = FrictionMode.SLIPS
         kept = p.limit[c, r] / k if E[r] > 0.0 else -p.limit[c, r] / k
         over = E[r] - kept
         E[r] = kept

@@ -56,7 +56,7 @@ class Attempt:
 
     @property
     def needed(self) -> tuple[int, ...]:
-        """The bodies that the score depends on: the needle, and the camera's body or the holes."""
+        """The bodies that the score depends on, the needle and the camera's body or the holes."""
         if self.task == "pose_estimation":
             return self._scenery.needle, self._camera
         return self._scenery.needle, *self._scenery.entries, *self._scenery.exits

@@ -15,7 +15,6 @@ from ligature.model.scene import ArmKind, Scene
 Array = NDArray[np.float64]
 
 _HOLE = re.compile(r"(?P<side>Entry|Exit)(?P<number>\d+)\Z")
-_POINTS = ("base", "middle", "tip")
 
 
 class MissingBodies(ValueError):

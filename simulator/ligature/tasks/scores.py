@@ -73,6 +73,11 @@ def judge_estimate(
         The reported pose of the needle's body in the camera's frame, (4, 4).
     time
         Simulated seconds until the report.
+
+    Returns
+    -------
+    EstimationScore
+        Errors of base, middle and tip of the needle in metres.
     """
     T = T_world_camera @ T_camera_needle
     reported = scenery.points @ T[:3, :3].T + T[:3, 3]

@@ -113,8 +113,3 @@ def axes_of_motions(right: Array, up: Array) -> Array:
         raise Unclear(f"right and up were {np.rad2deg(np.pi / 2 - off):.0f}° apart; they must be about 90°")
     U, _, Vt = np.linalg.svd(np.array([x, y, np.cross(x, y)]))
     return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
-
-
-def handle_of(axes: Array, R_device: Array) -> Array:
-    """Frame (3, 3) of the hand in the device, held as an instrument that points away: tip frame along the view."""
-    return np.asarray((axes @ R_device).T)

@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 Heard = Callable[[str, Any], None]
 
 DISABLED, SETTING, ALIGNING, ENABLED = "DISABLED", "SETTING_ARMS_STATE", "ALIGNING_MTM", "ENABLED"
-WORDS = ("enable", "disable", "align_MTM")
 
 
 class Topics:
