@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 TOUCHED = 1.0
 """Seconds after the operator's last touch for which a control does not follow the arm."""
 
+STEP = 1.0
+"""Millimetres or degrees by which an arrow key moves a slider; its field takes tenths."""
+
 GIZMO_SIZE = 0.035
 """Metres from the middle of a gizmo to the ends of its arrows."""
 
@@ -163,7 +166,9 @@ class ArmControls:
 def _slider(gui: Any, joint: JointFacts, value: float) -> Any:
     low, high = round(joint.scale * joint.low, 1), round(joint.scale * joint.high, 1)
     shown = float(np.clip(round(joint.scale * value, 1), low, high))
-    return gui.add_slider(f"{joint.name.replace('_', ' ')} {joint.unit}", low, high, 0.1, shown)
+    slider = gui.add_slider(f"{joint.name.replace('_', ' ')} {joint.unit}", low, high, STEP, shown)
+    slider.precision = 1
+    return slider
 
 
 def _follow(slider: Any, joint: JointFacts, value: float, astray: bool) -> None:

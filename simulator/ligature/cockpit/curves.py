@@ -5,6 +5,8 @@ Newtons, millimetres, percent, seconds.
 
 from __future__ import annotations
 
+import csv
+import io
 from collections import deque
 from collections.abc import Callable
 from html import escape
@@ -30,6 +32,12 @@ SCORE = "task score, % of holes"
 RANGES = {SCORE: (-5.0, 105.0)}
 """Of charts whose values have bounds."""
 
+TOOLS = (
+    '<div class="lig-tools"><button type="button" data-ligature="csv">Save as CSV</button>'
+    '<button type="button" data-ligature="png">Save as picture</button></div>'
+)
+"""Buttons that our script obeys."""
+
 Values = Callable[[Any], list[float]]
 
 
@@ -51,6 +59,7 @@ class Curves:
     def show(self, gui: GuiApi) -> None:
         """Put the charts into the container of ``gui`` that is open."""
         self._task = gui.add_html("")
+        gui.add_html(TOOLS)
         empty = np.zeros(1)
         for title, names, _ in self._charts:
             series = (uplot.Series(label="s"), *_series(names))
@@ -85,6 +94,17 @@ class Curves:
         for handle, (_, names, _) in zip(self._handles, self._charts, strict=True):
             handle.data = (times, *(rows[:, column + i] for i in range(len(names))))
             column += len(names)
+
+    def table(self) -> str:
+        """What the charts show, as CSV: a row for each sample."""
+        names = [f"{title}: {name}" for title, names, _ in self._charts for name in names]
+        rows = [
+            ["time, s", *names],
+            *([f"{t:.3f}", *(f"{v:.6g}" for v in row)] for t, row in zip(self._times, self._rows, strict=True)),
+        ]
+        text = io.StringIO()
+        csv.writer(text).writerows(rows)
+        return text.getvalue()
 
     def _words(self, state: Any) -> str:
         attempt = self._attempt

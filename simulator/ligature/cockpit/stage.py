@@ -85,6 +85,13 @@ class Stage:
                 self.sent += 1
 
 
+def work_place(scene: Scene, state: NDArray[np.void]) -> Array:
+    """Where the work is (3,): the middle of threads, else of what can move."""
+    loose = [*scene.rod_bodies] or [body.index for body in scene.bodies if not body.static]
+    places = state["body_pose"][0, loose, :3] if loose else np.zeros((1, 3))
+    return 0.5 * (np.min(places, axis=0) + np.max(places, axis=0))  # type: ignore[no-any-return]
+
+
 def first_view(scene: Scene, state: NDArray[np.void]) -> tuple[Array, Array, Array]:
     """Where a browser looks from at first, at what, and what is up, each (3,).
 
