@@ -165,7 +165,7 @@ class Cockpit:
                 self._report(f"'{word}' of a browser failed", error)
         self._follow(now, now - self._last)
         self._last = now
-        self._curves.observe(self._state[0])
+        self._curves.observe(self._state[0], float(self._block.figures["real_time_factor"][0]))
         for show, due in self._due.items():
             if now >= due:
                 try:

@@ -36,7 +36,6 @@ def serve(address: Address, gate: Gate, wire: Wire | None = None) -> ViserServer
         server._websock_server.unregister_handler(message)
     gui = server.gui
     paint(gui, True)
-    server.scene.configure_default_lights(cast_shadow=False)
     gui.main_panel.dock_right()
     gui.main_panel.set_width(RIGHT_WIDTH)
     return server
@@ -79,11 +78,11 @@ class Header:
 
     def refresh(self, time: float, factor: float, running: str, operated: str, viewers: int) -> None:
         """Show the figures."""
-        mark = badge(running, "#37b24d" if running == "running" else "#f59f00")
+        mark = badge(running, "#237032" if running == "running" else "#9c5100")
         crowd = f"{operated} · {viewers} browser{'s' if viewers != 1 else ''}"
         words = (
             f'<div id="header" style="padding:4px 8px;font-size:13px"><b>{escape(self._scene)}</b> {mark}<br>'
-            f'{time:.1f} s · {factor:.2f} × real time<br><span style="color:#909296">{escape(crowd)}</span></div>'
+            f'{time:.1f} s · {factor:.2f} × real time<br><span class="ligature-quiet">{escape(crowd)}</span></div>'
         )
         if words != self._shown:
             self._shown = self._html.content = words

@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import ViserServer
 
+from ligature.cockpit.lighting import LightStage, distance_of_work
 from ligature.cockpit.looks import body_looks, thread_colour
 from ligature.cockpit.tissue import TissueStage
 from ligature.model.frames import pose7_matrix
 from ligature.model.poses import pose7_matrices
 from ligature.model.scene import ArmKind, Scene
+from ligature.model.state import new_state
 from ligature.render.thread import Tube
 from ligature.robots.fitting import base_pose, kinematics_of
 from ligature.robots.psm_arm import HOME
@@ -37,7 +39,10 @@ class Stage:
     def __init__(self, server: ViserServer, scene: Scene) -> None:
         self._server, self._scene = server, scene
         self._nodes = {
-            owner: server.scene.add_glb(f"/scene/{owner}", data) for owner, data in body_looks(scene).items()
+            owner: server.scene.add_glb(
+                f"/scene/{owner}", data, cast_shadow=not _rests(scene, owner), receive_shadow=_rests(scene, owner)
+            )
+            for owner, data in body_looks(scene).items()
         }
         self._owners = np.array(sorted(self._nodes), dtype=int)
         self._shown = np.full((len(self._owners), 7), np.inf)
@@ -49,10 +54,12 @@ class Stage:
             self._threads.append(
                 server.scene.add_mesh_simple(
                     f"/threads/{rod.name}", surface.positions.astype(np.float32), surface.faces.astype(np.uint32),
-                    color=thread_colour(scene, rod.bodies[0]), side="double", cast_shadow=False,
+                    color=thread_colour(scene, rod.bodies[0]), side="double", receive_shadow=False,
                 )
             )  # fmt: skip
         self._tissues = TissueStage(server, scene)
+        begin = new_state(scene)
+        self._lights = LightStage(server, scene, distance_of_work(scene, begin, work_place(scene, begin)))
         self._rod_poses = [np.full((len(rod.bodies), 7), np.inf) for rod in scene.rods]
         self.sent = 0
 
@@ -62,7 +69,7 @@ class Stage:
         with self._server.atomic():
             self._move(poses[self._owners])
             self._bend(poses)
-            self.sent += self._tissues.update(state)
+            self.sent += self._tissues.update(state) + self._lights.update(state)
 
     def _move(self, poses: Array) -> None:
         moved = (np.abs(poses[:, :3] - self._shown[:, :3]).max(axis=1) > STILL) | (
@@ -83,6 +90,11 @@ class Stage:
                 T = pose7_matrices(poses[: len(self._scene.bodies)])
                 node.vertices = tube.triangles(T).positions.astype(np.float32)
                 self.sent += 1
+
+
+def _rests(scene: Scene, owner: int) -> bool:
+    """Whether shadows fall on a body; what moves casts them. Nothing does both: a shadow map is too coarse for it."""
+    return owner < len(scene.bodies) and scene.bodies[owner].static
 
 
 def work_place(scene: Scene, state: NDArray[np.void]) -> Array:

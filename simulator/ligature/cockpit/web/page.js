@@ -299,9 +299,20 @@
     if (box) for (const side of ["left", "top", "width", "height"]) root.style[side] = `${box[side]}px`;
   };
   const names = () => {
-    for (const thumb of document.querySelectorAll("[role=slider]:not([aria-label])")) {
-      const id = thumb.closest("[id]")?.parentElement?.closest("[id]")?.id || thumb.closest("[id]")?.id;
-      const label = id && document.querySelector(`label[for="${CSS.escape(id)}"]`);
+    for (const button of document.querySelectorAll(".mantine-Notification-closeButton:not([aria-label])")) button.setAttribute("aria-label", "Close");
+    for (const button of document.querySelectorAll("button.mantine-ActionIcon-root:not([aria-label])"))
+      if (!button.textContent.trim()) button.setAttribute("aria-label", "Connection and display");
+    for (const field of document.querySelectorAll("input:not([aria-label]):not([type=hidden])")) {
+      if (field.labels?.length) continue;
+      let row = field.parentElement;
+      while (row && !row.querySelector("label")) row = row.parentElement;
+      const name = row?.querySelector("label")?.textContent;
+      if (name) field.setAttribute("aria-label", name);
+    }
+    for (const thumb of document.querySelectorAll("[role=slider]")) {
+      let label = null;
+      for (let one = thumb; one && !label && !thumb.getAttribute("aria-label"); one = one.parentElement)
+        label = one.id && document.querySelector(`label[for="${CSS.escape(one.id)}"]`);
       if (label) thumb.setAttribute("aria-label", label.textContent);
     }
   };
