@@ -141,6 +141,7 @@ class Cockpit:
             panels[1].dock_below(panels[0])
             panels[0].set_height(CAMERA_HEIGHT)
         self._stage = Stage(server, scene)
+        self._tube = True
 
     @property
     def url(self) -> str:
@@ -203,7 +204,8 @@ class Cockpit:
             client, self._panel, self._clockwork.paused, self._speed, self._recording, self._record_as, act
         )
         if self._sights:
-            self._camera_controls = CameraControls(client, self._camera_folder, tuple(self._sights), self._sight, act)
+            names = tuple(self._sights)
+            self._camera_controls = CameraControls(client, self._camera_folder, names, self._sight, self._tube, act)
         if self._ros is not None:
             self._teleop_controls = TeleopControls(client, self._ros, act)
         if self._begins[0] == own and time.monotonic() - self._begins[1] < CLAIM_TIMEOUT:
@@ -343,6 +345,9 @@ class Cockpit:
             self._record(bool(value))
         elif word == "sight":
             self._sight = value
+        elif word == "tube":
+            self._tube = bool(value)
+            self._stage.show_endoscope(self._tube)
         elif self._ros is not None:
             obey_teleop(self._ros.remote, word, value)
 

@@ -15,7 +15,7 @@ MOST_CHARACTERS = 500
 """Of an order; those of people have at most a hundred."""
 
 MODES = {"fine": 0.1, "normal": 0.4, "fast": 1.0}
-"""Speeds of the hand, as shares of the fastest."""
+"""Speeds of the hand, as shares of the maximum velocity of goals."""
 
 PHASES = ("start", "move", "end")
 """Of a drag in the picture."""

@@ -44,6 +44,7 @@ class Stage:
             )
             for owner, data in body_looks(scene).items()
         }
+        self._endoscope = [self._nodes[owner] for owner in endoscope(scene) if owner in self._nodes]
         self._owners = np.array(sorted(self._nodes), dtype=int)
         self._shown = np.full((len(self._owners), 7), np.inf)
         bodies = np.array([body.T_world_body for body in scene.bodies]).reshape(-1, 4, 4)
@@ -71,6 +72,11 @@ class Stage:
             self._bend(poses)
             self.sent += self._tissues.update(state) + self._lights.update(state)
 
+    def show_endoscope(self, shown: bool) -> None:
+        """Show the endoscope's tube, or hide it: it may stand before what is worked on."""
+        for node in self._endoscope:
+            node.visible = shown
+
     def _move(self, poses: Array) -> None:
         moved = (np.abs(poses[:, :3] - self._shown[:, :3]).max(axis=1) > STILL) | (
             np.abs(poses[:, 3:] - self._shown[:, 3:]).max(axis=1) > UNTURNED
@@ -95,6 +101,12 @@ class Stage:
 def _rests(scene: Scene, owner: int) -> bool:
     """Whether shadows fall on a body; what moves casts them. Nothing does both: a shadow map is too coarse for it."""
     return owner < len(scene.bodies) and scene.bodies[owner].static
+
+
+def endoscope(scene: Scene) -> set[int]:
+    """Indices of the bodies that carry cameras."""
+    parents = [camera.attachment.parent for camera in scene.cameras]
+    return {parent[1] for parent in parents if parent is not None and parent[0] == "body"}
 
 
 def work_place(scene: Scene, state: NDArray[np.void]) -> Array:

@@ -73,12 +73,12 @@ class Wire:
 
     def show(self, picture: bytes) -> None:
         """Send a picture (JPEG) to every browser that has shown the one before."""
-        self._on_loop(lambda: [self._give(line, picture=picture) for line in self._lines.values()])
+        self._on_loop(lambda: [self._hand(line, picture=picture) for line in self._lines.values()])
 
     def inform(self, client: int, facts: dict[str, Any]) -> None:
         """Send facts to a browser, unless it has them."""
         text = json.dumps(facts)
-        self._on_loop(lambda: self._give(self._lines.get(client), facts=text))
+        self._on_loop(lambda: self._hand(self._lines.get(client), facts=text))
 
     def _on_loop(self, call: Callable[[], Any]) -> None:
         if self._loop is not None:
@@ -93,7 +93,7 @@ class Wire:
             asyncio.ensure_future(line.connection.close())
 
     @staticmethod
-    def _give(line: _Line | None, picture: bytes | None = None, facts: str = "") -> None:
+    def _hand(line: _Line | None, picture: bytes | None = None, facts: str = "") -> None:
         if line is not None:
             line.picture, line.facts = picture or line.picture, facts or line.facts
             line.wakes.set()

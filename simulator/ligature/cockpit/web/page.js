@@ -43,7 +43,7 @@
     element.append(...children);
     return element;
   };
-  const recall = (name) => { try { return localStorage.getItem(name); } catch { return null; } };
+  const kept = (name) => { try { return localStorage.getItem(name); } catch { return null; } };
   const keep = (name, value) => { try { localStorage.setItem(name, value); } catch { /* private windows */ } };
 
   // --- the connection -------------------------------------------------------------------------------------------------
@@ -59,7 +59,7 @@
     const mine = (socket = new WebSocket(location.origin.replace(/^http/, "ws") + "/wire"));
     mine.onopen = () => {
       order("hello", shown);
-      if (recall(KEPT.theme) === "light") order("dark", false);
+      if (kept(KEPT.theme) === "light") order("dark", false);
       sendView();
     };
     mine.onmessage = (event) => (typeof event.data === "string" ? inform(JSON.parse(event.data)) : show(event.data));
@@ -249,7 +249,7 @@
     ["view", () => "Click the camera's picture, or press V, to work by it."],
     ["help", () => "Press ? for all keys."],
   ];
-  const dones = new Set((recall(KEPT.hints) ?? "").split(" "));
+  const dones = new Set((kept(KEPT.hints) ?? "").split(" "));
   const finish = (name) => { dones.add(name); keep(KEPT.hints, [...dones].join(" ").trim()); update(); };
   const done = (name) => { if (!dones.has(name) && facts.operates) finish(name); };
 
