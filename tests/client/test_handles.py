@@ -198,7 +198,7 @@ def test_active_bodies_ask_for_their_lists() -> None:
 def test_joints_that_were_just_asked_for_are_waited_for_but_not_for_ever() -> None:
     body = RigidBody("/a/b")
     begin = time.monotonic()
-    assert body.get_num_joints() == 0 and time.monotonic() - begin < 0.1
+    assert body.get_num_joints() == 0 and time.monotonic() - begin < 0.4
     body.set_active()
     listing = threading.Timer(0.1, body.ros_cb, [RigidBodyState(joint_names=["a"], joint_positions=[0.5])])
     listing.start()
@@ -206,8 +206,9 @@ def test_joints_that_were_just_asked_for_are_waited_for_but_not_for_ever() -> No
     without = RigidBody("/a/c")
     without.set_active()
     begin = time.monotonic()
-    assert without.get_joint_names() == [] and 0.4 < time.monotonic() - begin < 0.8
-    assert without.get_joint_pos(0) is None and time.monotonic() - begin < 0.8
+    assert without.get_joint_names() == [] and 0.4 < time.monotonic() - begin < 5.0
+    begin = time.monotonic()
+    assert without.get_joint_pos(0) is None and time.monotonic() - begin < 0.4
 
 
 def test_only_what_has_a_pose_command_can_be_moved() -> None:

@@ -177,6 +177,19 @@ class Listener:
         time.sleep(seconds)
         return (len(self.messages) - before) / (time.monotonic() - start)
 
+    def comes_at(self, low: float, high: float = float("inf"), seconds: float = 1.0) -> bool:
+        """Wait for a span of ``seconds`` in which ``low`` to ``high`` messages a second arrive.
+
+        One span alone says little: whatever else the machine did in it counts against the sender.
+        """
+        rates: list[float] = []
+
+        def fits() -> bool:
+            rates.append(self.rate(seconds))
+            return low <= rates[-1] <= high
+
+        return until(fits, lambda: f"{low} to {high} messages a second; came: {rates}", 30.0)
+
     def close(self) -> None:
         self._subscriber.unregister()
 

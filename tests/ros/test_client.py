@@ -72,7 +72,7 @@ def test_names_that_match_nothing_or_several_give_none_with_what_there_is(client
     assert client.get_obj_handle("psm9/baselink") is None
     assert client.get_obj_handle("baselink") is None
     assert client.get_obj_pose("psm9/baselink") is None
-    assert time.monotonic() - begin < 0.1
+    assert time.monotonic() - begin < 1.0, "each waited for an object that might appear"
     nothing, several, _ = (record.getMessage() for record in caplog.records)
     assert nothing.startswith("no object's name contains 'psm9/baselink' (get_obj_names() lists all ")
     assert "/ambf/env/psm1/baselink" in nothing and "/ambf/env/psm2/baselink" in nothing, "the closest are named"
@@ -133,11 +133,10 @@ def test_commands_go_out_at_the_rate_given_to_connect_for_active_objects_only(
     active = listen("/ambf/env/psm2/baselink/Command", RigidBodyCmd)
     idle = listen("/ambf/env/cameras/cameraL/Command", CameraCmd)
     active.wait()
-    assert active.rate(2.0) == pytest.approx(50, abs=3)
+    assert active.comes_at(47, 53, 2.0)
     assert idle.messages == []
     slow.clean_up()
-    wait_for(lambda: active.rate(0.2) == 0)
-    assert active.rate(0.5) == 0
+    assert active.comes_at(0, 0, 0.5)
 
 
 def test_a_body_is_moved_driven_and_pushed(client: Any) -> None:
@@ -278,7 +277,7 @@ def test_a_ral_reports_time_stamps_messages_and_runs_functions(client: Any) -> N
     begin = time.monotonic()
     for _ in range(20):
         rate.sleep()
-    assert time.monotonic() - begin == pytest.approx(0.2, abs=0.08)
+    assert 0.15 < time.monotonic() - begin < 1.0
 
 
 @pytest.mark.parametrize("example", re.findall(r"```python\n(.*?)```", CLIENTS.read_text(), re.DOTALL))

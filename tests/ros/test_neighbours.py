@@ -31,7 +31,7 @@ def test_a_second_simulator_of_the_same_world_ends_and_states_what_to_do(
     assert second.process.wait(20) == 1
     assert "another simulator runs on this ROS master (node /ligature at http://" in second.output
     assert "'--ns'" in second.output
-    assert listen("/ambf/env/World/State", WorldState).rate(0.5) > 20
+    assert listen("/ambf/env/World/State", WorldState).comes_at(20, seconds=0.5)
 
 
 def test_a_simulator_with_a_prefix_lives_beside_it(start: Callable[..., Program], listen: Callable[..., Any]) -> None:
