@@ -59,7 +59,7 @@ SMALL_VIEW = View(False, HEIGHT)
 AFTER_FAILURE = 1.0
 """Seconds after which a part of the page that failed is tried again."""
 
-CLAIM_TIMEOUT = 5.0
+CLAIM_TIMEOUT = 30.0
 """Seconds in which who pressed *Start* gets control, or has to press it again."""
 
 REPORTED = ("warning", "error")
