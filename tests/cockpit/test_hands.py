@@ -284,6 +284,8 @@ def test_start_brings_tips_into_the_picture(posed: Posed) -> None:
     places = [posed.sight.place(fact.tip_in_world(posed.state)[:3, 3]) for fact in posed.facts[:2]]
     assert sorted(place[0] for place in places) == pytest.approx([-0.25, 0.25], abs=0.02)
     assert [place[1] for place in places] == pytest.approx([0.0, 0.0], abs=0.02)
+    forces = [float(np.linalg.norm(posed.state["arm"][arm]["spatial_measured_cf"][:3])) for arm in (0, 1)]
+    assert max(forces) < 5.0, "and touch nothing"
 
 
 def test_a_tip_is_seen_where_the_renderer_shows_it(posed: Posed) -> None:

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 NEAREST = 0.01
 """Metres from a camera at which its picture begins for hands."""
 
-ASIDE, BEFORE = 0.25, 0.8
+ASIDE, BEFORE = 0.25, 0.6
 """Where tips are brought into view: heights of the picture beside its middle, and share of the depth of the work."""
 
 NEAR = 0.15
