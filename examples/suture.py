@@ -20,7 +20,7 @@ from ligature.render.context import RenderUnavailable
 from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
-from ligature.tasks import Measures, Monitor, SutureScore, judge_suture
+from ligature.tasks import Measures, Monitor, Scenery, SutureScore, judge_suture
 from ligature.tasks.throws import UP, NeedleArc, Throw, best_grasp, pose_of
 from PIL import Image
 
@@ -36,6 +36,9 @@ PULL_DEPTHS = (0.0018, 0.0022, 0.0026)
 
 PICK_DEPTHS = (0.003, 0.004, 0.005)
 """The same for the hand that picks it up."""
+
+ASIDE = (0.0, 4e-4, -4e-4)
+"""Metres along the needle by which a hand that has closed on nothing tries beside the place."""
 
 OPEN, SHUT = 0.8, -0.35
 ABOVE, MEETING, BEFORE, BEYOND = 0.02, 0.03, 0.4, 0.5
@@ -57,10 +60,12 @@ class Failure(RuntimeError):
 class Surgeon:
     """Two arms, a needle, and how they work together."""
 
-    def __init__(self, simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None) -> None:
+    def __init__(
+        self, simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None, pairs: int = 1
+    ) -> None:
         self.simulation, self._watch = simulation, watch
         scene = simulation.scene
-        self.monitor = Monitor(scene)
+        self.monitor = Monitor(scene, Scenery.of(scene, pairs))
         self._needle = simulation.bodies[scene.bodies[self.monitor.scenery.needle].identity.topic]
         self.arc = NeedleArc.of(scene.needles[0], scene.bodies[self.monitor.scenery.needle])
         self._base = {arm.name: scene.bodies[arm.base].T_world_body for arm in scene.arms if arm.base >= 0}
@@ -88,9 +93,10 @@ class Surgeon:
         """Pose (4, 4) of an arm's tool by its own sensors."""
         return self._base[name] @ pose_of(self.arms[name].local_measured_cp())
 
-    def hole(self, side: str, pair: int) -> Array:
-        """Position (3,) of a hole."""
-        return self.simulation.bodies[f"BODY {side}{pair}"].pose[:3]
+    def ends(self, pair: int) -> tuple[Array, Array]:
+        """Where a throw goes in and out, (3,) each: the holes of a pair."""
+        entry, exit = (self.simulation.bodies[f"BODY {side}{pair}"].pose[:3] for side in ("Entry", "Exit"))
+        return entry, exit
 
     # --- moving -----------------------------------------------------------------------------
 
@@ -153,11 +159,14 @@ class Surgeon:
         self.line(name, frame(np.eye(3), ABOVE * UP) @ self.tool(name))
         self.move(name, frame(np.eye(3), ABOVE * UP) @ self._behind(T_arc_tool))
         self.line(name, self._behind(T_arc_tool))
-        self.line(name, self.needle() @ T_arc_tool)
-        self.jaw(name, SHUT, 0.5)
-        self.wait(0.2)
-        if not self.holds(name):
-            raise Failure(f"{name} closed on nothing")
+        for aside in ASIDE:
+            self.line(name, self.needle() @ T_arc_tool @ frame(np.eye(3), np.array([aside, 0.0, 0.0])))
+            self.jaw(name, SHUT, 0.5)
+            self.wait(0.2)
+            if self.holds(name):
+                return
+            self.jaw(name, OPEN)
+        raise Failure(f"{name} closed on nothing")
 
     def holds(self, name: str) -> bool:
         """Whether something is between the fingers."""
@@ -184,12 +193,16 @@ class Surgeon:
             self.wait(0.05)
 
     def throw(self, pair: int) -> Throw:
-        """The circle through a pair of holes."""
-        return Throw.through(self.hole("Entry", pair), self.hole("Exit", pair), self.arc.radius, UP)
+        """The circle through both ends of a throw."""
+        return Throw.through(*self.ends(pair), self.arc.radius, UP)
+
+    def meeting(self, throw: Throw) -> Array:
+        """Pose (4, 4) of the arc frame in which the needle is handed over."""
+        return frame(np.eye(3), MEETING * UP) @ throw.arc_at(-BEFORE, self.arc)
 
     def pick_up(self, name: str, throw: Throw) -> None:
-        """Take the needle from the pad near its tip, and hold it up before the entry."""
-        waiting = frame(np.eye(3), MEETING * UP) @ throw.arc_at(-BEFORE, self.arc)
+        """Take the needle from the pad near its tip, and hold it up where it is handed over."""
+        waiting = self.meeting(throw)
         grasp = self._grasp(name, PICK_DEPTHS, [waiting], self.needle(), upright=True)
         self.take(name, grasp)
         T = self.tool(name)
@@ -201,7 +214,7 @@ class Surgeon:
     ) -> Array:
         """Pose (4, 4) of the tool in the arc frame that reaches the whole way, and where the needle is now."""
         kinematics, base = self.arms[name].kinematics, self._base[name]
-        grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.hole("Entry", 1), upright)
+        grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.ends(1)[0], upright)
         if grasp is None:
             raise Failure(f"{name} cannot hold the needle so that it reaches the whole throw")
         return grasp.tool_in_arc(self.arc)
@@ -214,9 +227,13 @@ class Surgeon:
         self.line(name, start)
         self.turn(name, throw, -BEFORE, throw.towards_exit + BEYOND)
 
+    def reached(self, throw: Throw) -> float:
+        """Angle past the entry at which the tip is when the needle has been driven."""
+        return throw.towards_exit + BEYOND
+
     def pull_out(self, name: str, other: str, throw: Throw, out: float = 0.035) -> None:
         """``name`` takes the tip beyond the exit, ``other`` lets go, and the needle and its thread come out."""
-        tip = throw.towards_exit + BEYOND
+        tip = self.reached(throw)
         rest = self.arc.end - self.arc.begin
         way = [throw.arc_at(a, self.arc) for a in np.linspace(tip, throw.towards_exit + rest + 0.3, 10)]
         self.take(name, self._grasp(name, PULL_DEPTHS, way, self.needle()))

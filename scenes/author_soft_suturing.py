@@ -28,6 +28,9 @@ WOUND = (0.004, 0.04, 0.01)
 """Width, length and depth of the wound in the middle of the pad's upper side."""
 
 CELL = 0.005
+SHARP = {"puncture force": 0.2, "cutting force": 0.08, "exit force": 0.06}
+"""Forces in newtons of a new cutting needle: it enters at the least of the 0.2 to 0.6 N that suture needles need."""
+
 ASIDE = 0.015
 """How far along X the pad lies from the middle of the board, which leaves room for the needle."""
 
@@ -58,6 +61,7 @@ def pad() -> dict[str, Any]:
     top = PAD[2] / 2
     body["ligature tissue"] = {
         "material": "silicone pad",
+        **SHARP,
         "cell size": CELL,
         "fixed": ["-z"],
         "slits": [

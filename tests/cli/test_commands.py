@@ -153,6 +153,10 @@ def test_demo_names_the_example_that_is_missing(
         "import sys; sys.exit(0 if sys.argv[1:4] == ['--throws', '2', '--seed'] else 3)"
     )
     assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 0
+    (tmp_path / "suture_tissue.py").write_text("import sys; sys.exit(sys.argv[1:3] != ['--seed', '7'])")
+    assert demo.demo(2, 7, tmp_path, None, Console(soft_wrap=True), tissue=True) == 0
+    assert demo.demo(2, 7, tmp_path, tmp_path / "d.h5", Console(soft_wrap=True), tissue=True) == 2
+    assert "leave out --tissue, or --dataset" in capsys.readouterr().out
 
 
 def test_render_warns_of_a_picture_that_is_mostly_white(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_both_arms_reach_every_pair_of_holes() -> None:
         for name, (depths, turns) in ways.items():
             way = [throw.arc_at(a, arc) for a in turns]
             kinematics, base = surgeon.arms[name].kinematics, surgeon._base[name]
-            above = surgeon.hole("Entry", pair)
+            above = surgeon.ends(pair)[0]
             assert throws.best_grasp(arc, depths, kinematics, base, way, way[0], above), (pair, name)
 
 

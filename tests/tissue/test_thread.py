@@ -130,6 +130,21 @@ def test_thread_pulled_across_tears_the_tissue_at_its_strength(kit, strength):
     assert (material[:, 1] > 0.0155 + 1e-3).all()
 
 
+def test_the_first_node_of_a_path_holds_the_thread_before_the_needle_has_left_the_next(kit):
+    block, string = _block(kit, TissueMaterial(1e5))
+    first, *others = block.paths.node[0, : block.paths.count[0]]
+    string.thread.engaged[others] = 0
+    before = block.interface.points.weights[first].copy()
+    string.held = {i: x.copy() for i, x in enumerate(string.x)}
+    for _ in range(100):
+        for i in string.held:
+            string.held[i] = string.held[i] + [0.0, 5e-6, 0.0]
+        string.tick()
+        block.step()
+    assert 0.05 < sum(pull[1] for pull in string.pull.values()) < 0.5
+    np.testing.assert_array_equal(block.interface.points.weights[first], before)
+
+
 def _wound(gap):
     """A pad with a gaping wound."""
     y = np.concatenate([np.linspace(0.0, 0.015, 5), np.linspace(0.015 + gap, 0.03 + gap, 5)])

@@ -1,4 +1,4 @@
-"""``ligature demo``: runs the bundled example that sutures by itself."""
+"""``ligature demo``: runs the bundled examples that suture by themselves."""
 
 from __future__ import annotations
 
@@ -19,14 +19,22 @@ EXAMPLE = EXAMPLES / "suture.py"
 
 def demo(
     throws: int, seed: int, out: Path, dataset: Path | None, console: Console, episodes: int = 1,
-    sampling: Sampling | None = None,
+    sampling: Sampling | None = None, tissue: bool = False,
 ) -> int:  # fmt: skip
-    """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status."""
-    if not EXAMPLE.is_file():
-        console.print(f"the demonstration '{EXAMPLE}' is missing; install Ligature again")
+    """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status.
+
+    With ``tissue`` it is the one that sutures soft tissue.
+    """
+    example = EXAMPLE.with_name("suture_tissue.py") if tissue else EXAMPLE
+    if tissue and dataset is not None:
+        console.print("--dataset writes sutures through holes; leave out --tissue, or --dataset")
+        return 2
+    if not example.is_file():
+        console.print(f"the demonstration '{example}' is missing; install Ligature again")
         return 2
     if dataset is None:
-        command = [sys.executable, str(EXAMPLE), "--throws", str(throws), "--seed", str(seed), "--out", str(out)]
+        count = [] if tissue else ["--throws", str(throws)]
+        command = [sys.executable, str(example), *count, "--seed", str(seed), "--out", str(out)]
     else:
         words = [str(dataset), "--throws", str(throws), "--seed", str(seed), "--episodes", str(episodes)]
         words += (sampling or Sampling()).words()

@@ -381,6 +381,7 @@ def demo(
     throws: Annotated[
         int, typer.Option(help="Number of throws, beginning at the first pair of holes.", min=1, max=4)
     ] = 2,
+    tissue: Annotated[bool, typer.Option("--tissue", help="Suture soft tissue without holes instead.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the needle's pose; 0 keeps the pose of the scene.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
     dataset: Annotated[Optional[Path], typer.Option(help="HDF5 dataset to write instead of pictures.")] = None,  # noqa: UP045
@@ -392,8 +393,8 @@ def demo(
     """Let two arms suture autonomously; prints the score, writes pictures."""
     from ligature.cli.demo import demo as run_demo
 
-    sampling = _sampling(dataset, rate, size, camera)
-    raise typer.Exit(run_demo(throws, seed, out, dataset, Console(highlight=False, soft_wrap=True), episodes, sampling))
+    sampling, console = _sampling(dataset, rate, size, camera), Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_demo(throws, seed, out, dataset, console, episodes, sampling, tissue))
 
 
 @app.command()

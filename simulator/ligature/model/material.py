@@ -65,7 +65,7 @@ class TissueMaterial:
 
 
 MATERIALS = {
-    "silicone pad": TissueMaterial(69e3, density=1070.0),
+    "silicone pad": TissueMaterial(69e3, density=1070.0, strength=6655.0),
     "skin": TissueMaterial(101e3, density=1100.0, puncture_force=0.8, cutting_force=0.2, exit_force=0.3),
     "fat": TissueMaterial(3.25e3, density=950.0, puncture_force=0.1, cutting_force=0.03, exit_force=0.05, friction=3.0,
                           strength=200.0),
@@ -76,12 +76,12 @@ MATERIALS = {
 }  # fmt: skip
 """Materials by name; Poisson's ratio is 0.45 in all of them: at 0.49 cells tremble under loads on few nodes.
 
-Young's moduli: silicone pad, the stress at 100 % strain of Ecoflex 00-30 (Smooth-On, technical bulletin); skin, Liang
-and Boppart 2010; fat, Samani and others 2007; stomach and liver, Lim and others 2009. Densities of stomach and liver:
-Duck 2013; of the others, ICRP 110. The cutting force of liver is its toughness of 164 J/m² (Gokgol and others 2012)
-times a needle of 0.4 mm. All other forces are chosen: within the 0.2 to 0.6 N at which a suture needle punctures
-hydrogel for silicone, and lower or higher in the order of the materials' toughness. They are starting points, no
-measurements.
+Young's moduli: silicone pad, the stress at 100 % strain of Ecoflex 00-30 (Smooth-On, technical bulletin), and its
+strength the tear strength there, 38 pounds an inch; skin, Liang and Boppart 2010; fat, Samani and others 2007; stomach
+and liver, Lim and others 2009. Densities of stomach and liver: Duck 2013; of the others, ICRP 110. The cutting force of
+liver is its toughness of 164 J/m² (Gokgol and others 2012) times a needle of 0.4 mm. All other forces are chosen:
+within the 0.2 to 0.6 N at which a suture needle punctures hydrogel for silicone, and lower or higher in the order of
+the materials' toughness. They are starting points, no measurements.
 """
 
 KEYS = {

@@ -17,7 +17,7 @@ from ligature.kernels import inlined, kernel
 from ligature.tables import opener
 from ligature.tissue.interface import carried
 from ligature.tissue.layout import Paths, Points, open_tissue
-from ligature.tissue.needle import CAPTURE
+from ligature.tissue.needle import CAPTURE, LEAST_SHARE
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -239,7 +239,8 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
                     total += E[a, k] * (W[k, 0] * E[b, 0] + W[k, 1] * E[b, 1] + W[k, 2] * E[b, 2])
                 rows.soft[r, a, b] = total
         rows.limit[r, 0] = strand.friction[0] * points.friction[i] * held.share[i]
-        rows.limit[r, 1] = points.strength[i] * held.share[i]
+        # The first node of a path stands for no length while the needle has the others; it tears no sooner than they.
+        rows.limit[r, 1] = points.strength[i] * max(held.share[i], LEAST_SHARE)
 
 
 @inlined
