@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +12,9 @@ from typing import Any
 import ligature
 import numpy as np
 import pytest
-from ligature.cockpit.curves import Curves
+from hypothesis import given
+from hypothesis import strategies as st
+from ligature.cockpit.curves import Curves, span_of
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
 from viser import ViserServer
@@ -67,3 +71,29 @@ def test_a_scene_without_a_task_has_no_score(server: ViserServer) -> None:
     curves.refresh(new_state(small)[0])
     assert not any(handle.title.startswith("task score") for handle in curves._handles)
     assert "No suturing task" in curves._task.content
+
+
+@given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=30), st.sampled_from([0.1, 1.0]))
+def test_an_axis_shows_all_values_and_is_not_much_too_long(values: list[float], least: float) -> None:
+    low, high = span_of(np.array(values), least)
+    assert low <= min(*values, 0.0)
+    assert high >= max(*values, 0.0)
+    assert high <= max(3.0 * max(values), least * (1.0 + 1e-9))
+    assert -low <= max(-3.0 * min(values), 0.0)
+
+
+def test_the_table_has_a_row_for_each_sample(scene: Scene, server: ViserServer) -> None:
+    curves = Curves(scene)
+    curves.show(server.gui)
+    state = new_state(scene)[0]
+    for tick in range(5):
+        state["sim_time"] = 0.2 * tick
+        curves.observe(state, 0.5)
+    rows = list(csv.reader(io.StringIO(curves.table())))
+    names, numbers = rows[0], np.array(rows[1:], dtype=float)
+    assert names[0] == "time, s"
+    assert numbers.shape == (5, len(names))
+    assert numbers[:, 0] == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8])
+    assert (numbers[:, names.index("real-time factor: physics")] == 0.5).all()
+    for word in ("thread tension", "tip force", "depth in tissue", "task score"):
+        assert any(name.startswith(word) for name in names)

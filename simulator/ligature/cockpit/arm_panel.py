@@ -22,11 +22,15 @@ Array = NDArray[np.float64]
 TOUCHED = 1.0
 """Seconds after the operator's last touch for which a control does not follow the arm."""
 
+STEP = 1.0
+"""Millimetres or degrees by which an arrow key moves a slider; its field takes tenths."""
+
 GIZMO_SIZE = 0.035
 """Metres from the middle of a gizmo to the ends of its arrows."""
 
 COMMANDS = ("Enable", "Home", "Hold", "Disable")
-COLOURS = {State.DISABLED: "#868e96", State.ENABLED: "#37b24d", State.PAUSED: "#f59f00", State.FAULT: "#e03131"}
+COLOURS = {State.DISABLED: "#5c636a", State.ENABLED: "#237032", State.PAUSED: "#9c5100", State.FAULT: "#c92a2a"}
+"""On which white letters can be read (4.5 : 1)."""
 
 Act = Callable[[str, int, Any], None]
 """Takes what the operator did: a word, the number of the arm, and a value."""
@@ -53,13 +57,13 @@ class ArmStatus:
     def _words(self, record: Any) -> str:
         operating = State(int(record["operating"]))
         badges = [(operating.name, COLOURS[operating])]
-        badges += [("HOMED", "#1971c2")] if record["homed"] else [("NOT HOMED", "#868e96")]
-        badges += [("BUSY", "#f59f00")] if record["busy"] else []
+        badges += [("HOMED", "#1864ab")] if record["homed"] else [("NOT HOMED", "#5c636a")]
+        badges += [("BUSY", "#9c5100")] if record["busy"] else []
         marks = " ".join(badge(word, colour) for word, colour in badges)
         x, y, z = (np.round(1e3 * record["measured_cp"][:3], 1) + 0.0).tolist()  # and no -0.0
         force = float(np.linalg.norm(record["spatial_measured_cf"][:3]))
         tip = f"tip {x:.1f} {y:.1f} {z:.1f} mm · {force:.2f} N"
-        note = f'<br><span style="color:#f08c00">{escape(self.note)}</span>' if self.note else ""
+        note = f'<br><span class="ligature-note">{escape(self.note)}</span>' if self.note else ""
         return f'<div id="arm-{self.facts.name}" style="font-size:12px;padding:2px 8px">{marks}<br>{tip}{note}</div>'
 
 
@@ -163,7 +167,9 @@ class ArmControls:
 def _slider(gui: Any, joint: JointFacts, value: float) -> Any:
     low, high = round(joint.scale * joint.low, 1), round(joint.scale * joint.high, 1)
     shown = float(np.clip(round(joint.scale * value, 1), low, high))
-    return gui.add_slider(f"{joint.name.replace('_', ' ')} {joint.unit}", low, high, 0.1, shown)
+    slider = gui.add_slider(f"{joint.name.replace('_', ' ')} {joint.unit}", low, high, STEP, shown)
+    slider.precision = 1
+    return slider
 
 
 def _follow(slider: Any, joint: JointFacts, value: float, astray: bool) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from viser import ClientHandle, ViserServer
 
 from ligature.cockpit.desk import Desk
+from ligature.cockpit.wire import Wire
 
 KEY = "ligature_operator"
 """Name below which a browser keeps the key of its operator."""
@@ -29,11 +30,12 @@ class Audience:
     """
 
     def __init__(
-        self, server: ViserServer, put: Put, begin: Callable[[ClientHandle], None], end: Callable[[str, bool], None]
-    ) -> None:
+        self, server: ViserServer, wire: Wire, put: Put, begin: Callable[[ClientHandle], None],
+        end: Callable[[str, bool], None],
+    ) -> None:  # fmt: skip
         self.clients: dict[int, ClientHandle] = {}
         self.desk = Desk()
-        self._put, self._begin, self._end = put, begin, end
+        self._wire, self._put, self._begin, self._end = wire, put, begin, end
         self._buttons: dict[int, Any] = {}
         server.on_client_connect(self._on_connect)
         server.on_client_disconnect(self._on_disconnect)
@@ -55,11 +57,13 @@ class Audience:
         """Take what happened; False when it is for somebody else to decide."""
         if word == "connect":
             self.clients[client] = value
+            value.gui.add_html(f'<span id="ligature-pass" data-pass="{self._wire.admit(client)}"></span>', order=-1)
             self._seat(client)
             self._ask_key(value, "comes back", KEY_TIMEOUT)
         elif word == "disconnect":
             self.clients.pop(client, None)
             self._buttons.pop(client, None)
+            self._wire.forget(client)
             if self.desk.leaves(client, now):
                 self._end("the operator's browser is gone", False)
         elif client not in self.clients:
@@ -76,6 +80,10 @@ class Audience:
         else:
             return client != self.desk.operator
         return True
+
+    def claim(self, client: int) -> None:
+        """Let a browser take the desk, as if it had asked for it with its button."""
+        self._ask_key(self.clients[client], "claim", 1.0)
 
     def _ask_key(self, client: ClientHandle, then: str, timeout: float) -> None:
         """Ask a browser for the key that it was given as operator, on a thread of its own: it may take a while."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -22,24 +23,44 @@ from ligature.cockpit.arm_panel import ArmControls, ArmStatus
 from ligature.cockpit.audience import Audience
 from ligature.cockpit.camera_panel import NO_PICTURES, CameraControls
 from ligature.cockpit.curves import Curves
-from ligature.cockpit.deadman import TIMEOUT, DeadMan
+from ligature.cockpit.deadman import GONE, DeadMan
 from ligature.cockpit.gate import Gate
-from ligature.cockpit.page import CAMERA_HEIGHT, LEFT_WIDTH, Header, look_from, serve
-from ligature.cockpit.pictures import Pictures, sights
+from ligature.cockpit.hands import Hands, Sightline
+from ligature.cockpit.orders import Order, View
+from ligature.cockpit.page import (
+    CAMERA_HEIGHT,
+    LEFT_WIDTH,
+    PICTURE,
+    Header,
+    behind,
+    look_from,
+    look_now,
+    paint,
+    serve,
+)  # fmt: skip
+from ligature.cockpit.pictures import HEIGHT, Pictures, Wish, sights
 from ligature.cockpit.pursuit import ArmPursuits
 from ligature.cockpit.ros_panel import Health, Remote, RosPanel, TeleopControls, obey_teleop
 from ligature.cockpit.simulation_panel import Clockwork, SimulationControls, SimulationPanel
-from ligature.cockpit.stage import Stage, first_view
+from ligature.cockpit.stage import Stage, first_view, work_place
+from ligature.cockpit.starter import Starter
+from ligature.cockpit.wire import Wire
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import new_state
 from ligature.robots.commands import Hold, StateCommand
 
 PERIOD = 0.01
-STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD = 0.05, 0.2, 0.4
-"""Seconds between turns of the loop, poses, words and controls, and curves."""
+STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD, PICTURE_PERIOD = 0.05, 0.2, 0.4, 0.02
+"""Seconds between turns of the loop, poses, words and controls, curves, and looks for a new picture."""
+
+SMALL_VIEW = View(False, HEIGHT)
+"""What a browser shows that has not said anything else."""
 
 AFTER_FAILURE = 1.0
 """Seconds after which a part of the page that failed is tried again."""
+
+CLAIM_TIMEOUT = 30.0
+"""Seconds in which who pressed *Start* gets control, or has to press it again."""
 
 REPORTED = ("warning", "error")
 """Events of an arm that are shown beside it."""
@@ -66,7 +87,8 @@ class Cockpit:
         block.read(self._state)
         block.events.skip()
         self._address = address
-        self.server = serve(address, Gate(address, token, warn))
+        self._wire = Wire()
+        self.server = serve(address, Gate(address, token, warn), self._wire)
         self._deadman = DeadMan(self.server)
         self._inbox: deque[tuple[str, int, Any]] = deque()
         self._clockwork = Clockwork(self._outbox.push)
@@ -74,18 +96,24 @@ class Cockpit:
         self._record_as, self._recorded, self._reported = "", "", ""
         facts = [ArmFacts.of(scene, index) for index in range(len(scene.arms))]
         self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
+        self._hands = Hands(facts, self._pursuits)
+        self._starter = Starter(facts, self._outbox.push)
+        self._views: dict[int, View] = {}
+        self._begins = (-1, 0.0)
         self._curves = Curves(scene, task)
         self._lay_out(facts, ros, title)
         self._controls: list[ArmControls] = []
         self._run_controls: SimulationControls | None = None
         self._camera_controls: CameraControls | None = None
         self._teleop_controls: TeleopControls | None = None
-        self._due = {self._show_stage: 0.0, self._show_words: 0.0, self._show_curves: 0.0}
+        shows = (self._show_stage, self._show_words, self._show_curves, self._show_picture)
+        self._due: dict[Callable[[float], float], float] = dict.fromkeys(shows, 0.0)
         self._last = time.monotonic()
         self._moved_at, self._tick = self._last, -1
         self._audience = Audience(
-            self.server, lambda *what: self._inbox.append(what), self._begin_operating, self._end_operating
+            self.server, self._wire, lambda *what: self._inbox.append(what), self._begin_operating, self._end_operating
         )
+        self._wire.begin(lambda *what: self._inbox.append(what), self.server.get_event_loop())
 
     def _lay_out(self, facts: list[ArmFacts], ros: tuple[Health, Remote] | None, title: str) -> None:
         server, scene = self.server, self._scene
@@ -102,7 +130,7 @@ class Cockpit:
             panels.append(server.gui.add_panel())
             with panels[-1].add_tab("Cameras"):
                 self._camera_folder = server.gui.add_folder("View")
-                self._picture = server.gui.add_image(np.zeros((2, 2, 3), np.uint8), format="jpeg", jpeg_quality=80)
+                server.gui.add_html(PICTURE)
                 self._camera_words = server.gui.add_html("")
         panels.append(server.gui.add_panel())
         with panels[-1].add_tab("Curves"):
@@ -113,6 +141,7 @@ class Cockpit:
             panels[1].dock_below(panels[0])
             panels[0].set_height(CAMERA_HEIGHT)
         self._stage = Stage(server, scene)
+        self._tube = True
 
     @property
     def url(self) -> str:
@@ -129,13 +158,15 @@ class Cockpit:
         while self._inbox:
             word, client, value = self._inbox.popleft()
             try:
-                if not self._audience.hear(word, client, value, now):
+                if word == "wire":
+                    self._hear_wire(client, value)
+                elif not self._audience.hear(word, client, value, now):
                     self._obey(word, value)
             except Exception as error:  # nothing that one browser does ends the page for the others
                 self._report(f"'{word}' of a browser failed", error)
         self._follow(now, now - self._last)
         self._last = now
-        self._curves.observe(self._state[0])
+        self._curves.observe(self._state[0], float(self._block.figures["real_time_factor"][0]))
         for show, due in self._due.items():
             if now >= due:
                 try:
@@ -173,9 +204,13 @@ class Cockpit:
             client, self._panel, self._clockwork.paused, self._speed, self._recording, self._record_as, act
         )
         if self._sights:
-            self._camera_controls = CameraControls(client, self._camera_folder, tuple(self._sights), self._sight, act)
+            names = tuple(self._sights)
+            self._camera_controls = CameraControls(client, self._camera_folder, names, self._sight, self._tube, act)
         if self._ros is not None:
             self._teleop_controls = TeleopControls(client, self._ros, act)
+        if self._begins[0] == own and time.monotonic() - self._begins[1] < CLAIM_TIMEOUT:
+            self._starter.begin()
+        self._begins = (-1, 0.0)
 
     def _end_operating(self, why: str, there: bool) -> None:
         """Nobody operates any more; ``there``: whether the browser still shows the controls."""
@@ -185,6 +220,107 @@ class Cockpit:
                 if controls is not None:
                     controls.remove()
         self._controls, self._run_controls, self._camera_controls, self._teleop_controls = [], None, None, None
+
+        self._starter.end()
+        self._hands.rest()
+
+    # --- the page's own script -------------------------------------------------------------------
+
+    def _hear_wire(self, client: int, order: Order) -> None:
+        """What the script of a browser orders: some of it anybody's, the rest the operator's."""
+        handle = self._audience.clients.get(client)
+        if handle is None:
+            return
+        word, value = order
+        if word == "view":
+            self._views[client] = value
+        elif word == "dark":
+            paint(handle.gui, value)
+        elif word == "csv":
+            name = time.strftime("ligature-curves-%Y-%m-%d-%H%M%S.csv")
+            handle.send_file_download(name, self._curves.table().encode(), save_immediately=True)
+        elif word == "start":
+            self._start(handle)
+        elif client == self._audience.desk.operator:
+            self._obey_hands(word, value, handle)
+
+    def _start(self, client: ClientHandle) -> None:
+        look_now(client, *first_view(self._scene, self._state))
+        if self._audience.desk.operator == client.client_id:
+            self._starter.begin()
+        else:
+            self._begins = client.client_id, time.monotonic()
+            self._audience.claim(client.client_id)
+
+    def _obey_hands(self, word: str, value: Any, client: ClientHandle) -> None:
+        state, hands = self._state[0], self._hands
+        if word == "move":
+            self._forget_note(hands.selected)
+            hands.move(value, time.monotonic())
+        elif word == "silent":
+            hands.rest()
+        elif word == "hold":
+            self._hold()
+        elif word == "next":
+            hands.next()
+        elif word == "speed":
+            hands.mode = value
+        elif word == "drag":
+            sight = self._camera_sight
+            arm = None if sight is None else hands.drag(state, value, sight)
+            if arm is not None:
+                self._forget_note(arm)
+
+    def _hold(self) -> None:
+        """Every arm stays where it is."""
+        self._hands.rest()
+        for arm, pursuits in enumerate(self._pursuits):
+            if pursuits.stop():
+                self._outbox.push(Hold(arm))
+
+    def _forget_note(self, arm: int) -> None:
+        if 0 <= arm < len(self._arms):
+            self._arms[arm].note = ""
+
+    @property
+    def _camera_sight(self) -> Sightline | None:
+        """How the camera looks whose picture is shown, the first of two."""
+        sight = self._sights.get(self._sight)
+        if sight is None:
+            return None
+        index = sight.eyes[0][0]
+        return Sightline.of(self._scene.cameras[index], self._state["camera_world"][0, index])
+
+    def _sightline(self, client: ClientHandle) -> Sightline:
+        """How a browser looks: through the camera where its picture is large, else at the 3D view."""
+        if self._views.get(client.client_id, SMALL_VIEW).large and self._camera_sight is not None:
+            return self._camera_sight
+        try:
+            return Sightline.browser(client.camera.wxyz)
+        except AssertionError:  # a browser that has not shown anything yet
+            return self._camera_sight or Sightline(np.eye(3), np.zeros(3))
+
+    def _inform(self) -> None:
+        """Give every script what it shows."""
+        desk = self._audience.desk
+        ready = [arm.facts.ready(self._state[0]) for arm in self._arms]
+        hands = self._hands
+        chosen = self._arms[hands.selected].facts.name if hands.selected >= 0 else ""
+        wish = self._wish()
+        for client in self._audience.clients:
+            self._wire.inform(
+                client,
+                {
+                    "operates": client == desk.operator,
+                    "free": desk.operator is None and not desk.kept(time.monotonic()),
+                    "starting": self._starter.active,
+                    "ready": hands.selected >= 0 and ready[hands.selected],
+                    "arm": chosen,
+                    "speed": hands.mode,
+                    "eyes": 0 if wish is None else len(wish.sight.eyes),
+                    "pair": wish is not None and len(self._sights[self._sight].eyes) > 1,
+                },
+            )
 
     # --- what the operator does ----------------------------------------------------------------
 
@@ -209,6 +345,9 @@ class Cockpit:
             self._record(bool(value))
         elif word == "sight":
             self._sight = value
+        elif word == "tube":
+            self._tube = bool(value)
+            self._stage.show_endoscope(self._tube)
         elif self._ros is not None:
             obey_teleop(self._ros.remote, word, value)
 
@@ -235,28 +374,37 @@ class Cockpit:
             pursuits.pose(start, facts.in_reference(state, value))
 
     def _follow(self, now: float, dt: float) -> None:
-        """Send the next goals of what is pursued, as long as the operator's browser answers."""
+        """Send the next goals of what is pursued, slower or not at all while the operator's browser is silent."""
+        client = self._audience.clients.get(
+            -1 if self._audience.desk.operator is None else self._audience.desk.operator
+        )
+        if client is not None:
+            if self._starter.advance(self._state[0]) and self._camera_sight is not None:
+                self._hands.bring(self._state[0], work_place(self._scene, self._state), self._camera_sight)
+            if self._hands.busy:
+                self._hands.advance(self._state[0], self._sightline(client), now, dt)
         driven = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
-        dragged = any(controls.dragging for controls in self._controls)
-        self._deadman.watch(self._audience.desk.operator if driven or dragged else None)
-        if self._deadman.silence > TIMEOUT:
-            silent = 1e3 * self._deadman.silence
-            self._stop_all(f"the operator's browser has not answered for {silent:.0f} ms")
+        dragged = self._hands.dragging is not None or any(controls.dragging for controls in self._controls)
+        self._deadman.watch(None if client is None else client.client_id, bool(driven or dragged))
+        silence = self._deadman.silence
+        pace = self._deadman.pace(dt)
+        if silence > GONE:
+            self._stop_all(f"the operator's browser has not answered for {1e3 * silence:.0f} ms")
             return
-        for arm in driven:
-            for command in self._pursuits[arm].advance(min(dt, 0.05)):
+        for arm in driven if pace > 0.0 else ():
+            for command in self._pursuits[arm].advance(pace * min(dt, 0.05)):
                 self._outbox.push(command)
 
     def _stop_all(self, why: str) -> None:
         """Hold every arm that the operator drives, and show why."""
         for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
-            dragged = arm < len(self._controls) and self._controls[arm].dragging
+            dragged = arm == self._hands.dragging or (arm < len(self._controls) and self._controls[arm].dragging)
             if pursuits.stop() or dragged:
                 self._outbox.push(Hold(arm))
                 if why and status.note != f"hold: {why}":
                     status.note = f"hold: {why}"
                     self._warn(f"{status.facts.name} holds: {why}")
-        self._deadman.watch(None)
+        self._hands.rest()
 
     @property
     def _recording(self) -> bool:
@@ -302,10 +450,21 @@ class Cockpit:
                 controls.refresh(state, not pursuits.active)
             if self._run_controls is not None:
                 self._run_controls.show_recording(self._recording)
-            self._show_picture()
+            self._inform()
             self._show_ros()
-        self._pictures.want(self._sights.get(self._sight) if self._audience.clients else None)
+        self._pictures.want(self._wish() if self._audience.clients else None)
         return WORDS_PERIOD
+
+    def _wish(self) -> Wish | None:
+        """The picture that the browsers want: as large as the largest of them."""
+        sight = self._sights.get(self._sight)
+        self._views = {client: view for client, view in self._views.items() if client in self._audience.clients}
+        large = [view for view in self._views.values() if view.large]
+        if sight is None:
+            return None
+        if large and not any(view.stereo for view in large):
+            sight = sight.mono
+        return Wish(sight, max([HEIGHT, *(view.height for view in large)]), bool(large))
 
     def _show_ros(self) -> None:
         if self._ros is None:
@@ -325,20 +484,21 @@ class Cockpit:
     def _run_words(self) -> list[str]:
         figures = self._block.figures
         p50, p99 = 1e3 * float(figures["tick_p50"][0]), 1e3 * float(figures["tick_p99"][0])
-        lines = [f"update {p50:.2f} ms, p99 {p99:.2f} ms · {float(figures['behind'][0]):.1f} s behind"]
+        lines = [f"update {p50:.2f} ms, p99 {p99:.2f} ms · {behind(float(figures['behind'][0]))}"]
         lines.append(f"commands {int(figures['received'][0])}, rejected {int(figures['rejected'][0])}")
         if self._recorded or self._recording:
             lines.append(self._recorded or "recording")
         return lines
 
-    def _show_picture(self) -> None:
-        if not self._sights:
-            return
-        picture = self._pictures.newest()
-        if picture is not None:
-            self._picture.image = picture
-        if self._pictures.problem:
-            self._camera_words.content = "<small>no pictures</small>"
+    def _show_picture(self, now: float) -> float:
+        if self._sights:
+            picture = self._pictures.newest()
+            if picture is not None:
+                self._wire.show(picture)
+            words = f"<small>no pictures: {escape(self._pictures.problem)}</small>" if self._pictures.problem else ""
+            if self._camera_words.content != words:
+                self._camera_words.content = words
+        return PICTURE_PERIOD
 
     def _show_curves(self, now: float) -> float:
         if self._audience.clients:

@@ -5,12 +5,16 @@ Newtons, millimetres, percent, seconds.
 
 from __future__ import annotations
 
+import csv
+import io
+import math
 from collections import deque
 from collections.abc import Callable
 from html import escape
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from viser import GuiApi, uplot
 
 from ligature.model.scene import ArmKind, Scene
@@ -27,8 +31,22 @@ COLOURS = ("#4dabf7", "#ffa94d", "#69db7c", "#f783ac", "#b197fc")
 
 SCORE = "task score, % of holes"
 
+TENSION, FORCE, DEPTH, FACTOR = "thread tension, N", "tip force, N", "depth in tissue, mm", "real-time factor"
+
 RANGES = {SCORE: (-5.0, 105.0)}
 """Of charts whose values have bounds."""
+
+LEAST = {TENSION: 0.1, FORCE: 0.1, DEPTH: 1.0, FACTOR: 1.0}
+"""Height of charts whose values are small: noise is not to fill them."""
+
+PADDING = (14, 10, 0, 0)
+"""Pixels above, right of, below and left of a chart, so that its labels are seen as a whole."""
+
+TOOLS = (
+    '<div class="lig-tools"><button type="button" data-ligature="csv">Save as CSV</button>'
+    '<button type="button" data-ligature="png">Save as picture</button></div>'
+)
+"""Buttons that our script obeys."""
 
 Values = Callable[[Any], list[float]]
 
@@ -41,30 +59,35 @@ class Curves:
 
     def __init__(self, scene: Scene, task: str = "") -> None:
         self._attempt = _attempt(scene, task)
-        self._charts = [chart for chart in (*_charts(scene), *_score(self._attempt)) if chart[1]]
+        pace: tuple[str, list[str], Values] = (FACTOR, ["physics"], lambda _: [self._factor])
+        self._charts = [chart for chart in (*_charts(scene), *_score(self._attempt), pace) if chart[1]]
         self._times: deque[float] = deque(maxlen=int(SPAN * SAMPLES))
         self._rows: deque[list[float]] = deque(maxlen=int(SPAN * SAMPLES))
         self._handles: list[Any] = []
+        self._spans: list[tuple[float, float]] = []
+        self._factor = 0.0
         self._sent = float("-inf")
         self._task: Any = None
 
     def show(self, gui: GuiApi) -> None:
         """Put the charts into the container of ``gui`` that is open."""
         self._task = gui.add_html("")
+        gui.add_html(TOOLS)
         empty = np.zeros(1)
         for title, names, _ in self._charts:
             series = (uplot.Series(label="s"), *_series(names))
-            scales = {"x": uplot.Scale(time=False)}
-            if title in RANGES:
-                scales["y"] = uplot.Scale(range=RANGES[title])
+            span = RANGES.get(title) or span_of(empty, LEAST[title])
+            self._spans.append(span)
             self._handles.append(
                 gui.add_uplot(
-                    (empty, *(empty for _ in names)), series, title=title, height=150, scales=scales
+                    (empty, *(empty for _ in names)), series, title=title, height=150, scales=_scales(span),
+                    padding=PADDING, legend=uplot.Legend(show=len(names) > 1, live=False),
                 )
             )  # fmt: skip
 
-    def observe(self, state: Any) -> None:
-        """Take a state; a reset begins the task anew."""
+    def observe(self, state: Any, factor: float = 0.0) -> None:
+        """Take a state, and the real-time factor; a reset begins the task anew."""
+        self._factor = factor
         if self._attempt is not None:
             self._attempt.observe(state)
         time = float(state["sim_time"])
@@ -82,9 +105,23 @@ class Curves:
         self._sent = self._times[-1]
         times, rows = np.array(self._times), np.array(self._rows)
         column = 0
-        for handle, (_, names, _) in zip(self._handles, self._charts, strict=True):
+        for number, (handle, (title, names, _)) in enumerate(zip(self._handles, self._charts, strict=True)):
+            span = RANGES.get(title) or span_of(rows[:, column : column + len(names)], LEAST[title])
+            if span != self._spans[number]:
+                self._spans[number], handle.scales = span, _scales(span)
             handle.data = (times, *(rows[:, column + i] for i in range(len(names))))
             column += len(names)
+
+    def table(self) -> str:
+        """What the charts show, as CSV: a row for each sample."""
+        names = [f"{title}: {name}" for title, names, _ in self._charts for name in names]
+        rows = [
+            ["time, s", *names],
+            *([f"{t:.3f}", *(f"{v:.6g}" for v in row)] for t, row in zip(self._times, self._rows, strict=True)),
+        ]
+        text = io.StringIO()
+        csv.writer(text).writerows(rows)
+        return text.getvalue()
 
     def _words(self, state: Any) -> str:
         attempt = self._attempt
@@ -101,6 +138,25 @@ class Curves:
             lines += judge_suture(attempt.monitor.scenery, poses, measures.passages, measures.time, pairs).lines()
         lines += measures.lines()
         return '<div style="font-size:12px;padding:2px 8px">' + "<br>".join(escape(line) for line in lines) + "</div>"
+
+
+def span_of(values: NDArray[np.float64], least: float) -> tuple[float, float]:
+    """Ends of an axis that shows ``values`` and zero, at round numbers, so that they seldom change."""
+    low, high = min(float(np.min(values)), 0.0), max(float(np.max(values)), 0.0)
+    return -_round_up(-low, 0.0), _round_up(high, least)
+
+
+def _round_up(value: float, least: float) -> float:
+    """The next of 1, 2, 5, 10 … of its power of ten above ``value``, and at least ``least``."""
+    value = max(1.05 * value, least)
+    if value <= 0.0:
+        return 0.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return float(next(power * step for step in (1.0, 2.0, 5.0, 10.0) if power * step >= value * (1.0 - 1e-9)))
+
+
+def _scales(span: tuple[float, float]) -> dict[str, uplot.Scale]:
+    return {"x": uplot.Scale(time=False), "y": uplot.Scale(range=span)}
 
 
 def _attempt(scene: Scene, task: str) -> Attempt | None:
@@ -143,7 +199,7 @@ def _charts(scene: Scene) -> list[tuple[str, list[str], Values]]:
         return [float(depth[chosen].max(initial=0.0)) for chosen in (on_needle, ~on_needle)]
 
     return [
-        ("thread tension, N", [name or f"thread {i}" for i, (name, _) in enumerate(threads, 1)], tension),
-        ("tip force, N", [name for _, name in arms], forces),
-        ("depth in tissue, mm", ["needle", "thread"] if scene.holes else [], depths),
+        (TENSION, [name or f"thread {i}" for i, (name, _) in enumerate(threads, 1)], tension),
+        (FORCE, [name for _, name in arms], forces),
+        (DEPTH, ["needle", "thread"] if scene.holes else [], depths),
     ]

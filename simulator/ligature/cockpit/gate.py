@@ -26,8 +26,10 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ligature.cockpit.address import Address
+from ligature.cockpit.assets import asset
 from ligature.cockpit.guesses import REPORT_PAUSE, Guesses
 from ligature.cockpit.intake import MOST_BYTES, careful
+from ligature.cockpit.wire import PATH, Wire
 
 COOKIE = "ligature_cockpit"
 PARAMETER = "token"
@@ -44,8 +46,8 @@ HEADERS = {
 MOST_PATH = 2000
 """Most characters of the path of a request."""
 
-MOST_CONNECTIONS = 64
-"""Most browsers at a time: one that never reads holds half a megabyte until its connection is given up."""
+MOST_CONNECTIONS = 128
+"""Most connections at a time, two of each browser; one that never reads holds half a megabyte until it is given up."""
 
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Ligature cockpit</title>
 <body style="font-family: sans-serif; background: #1a1b1e; color: #c1c2c5; text-align: center; padding-top: 20vh">
@@ -154,6 +156,10 @@ def _refusal(status: http.HTTPStatus, why: str) -> Response:
     return Response(status, status.phrase, headers, body)
 
 
+def _path(connection: Any) -> str:
+    return "" if connection.request is None else str(connection.request.path.partition("?")[0])
+
+
 def _caller(connection: ServerConnection) -> str:
     """The address of whoever asks."""
     address = connection.remote_address
@@ -161,8 +167,11 @@ def _caller(connection: ServerConnection) -> str:
 
 
 @contextmanager
-def guarded(gate: Gate) -> Iterator[None]:
-    """Have ``gate`` stand before a websocket server that is started within: viser has no hook for that of its own."""
+def guarded(gate: Gate, wire: Wire) -> Iterator[None]:
+    """Have ``gate`` stand before a websocket server that is started within, which also serves our files and ``wire``.
+
+    viser has no hook for that of its own.
+    """
     serve = websockets.asyncio.server.serve
 
     def guarded_serve(
@@ -172,7 +181,7 @@ def guarded(gate: Gate) -> Iterator[None]:
         **options: Any,
     ) -> Any:
         async def process(connection: ServerConnection, request: Request) -> Any:
-            response = await gate.decide(request, _caller(connection))
+            response = await gate.decide(request, _caller(connection)) or asset(request)
             if response is None and process_request is not None:
                 response = process_request(connection, request)
                 if inspect.isawaitable(response):
@@ -191,7 +200,7 @@ def guarded(gate: Gate) -> Iterator[None]:
                     gate.complain()
                     await connection.close(1013, "too many browsers watch already")
                 else:
-                    await careful(handler)(connection)
+                    await careful(wire.serve if _path(connection) == PATH else handler)(connection)
             finally:
                 gate.connections -= 1
 

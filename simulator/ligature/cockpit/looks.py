@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
+from ligature.cockpit.tone import displayed, linear, reflecting, rendered
 from ligature.model.scene import Scene
 from ligature.render.picture_files import read_picture
 from ligature.render.surface import Physical, Surface, roughness_of
@@ -25,6 +26,16 @@ LARGEST_PICTURE = 1024
 
 GROUND = 20.0
 """Metres from end to end beyond which a piece is an endless plane, which a page shows by its grid alone."""
+
+FACING, AMBIENT, GATHERED = 0.85, 0.35, 0.5
+"""How a surface stands to the light for which its colours are matched, and the renderer's light from everywhere: for
+surfaces without reflectance figures, and what those with them gather."""
+
+GLOSS = 0.018
+"""Light that a dielectric surface mirrors beside that, whatever its colour."""
+
+LIT = 1.05
+"""Light on such a surface on the page: of the lamp and of what is around."""
 
 METAL_SHEEN = 0.6
 """Metallic part of bare metal in a browser: the rest stays diffuse, so that it is seen against any surroundings."""
@@ -47,16 +58,12 @@ def thread_colour(scene: Scene, body: int) -> tuple[int, int, int]:
     from ligature.render.surface import surface_of
 
     visual = scene.bodies[body].visual
-    r, g, b = surface_of(visual.colour, VisualLoader().material(visual)).colour.diffuse
-    return round(255 * r), round(255 * g), round(255 * b)
+    return mean_colour(surface_of(visual.colour, VisualLoader().material(visual)))
 
 
 def mean_colour(surface: Surface) -> tuple[int, int, int]:
     """Colour of a surface without its texture's details, 0..255."""
-    picture, colour = _picture(surface), np.asarray(surface.colour.diffuse)
-    if picture is not None:
-        colour = colour * np.asarray(picture, dtype=float).mean(axis=(0, 1)) / 255.0
-    r, g, b = np.round(255.0 * np.clip(colour, 0.0, 1.0)).astype(int).tolist()
+    r, g, b = np.round(255.0 * displayed(_base(surface) * linear(_texel(surface)))).astype(int).tolist()
     return r, g, b
 
 
@@ -84,22 +91,40 @@ def _packed(pieces: Sequence[Piece], materials: dict[Surface, PBRMaterial]) -> b
 
 def _material(surface: Surface) -> PBRMaterial:
     look = surface.physical or Physical(roughness=max(roughness_of(surface.colour.shininess), 0.35))
-    colour = np.array([*_linear(surface.colour.diffuse), surface.colour.alpha])
+    base, picture = _base(surface), _picture(surface)
+    if picture is not None and base.max() > 1.0:  # glTF's factors end at 1
+        picture = Image.fromarray(
+            np.round(255.0 * displayed(linear(np.asarray(picture) / 255.0) * base)).astype(np.uint8)
+        )
+        base = np.ones(3)
+    colour = np.array([*base, surface.colour.alpha])
     return PBRMaterial(
         baseColorFactor=np.round(255 * np.clip(colour, 0.0, 1.0)).astype(np.uint8),
         metallicFactor=METAL_SHEEN * look.metallic,
         roughnessFactor=look.roughness,
-        emissiveFactor=_linear(surface.colour.emission),
-        baseColorTexture=_picture(surface),
+        emissiveFactor=linear(surface.colour.emission).tolist(),
+        baseColorTexture=picture,
         alphaMode=None if surface.opaque else "BLEND",
         doubleSided=True,
     )
 
 
-def _linear(colour: tuple[float, float, float]) -> list[float]:
-    """Linear values of an sRGB colour, which glTF wants (IEC 61966-2-1)."""
-    c = np.clip(np.asarray(colour, dtype=float), 0.0, 1.0)
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).tolist()  # type: ignore[no-any-return]
+def _base(surface: Surface) -> Array:
+    """Linear colour (3,) by which a browser is to multiply the texture; above 1 where the texture is too dark."""
+    diffuse, texel = np.asarray(surface.colour.diffuse), _texel(surface)
+    if surface.physical is not None and surface.physical.metallic > 0.5:
+        return linear(diffuse)
+    if surface.physical is not None:
+        lit = rendered(linear(diffuse * texel) * (FACING + GATHERED) + GLOSS)
+    else:
+        lit = texel * (FACING * diffuse + AMBIENT * np.asarray(surface.colour.ambient))
+    return reflecting(np.clip(lit, 0.0, 1.0), LIT) / np.maximum(linear(texel), 1e-3)
+
+
+def _texel(surface: Surface) -> Array:
+    """Mean displayed colour (3,) of the texture, white without one."""
+    picture = _picture(surface)
+    return np.ones(3) if picture is None else np.asarray(picture, dtype=float).mean(axis=(0, 1)) / 255.0
 
 
 def _picture(surface: Surface) -> Image.Image | None:

@@ -5,6 +5,7 @@ It draws the newest state as seldom as a person puts up with, and takes no more 
 
 from __future__ import annotations
 
+import io
 import multiprocessing
 import os
 import signal
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from ligature.bus import Block, BusError
 from ligature.model.optics import EYES, stereo_partners
@@ -23,13 +25,16 @@ from ligature.model.state import new_state, state_dtype
 from ligature.process import end_with_parent, lower_priority
 
 HEIGHT = 240
-"""Pixels of a picture from top to bottom."""
+"""Pixels of a small picture from top to bottom."""
 
-PERIOD = 0.2
-"""Seconds between pictures at least."""
+PERIOD, LARGE_PERIOD = 0.2, 0.05
+"""Seconds between pictures at least: small ones, and one that somebody works by."""
 
-REST = 3.0
+REST, LARGE_REST = 3.0, 0.25
 """Seconds of rest for each second of drawing."""
+
+QUALITY = 82
+"""Of JPEG."""
 
 NICE = 10
 """How much lower the scheduling priority of drawing is than that of physics and the rest of the cockpit."""
@@ -44,6 +49,20 @@ class Sight:
 
     name: str
     eyes: tuple[Eye, ...]
+
+    @property
+    def mono(self) -> Sight:
+        """What its first eye sees."""
+        return Sight(self.name, self.eyes[:1])
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A sight, how many pixels it is high at most, and whether somebody works by it."""
+
+    sight: Sight
+    height: int = HEIGHT
+    large: bool = False
 
 
 def sights(scene: Scene) -> tuple[Sight, ...]:
@@ -67,17 +86,17 @@ class Pictures:
         self._process = context.Process(target=_draw, args=(scene, bus, theirs), daemon=True)
         self._process.start()
         theirs.close()
-        self._wanted: Sight | None = None
+        self._wanted: Wish | None = None
         self.problem = ""
 
-    def want(self, sight: Sight | None) -> None:
-        """Draw ``sight`` from now on, None for nothing."""
-        if sight != self._wanted and not self.problem:
-            self._wanted = sight
-            self._try(lambda: self._pipe.send(sight))
+    def want(self, wish: Wish | None) -> None:
+        """Draw ``wish`` from now on, None for nothing."""
+        if wish != self._wanted and not self.problem:
+            self._wanted = wish
+            self._try(lambda: self._pipe.send(wish))
 
-    def newest(self) -> NDArray[np.uint8] | None:
-        """The newest picture (height, width, 3) that was not taken yet; `problem` is the reason why there are none."""
+    def newest(self) -> bytes | None:
+        """The newest picture (JPEG) that was not taken yet; `problem` is the reason why there are none."""
         picture = None
         while not self.problem and self._try(self._pipe.poll):
             got = self._try(self._pipe.recv)
@@ -106,14 +125,14 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.setsid()
     lower_priority(NICE)
-    sight: Sight | None = None
+    wish: Wish | None = None
     easel: _Easel | None = None
     while True:
-        while pipe.poll(None if sight is None else 0):
-            sight = pipe.recv()
+        while pipe.poll(None if wish is None else 0):
+            wish = pipe.recv()
             if easel is not None:
                 easel.reset()
-        if sight is None:
+        if wish is None:
             continue
         try:
             easel = easel or _Easel(scene, bus)
@@ -123,11 +142,19 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
         begin = time.monotonic()
         if easel.ended:
             return
-        picture = easel.picture(sight)
+        picture = easel.picture(wish)
         if picture is not None:
-            pipe.send(picture)
+            pipe.send(jpeg(picture))
         spent = time.monotonic() - begin
-        time.sleep(max(PERIOD - spent, REST * spent))
+        period, rest = (LARGE_PERIOD, LARGE_REST) if wish.large else (PERIOD, REST)
+        time.sleep(max(period - spent, rest * spent))
+
+
+def jpeg(picture: NDArray[np.uint8]) -> bytes:
+    """A picture (height, width, 3) as JPEG."""
+    packed = io.BytesIO()
+    Image.fromarray(picture).save(packed, "JPEG", quality=QUALITY)
+    return packed.getvalue()
 
 
 class _Easel:
@@ -152,8 +179,8 @@ class _Easel:
         """Draw the same moment again when asked."""
         self._drawn = -1
 
-    def picture(self, sight: Sight) -> NDArray[np.uint8] | None:
-        """All eyes of ``sight`` side by side, (h, w, 3); None when nothing has happened since the last one."""
+    def picture(self, wish: Wish) -> NDArray[np.uint8] | None:
+        """All eyes of ``wish`` side by side, (h, w, 3); None when nothing has happened since the last one."""
         from ligature.render import view_of
 
         self._block.read(self._state)
@@ -162,10 +189,11 @@ class _Easel:
             return None
         self._drawn = moment
         shown = []
-        for index, eye in sight.eyes:
+        for index, eye in wish.sight.eyes:
             camera = self._scene.cameras[index]
             width, height = camera.resolution
-            size = (max(round(HEIGHT * width / height), 1), HEIGHT)
+            high = min(wish.height, max(height, HEIGHT))
+            size = (max(round(high * width / height), 1), high)
             view = view_of(camera, self._state["camera_world"][0, index], size, eye)
             shown.append(self._renderer.render(self._state, view, ("rgb",), camera.preprocessing_shaders).rgb)
         return np.ascontiguousarray(np.concatenate(shown, axis=1))

@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 LINEAR, ANGULAR = 0.1, 1.5
 """Maximum velocity of goals of a tip, in m/s and rad/s."""
 
+SMOOTH = 0.06
+"""Seconds in which the velocity of a goal follows a key or a stick."""
+
 JAW = 2.0
 """Maximum velocity of goals of a jaw or gripper in rad/s."""
 
@@ -80,12 +83,44 @@ class PosePursuit:
         return self.goal is self.target
 
 
+@dataclass(eq=False)
+class TwistPursuit:
+    """Tip poses (4, 4) that move with ``twist`` (6,): m/s and rad/s in the frame that ``servo_cp`` of the arm takes.
+
+    The velocity of the goal follows the twist within `SMOOTH`, so that a key that goes down does not jerk an arm.
+    """
+
+    goal: Array
+    twist: Array
+    verb: str = "servo_cp"
+
+    def __post_init__(self) -> None:
+        self._now = np.zeros(6)
+
+    def advance(self, dt: float) -> tuple[float, ...]:
+        """The goal ``dt`` seconds later, as a pose (7,)."""
+        self._now = self._now + (self.twist - self._now) * min(dt / SMOOTH, 1.0)
+        turn = dt * self._now[3:]
+        angle = float(np.linalg.norm(turn))
+        goal = self.goal.copy()
+        goal[:3, 3] += dt * self._now[:3]
+        if angle > 0.0:
+            goal[:3, :3] = axis_rotation(turn / angle, angle) @ goal[:3, :3]
+        self.goal = goal
+        return tuple(matrix_pose7(goal).tolist())
+
+    @property
+    def arrived(self) -> bool:
+        """Whether it stands and is to stand."""
+        return not self.twist.any() and float(np.abs(self._now).max()) < 1e-5
+
+
 class ArmPursuits:
-    """What one arm pursues: joints or a tip pose, and beside it the jaw."""
+    """What one arm pursues: joints, a tip pose or a twist, and beside it the jaw."""
 
     def __init__(self, arm: int) -> None:
         self._arm = arm
-        self._motion: JointPursuit | PosePursuit | None = None
+        self._motion: JointPursuit | PosePursuit | TwistPursuit | None = None
         self._jaw: JointPursuit | None = None
 
     @property
@@ -103,13 +138,30 @@ class ArmPursuits:
 
     def pose(self, start: Array, target: Array) -> None:
         """Go to ``target`` (4, 4), from ``start`` (4, 4) unless a pose is pursued already."""
-        goal = self._motion.goal if isinstance(self._motion, PosePursuit) else np.array(start)
+        goal = np.array(start) if isinstance(self._motion, JointPursuit | None) else self._motion.goal
         self._motion = PosePursuit(goal, np.array(target))
+
+    def twist(self, start: Array, twist: Array) -> None:
+        """Move with ``twist`` (6,), from ``start`` (4, 4) unless the tip moves already; zeros let it come to rest."""
+        if isinstance(self._motion, TwistPursuit):
+            self._motion.twist = np.array(twist)
+        elif np.any(twist):
+            goal = self._motion.goal if isinstance(self._motion, PosePursuit) else np.array(start)
+            self._motion = TwistPursuit(goal, np.array(twist))
+
+    @property
+    def twists(self) -> bool:
+        """Whether it moves with a twist."""
+        return isinstance(self._motion, TwistPursuit)
 
     def jaw(self, start: float, target: float, verb: str) -> None:
         """Open or close to ``target``."""
         goal = np.array([start]) if self._jaw is None else self._jaw.goal
         self._jaw = JointPursuit(goal, np.array([target]), np.array([JAW]), verb)
+
+    def rest_jaw(self) -> None:
+        """Leave the jaw where it is."""
+        self._jaw = None
 
     def advance(self, dt: float) -> list[ArmCommand]:
         """Commands for the next ``dt`` seconds; what arrives is pursued no longer."""

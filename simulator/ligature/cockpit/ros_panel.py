@@ -88,11 +88,11 @@ class RosPanel:
         rows = []
         for name in sorted(self.remote.pairs):
             pair = self.remote.pairs[name]
-            colour = "#37b24d" if pair.following else "#1971c2" if pair.selected else "#868e96"
+            colour = "#237032" if pair.following else "#1864ab" if pair.selected else "#5c636a"
             rows.append(
                 f"{badge('drives' if pair.following else 'selected' if pair.selected else 'idle', colour)} "
                 f"{escape(pair.leader)} → {escape(pair.follower)} "
-                f'<span style="color:#909296">{escape(pair.status or pair.current_state)}</span>'
+                f'<span class="ligature-quiet">{escape(pair.status or pair.current_state)}</span>'
             )
         words = "<br>".join(rows) or "no teleoperation; start <code>ligature teleop</code>"
         return f'<div id="pairs" style="font-size:12px;padding:2px 8px">{words}</div>'

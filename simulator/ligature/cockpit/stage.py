@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import ViserServer
 
+from ligature.cockpit.lighting import LightStage, distance_of_work
 from ligature.cockpit.looks import body_looks, thread_colour
 from ligature.cockpit.tissue import TissueStage
 from ligature.model.frames import pose7_matrix
 from ligature.model.poses import pose7_matrices
 from ligature.model.scene import ArmKind, Scene
+from ligature.model.state import new_state
 from ligature.render.thread import Tube
 from ligature.robots.fitting import base_pose, kinematics_of
 from ligature.robots.psm_arm import HOME
@@ -37,8 +39,12 @@ class Stage:
     def __init__(self, server: ViserServer, scene: Scene) -> None:
         self._server, self._scene = server, scene
         self._nodes = {
-            owner: server.scene.add_glb(f"/scene/{owner}", data) for owner, data in body_looks(scene).items()
+            owner: server.scene.add_glb(
+                f"/scene/{owner}", data, cast_shadow=not _rests(scene, owner), receive_shadow=_rests(scene, owner)
+            )
+            for owner, data in body_looks(scene).items()
         }
+        self._endoscope = [self._nodes[owner] for owner in endoscope(scene) if owner in self._nodes]
         self._owners = np.array(sorted(self._nodes), dtype=int)
         self._shown = np.full((len(self._owners), 7), np.inf)
         bodies = np.array([body.T_world_body for body in scene.bodies]).reshape(-1, 4, 4)
@@ -49,10 +55,12 @@ class Stage:
             self._threads.append(
                 server.scene.add_mesh_simple(
                     f"/threads/{rod.name}", surface.positions.astype(np.float32), surface.faces.astype(np.uint32),
-                    color=thread_colour(scene, rod.bodies[0]), side="double", cast_shadow=False,
+                    color=thread_colour(scene, rod.bodies[0]), side="double", receive_shadow=False,
                 )
             )  # fmt: skip
         self._tissues = TissueStage(server, scene)
+        begin = new_state(scene)
+        self._lights = LightStage(server, scene, distance_of_work(scene, begin, work_place(scene, begin)))
         self._rod_poses = [np.full((len(rod.bodies), 7), np.inf) for rod in scene.rods]
         self.sent = 0
 
@@ -62,7 +70,12 @@ class Stage:
         with self._server.atomic():
             self._move(poses[self._owners])
             self._bend(poses)
-            self.sent += self._tissues.update(state)
+            self.sent += self._tissues.update(state) + self._lights.update(state)
+
+    def show_endoscope(self, shown: bool) -> None:
+        """Show the endoscope's tube, or hide it: it may stand before what is worked on."""
+        for node in self._endoscope:
+            node.visible = shown
 
     def _move(self, poses: Array) -> None:
         moved = (np.abs(poses[:, :3] - self._shown[:, :3]).max(axis=1) > STILL) | (
@@ -83,6 +96,24 @@ class Stage:
                 T = pose7_matrices(poses[: len(self._scene.bodies)])
                 node.vertices = tube.triangles(T).positions.astype(np.float32)
                 self.sent += 1
+
+
+def _rests(scene: Scene, owner: int) -> bool:
+    """Whether shadows fall on a body; what moves casts them. Nothing does both: a shadow map is too coarse for it."""
+    return owner < len(scene.bodies) and scene.bodies[owner].static
+
+
+def endoscope(scene: Scene) -> set[int]:
+    """Indices of the bodies that carry cameras."""
+    parents = [camera.attachment.parent for camera in scene.cameras]
+    return {parent[1] for parent in parents if parent is not None and parent[0] == "body"}
+
+
+def work_place(scene: Scene, state: NDArray[np.void]) -> Array:
+    """Where the work is (3,): the middle of threads, else of what can move."""
+    loose = [*scene.rod_bodies] or [body.index for body in scene.bodies if not body.static]
+    places = state["body_pose"][0, loose, :3] if loose else np.zeros((1, 3))
+    return 0.5 * (np.min(places, axis=0) + np.max(places, axis=0))  # type: ignore[no-any-return]
 
 
 def first_view(scene: Scene, state: NDArray[np.void]) -> tuple[Array, Array, Array]:

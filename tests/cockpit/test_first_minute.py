@@ -1,0 +1,201 @@
+"""The first minute and the hands of a person with a real browser: one button, keys, a game pad, drags, hints, help."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from ligature.cockpit.hands import Sightline
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+from tests.cockpit.conftest import Person, Served, tip, until
+from tests.waiting import stays, steady
+
+pytestmark = pytest.mark.timeout(600)
+
+ARMS = ("PSM1", "PSM2")
+
+
+def sight(served: Served) -> Sightline:
+    """How the endoscope looks."""
+    return Sightline.of(served.scene.cameras[0], served.state["camera_world"][0])
+
+
+def ready(served: Served) -> bool:
+    return all(served.arm(name)["homed"] and not served.arm(name)["busy"] for name in ARMS)
+
+
+def element(person: Person, identity: str) -> Any:
+    return until(lambda: next(iter(person.driver.find_elements("id", identity)), None), identity)
+
+
+def shown(person: Person, identity: str) -> bool:
+    return any(one.is_displayed() for one in person.driver.find_elements("id", identity))
+
+
+def presses(person: Person, identity: str) -> None:
+    until(lambda: shown(person, identity), f"{identity} is shown")
+    person.driver.execute_script("arguments[0].click()", element(person, identity))
+
+
+def standing(served: Served, name: str = "PSM1") -> np.ndarray:
+    return np.asarray(steady(lambda: tip(served, name).copy(), 0.5, 1e-6, "the arm stands"))
+
+
+def holds(person: Person, key: str, until_: Callable[[], bool], what: str, shift: bool = False) -> None:
+    """Hold a key until something has happened."""
+    chain = ActionChains(person.driver)
+    (chain.key_down(Keys.SHIFT) if shift else chain).key_down(key).perform()
+    try:
+        until(until_, what, 30.0)
+    finally:
+        chain = ActionChains(person.driver).key_up(key)
+        (chain.key_up(Keys.SHIFT) if shift else chain).perform()
+
+
+@pytest.fixture
+def operator(served: Served, person: Person) -> Person:
+    """Somebody who has pressed Start; the camera's picture is small."""
+    if not person.driver.current_url.startswith(served.url):
+        person.opens(served.url)
+        presses(person, "lig-start")
+    until(lambda: ready(served), "instruments are ready")
+    until(lambda: shown(person, "lig-arm"), "hands are free")
+    standing(served)
+    return person
+
+
+def test_one_button_takes_control_powers_homes_and_brings_into_view(served: Served, person: Person) -> None:
+    person.opens(served.url)
+    until(lambda: shown(person, "lig-welcome"), "there is one thing to do")
+    presses(person, "lig-start")
+    person.sees("Give up control")
+    until(lambda: ready(served), "instruments are powered and homed")
+    until(lambda: not shown(person, "lig-welcome"), "the question goes away")
+    for name in ARMS:
+        place = sight(served).place(standing(served, name)[:3, 3])
+        assert np.abs(place).max() < 0.5, f"{name} is in the picture"
+    until(lambda: "hold W A S D" in element(person, "lig-hint").text, "a hint says what to do next")
+
+
+def test_a_key_moves_the_tip_as_long_as_it_is_held(served: Served, operator: Person) -> None:
+    begin = standing(served)
+    holds(operator, "d", lambda: np.linalg.norm((tip(served, "PSM1") - begin)[:3, 3]) > 0.004, "the tip moves")
+    end = standing(served)
+    stays(lambda: np.abs(tip(served, "PSM1") - end).max() < 1e-6, "it stands when the key is up", 0.5)
+    holds(operator, "a", lambda: np.linalg.norm((tip(served, "PSM1") - end)[:3, 3]) > 0.004, "it goes back")
+    way, back = (end - begin)[:3, 3], (standing(served) - end)[:3, 3]
+    assert way @ back < -0.95 * np.linalg.norm(way) * np.linalg.norm(back)
+    assert end[:3, :3] == pytest.approx(begin[:3, :3], abs=2e-3), "it does not turn"
+
+
+def test_shift_turns_the_tip_and_x_opens_the_jaw(served: Served, operator: Person) -> None:
+    begin = standing(served)
+    holds(operator, "e", lambda: bool(np.trace(tip(served, "PSM1")[:3, :3].T @ begin[:3, :3]) < 2.98), "it turns", True)
+    assert standing(served)[:3, 3] == pytest.approx(begin[:3, 3], abs=1e-3), "where it is"
+    before = float(served.arm("PSM1")["jaw_setpoint_js"][0])
+    holds(operator, "x", lambda: served.arm("PSM1")["jaw_setpoint_js"][0] > before + 0.1, "the jaw opens")
+    jaw = float(steady(lambda: np.array(served.arm("PSM1")["jaw_setpoint_js"][0]), 0.5, 1e-6, "the jaw stands"))
+    assert jaw < 1.3, "it does not go on to its end"
+
+
+def test_keys_in_a_field_are_text(served: Served, operator: Person) -> None:
+    begin = standing(served)
+    operator.writes("Record as", "wasd")
+    stays(lambda: np.abs(tip(served, "PSM1") - begin).max() < 1e-6, "nothing moves", 0.5)
+
+
+def test_arrow_keys_step_a_slider_by_a_degree(served: Served, operator: Person) -> None:
+    slider = operator.slider("roll °")
+    before = float(served.arm("PSM1")["setpoint_js"][0, 3])
+    for _ in range(5):
+        slider.send_keys(Keys.ARROW_RIGHT)
+    until(lambda: served.arm("PSM1")["setpoint_js"][0, 3] - before > np.deg2rad(3.0), "the joint moves")
+    standing(served)
+    assert 3.5 < np.rad2deg(served.arm("PSM1")["setpoint_js"][0, 3] - before) < 6.5
+
+
+def test_n_takes_the_next_arm(served: Served, operator: Person) -> None:
+    before = element(operator, "lig-arm").text
+    ActionChains(operator.driver).send_keys("n").perform()
+    until(lambda: element(operator, "lig-arm").text not in ("", before), "another arm is selected")
+    ActionChains(operator.driver).send_keys("n").perform()
+    until(lambda: element(operator, "lig-arm").text == before, "and the first again")
+
+
+def test_a_game_pad_moves_the_tip(served: Served, operator: Person) -> None:
+    begin = standing(served)
+    operator.driver.execute_script(
+        "const b = Array.from({length: 16}, () => ({value: 0, pressed: false}));"
+        "window.stick = [0, 0.9, 0.05, 0]; navigator.getGamepads = () => [{connected: true, axes: window.stick, buttons: b}]"
+    )
+    moved = until(lambda: np.linalg.norm((tip(served, "PSM1") - begin)[:3, 3]) > 0.003, "the stick moves the tip")
+    operator.driver.execute_script("window.stick = [0.1, -0.1, 0.1, 0]")
+    end = standing(served)
+    assert moved
+    assert end[:3, :3] == pytest.approx(begin[:3, :3], abs=2e-3), "a stick at rest is never quite in the middle"
+    operator.driver.execute_script("delete navigator.getGamepads")
+
+
+def test_a_drag_in_the_picture_takes_the_tip_along(served: Served, operator: Person) -> None:
+    presses(operator, "lig-swap")
+    size = "const i = document.getElementById('lig-image'); return i.naturalHeight ? [i.naturalWidth, i.naturalHeight] : null"
+    until(lambda: (operator.driver.execute_script(size) or [900])[0] < 900, "one eye's picture is large")
+    try:
+        box = operator.driver.execute_script(
+            "const r = document.getElementById('lig-image').getBoundingClientRect(); return [r.x, r.y, r.width, r.height]"
+        )
+        # the picture fits its box as a whole
+        wide, high = until(lambda: operator.driver.execute_script(size), "the size of the picture")
+        shown_high = min(box[3], box[2] * high / wide)
+        begin, view = standing(served), sight(served)
+        place = view.place(begin[:3, 3])
+        x, y = box[0] + box[2] / 2 + place[0] * shown_high, box[1] + box[3] / 2 - place[1] * shown_high
+        way = np.array([40.0, 30.0])
+        operator.holds_at(x, y, [(10, 10), (30, 20)])
+        operator.lets_go()
+        until(lambda: np.linalg.norm((tip(served, "PSM1") - begin)[:3, 3]) > 1e-3, "the tip moves")
+        end = standing(served)
+        moved = (view.place(end[:3, 3]) - place) * shown_high * [1, -1]
+        assert moved == pytest.approx(way, abs=4.0), "by as many pixels as the pointer"
+        assert view.depth(end[:3, 3]) == pytest.approx(view.depth(begin[:3, 3]), abs=1e-3)
+    finally:
+        presses(operator, "lig-swap")
+
+
+def test_hints_go_away_for_good(served: Served, operator: Person) -> None:
+    operator.driver.execute_script("localStorage.removeItem('ligature_hints')")
+    operator.driver.refresh()
+    operator.sees("Give up control")
+    until(lambda: shown(operator, "lig-hints"), "a hint is shown")
+    presses(operator, "lig-hints-off")
+    until(lambda: not shown(operator, "lig-hints"), "it goes")
+    operator.driver.refresh()
+    operator.sees("Give up control")
+    until(lambda: shown(operator, "lig-arm"), "the page is there")
+    stays(lambda: not shown(operator, "lig-hints"), "and does not come back", 1.0)
+
+
+def test_a_question_mark_shows_all_keys_and_escape_ends_it(operator: Person) -> None:
+    ActionChains(operator.driver).send_keys("?").perform()
+    until(lambda: shown(operator, "lig-help"), "the help is open")
+    for words in ("move the tip left, right", "Game pad", "Behind the clock"):
+        assert words in element(operator, "lig-help").text
+    inside = "return document.getElementById('lig-help').contains(document.activeElement)"
+    assert operator.driver.execute_script(inside), "the focus is in it"
+    ActionChains(operator.driver).send_keys(Keys.ESCAPE).perform()
+    until(lambda: not shown(operator, "lig-help"), "it closes")
+
+
+def test_the_theme_is_light_or_dark_and_kept(served: Served, operator: Person) -> None:
+    scheme = "return document.documentElement.dataset.mantineColorScheme"
+    assert operator.driver.execute_script(scheme) == "dark"
+    presses(operator, "lig-theme")
+    until(lambda: operator.driver.execute_script(scheme) == "light", "it is light")
+    operator.driver.refresh()
+    until(lambda: operator.driver.execute_script(scheme) == "light", "it is light after a reload")
+    presses(operator, "lig-theme")
+    until(lambda: operator.driver.execute_script(scheme) == "dark", "it is dark again")
