@@ -144,3 +144,39 @@ def test_pages_name_the_wheel_of_this_version() -> None:
         for version in re.findall(r"ligature_sim-(\d[\w.]*)-py3", path.read_text())
     }
     assert named and {version for _, version in named} == {ligature.__version__}, named
+
+
+IMPORTED = {
+    "learn": ("gymnasium", "h5py", "ligature.environments"),
+    "lerobot": ("h5py", "pyarrow.parquet", "av", "ligature.datasets.lerobot"),
+    "train": ("torch", "stable_baselines3", "onnx", "onnxscript", "onnxruntime"),
+    "cockpit": ("viser", "websockets", "ligature.cockpit.page"),
+    "convert": ("yourdfpy", "mujoco"),
+}
+"""What each extra for users brings, as it is imported."""
+
+
+def test_every_extra_for_users_is_imported_by_the_test_of_newest_packages() -> None:
+    assert set(IMPORTED) == {name for name, packages in EXTRAS.items() if packages} - {"dev"}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)  # some gigabytes to fetch and unpack
+def test_the_newest_packages_that_the_bounds_allow_work_together(distributions: Path, tmp_path: Path) -> None:
+    """As pip installs them for a stranger today; a package may want another of a version that pip does not know of."""
+    python = tmp_path / "venv" / "bin" / "python"
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "venv")], check=True)
+    wheel = next(distributions.glob("*.whl"))
+    wanted = f"{wheel}[{','.join(IMPORTED)}]"
+    done = subprocess.run([python, "-m", "pip", "install", "-q", wanted], capture_output=True, text=True)
+    if done.returncode and "No matching distribution" in done.stderr:
+        pytest.skip(f"the index cannot be reached: {done.stderr[-300:]}")
+    assert done.returncode == 0, done.stderr
+    for module in (module for modules in IMPORTED.values() for module in modules):
+        subprocess.run([python, "-c", f"import {module}"], cwd=tmp_path, check=True)
+    example = ROOT / "examples" / "record_experts.py"
+    recorded = [python, str(example), "reach.h5", "--task", "reach", "--episodes", "2"]
+    subprocess.run(recorded, cwd=tmp_path, check=True)
+    ligature_command = tmp_path / "venv" / "bin" / "ligature"
+    subprocess.run([ligature_command, "dataset", "export", "reach.h5", "reach"], cwd=tmp_path, check=True)
+    assert list((tmp_path / "reach").rglob("*.parquet"))

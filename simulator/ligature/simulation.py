@@ -241,7 +241,10 @@ class Simulation:
         self._resting: dict[int, int] = {}
         """Subsystems that are left out, by their number, and the tick from which each goes on."""
         self._reported: dict[tuple[str, str], int] = {}
-        self._phases = [(self.phases[phase], subsystems) for phase, subsystems in self._tick.items()]
+        self._phases = [
+            (self.phases[phase], [s for s in subsystems if type(s).step is not Subsystem.step])
+            for phase, subsystems in self._tick.items()
+        ]
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._handlers: dict[type[Message], Callable[[Any], None]] = {

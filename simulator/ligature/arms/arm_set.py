@@ -65,7 +65,10 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         try:
             act(*arguments)
         except Exception as error:
-            arm.fault(f"{what} failed: {_words(error)}")
+            self._fault(what, arm, error)
+
+    def _fault(self, what: str, arm: Arm, error: Exception) -> None:
+        arm.fault(f"{what} failed: {_words(error)}")
 
     def release(self, index: int) -> None:
         """Whoever commanded an arm is gone: it stays where it is."""
@@ -78,7 +81,10 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def step(self, tick: int) -> None:
         """Advance all arms by a tick."""
         for arm in self._arms:
-            self._guarded("motion", arm, arm.tick, self._dt)
+            try:  # here and not in `_guarded`: it is done every tick
+                arm.tick(self._dt)
+            except Exception as error:
+                self._fault("motion", arm, error)
         if (tick + 1) % WATCH_PERIOD == 0:
             for arm in self._arms:
                 self._guarded("following-error check", arm, arm.watch, WATCH_PERIOD * self._dt)

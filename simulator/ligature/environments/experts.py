@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.environments.goals import Insert
+from ligature.environments.goals import Insert, holds
 from ligature.environments.suturing import STEP_ANGLE, STEP_JAW, STEP_LENGTH, SuturingEnv
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.robots.poses import rotation_vector
@@ -19,6 +19,9 @@ from ligature.tasks.throws import UP, NeedleArc, best_grasp
 Array = NDArray[np.float64]
 OPEN, SHUT = 0.8, -0.34
 """Angles of the jaw."""
+
+TRIES = 3
+"""How often an expert goes for the needle."""
 
 
 class Hand:
@@ -84,10 +87,25 @@ class Hand:
 
     def take(self, T: Array) -> Iterator[Array]:
         """Close the jaws at a pose of the tool, from above."""
-        above = frame(np.eye(3), -0.015 * T[:3, 2]) @ T
-        yield from self.go(above, OPEN)
+        yield from self.go(_above(T), OPEN)
         yield from self.go(T, OPEN)
         yield from self.stay(20, SHUT)
+
+    def fetch(self) -> Iterator[Array]:
+        """Grasp the needle; a thread that falls off the pad's edge may turn it meanwhile."""
+        for _ in range(TRIES):
+            T = self.grasp()
+            T_arc_tool = inverse(self.needle_arc) @ T
+            yield from self.go(_above(T), OPEN)
+            yield from self.take(self.needle_arc @ T_arc_tool)
+            if holds(self.simulation, self.arm, self.needle):
+                return
+            yield from self.go(self.moved(z=0.015), OPEN)
+
+
+def _above(T: Array) -> Array:
+    """The pose from which the tool goes straight to ``T``."""
+    return frame(np.eye(3), -0.015 * T[:3, 2]) @ T
 
 
 Policy = Callable[[Hand, Array], Iterator[Array]]
@@ -102,7 +120,7 @@ def reach(hand: Hand, observation: Array) -> Iterator[Array]:
 
 def pick(hand: Hand, observation: Array) -> Iterator[Array]:
     """Grasp the needle, lift it, hold it."""
-    yield from hand.take(hand.grasp())
+    yield from hand.fetch()
     yield from hand.go(hand.moved(z=0.045), SHUT)
     yield from hand.stay(60, SHUT)
 

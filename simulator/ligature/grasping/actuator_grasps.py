@@ -19,6 +19,9 @@ class ActuatorGrasps:
         self._grasps: dict[int, tuple[BodyGrasp, float]] = {}
         self._added = 0
 
+    def __len__(self) -> int:
+        return len(self._grasps)
+
     @property
     def grasps(self) -> list[BodyGrasp]:
         """All grasps, oldest first."""

@@ -99,6 +99,9 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._fingers = [Fingers(jaw, world) for jaw in scene.jaws]
         tree_of = {link.body: tree for tree in scene.articulations for link in tree.links}
         self._own = [{link.body for link in tree_of[jaw.palm].links} for jaw in scene.jaws]
+        free = {body.index for body in scene.bodies if not body.static}
+        self._idle = [not rods.rods and not free - own for own in self._own]
+        """Jaws for which there is nothing to grasp."""
         self._actuators = [[a.index for a in scene.actuators if a.parent in own] for own in self._own]
         self._jaw_grasps: list[JawGrasp | None] = [None for _ in scene.jaws]
         self._thread_grasps: list[thread_grasps.ThreadGrasp | None] = [None for _ in scene.jaws]
@@ -156,9 +159,12 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
                 self._keep(index, held)
             elif thread is not None:
                 self._keep_thread(index, thread)
+            elif self._idle[index]:
+                continue
             elif self._near[index] or ((tick + index) % SEARCH_PERIOD == 0 and self._fingers[index].driven()):
                 self._search(index)
-        self._exchange_impulses()
+        if self._actuator_grasps or any(held is not None for held in self._jaw_grasps):
+            self._exchange_impulses()
 
     def _search(self, index: int) -> None:
         """Close gently on the nearest body between the fingers; grasp it when both pads touch it."""

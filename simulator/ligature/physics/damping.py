@@ -25,6 +25,8 @@ class Damping:
 
     def step(self) -> None:
         """Slow them down by a tick's part."""
+        if not self._places:
+            return
         if self._motions.handle:
             slow_down(self._motions.handle, self._motions.table, self._trees, self._factors)
         else:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import KeysView
+from collections.abc import Set
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,46 +21,51 @@ class Impulses:
 
     def __init__(self, engine: Engine, commands: BodyCommands) -> None:
         self._engine, self._commands = engine, commands
-        self._total: dict[int, Array] = {}
+        self._total = np.zeros((len(engine.scene.bodies), 6))
+        self._bodies: set[int] = set()
 
     @property
-    def bodies(self) -> KeysView[int]:
+    def bodies(self) -> Set[int]:
         """The bodies that impulses act on in the coming tick so far."""
-        return self._total.keys()
+        return self._bodies
 
     def apply(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) and ``moment`` (3,).
 
         A driven body feels it and moves as commanded.
         """
-        total, given = self._total.get(body), np.concatenate([impulse, moment])
-        self._total[body] = given if total is None else total + given
+        total = self._total[body]
+        if body not in self._bodies:
+            self._bodies.add(body)
+            total[:] = 0.0
+        total[:3] += impulse
+        total[3:] += moment
         if self._commands.pushable(body):
-            self._load(body, given / self._engine.dt)
+            self._load(body, impulse, moment)
 
-    def _load(self, body: int, wrench: Array) -> None:
+    def _load(self, body: int, impulse: Array, moment: Array) -> None:
         engine, motions = self._engine, self._engine.motions
         if motions.handle:
-            load_body(motions.handle, motions.table, engine.place_table, body, wrench)
+            load_body(motions.handle, motions.table, engine.place_table, body, impulse, moment, engine.dt)
         else:
-            engine.place_of[body].load(wrench.tolist())
+            engine.place_of[body].load((np.concatenate([impulse, moment]) / engine.dt).tolist())
 
     def pending(self, body: int) -> Array:
         """Impulse and moment (6,) that act in the coming tick so far."""
-        return self._total.get(body, np.zeros(6))
+        return self._total[body].copy() if body in self._bodies else np.zeros(6)
 
     def clear(self) -> None:
         """A tick begins."""
-        self._total.clear()
+        self._bodies.clear()
 
-    def snapshot(self) -> dict[str, dict[int, Array]]:
+    def snapshot(self) -> dict[str, Any]:
         """What lasts from tick to tick."""
         return kept(self, _KEPT)
 
-    def restore(self, snapshot: dict[str, dict[int, Array]]) -> None:
+    def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
         put_back(self, snapshot)
 
 
-_KEPT = ("_total",)
+_KEPT = ("_total", "_bodies")
 """Attributes that last from tick to tick."""

@@ -247,12 +247,17 @@ def read_bodies(handle: int, tree_table: Integers, place_table: Integers, bodies
 
 
 @kernel
-def load_body(handle: int, tree_table: Integers, place_table: Integers, body: int, wrench: Array) -> None:
-    """Apply force and torque (6,) at the centre of mass of a body in the coming tick."""
+def load_body(
+    handle: int, tree_table: Integers, place_table: Integers, body: int, impulse: Array, moment: Array, dt: float
+) -> None:
+    """Apply the force and torque that have an ``impulse`` (3,) and ``moment`` (3,) in the coming tick of ``dt``.
+
+    The force acts at the centre of mass of the body.
+    """
     trees, places = open_trees(tree_table), open_places(place_table)
     bring_up(handle, trees, places.tree[body], places.link[body] >= 0)
-    for a in range(6):
-        trees.wanted[a] = wrench[a]
+    for a in range(3):
+        trees.wanted[a], trees.wanted[3 + a] = impulse[a] / dt, moment[a] / dt
     submit(handle, _push(handle, trees, places, body))
     command = init_forces(handle)  # a command of its own: Bullet puts the second of two over the first
     add_torque(command, places.uid[body], places.link[body], trees.wanted_at[0] + 24, WORLD_FRAME)

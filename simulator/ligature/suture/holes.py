@@ -111,13 +111,14 @@ class Holes:
         self._mobile = self._sites.recoil.any(axis=(1, 2))
         self._countdown = 0
         self._turn = -1
-        self._idle = not scene.holes or not (self._needles or self._rods)
+        self.idle = not scene.holes or not (self._needles or self._rods)
+        """Whether nothing can ever be in a hole."""
 
     # --- the tick ---------------------------------------------------------------------------
 
     def begin(self) -> None:
         """Find and follow passages, before the rods advance."""
-        if self._idle:
+        if self.idle:
             return
         if self._countdown > 0:
             self._countdown -= 1
@@ -131,6 +132,8 @@ class Holes:
     def end(self) -> None:
         """Solve needles without a rod and apply the reactions to the holes, after the rods have advanced."""
         p = self._passages
+        if not p.filled[0]:
+            return
         for c in range(p.filled[0]):
             path = int(p.path[c])
             if p.owner[c] < 0 and path not in p.path[:c]:

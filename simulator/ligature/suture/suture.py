@@ -20,9 +20,12 @@ class Suture(Subsystem):
         self._bodies = bodies
         self.rods = Rods(scene, dt)
         self.holes = Holes(scene, self.rods, bodies, dt)
+        self._idle = not self.rods.rods and self.holes.idle
 
     def step(self, tick: int) -> None:
         """Exchange impulses between rods, holes and bodies; the coming step of the bodies moves by them."""
+        if self._idle:
+            return
         self.holes.begin()
         self.rods.step(self._bodies)
         self.holes.end()

@@ -91,7 +91,10 @@ def _core(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
     yield Column("action", motors, action)
     yield Column("delta_action", motors, action - now)
     poses = [(arm["local_setpoint_cp"][:], arm["local_action_cp"][:], arm["jaw/action_js"][:][:, None]) for arm in arms]
-    absolute = np.concatenate([np.hstack([after, jaw]) for _, after, jaw in poses], axis=1)
+    tips = [one_sign(arm["local_measured_cp"][:]) for arm in arms]
+    absolute = np.concatenate(
+        [np.hstack([one_sign(after, tip[0]), jaw]) for (_, after, jaw), tip in zip(poses, tips, strict=True)], axis=1
+    )
     yield Column("cartesian_action", robot.each((*POSE, "jaw")), absolute)
     steps = [_step(before, after) for before, after, _ in poses]
     yield Column("cartesian_delta_action", robot.each(TURN), np.concatenate(steps, axis=1))
@@ -103,8 +106,8 @@ def _more(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
     yield Column("observation.setpoint", motors, _motors(arms, "setpoint_js", 0))
     yield Column("observation.velocity", motors, _motors(arms, "measured_js", 1))
     yield Column("observation.effort", motors, _motors(arms, "measured_js", 2))
-    tips = np.concatenate([arm["local_measured_cp"][:] for arm in arms], axis=1)
-    yield Column("observation.cartesian", robot.each(POSE), tips)
+    tips = [one_sign(arm["local_measured_cp"][:]) for arm in arms]
+    yield Column("observation.cartesian", robot.each(POSE), np.concatenate(tips, axis=1))
     forces = np.concatenate([arm["spatial_measured_cf"][:] for arm in arms], axis=1)
     yield Column("observation.meta.force_torque", robot.each(WRENCH), forces)
     pressed = np.stack([arm["jaw/force"][:] for arm in arms], axis=1)
@@ -114,7 +117,7 @@ def _more(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
 def _ground_truth(episode: h5py.Group) -> Iterator[Column]:
     if "needle" in episode:
         needle = episode["needle"]
-        yield Column("ground_truth.needle_pose", POSE, needle["pose"][:])
+        yield Column("ground_truth.needle_pose", POSE, one_sign(needle["pose"][:]))
         yield Column("ground_truth.needle_twist", ("vx", "vy", "vz", "wx", "wy", "wz"), needle["twist"][:])
         yield Column("ground_truth.needle_force", ("fx", "fy", "fz"), needle["tissue_force"][:])
     if "thread" in episode:
@@ -141,6 +144,19 @@ def _motors(arms: Sequence[h5py.Group], name: str, row: int) -> NDArray[Any]:
 
 def _joined(arms: Sequence[h5py.Group], name: str, jaw: str) -> NDArray[Any]:
     return np.concatenate([part for arm in arms for part in (arm[name][:], arm[jaw][:][:, None])], axis=1)
+
+
+def one_sign(poses: NDArray[Any], near: NDArray[Any] | None = None) -> NDArray[Any]:
+    """Poses (n, 7) whose quaternions do not leap between their two signs, which mean the same turn.
+
+    The first has the sign nearer to the pose ``near`` (7,), or without one that with its largest number positive.
+    """
+    q = poses[:, 3:]
+    first = q[0] @ near[3:] if near is not None else q[0, np.argmax(np.abs(q[0]))]
+    along = np.concatenate([[first], np.sum(q[1:] * q[:-1], axis=1)])
+    out = poses.copy()
+    out[:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, None]
+    return out
 
 
 def _step(before: NDArray[Any], after: NDArray[Any]) -> NDArray[Any]:
