@@ -8,6 +8,7 @@ SCENE  ?= scenes/suturing/launch.yaml
 MUTANTS ?= 100000
 READERS ?= 100000
 SCENES ?= 10000
+PATHS ?= 200
 RELEASES ?= 100
 COMMANDS ?= 1000000
 KILLS ?= 200
@@ -89,6 +90,7 @@ fuzz: developers
 	$(PYTHON) -m tests.fuzz.run --mutants $(MUTANTS)
 	$(PYTHON) -m tests.fuzz.run --scenes $(SCENES)
 	$(PYTHON) -m tests.fuzz.run --readers $(READERS)
+	$(PYTHON) -m tests.fuzz.run --paths $(PATHS)
 	$(PYTHON) -m tests.fuzz.release --trials $(RELEASES)
 	$(PYTHON) -m tests.fuzz.commands --commands $(COMMANDS)
 	$(PYTHON) -m tests.fuzz.kills --kills $(KILLS)

@@ -76,6 +76,7 @@ CACHES: dict[str, str] = {
     "Rod.springs": "written by every tick that tissue takes part in",
     # soft tissue
     "ElasticGrid._responses": "follows from the grid",
+    "Field.found": "counts how often boxes were found",
     "ElasticGrid._bulk": "what of it lasts are attributes of the grid, too",
     "ScenePiercer._mount": "what of it lasts are attributes of the needle, too",
     **dict.fromkeys(
@@ -119,11 +120,18 @@ CACHES: dict[str, str] = {
             "Contacts.solve",
             "Contacts.overflow",
             "Parts.live",
+            "Parts.known",
             "Parts.R",
             "Parts.centre",
-            *(f"Around.{name}" for name in ("pose", "twist", "light", "moments", "kept", "inside", "read", "turn")),
+            *(
+                f"Around.{name}"
+                for name in ("light", "moments", "kept", "inside", "read", "wanted", "motion", "pushed")
+            ),
+            "Around.turn",
             "FrameArrays.turn",
             "ScenePiercer.spring",
+            "ScenePiercer.met",
+            "Piece._motion",
             "SceneThread._run",
             "SceneThread._holds",
         ),

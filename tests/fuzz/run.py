@@ -1,7 +1,8 @@
 """Runs mutants, or generated scenes, in worker processes: ``python -m tests.fuzz.run --mutants 100000 --jobs 2``.
 
 A mutant must end, within a time limit, accepted or with findings that name their place; a scene, with
-``--scenes 10000``, must run a second as `tests.fuzz.simulate` states. Any other exception, a hang or a crash of the
+``--scenes 10000``, must run a second as `tests.fuzz.simulate` states; a needle, with ``--paths 200``, must get through
+tissue as `tests.fuzz.paths` states. Any other exception, a hang or a crash of the
 process is a failure; its files are kept in ``build/fuzz``. Mutant and scene N are the same in every run, so that
 ``--first N --mutants 1`` repeats one.
 """
@@ -117,6 +118,21 @@ def try_scene(folder: Path, number: int, attempt: Attempt | None) -> str:
     return simulate(folder, number)
 
 
+def path_files(number: int) -> dict[str, bytes]:
+    """What a path of a needle through tissue is, in words."""
+    from tests.fuzz.paths import drive
+
+    return {"path.txt": f"{drive(number)}\n".encode()}
+
+
+def try_path(folder: Path, number: int, attempt: Attempt | None) -> str:
+    """Drive a needle through tissue."""
+    from tests.fuzz.paths import drive, fault_of
+
+    fault = fault_of(drive(number))
+    return f"failure: {fault}" if fault else "sound"
+
+
 @dataclass(frozen=True)
 class Campaign:
     """A kind of cases: what they go through, their files, and what they are called in figures and reports."""
@@ -135,6 +151,7 @@ READERS = Campaign(
     lambda number: readers.mutant(number)[0].kind,
 )
 SCENES = Campaign(try_scene, scene_files, "scene", lambda number: "scene")
+PATHS = Campaign(try_path, path_files, "path", lambda number: "path")
 
 
 def work(connection: Connection, folder: str, trial: Trial, attempt: Attempt | None) -> None:
@@ -280,6 +297,7 @@ def main() -> int:
     kind.add_argument("--mutants", type=int, default=100_000)
     kind.add_argument("--scenes", type=int, help="generated scenes, instead of mutants")
     kind.add_argument("--readers", type=int, help="mutants of files that are no scenes, instead of mutants of scenes")
+    kind.add_argument("--paths", type=int, help="paths of needles through tissue, instead of mutants")
     flags.add_argument("--first", type=int, default=0, help="number of the first one")
     flags.add_argument("--jobs", type=int, default=2, help="worker processes")
     given = flags.parse_args()
@@ -288,6 +306,17 @@ def main() -> int:
         cases, outcome = (
             given.readers,
             run(given.readers, given.first, given.jobs, campaign=READERS, log=sys.stderr.write),
+        )
+    elif given.paths is not None:
+        cases = given.paths
+        outcome = run(
+            cases,
+            given.first,
+            given.jobs,
+            limit=SCENE_LIMIT,
+            campaign=PATHS,
+            chunk=SCENE_CHUNK,
+            log=sys.stderr.write,
         )
     elif given.scenes is None:
         cases, outcome = given.mutants, run(given.mutants, given.first, given.jobs, log=sys.stderr.write)
@@ -304,7 +333,8 @@ def main() -> int:
         )
     ended = ", ".join(f"{key} {count}" for key, count in sorted(outcome.ended.items()))
     seconds = time.monotonic() - begin
-    noun = "files" if given.readers is not None else "mutants" if given.scenes is None else "scenes"
+    kinds = {"files": given.readers, "scenes": given.scenes, "paths": given.paths}
+    noun = next((name for name, count in kinds.items() if count is not None), "mutants")
     sys.stdout.write(f"{cases} {noun} in {seconds:.0f} s: {ended}; {len(outcome.failures)} failures\n")
     return int(bool(outcome.failures))
 

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from ligature.kernels import compiled
+from ligature.kernels import kernel
 
 Array = NDArray[np.float64]
 
 BOX, SPHERE, CYLINDER, CAPSULE, CONE, HULL, HALF_SPACE = range(7)
 
 
-@compiled
+@kernel
 def signed_distance(kind: int, size: Array, planes: Array, p: Array, normal: Array) -> float:
     """Distance of ``p`` (3,) to the shape; its outward direction is written to ``normal`` (3,)."""
     if kind == SPHERE:
@@ -41,7 +41,7 @@ def signed_distance(kind: int, size: Array, planes: Array, p: Array, normal: Arr
     return best
 
 
-@compiled
+@kernel
 def _radial(x: float, y: float, z: float, radius: float, normal: Array) -> float:
     length = (x * x + y * y + z * z) ** 0.5
     if length < 1e-15:
@@ -51,7 +51,7 @@ def _radial(x: float, y: float, z: float, radius: float, normal: Array) -> float
     return length - radius
 
 
-@compiled
+@kernel
 def _box(size: Array, p: Array, normal: Array) -> float:
     square = 0.0
     deepest, axis = -1e30, 0
@@ -72,7 +72,7 @@ def _box(size: Array, p: Array, normal: Array) -> float:
     return deepest
 
 
-@compiled
+@kernel
 def _cylinder(size: Array, p: Array, normal: Array) -> float:
     r = (p[0] * p[0] + p[1] * p[1]) ** 0.5
     ux, uy = (p[0] / r, p[1] / r) if r > 1e-15 else (1.0, 0.0)
@@ -89,7 +89,7 @@ def _cylinder(size: Array, p: Array, normal: Array) -> float:
     return axial
 
 
-@compiled
+@kernel
 def _cone(size: Array, p: Array, normal: Array) -> float:
     r = (p[0] * p[0] + p[1] * p[1]) ** 0.5
     ux, uy = (p[0] / r, p[1] / r) if r > 1e-15 else (1.0, 0.0)

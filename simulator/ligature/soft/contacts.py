@@ -36,32 +36,32 @@ MAX_WAIT = 64
 
 
 class Around(NamedTuple):
-    """B bodies around a block as they were last read, in world axes; row 0 is the block's own rigid body."""
+    """B bodies around a block, in world axes; row 0 is the block's own rigid body."""
 
-    pose: Array  # (B, 7) of the inertial frame
-    twist: Array  # (B, 6)
+    body: Integers  # (B,) in the scene
     light: Array  # (B,) 1 / kg
     moments: Array  # (B, 3) principal
     radius: Array  # (B,) of its parts about the centre of mass
     due: Integers  # (B,) ticks until it is looked at
     kept: Flags  # (B,) touches the tissue
     inside: Flags  # (B,) a needle that is in the tissue
-    read: Integers  # (B,) rows that are to be read in this tick
+    read: Integers  # (B,) rows that are looked at in this tick
+    wanted: Integers  # (B,) the bodies of these rows, and the block's own after them
+    motion: Array  # (B, 13) their poses (7,) and twists (6,)
+    pushed: Integers  # (B,) rows that the tissue pushes
     turn: Array  # (2, 3, 3) scratch
 
 
-def _around(bodies: int) -> Around:
-    B, z = bodies, np.zeros
+def _around(bodies: list[int]) -> Around:
+    B, z = len(bodies), np.zeros
     i = lambda: np.zeros(B, np.int64)  # noqa: E731
-    around = Around(
-        z((B, 7)), z((B, 6)), z(B), np.ones((B, 3)), z(B), i(), np.zeros(B, np.bool_), np.zeros(B, np.bool_), i(),
-        z((2, 3, 3)),
+    return Around(
+        np.array(bodies, dtype=np.int64), z(B), np.ones((B, 3)), z(B), i(), np.zeros(B, np.bool_),
+        np.zeros(B, np.bool_), i(), i(), z((B, 13)), i(), z((2, 3, 3)),
     )  # fmt: skip
-    around.pose[:, 6] = 1.0
-    return around
 
 
-open_around = opener(_around(1))
+open_around = opener(_around([0]))
 
 
 class BodyContacts:
@@ -83,11 +83,11 @@ class BodyContacts:
         placed = {link.body for tree in scene.articulations for link in tree.links} - excluded
         self.listed = [b.index for b in scene.bodies if b.colliders and b.index in placed]
         self._piercers = [(self.listed.index(p.body.index) + 1, p) for p in piercers if p.body.index in self.listed]
-        self._around = _around(len(self.listed) + 1)
-        grid, fixed = block.elastic.grid, block.elastic.row < 0
+        self._around = _around([own, *self.listed])
+        self._static = [True, *(scene.bodies[b].static for b in self.listed)]
         self._contacts = Contacts(
             arrays.touching(), arrays.partners(len(self.listed) + 1), self._gather(scene), arrays.scratch(),
-            ~fixed[grid.faces].all(axis=1), np.zeros(1, np.int64),
+            np.zeros(1, np.int64),
         )  # fmt: skip
         self._touching = self._contacts.touching
         self._contacts.partners.friction[1:] = [
@@ -115,6 +115,7 @@ class BodyContacts:
         parts = arrays.parts(len(rows), int(ends[-1]))
         for k, (body, T, kind, size, planes, box) in enumerate(rows):
             parts.body[k], parts.local[k], parts.kind[k], parts.size[k] = body, T, kind, size
+            parts.still[k] = self._static[body]
             parts.plane_range[k] = ends[k], ends[k + 1]
             parts.planes[ends[k] : ends[k + 1]] = planes
             parts.middle[k], parts.half[k] = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0])
@@ -130,33 +131,32 @@ class BodyContacts:
         count = choose(contacts, around)
         if not count:
             return
-        self._read(self._around.read[:count].tolist())
-        if meet(tissue, contacts, around, frame.table, count, self._dt):
-            self._push()
+        self._read(count)
+        pushed = meet(tissue, contacts, around, frame.table, count, self._dt)
+        if pushed:
+            self._push(self._around.pushed[:pushed].tolist())
 
-    def _read(self, rows: list[int]) -> None:
+    def _read(self, count: int) -> None:
         """Read the motion of the bodies that are looked at, and how light they are."""
         around, bodies = self._around, self._bodies
         for row, piercer in self._piercers:
             self._contacts.partners.tip[row], around.inside[row] = piercer.tip, piercer.engaged
-        for row in rows:
-            index = self.listed[row - 1]
-            around.pose[row], around.twist[row] = bodies.motion(index)
-            if self._scene.bodies[index].static or bodies.driven(index):
-                around.light[row] = 0.0
-            else:
-                mass, around.moments[row] = bodies.masses.mass_of(index)
-                around.light[row] = 1.0 / mass
+        bodies.read_motions(around.wanted[: count + 1], around.motion[: count + 1])
+        for row in around.read[:count].tolist():
+            if not self._static[row]:
+                self._read_mass(row, self.listed[row - 1])
         # The tissue's own rigid body recoils where nothing but gravity holds it.
         if self._own_free:
-            around.pose[0], around.twist[0] = bodies.motion(self._own)
-            mass, around.moments[0] = bodies.masses.mass_of(self._own)
-            around.light[0] = 0.0 if bodies.driven(self._own) else 1.0 / mass
+            self._read_mass(0, self._own)
 
-    def _push(self) -> None:
+    def _read_mass(self, row: int, body: int) -> None:
+        mass, self._around.moments[row] = self._bodies.masses.mass_of(body)
+        self._around.light[row] = 0.0 if self._bodies.driven(body) else 1.0 / mass
+
+    def _push(self, rows: list[int]) -> None:
         """Push the bodies by what the tissue does to them."""
         push = self._contacts.partners.push
-        for row in np.flatnonzero(push.any(axis=1)).tolist():
+        for row in rows:
             impulse, body = self._dt * push[row], self.listed[row - 1] if row else self._own
             if row or not self._scene.bodies[body].static:
                 self._bodies.apply_impulse(body, impulse[:3], impulse[3:])
@@ -192,7 +192,7 @@ class BodyContacts:
 
 @kernel
 def choose(contact_table: Integers, around_table: Integers) -> int:
-    """How many bodies are to be read in this tick; ``Around.read`` has their rows."""
+    """How many bodies are to be looked at in this tick; ``Around.read`` has their rows."""
     touching, around = open_contacts(contact_table).touching, open_around(around_table)
     for b in range(around.kept.shape[0]):
         around.kept[b] = False
@@ -204,16 +204,17 @@ def choose(contact_table: Integers, around_table: Integers) -> int:
         if around.due[b] > 0 and not around.kept[b]:
             around.due[b] -= 1
         else:
-            around.read[count] = b
+            around.read[count], around.wanted[count] = b, around.body[b]
             count += 1
+    around.wanted[count] = around.body[0]
     return count
 
 
 @kernel
 def meet(
     tissue: Integers, contact_table: Integers, around_table: Integers, frame_table: Integers, count: int, dt: float
-) -> bool:
-    """A tick of the bodies that were read: True where any touches the tissue, with `Partners.push` in world axes."""
+) -> int:
+    """A tick of the bodies that were read: how many the tissue pushes, by `Partners.push` in world axes."""
     t, contacts, around, f = (
         open_tissue(tissue), open_contacts(contact_table), open_around(around_table), open_frame(frame_table),
     )  # fmt: skip
@@ -225,31 +226,37 @@ def meet(
         parts.live[c] = False
     near = False
     for k in range(count):
-        b = around.read[k]
-        x, y, z = into(f, around.pose[b, 0], around.pose[b, 1], around.pose[b, 2])
+        b, m = around.read[k], around.motion[k]
+        x, y, z = into(f, m[0], m[1], m[2])
         gap = math.sqrt((x - mx) ** 2 + (y - my) ** 2 + (z - mz) ** 2) - half - around.radius[b] - REACH
         if gap > 0.0 and not around.kept[b]:
             around.due[b] = min(int(gap / (MAX_APPROACH * dt)), MAX_WAIT)
             continue
         near = True
-        _place(contacts, around, f, b)
+        _place(contacts, around, f, b, m)
         if not around.inside[b]:
             for c in range(parts.live.shape[0]):
                 if parts.body[c] == b:
                     parts.live[c] = True
     if not near:
-        return False
+        return 0
     if around.light[0] > 0.0:
-        _place(contacts, around, f, 0)
+        _place(contacts, around, f, 0, around.motion[count])
     else:
         partners.light[0] = 0.0
     if not touch(field, t.points, contacts, dt):
-        return False
+        return 0
+    pushed = 0
     for b in range(partners.push.shape[0]):
-        p = partners.push[b]
+        p, any_ = partners.push[b], False
         p[0], p[1], p[2] = rotate(f.R, p[0], p[1], p[2])
         p[3], p[4], p[5] = rotate(f.R, p[3], p[4], p[5])
-    return True
+        for a in range(6):
+            any_ = any_ or p[a] != 0.0
+        if any_:
+            around.pushed[pushed] = b
+            pushed += 1
+    return pushed
 
 
 @inlined
@@ -258,9 +265,9 @@ def _middle(box: Array, a: int) -> float:
 
 
 @inlined
-def _place(contacts: Contacts, around: Around, f: FrameArrays, b: int) -> None:
-    """Where a body is and how it moves, in the frame of the tissue."""
-    partners, pose, twist = contacts.partners, around.pose[b], around.twist[b]
+def _place(contacts: Contacts, around: Around, f: FrameArrays, b: int, motion: Array) -> None:
+    """Where a body with pose and twist ``motion`` (13,) is and how it moves, in the frame of the tissue."""
+    partners, pose, twist = contacts.partners, motion[:7], motion[7:]
     Q, R, c, v = around.turn[0], partners.R[b], partners.centre[b], partners.twist[b]
     matrix_of(pose[3], pose[4], pose[5], pose[6], Q)
     for i in range(3):

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.kernels import kernel
+from ligature.kernels import inlined, kernel
 from ligature.model.piercing import Needle
 from ligature.model.scene import Body, Scene
 from ligature.model.shapes import Box, Capsule, Cone, Cylinder, Sphere
-from ligature.soft.frame import Frame, into, open_frame, turn_six, velocity_at
+from ligature.soft.frame import Frame, FrameArrays, into, open_frame, turn_six, velocity_at
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.rod import Rod
 from ligature.suture.rotations import matrix_of, multiply, rotate, rotate_back, rotation_vector
@@ -20,7 +21,7 @@ from ligature.suture.tracking import open_nodes
 from ligature.tables import opener, table_of
 from ligature.tissue.block import TissueBlock
 from ligature.tissue.layout import open_tissue
-from ligature.tissue.needle import OUTSIDE, open_needle
+from ligature.tissue.needle import OUTSIDE, NeedleArrays, open_needle
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +33,10 @@ USUAL_RADIUS = 0.25e-3
 """Radius of the wire of a needle whose shapes do not show it, m."""
 
 NEAR = 0.01
-"""Distance in metres from the box around the tissue within which a needle is looked at."""
+"""Distance in metres from the box around the tissue within which it is known where a needle's tip is."""
+
+FAR, BESIDE, MEETS = 0, 1, 2
+"""Where a needle is: far from the tissue, its tip outside of the box around it, or one that may touch it."""
 
 
 def wire_radius(body: Body) -> float:
@@ -62,13 +66,15 @@ class Mount(NamedTuple):
     wrench: Array  # (6,) of the tissue on it
     turn: Array  # (2, 3, 3) scratch
     six: Array  # (6,)
+    motion: Array  # (1, 13) pose and twist
 
 
 def _mount(local: Array) -> Mount:
     z = np.zeros
     return Mount(
-        np.ascontiguousarray(local), z(7), z(6), z(1), z(3), z(6), z(6), np.full(3, np.inf), z(6), z((2, 3, 3)), z(6)
-    )
+        np.ascontiguousarray(local), z(7), z(6), z(1), z(3), z(6), z(6), np.full(3, np.inf), z(6), z((2, 3, 3)), z(6),
+        z((1, 13)),
+    )  # fmt: skip
 
 
 open_mount = opener(_mount(np.eye(3)))
@@ -79,7 +85,7 @@ class ScenePiercer:
 
     ``rod`` is the thread that carries the needle as a node of its own solve, None for a needle without one.
     ``tip`` (3,) is where its tip is in B, infinite while it is far from the tissue; ``wrench`` (6,) what the tissue
-    does to it, in world axes.
+    does to it, in world axes; ``met`` whether it could touch the tissue in the last tick.
     """
 
     def __init__(self, scene: Scene, needle: Needle, block: TissueBlock, rod: Rod | None, dt: float) -> None:
@@ -94,22 +100,21 @@ class ScenePiercer:
         self._reach = NEAR + arc.length + float(np.linalg.norm(tip))
         self._weight = self.body.mass * self.body.gravity
         self._joint_load = np.zeros(6)
-        self.spring = -1
+        self._index = np.array([self.body.index])
+        self.met, self.spring = False, -1
 
     @property
     def engaged(self) -> bool:
         """Whether the tissue touches the needle."""
-        return self.inside.where != OUTSIDE or bool(self.inside.engaged.any())
+        return bool(is_engaged(self._tables[1]))
 
     def approach(self, bodies: HeldBodies, frame: Frame) -> bool:
-        """Fill the needle's shape and equations in B; False while it is far from the tissue."""
+        """Fill the needle's shape and equations in B; False while it cannot touch the tissue."""
         m = self._mount
-        m.pose[:], m.twist[:] = bodies.motion(self.body.index)
-        engaged = self.engaged
-        if not engaged and is_far(self._tables[0], frame.table, m.pose, self._reach):
-            self.inside.forget()
-            self.wrench[:] = 0.0
-            self.tip[:] = np.inf
+        bodies.read_motions(self._index, m.motion)
+        where, engaged = look(*self._tables, frame.table, self.inside.before, self._reach)
+        self.met = where == MEETS
+        if not self.met:
             return False
         extra, extra_inertia, pull = bodies.attached_load(self.body.index)
         m.mass[0], m.inertia[:] = self.body.mass + extra, self.body.inertia + extra_inertia
@@ -136,7 +141,7 @@ class ScenePiercer:
     def end(self, frame: Frame) -> None:
         """Conclude with the motion that the rod's solve found."""
         assert self.rod is not None and self._nodes is not None
-        self._joint_load[:] = self.rod.joint_load(self.body.index)
+        self.rod.read_joint_load(self.body.index, self._joint_load)
         if self.spring < 0:
             return
         _, needle, mount = self._tables
@@ -176,20 +181,58 @@ _KEPT = ("wrench", "tip", "_joint_load")
 """Attributes that last from tick to tick."""
 
 
-@kernel
-def is_far(tissue: Integers, frame: Integers, pose: Array, reach: float) -> bool:
-    """Whether a place (7,) of W is further than ``reach`` from the box around the tissue."""
-    box, f = open_tissue(tissue).field.box, open_frame(frame)
-    x, y, z = into(f, pose[0], pose[1], pose[2])
-    low = x < box[0, 0] - reach or y < box[0, 1] - reach or z < box[0, 2] - reach
-    return low or x > box[1, 0] + reach or y > box[1, 1] + reach or z > box[1, 2] + reach
+@inlined
+def _engaged(n: NeedleArrays) -> bool:
+    engaged = n.held.tip[0] != OUTSIDE
+    for i in range(n.held.engaged.shape[0]):
+        engaged = engaged or n.held.engaged[i] != 0
+    return engaged
 
 
 @kernel
-def equations(needle: Integers, mount: Integers, frame: Integers, dt: float) -> None:
-    """A needle's shape and own equations H δ = g in B, for its motion relative to the tissue's frame."""
-    n, m, f = open_needle(needle), open_mount(mount), open_frame(frame)
-    Q, R, shape, H, g = m.turn[0], m.turn[1], n.shape, n.H, n.g
+def is_engaged(needle: Integers) -> bool:
+    """Whether the tissue touches a needle."""
+    return _engaged(open_needle(needle))
+
+
+@inlined
+def _beside(box: Array, reach: float, x: float, y: float, z: float) -> bool:
+    """Whether a place of B is further than ``reach`` from a box (2, 3), or nowhere."""
+    within = box[0, 0] - reach <= x <= box[1, 0] + reach and box[0, 1] - reach <= y <= box[1, 1] + reach
+    return not (within and box[0, 2] - reach <= z <= box[1, 2] + reach)
+
+
+@kernel
+def look(
+    tissue: Integers, needle: Integers, mount: Integers, frame: Integers, before: Array, reach: float
+) -> tuple[int, bool]:
+    """Take a needle's motion, and find its shape: where it is (`FAR`, `BESIDE`, `MEETS`), and whether it is held.
+
+    One that is not held meets the surface with its tip alone, on the way from where it was ``before`` (3,).
+    """
+    box, n, m, f = open_tissue(tissue).field.box, open_needle(needle), open_mount(mount), open_frame(frame)
+    for a in range(7):
+        m.pose[a] = m.motion[0, a]
+    for a in range(6):
+        m.twist[a] = m.motion[0, 7 + a]
+    engaged, shape = _engaged(n), n.shape
+    x, y, z = into(f, m.pose[0], m.pose[1], m.pose[2])
+    far = not engaged and _beside(box, reach, x, y, z)
+    if not far:
+        _shape(n, m, f)
+        if engaged or not (_beside(box, 0.0, shape[0], shape[1], shape[2])
+                           and _beside(box, 0.0, before[0], before[1], before[2])):  # fmt: skip
+            return MEETS, engaged
+    for a in range(3):
+        before[a], m.tip[a] = (math.nan, math.inf) if far else (shape[a], shape[a])
+        m.wrench[a], m.wrench[3 + a] = 0.0, 0.0
+    return FAR if far else BESIDE, False
+
+
+@inlined
+def _shape(n: NeedleArrays, m: Mount, f: FrameArrays) -> None:
+    """Where a needle is in B."""
+    Q, R, shape = m.turn[0], m.turn[1], n.shape
     matrix_of(m.pose[3], m.pose[4], m.pose[5], m.pose[6], Q)
     for i in range(3):
         for j in range(3):
@@ -201,6 +244,13 @@ def equations(needle: Integers, mount: Integers, frame: Integers, dt: float) -> 
     for a in range(3):
         shape[a] += shape[11 + a]
         m.tip[a] = shape[a]
+
+
+@kernel
+def equations(needle: Integers, mount: Integers, frame: Integers, dt: float) -> None:
+    """A needle's own equations H δ = g in B, for its motion relative to the tissue's frame; its shape is known."""
+    n, m, f = open_needle(needle), open_mount(mount), open_frame(frame)
+    R, shape, H, g = m.turn[1], n.shape, n.H, n.g
     for i in range(6):
         for j in range(6):
             H[i, j] = 0.0

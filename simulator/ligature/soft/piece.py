@@ -55,11 +55,13 @@ class Piece:
         self.threads = [SceneThread(p.rod, p, self.block, self.frame) for p in self._carried if p.rod is not None]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
         self.wrench, self.peak = np.zeros(6), np.zeros(1)
+        self._index, self._motion = np.array([tissue.body]), np.zeros((1, 13))
         self._read()
         self.frame.restart()
 
     def _read(self) -> None:
-        self.frame.read(*self._bodies.motion(self._body.index))
+        self._bodies.read_motions(self._index, self._motion)
+        self.frame.read(self._motion[0, :7], self._motion[0, 7:])
 
     # --- the tick -----------------------------------------------------------------------------
 

@@ -73,10 +73,9 @@ class SceneThread:
 
     def begin(self, dt: float) -> None:
         """Hand the rod what the tissue does to it."""
-        self.inside.draw_in(self._piercer.inside)
-        self._holds = self.engaged
-        if self._holds:
-            hold(self._tables, dt)
+        if self._piercer.met:
+            self.inside.draw_in(self._piercer.inside)
+        self._holds = bool(hold(self._tables, dt))
 
     def end(self, dt: float) -> None:
         """Conclude with the motion that the rod's solve found."""
@@ -114,9 +113,14 @@ def _lay_out(run: Run, nodes: Nodes, f: FrameArrays) -> None:
 
 
 @kernel
-def hold(tables: Tables, dt: float) -> None:
-    """Find the nodes that hold a rod as its tick begins, and make springs of them."""
+def hold(tables: Tables, dt: float) -> bool:
+    """Find the nodes that hold a rod as its tick begins, and make springs of them; whether there are any."""
     t, strand, run, nodes, s, f = _open(tables)
+    holds = False
+    for i in range(strand.held.engaged.shape[0]):
+        holds = holds or strand.held.engaged[i] != 0
+    if not holds:
+        return False
     _lay_out(run, nodes, f)
     prepare(t.points, t.paths, strand, run.line, (t.field.clock[0] + 1) / t.field.clock[1])
     rows, K = strand.rows, run.K
@@ -145,6 +149,7 @@ def hold(tables: Tables, dt: float) -> None:
         load = s.load[row]
         load[0], load[1], load[2] = rotate(f.R, fx, fy, fz)
         load[3], load[4], load[5] = rotate(f.R, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+    return True
 
 
 @inlined

@@ -23,7 +23,7 @@ from ligature.suture.description import Attachment, RodDescription, frame_quater
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, find_pushed, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
-from ligature.suture.springs import springs
+from ligature.suture.springs import read_other_loads, springs
 from ligature.suture.substeps import run_tick
 from ligature.tables import table_of
 
@@ -330,12 +330,10 @@ class Rod:
         """Remove the springs of the last tick."""
         self.springs.filled[0] = 0
 
-    def joint_load(self, body: int) -> Array:
-        """Force and moment (6,) of the rod on a partner in the last tick, without those of `springs`."""
+    def read_joint_load(self, body: int, out: Array) -> None:
+        """Fill ``out`` with force and moment (6,) of the rod on a partner in the last tick, without its `springs`."""
         node = self.node_of[body]
-        n = int(self.springs.filled[0])
-        own = self.springs.impulse[:n][self.springs.node[:n] == node].sum(axis=0)
-        return np.asarray((self.impulse[node] - own) / self.dt)
+        read_other_loads(self._spring_table, node, self.impulse[node], self.dt, out)
 
     def _end_pulls(self) -> None:
         """Undo `pull_partner`."""

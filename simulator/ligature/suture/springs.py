@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.kernels import inlined
+from ligature.kernels import inlined, kernel
 from ligature.suture.layout import Nodes, Work
 from ligature.suture.rotations import multiply, rotation_vector
 from ligature.tables import opener
@@ -100,3 +100,15 @@ def add_spring_impulses(s: Springs, impulse: Array, h: float) -> None:
         for a in range(6):
             s.impulse[c, a] += h * s.force[c, a]
             impulse[s.node[c], a] += h * s.force[c, a]
+
+
+@kernel
+def read_other_loads(table: Integers, node: int, impulse: Array, dt: float, out: Array) -> None:
+    """Fill ``out`` (6,) with what moved a node by ``impulse`` (6,) in a tick of ``dt`` s besides its springs."""
+    s = open_springs(table)
+    for a in range(6):
+        own = 0.0
+        for c in range(s.filled[0]):
+            if s.node[c] == node:
+                own += s.impulse[c, a]
+        out[a] = (impulse[a] - own) / dt

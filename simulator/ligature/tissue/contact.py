@@ -7,7 +7,8 @@ Each convex part of a body has at most one point of contact with each face of th
     f_n ≥ 0, u_n + c f_n ≥ 0, one of them zero; ‖f_t‖ ≤ μ f_n, u_t + c f_t = 0 unless it slips
 
 with u the gap along the normal and the stretch across it at the end of the tick (Coulomb friction by bristles of
-compliance c). Axes are those of the block.
+compliance c). A face that is held has points of contact for bodies that come from inside, so that what presses the
+tissue flat does not turn its cells inside out. Axes are those of the block.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.mesh.distance import SPHERE
 from ligature.tissue.contact_arrays import Contacts, Solve, Touching
-from ligature.tissue.contact_search import find_contacts, measure_contacts, place_part
+from ligature.tissue.contact_search import find_contacts, measure_contacts
 from ligature.tissue.dense import times, times_transposed
 from ligature.tissue.interface import add_point, displaced, place_point, settle_point
 from ligature.tissue.layout import LEAVING, Field, Points
@@ -35,6 +37,13 @@ MEET = 0.5e-3
 DEEPER = 0.2e-3
 """Depth in metres by which another place of a face must be deeper for the point of contact to move there."""
 
+DEEPER_BALL = 5e-6
+"""The same for balls, and on faces that are held, m.
+
+A ball of 8 mm is as deep elsewhere when it has rolled by 0.3 mm, the lever of `ROLLING`: so it does not roll off by
+itself over a point that stays behind.
+"""
+
 RECOVERY = 4e-5
 """Depth in metres out of which a body is pushed in a tick."""
 
@@ -43,6 +52,9 @@ SWEEPS = 12
 
 SOFT = 1e-5
 """Compliance of a bristle, m/N."""
+
+HARD = 1e-6
+"""Compliance of tissue that is pressed flat, m/N."""
 
 ROLLING = 0.3e-3
 """Lever in metres by which the tissue's push on a body that rolls lies before its middle."""
@@ -112,6 +124,7 @@ def _begin(field: Field, points: Points, contacts: Contacts, found: int) -> None
     t.point[r] = add_point(field, points, field.faces[q], work.weights)
     t.force[r, 0], t.force[r, 1], t.force[r, 2] = 0.0, 0.0, 0.0
     t.friction[r] = partners.friction[body]
+    t.soft[r] = HARD if field.core[q] > 0.0 else SOFT
     _anchor(contacts, points, r, found)
 
 
@@ -131,7 +144,8 @@ def match_contacts(field: Field, points: Points, contacts: Contacts, count: int,
                 row = r
         if row >= 0:
             work.known[row] = False
-            if value[0] < t.distance[row] - DEEPER:
+            rolls = contacts.parts.kind[part] == SPHERE or field.core[q] > 0.0
+            if value[0] < t.distance[row] - (DEEPER_BALL if rolls else DEEPER):
                 _set_weights(work, f)
                 place_point(field, points, t.point[row], field.faces[q], work.weights)
                 settle_point(field, points, t.point[row])
@@ -253,7 +267,7 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
 def _relax(touching: Touching, work: Solve, n: int, a: int) -> None:
     """One point: its normal force, then friction within the cone."""
     r = work.rows[a]
-    f, normal, D, u = touching.force[r], touching.normal[r], work.D[a, a], work.u[a]
+    f, normal, D, u, soft = touching.force[r], touching.normal[r], work.D[a, a], work.u[a], touching.soft[work.rows[a]]
     stiff, trace, gap, before = 0.0, 0.0, 0.0, 0.0
     for k in range(3):
         trace += D[k, k]
@@ -261,7 +275,7 @@ def _relax(touching: Touching, work: Solve, n: int, a: int) -> None:
         before += normal[k] * f[k]
         for m in range(3):
             stiff += normal[k] * D[k, m] * normal[m]
-    pressed = before - (gap + SOFT * before) / (stiff + SOFT)
+    pressed = before - (gap + soft * before) / (stiff + soft)
     pressed = pressed if pressed > 0.0 else 0.0
     across = max(trace - stiff, 0.5 * trace) + SOFT
     tx, ty, tz, size = 0.0, 0.0, 0.0, 0.0
@@ -288,11 +302,8 @@ def _relax(touching: Touching, work: Solve, n: int, a: int) -> None:
 def touch(field: Field, points: Points, contacts: Contacts, dt: float) -> bool:
     """A tick of all bodies whose parts are ``live``: True where any touches the tissue, with `Partners.push` then."""
     t, parts, partners, work = contacts.touching, contacts.parts, contacts.partners, contacts.solve
-    for c in range(parts.kind.shape[0]):
-        if parts.live[c]:
-            place_part(parts, partners, c)
-    measure_contacts(t, points, parts, partners, work.vectors)
-    count = find_contacts(field, parts, work, contacts.looked_at)
+    count = find_contacts(field, parts, partners, work)
+    measure_contacts(field, t, points, parts, partners, work.vectors)
     match_contacts(field, points, contacts, count, dt)
     n = press(contacts, points, (field.clock[0] + 1) / field.clock[1], dt)
     for b in range(partners.push.shape[0]):

@@ -31,6 +31,7 @@ class Touching(NamedTuple):
     anchor: Array  # (K, 3) of friction, in the inertial frame of the body
     force: Array  # (K, 3) on the tissue
     friction: Array  # (K,) Coulomb coefficient
+    soft: Array  # (K,) compliance along the normal, m/N
 
 
 class Partners(NamedTuple):
@@ -50,6 +51,7 @@ class Parts(NamedTuple):
     """P convex parts of bodies."""
 
     body: Integers  # (P,) row of `Partners`
+    still: Flags  # (P,) of a body without mass, which moves by commands alone
     local: Array  # (P, 4, 4) in the inertial frame of the body
     kind: Integers  # (P,) as in `ligature.mesh.distance`
     size: Array  # (P, 3)
@@ -60,6 +62,7 @@ class Parts(NamedTuple):
     live: Flags  # (P,) looked at in this tick
     R: Array  # (P, 3, 3) where it is in this tick
     centre: Array  # (P, 3)
+    known: Flags  # (P,) was looked at when faces near what stands were looked for
 
 
 class Solve(NamedTuple):
@@ -73,7 +76,8 @@ class Solve(NamedTuple):
     D: Array  # (K, K, 3, 3)
     own_point: Flags  # (N,) points of the interface that are these
     change: Array  # (N, 3) forces on the points without those of bodies, over those of the last step
-    found: Integers  # (F, 2) part and face
+    found: Integers  # (F, 2) part and face; of parts that stand first
+    standing: Integers  # (2,) how many were found of these, and `Field.found` then
     values: Array  # (F, 6) distance, normal towards the tissue, place on the face
     order: Integers  # (F,) the nearest first
     known: Flags  # (K,) points of contact that were not found yet
@@ -88,7 +92,6 @@ class Contacts(NamedTuple):
     partners: Partners
     parts: Parts
     solve: Solve
-    looked_at: Flags  # (q,) faces that move
     overflow: Integers  # (1,) points of contact for which there was no room
 
 
@@ -96,7 +99,7 @@ def touching(capacity: int = CAPACITY) -> Touching:
     """Room for ``capacity`` points of contact, none yet."""
     K, z = capacity, np.zeros
     i = lambda: np.zeros(K, np.int64)  # noqa: E731
-    return Touching(i(), i(), i(), i(), i(), z((K, 3)), z(K), z((K, 3)), z((K, 3)), z(K))
+    return Touching(i(), i(), i(), i(), i(), z((K, 3)), z(K), z((K, 3)), z((K, 3)), z(K), z(K))
 
 
 def partners(bodies: int) -> Partners:
@@ -109,8 +112,9 @@ def parts(number: int, planes: int) -> Parts:
     """Room for ``number`` parts with ``planes`` in all."""
     P, z = number, np.zeros
     return Parts(
-        np.zeros(P, np.int64), z((P, 4, 4)), np.zeros(P, np.int64), z((P, 3)), z((planes, 4)),
+        np.zeros(P, np.int64), np.zeros(P, np.bool_), z((P, 4, 4)), np.zeros(P, np.int64), z((P, 3)), z((planes, 4)),
         np.zeros((P, 2), np.int64), z((P, 3)), z((P, 3)), np.zeros(P, np.bool_), z((P, 3, 3)), z((P, 3)),
+        np.zeros(P, np.bool_),
     )  # fmt: skip
 
 
@@ -119,11 +123,9 @@ def scratch(points: int = MOST_POINTS, capacity: int = CAPACITY) -> Solve:
     K, F, z = capacity, 4 * capacity, np.zeros
     return Solve(
         np.zeros(K, np.int64), z((K, 3)), z((K, 3)), z((K, 3)), z((K, 3)), z((K, K, 3, 3)), np.zeros(points, np.bool_),
-        z((points, 3)), np.zeros((F, 2), np.int64), z((F, 6)), np.zeros(F, np.int64), np.zeros(K, np.bool_),
-        z((5, 3)), z(4),
+        z((points, 3)), np.zeros((F, 2), np.int64), np.zeros(2, np.int64), z((F, 6)), np.zeros(F, np.int64),
+        np.zeros(K, np.bool_), z((5, 3)), z(4),
     )  # fmt: skip
 
 
-open_contacts = opener(
-    Contacts(touching(1), partners(1), parts(1, 1), scratch(1, 1), np.zeros(1, np.bool_), np.zeros(1, np.int64))
-)
+open_contacts = opener(Contacts(touching(1), partners(1), parts(1, 1), scratch(1, 1), np.zeros(1, np.int64)))

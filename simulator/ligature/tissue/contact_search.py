@@ -1,6 +1,7 @@
 """Where rigid bodies are nearest to the surface of tissue: each face's deepest point for each convex part; metres.
 
-The best of a few points of a face, from which a search with ever smaller steps goes on.
+The best of a few points of a face, from which a search with ever smaller steps goes on. Faces that are held stop bodies
+that come from inside a little before they reach them: what presses tissue flat does not turn its cells inside out.
 """
 
 from __future__ import annotations
@@ -14,11 +15,10 @@ from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
 from ligature.tissue.contact_arrays import Partners, Parts, Solve, Touching
 from ligature.tissue.dense import times, times_transposed
-from ligature.tissue.layout import Field, Points
+from ligature.tissue.layout import GROUP, Field, Points
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 FACING = -0.2
 """Cosine between the surface's outward normal and a contact's above which a body is not before that face."""
@@ -37,14 +37,19 @@ REACH = 1.5e-3
 
 
 @inlined
-def place_part(parts: Parts, partners: Partners, c: int) -> None:
-    """Where part ``c`` is in this tick."""
+def place_part(parts: Parts, partners: Partners, c: int) -> bool:
+    """Where part ``c`` is in this tick; whether it was elsewhere before."""
     T, Q, o, b = parts.local[c], parts.R[c], parts.centre[c], parts.body[c]
-    R = partners.R[b]
+    R, moved = partners.R[b], False
     for k in range(3):
         for m in range(3):
-            Q[k, m] = R[k, 0] * T[0, m] + R[k, 1] * T[1, m] + R[k, 2] * T[2, m]
-        o[k] = partners.centre[b, k] + R[k, 0] * T[0, 3] + R[k, 1] * T[1, 3] + R[k, 2] * T[2, 3]
+            turned = R[k, 0] * T[0, m] + R[k, 1] * T[1, m] + R[k, 2] * T[2, m]
+            moved = moved or Q[k, m] != turned
+            Q[k, m] = turned
+        at = partners.centre[b, k] + R[k, 0] * T[0, 3] + R[k, 1] * T[1, 3] + R[k, 2] * T[2, 3]
+        moved = moved or o[k] != at
+        o[k] = at
+    return moved
 
 
 @inlined
@@ -75,21 +80,29 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
     """Add the deepest point of face ``q`` for part ``c``, if it is near, to what was found; returns how many are."""
     x, faces, vectors = field.x, field.faces, work.vectors
     p, a, b, normal, best_normal = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
-    best, u, v = math.inf, 0.5, 0.5
-    for s in range(COARSE * COARSE):
-        su, sv = (s % COARSE + 0.5) / COARSE, (s // COARSE + 0.5) / COARSE
-        _at(x, faces, q, su, sv, p)
-        d = _distance_to(parts, c, p, a, b, normal)
-        if d < best:
-            best, u, v = d, su, sv
-            best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+    best, u, v, core = math.inf, 0.5, 0.5, field.core[q]
     i, j, k, h = faces[q, 0], faces[q, 1], faces[q, 2], faces[q, 3]
     for m in range(3):
         a[m], b[m] = x[k, m] - x[i, m], x[h, m] - x[j, m]
     nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
     edge = math.sqrt(size)
-    if best > REACH + edge / COARSE:
+    if core > 0.0:
+        _at(x, faces, q, 0.5, 0.5, p)
+        _distance_to(parts, c, p, a, b, normal)
+        if nx * normal[0] + ny * normal[1] + nz * normal[2] <= -FACING * size:
+            return count
+    opposed = math.inf
+    for s in range(COARSE * COARSE):
+        su, sv = (s % COARSE + 0.5) / COARSE, (s // COARSE + 0.5) / COARSE
+        _at(x, faces, q, su, sv, p)
+        d = _distance_to(parts, c, p, a, b, normal) - core
+        opposed = min(opposed, nx * normal[0] + ny * normal[1] + nz * normal[2])
+        if d < best:
+            best, u, v = d, su, sv
+            best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+    # What tissue stands on is large and flat: no point of a face beside it faces it if none of these does.
+    if best > REACH + edge / COARSE or (parts.still[c] and core == 0.0 and opposed > 0.5 * FACING * size):
         return count
     step = 0.5 / COARSE
     while step * edge > FINE:
@@ -98,14 +111,14 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
             su = min(max(u + (step if way == 0 else -step if way == 1 else 0.0), 0.0), 1.0)
             sv = min(max(v + (step if way == 2 else -step if way == 3 else 0.0), 0.0), 1.0)
             _at(x, faces, q, su, sv, p)
-            d = _distance_to(parts, c, p, a, b, normal)
+            d = _distance_to(parts, c, p, a, b, normal) - core
             if d < best - LEVEL:
                 best, u, v, moved = d, su, sv, True
                 best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
         if not moved:
             step *= 0.5
     facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
-    if best > REACH or facing > FACING * size:
+    if best > REACH or (facing > FACING * size if core == 0.0 else facing < -FACING * size):
         return count
     work.found[count, 0], work.found[count, 1] = c, q
     work.values[count, 0], work.values[count, 4], work.values[count, 5] = best, u, v
@@ -115,12 +128,28 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
 
 
 @kernel
-def find_contacts(field: Field, parts: Parts, work: Solve, looked_at: Flags) -> int:
-    """Deepest point of each face for each part that is near; returns how many there are in ``work``."""
-    count = 0
+def find_contacts(field: Field, parts: Parts, partners: Partners, work: Solve) -> int:
+    """Deepest point of each face for each part that is near; returns how many there are in ``work``.
+
+    Faces move once in a tissue step: what was found of parts that stand counts until then.
+    """
+    stands = work.standing[1] == field.found[0]
+    for c in range(parts.kind.shape[0]):
+        moved = place_part(parts, partners, c) if parts.live[c] else False
+        if parts.still[c]:
+            stands = stands and not moved and parts.live[c] == parts.known[c]
+            parts.known[c] = parts.live[c]
+    if not stands:
+        work.standing[0], work.standing[1] = _find(field, parts, work, True, 0), field.found[0]
+    return _find(field, parts, work, False, work.standing[0])
+
+
+@inlined
+def _find(field: Field, parts: Parts, work: Solve, still: bool, count: int) -> int:
+    """Add what is near to the parts that are ``still``, or to the others, to the ``count`` that were found."""
     low, high = work.vectors[0], work.vectors[1]
     for c in range(parts.kind.shape[0]):
-        if not parts.live[c]:
+        if not parts.live[c] or parts.still[c] != still:
             continue
         R, o = parts.R[c], parts.centre[c]
         outside = False
@@ -134,18 +163,23 @@ def find_contacts(field: Field, parts: Parts, work: Solve, looked_at: Flags) -> 
         if outside:
             continue
         lx, ly, lz, hx, hy, hz = low[0], low[1], low[2], high[0], high[1], high[2]
-        for q in range(field.faces.shape[0]):
-            if not looked_at[q] or count == work.found.shape[0]:
-                continue
-            box = field.face_box[q]
+        for g in range(field.group_box.shape[0]):
+            box = field.group_box[g]
             if box[0, 0] > hx or box[1, 0] < lx or box[0, 1] > hy or box[1, 1] < ly or box[0, 2] > hz or box[1, 2] < lz:
                 continue
-            count = _search_face(field, parts, work, c, q, count)
+            for q in range(g * GROUP, min(field.faces.shape[0], (g + 1) * GROUP)):
+                box = field.face_box[q]
+                beside = box[0, 0] > hx or box[1, 0] < lx or box[0, 1] > hy or box[1, 1] < ly
+                if beside or box[0, 2] > hz or box[1, 2] < lz or count == work.found.shape[0]:
+                    continue
+                count = _search_face(field, parts, work, c, q, count)
     return count
 
 
 @kernel
-def measure_contacts(touching: Touching, points: Points, parts: Parts, partners: Partners, vectors: Array) -> None:
+def measure_contacts(
+    field: Field, touching: Touching, points: Points, parts: Parts, partners: Partners, vectors: Array
+) -> None:
     """Distance and normal of every point of contact as the tick begins."""
     a, b = vectors[0], vectors[1]
     for r in range(touching.used.shape[0]):
@@ -153,4 +187,4 @@ def measure_contacts(touching: Touching, points: Points, parts: Parts, partners:
             c, at = touching.part[r], points.at[touching.point[r]]
             if not parts.live[c]:
                 place_part(parts, partners, c)
-            touching.distance[r] = _distance_to(parts, c, at, a, b, touching.normal[r])
+            touching.distance[r] = _distance_to(parts, c, at, a, b, touching.normal[r]) - field.core[touching.face[r]]

@@ -5,7 +5,8 @@ the lattice split the grid in two until the pieces are small. Each separator or 
 blocks are eliminated from the leaves of the tree to its root (the multifrontal method: Liu, SIAM Review 34, 1992,
 82), each by A = [[P, Bᵀ], [B, S]] → D = P⁻¹, U = B D, S - U Bᵀ. A solve then is products of dense blocks with vectors
 alone: x₂ -= U b₁ up the tree, x₁ = D b₁ - Uᵀ x₂ down. The loops run in one thread, in one order, without
-reductions that a compiler could reorder, so that the bits depend on the input alone.
+reductions that a compiler could reorder, so that the bits depend on the input alone. They run over slices: an index
+into a long array that could be negative leaves a loop without vectors.
 """
 
 from __future__ import annotations
@@ -201,20 +202,22 @@ def _eliminate(factor: Elimination, x: Array, block: int) -> None:
         loaded = loaded or x[index[at + j]] != 0.0
     if not loaded:
         return
+    u = u[:m]
     for i in range(m):
         u[i] = 0.0
     j = 0
     while j + 4 <= w:
         p, q, r, s = x[index[at + j]], x[index[at + j + 1]], x[index[at + j + 2]], x[index[at + j + 3]]
         k = start + j * m
+        a, b, c, d = up[k : k + m], up[k + m : k + 2 * m], up[k + 2 * m : k + 3 * m], up[k + 3 * m : k + 4 * m]
         for i in range(m):
-            u[i] += p * up[k + i] + q * up[k + m + i] + r * up[k + 2 * m + i] + s * up[k + 3 * m + i]
+            u[i] += p * a[i] + q * b[i] + r * c[i] + s * d[i]
         j += 4
     while j < w:
-        p = x[index[at + j]]
-        k = start + j * m
+        p, k = x[index[at + j]], start + j * m
+        a = up[k : k + m]
         for i in range(m):
-            u[i] += p * up[k + i]
+            u[i] += p * a[i]
         j += 1
     for i in range(m):
         x[index[at + w + i]] -= u[i]
@@ -225,8 +228,8 @@ def _substitute(factor: Elimination, x: Array, block: int) -> None:
     """Find the own unknowns of a block from the later ones."""
     index, down = factor.index, factor.down
     half = factor.work.shape[0] // 2
-    u, b = factor.work[:half], factor.work[half:]
     w, m, at, start = factor.extent[block, 0], factor.extent[block, 1], factor.extent[block, 2], factor.extent[block, 4]
+    u, b = factor.work[:w], factor.work[half:]
     for j in range(w):
         b[j] = x[index[at + j]]
         u[j] = 0.0
@@ -237,14 +240,15 @@ def _substitute(factor: Elimination, x: Array, block: int) -> None:
     while j + 4 <= w + m:
         p, q, r, s = b[j], b[j + 1], b[j + 2], b[j + 3]
         k = start + j * w
+        c, d, e, f = down[k : k + w], down[k + w : k + 2 * w], down[k + 2 * w : k + 3 * w], down[k + 3 * w : k + 4 * w]
         for i in range(w):
-            u[i] += p * down[k + i] + q * down[k + w + i] + r * down[k + 2 * w + i] + s * down[k + 3 * w + i]
+            u[i] += p * c[i] + q * d[i] + r * e[i] + s * f[i]
         j += 4
     while j < w + m:
-        p = b[j]
-        k = start + j * w
+        p, k = b[j], start + j * w
+        c = down[k : k + w]
         for i in range(w):
-            u[i] += p * down[k + i]
+            u[i] += p * c[i]
         j += 1
     for j in range(w):
         x[index[at + j]] = u[j]

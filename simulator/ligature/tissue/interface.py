@@ -26,6 +26,7 @@ from ligature.tissue.layout import (
     CUTTING,
     EXIT,
     FRICTION,
+    GROUP,
     LEAVING,
     MOST_POINTS,
     PUNCTURE,
@@ -48,6 +49,9 @@ SPACING = 1.6e-3
 
 HARD = 1e-5
 """Least compliance of a bristle, m/N."""
+
+CORE = 0.3
+"""Part of the cell behind a held face that nothing presses together."""
 
 
 class Interface:
@@ -166,10 +170,21 @@ def _field(elastic: ElasticGrid, ticks: int) -> Field:
         np.ascontiguousarray(a, dtype=np.int64) for a in (grid.cells, grid.layer, grid.faces, grid.face_cell)
     )
     return Field(
-        elastic.x, elastic.force, cells, layers, faces, face_cell, np.zeros((len(faces), 2, 3)), np.zeros((2, 3)),
-        elastic.free, elastic.row, elastic.responses, elastic.factor, np.zeros(3 * len(elastic.free)),
+        elastic.x, elastic.force, cells, layers, faces, face_cell, _core(elastic), np.zeros((len(faces), 2, 3)),
+        np.zeros((-(-len(faces) // GROUP), 2, 3)), np.zeros((2, 3)), elastic.free, elastic.row, elastic.responses,
+        elastic.factor, np.zeros(3 * len(elastic.free)),
         np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 3, n, 3)), material, np.array([0, ticks]),
+        np.zeros(1, np.int64),
     )  # fmt: skip
+
+
+def _core(elastic: ElasticGrid) -> Array:
+    """`Field.core`: the part `CORE` of the cell behind each face whose nodes are all held."""
+    grid = elastic.grid
+    corners = grid.nodes[grid.faces]
+    across = np.abs(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])).argmax(axis=1)
+    depth = grid.sizes[grid.face_cell, across]
+    return np.where((elastic.row[grid.faces] < 0).all(axis=1), CORE * depth, 0.0)
 
 
 # --- points -----------------------------------------------------------------------------------
@@ -421,6 +436,7 @@ def refresh(table: Integers) -> None:
 @inlined
 def _box(field: Field) -> None:
     x = field.x
+    field.found[0] += 1
     for a in range(3):
         field.box[0, a], field.box[1, a] = math.inf, -math.inf
     for k in range(x.shape[0]):
@@ -429,5 +445,13 @@ def _box(field: Field) -> None:
     for q in range(field.faces.shape[0]):
         i, j, k, h = field.faces[q, 0], field.faces[q, 1], field.faces[q, 2], field.faces[q, 3]
         for a in range(3):
-            field.face_box[q, 0, a] = min(x[i, a], x[j, a], x[k, a], x[h, a])
-            field.face_box[q, 1, a] = max(x[i, a], x[j, a], x[k, a], x[h, a])
+            field.face_box[q, 0, a] = min(x[i, a], x[j, a], x[k, a], x[h, a]) - field.core[q]
+            field.face_box[q, 1, a] = max(x[i, a], x[j, a], x[k, a], x[h, a]) + field.core[q]
+    for g in range(field.group_box.shape[0]):
+        box = field.group_box[g]
+        for a in range(3):
+            box[0, a], box[1, a] = math.inf, -math.inf
+        for q in range(g * GROUP, min(field.faces.shape[0], (g + 1) * GROUP)):
+            for a in range(3):
+                box[0, a] = min(box[0, a], field.face_box[q, 0, a])
+                box[1, a] = max(box[1, a], field.face_box[q, 1, a])

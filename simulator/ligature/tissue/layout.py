@@ -22,6 +22,9 @@ MOST_POINTS = 160
 MOST_PATHS, MOST_NODES = 16, 32
 """Paths of a block, and nodes of a path, at most."""
 
+GROUP = 16
+"""Faces that share a box in the search for contacts."""
+
 UNUSED, USED, LEAVING = 0, 1, 2
 """A point that leaves has forces of this step to hand over, and pushes no more."""
 
@@ -48,7 +51,9 @@ class Field(NamedTuple):
     layer: Integers  # (m,)
     faces: Integers  # (q, 4)
     face_cell: Integers  # (q,)
-    face_box: Array  # (q, 2, 3) around the faces at the start of the step
+    core: Array  # (q,) distance of a held face, m, within which nothing presses the tissue; 0 for faces that move
+    face_box: Array  # (q, 2, 3) around the faces at the start of the step, and what is so near
+    group_box: Array  # (ceil(q / GROUP), 2, 3) around faces that follow each other
     box: Array  # (2, 3) around all nodes then
     free: Integers  # (f,)
     row: Integers  # (n,) its inverse, -1 for nodes that are held
@@ -59,6 +64,7 @@ class Field(NamedTuple):
     response: Array  # (N, 3, n, 3) displacements of all nodes for 1 N along x, y, z on a point
     material: Array  # (layers, 6)
     clock: Integers  # (2,) ticks of this step that are over, and in all
+    found: Integers  # (1,) how often the boxes were found
 
 
 class Points(NamedTuple):
@@ -125,8 +131,8 @@ def _example() -> Tissue:
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     factor = Elimination(i(1, 5), i(1), z(1), z(1), z(1))
     field = Field(
-        z((1, 3)), z((1, 3)), i(1, 8), i(1), i(1, 4), i(1), z((1, 2, 3)), z((2, 3)), i(1), i(1), z((1, 3, 1, 3)),
-        factor, z(3), z((1, 3)), z((1, 3, 1, 3)), z((1, 6)), i(2),
+        z((1, 3)), z((1, 3)), i(1, 8), i(1), i(1, 4), i(1), z(1), z((1, 2, 3)), z((1, 2, 3)), z((2, 3)), i(1), i(1),
+        z((1, 3, 1, 3)), factor, z(3), z((1, 3)), z((1, 3, 1, 3)), z((1, 6)), i(2), i(1),
     )  # fmt: skip
     return Tissue(field, points(1), paths(1, 1))
 

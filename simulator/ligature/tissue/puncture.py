@@ -143,9 +143,10 @@ class NeedleInTissue:
         """`end` with the motion that `arrays` hold; they have the wrench then."""
         self._conclude(self._left, end_coupling(self._interface.table, self.table, self._count))
 
-    def forget(self) -> None:
-        """Pass over a tick in which the needle is far from the tissue."""
-        self._before[:] = np.nan
+    @property
+    def before(self) -> Array:
+        """Where the tip was as the last tick began, (3,); nowhere while the needle is far from the tissue."""
+        return self._before
 
     def _take(self, tip: Array, tangent: Array, normal: Array, centre: Array, H: Array, g: Array) -> None:
         self._shape[:3], self._shape[3:6], self._shape[6:9], self._shape[11:] = tip, tangent, normal, centre
