@@ -60,6 +60,8 @@ setup(
     license="BSD-3-Clause",
     package_dir={"": "simulator"},
     packages=find_packages("simulator"),
-    package_data={"ligature": ["py.typed", "**/*.glsl", "**/*.vert", "**/*.frag", "client/names/*/*.py", "cockpit/web/*"]},
+    package_data={
+        "ligature": ["py.typed", "**/*.glsl", "**/*.vert", "**/*.frag", "client/names/*/*.py", "cockpit/web/*"]
+    },
     cmdclass={"build_py": BuildWithBundle, "sdist": SourceWithMessages},
 )
