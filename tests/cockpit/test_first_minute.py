@@ -143,7 +143,12 @@ def test_a_game_pad_moves_the_tip(served: Served, operator: Person) -> None:
 def test_a_drag_in_the_picture_takes_the_tip_along(served: Served, operator: Person) -> None:
     presses(operator, "lig-swap")
     size = "const i = document.getElementById('lig-image'); return i.naturalHeight ? [i.naturalWidth, i.naturalHeight] : null"
-    until(lambda: (operator.driver.execute_script(size) or [900])[0] < 900, "one eye's picture is large")
+
+    def one_eye() -> bool:
+        wide, high = operator.driver.execute_script(size) or (2, 1)  # both eyes stand side by side
+        return wide < 2 * high
+
+    until(one_eye, "one eye's picture is large")
     try:
         box = operator.driver.execute_script(
             "const r = document.getElementById('lig-image').getBoundingClientRect(); return [r.x, r.y, r.width, r.height]"

@@ -10,8 +10,9 @@ import ligature
 import numpy as np
 import pytest
 import trimesh
-from ligature.cockpit.looks import body_looks
+from ligature.cockpit.looks import LIT, body_looks
 from ligature.cockpit.tissue import CORNERS, LIFT, TURNS, TissueStage, discs, fan
+from ligature.cockpit.tone import displayed, linear, mapped
 from ligature.model.state import MAX_PUNCTURES, new_state
 
 PAD = (
@@ -48,7 +49,9 @@ def stage(tmp_path: Path) -> tuple[Page, TissueStage, Any, np.ndarray]:
 def test_a_pad_is_sent_as_a_closed_mesh_of_its_colour_and_not_as_a_rigid_one(stage: Any) -> None:
     page, _, scene, _ = stage
     mesh = page.meshes["/tissue/0"]
-    assert mesh.color == (128, 64, 255)
+    light = mapped(linear(np.array(mesh.color) / 255.0) * LIT)  # as a browser shows it where it is lit
+    red, green, blue = 255.0 * displayed(light)
+    assert (red, green) == pytest.approx((128, 64), abs=8) and blue > 220, "a browser's whites are no brighter"
     solid = trimesh.Trimesh(np.round(mesh.vertices.astype(float), 6), mesh.faces)
     assert solid.volume == pytest.approx(0.06 * 0.04 * 0.012, rel=1e-4)
     assert set(body_looks(scene)) == {1}
