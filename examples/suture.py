@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import ligature
 import numpy as np
@@ -325,21 +326,15 @@ def operate(
     return score, monitor.measures(), stopped
 
 
-def main() -> int:
-    """Make a suture and print how well it went."""
-    arguments = argparse.ArgumentParser(description="Two arms suture a pad by themselves.")
-    arguments.add_argument(
-        "--throws", type=int, choices=(1, 2, 3, 4), default=2, help="from the first pair of holes on"
-    )
-    arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
-    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
-    arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file; launch_400006.yaml has other tools")
-    given = arguments.parse_args()
+def perform(
+    given: argparse.Namespace, suture: Callable[[ligature.Simulation, Film | None], tuple[Any, Measures, str]]
+) -> int:
+    """Load the scene, suture, print how it went, and keep the pictures; returns the exit status."""
     simulation = ligature.Simulation(ligature.load(given.scene))
     scatter(simulation, given.seed)
     film = Film(simulation, given.out) if given.out else None
     started = time.perf_counter()
-    score, measures, stopped = operate(simulation, given.throws, film)
+    score, measures, stopped = suture(simulation, film)
     took = time.perf_counter() - started
     lines = [
         *score.lines(),
@@ -350,6 +345,19 @@ def main() -> int:
     if film is not None:
         print(film.save())
     return 0 if score.success and not stopped else 1
+
+
+def main() -> int:
+    """Make a suture and print how well it went."""
+    arguments = argparse.ArgumentParser(description="Two arms suture a pad by themselves.")
+    arguments.add_argument(
+        "--throws", type=int, choices=(1, 2, 3, 4), default=2, help="from the first pair of holes on"
+    )
+    arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
+    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
+    arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file; launch_400006.yaml has other tools")
+    given = arguments.parse_args()
+    return perform(given, lambda simulation, film: operate(simulation, given.throws, film))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +34,7 @@ from suture import (  # noqa: E402
     Failure,
     Film,
     Surgeon,
-    scatter,
+    perform,
 )
 
 Array = np.ndarray
@@ -259,21 +258,8 @@ def main() -> int:
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
     arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file")
     given = arguments.parse_args()
-    simulation = ligature.Simulation(ligature.load(given.scene))
-    scatter(simulation, given.seed)
-    film = Film(simulation, given.out) if given.out else None
-    started = time.perf_counter()
-    score, measures, stopped = operate(simulation, Plan(given.width, given.place), film)
-    took = time.perf_counter() - started
-    lines = [
-        *score.lines(),
-        *measures.lines(),
-        f"computed in {took:.1f} s, {simulation.time / took:.1f} times real time",
-    ]
-    print("\n".join([f"stopped: {stopped}", *lines] if stopped else lines))
-    if film is not None:
-        print(film.save())
-    return 0 if score.success and not stopped else 1
+    plan = Plan(given.width, given.place)
+    return perform(given, lambda simulation, film: operate(simulation, plan, film))
 
 
 if __name__ == "__main__":

@@ -290,11 +290,20 @@ def _keep(number: int, reason: str, outcome: Outcome, campaign: Campaign) -> Non
     outcome.failures.append(f"{campaign.noun} {number} of {min(files)}: {reason}")
 
 
+KINDS = {
+    "mutants": (MUTANTS, LIMIT, CHUNK),
+    "scenes": (SCENES, SCENE_LIMIT, SCENE_CHUNK),
+    "readers": (READERS, LIMIT, CHUNK),
+    "paths": (PATHS, SCENE_LIMIT, SCENE_CHUNK),
+}
+"""Campaigns by their option: seconds for a case, and cases of one process."""
+
+
 def main() -> int:
     """Entry point."""
     flags = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     kind = flags.add_mutually_exclusive_group()
-    kind.add_argument("--mutants", type=int, default=100_000)
+    kind.add_argument("--mutants", type=int, help="mutants of scenes; 100 000 by default")
     kind.add_argument("--scenes", type=int, help="generated scenes, instead of mutants")
     kind.add_argument("--readers", type=int, help="mutants of files that are no scenes, instead of mutants of scenes")
     kind.add_argument("--paths", type=int, help="paths of needles through tissue, instead of mutants")
@@ -302,39 +311,14 @@ def main() -> int:
     flags.add_argument("--jobs", type=int, default=2, help="worker processes")
     given = flags.parse_args()
     begin = time.monotonic()
-    if given.readers is not None:
-        cases, outcome = (
-            given.readers,
-            run(given.readers, given.first, given.jobs, campaign=READERS, log=sys.stderr.write),
-        )
-    elif given.paths is not None:
-        cases = given.paths
-        outcome = run(
-            cases,
-            given.first,
-            given.jobs,
-            limit=SCENE_LIMIT,
-            campaign=PATHS,
-            chunk=SCENE_CHUNK,
-            log=sys.stderr.write,
-        )
-    elif given.scenes is None:
-        cases, outcome = given.mutants, run(given.mutants, given.first, given.jobs, log=sys.stderr.write)
-    else:
-        cases = given.scenes
-        outcome = run(
-            cases,
-            given.first,
-            given.jobs,
-            limit=SCENE_LIMIT,
-            campaign=SCENES,
-            chunk=SCENE_CHUNK,
-            log=sys.stderr.write,
-        )
+    asked = {name: count for name in KINDS if (count := getattr(given, name)) is not None}
+    noun, cases = next(iter(asked.items()), ("mutants", 100_000))
+    campaign, limit, chunk = KINDS[noun]
+    outcome = run(
+        cases, given.first, given.jobs, limit=limit, campaign=campaign, chunk=chunk, log=sys.stderr.write
+    )  # fmt: skip
     ended = ", ".join(f"{key} {count}" for key, count in sorted(outcome.ended.items()))
     seconds = time.monotonic() - begin
-    kinds = {"files": given.readers, "scenes": given.scenes, "paths": given.paths}
-    noun = next((name for name, count in kinds.items() if count is not None), "mutants")
     sys.stdout.write(f"{cases} {noun} in {seconds:.0f} s: {ended}; {len(outcome.failures)} failures\n")
     return int(bool(outcome.failures))
 

@@ -23,11 +23,10 @@ class Lifts:
     def __init__(self, engine: Engine, bodies: Sequence[int], forces: Sequence[Array]) -> None:
         self._engine = engine
         self._bodies, self._forces = np.array(bodies, dtype=np.int64), np.array(forces).reshape(-1, 3)
-        self._idle = len(bodies) == 0
 
     def step(self) -> None:
         """Apply the forces for one tick."""
-        if self._idle:
+        if not self._bodies.size:
             return
         engine = self._engine
         motions = engine.motions

@@ -91,9 +91,9 @@ def _core(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
     yield Column("action", motors, action)
     yield Column("delta_action", motors, action - now)
     poses = [(arm["local_setpoint_cp"][:], arm["local_action_cp"][:], arm["jaw/action_js"][:][:, None]) for arm in arms]
-    tips = [one_sign(arm["local_measured_cp"][:]) for arm in arms]
+    begin = [one_sign(arm["local_measured_cp"][:1])[0] for arm in arms]
     absolute = np.concatenate(
-        [np.hstack([one_sign(after, tip[0]), jaw]) for (_, after, jaw), tip in zip(poses, tips, strict=True)], axis=1
+        [np.hstack([one_sign(after, tip), jaw]) for (_, after, jaw), tip in zip(poses, begin, strict=True)], axis=1
     )
     yield Column("cartesian_action", robot.each((*POSE, "jaw")), absolute)
     steps = [_step(before, after) for before, after, _ in poses]
