@@ -50,6 +50,13 @@ def namespaces(element: Element) -> Iterator[Diagnostic]:
         yield _finding(element, Severity.INFO, "namespace", "has a namespace without '/' at its end", hint, "name")
 
 
+def version(element: Element) -> Iterator[Diagnostic]:
+    """Files of another version than 1.0 are none of this format (§1.4)."""
+    if element.has("adf version") and element.text("adf version") != "1.0":
+        message = "'adf version' is not 1.0"
+        yield Diagnostic(Severity.ERROR, message, element.mark_of("adf version"), "write 1.0", "version")
+
+
 def frequencies(element: Element) -> Iterator[Diagnostic]:
     """Rates of publishing (§10.1)."""
     low, high = element.integer("publish frequency.low"), element.integer("publish frequency.high")
@@ -202,9 +209,10 @@ def world_surroundings(element: Element) -> Iterator[Diagnostic]:
 
 _COMMON: tuple[Rule, ...] = (names, frequencies, plugins)
 RULES: dict[str, tuple[Rule, ...]] = {
-    "launch": (plugins,),
-    "world": (namespaces, world_surroundings, plugins),
-    "model": (namespaces, plugins),
+    "launch": (plugins, version),
+    "world": (namespaces, world_surroundings, plugins, version),
+    "model": (namespaces, plugins, version),
+    "input devices": (version,),
     "body": (*_COMMON, shapes),
     "joint": (plugins, joint_limits, joint_springs, joint_without_effect),
     "ghost object": (*_COMMON, shapes),
