@@ -35,7 +35,7 @@ def names(element: Element) -> Iterator[Diagnostic]:
     """Objects with topics need a name that ROS takes (§4.1, §4.3)."""
     name = element.text("name").replace(" ", "")
     if not name:
-        yield _finding(element, Severity.WARNING, "name", "has no name, and so has its topic", "add name: …", "name")
+        yield _finding(element, Severity.WARNING, "name", "has no name, so its topic has none", "add name: …", "name")
     elif not _ROS_NAME.match(name) and not element.flag("passive"):
         hint = "letters, digits and '_' make a topic"
         yield _finding(element, Severity.WARNING, "name", f"is called '{name}'", hint, "name")
@@ -61,8 +61,8 @@ def frequencies(element: Element) -> Iterator[Diagnostic]:
     """Rates of publishing (§10.1)."""
     low, high = element.integer("publish frequency.low"), element.integer("publish frequency.high")
     if low > high:
-        message = f"publishes at {low} Hz without commands and at {high} Hz with them"
-        yield _finding(element, Severity.WARNING, "publish frequency", message, "write low, then high")
+        message = f"has a low publish frequency of {low} Hz, above the high one of {high} Hz"
+        yield _finding(element, Severity.WARNING, "publish frequency", message, "set low to at most high")
 
 
 def plugins(element: Element) -> Iterator[Diagnostic]:
@@ -76,7 +76,7 @@ def plugins(element: Element) -> Iterator[Diagnostic]:
             message = f"a plug-in of {element.kind} '{element.key}' lacks name or filename"
             yield Diagnostic(Severity.WARNING, message, entry.mark, "it is left out", "plugin")
     if entries:
-        yield _finding(element, Severity.INFO, "plugins", "has plug-ins, which are not run", "", "plugin")
+        yield _finding(element, Severity.INFO, "plugins", "has plug-ins, which Ligature does not load", "", "plugin")
 
 
 def shapes(element: Element) -> Iterator[Diagnostic]:
@@ -145,7 +145,9 @@ def joint_without_effect(element: Element) -> Iterator[Diagnostic]:
             if element.has(path):
                 yield _finding(element, Severity.DEBUG, path, f"is fixed, so '{path}' has no effect")
     if element.has("offset") and element.has("child offset"):
-        yield _finding(element, Severity.WARNING, "child offset", "has 'offset' too, which wins", "remove one")
+        yield _finding(
+            element, Severity.WARNING, "child offset", "also has 'offset', which takes precedence", "remove one"
+        )
 
 
 def sensor_rays(element: Element) -> Iterator[Diagnostic]:
@@ -155,7 +157,13 @@ def sensor_rays(element: Element) -> Iterator[Diagnostic]:
             hint = "add 'array', 'mesh' or 'parametric'"
             yield _finding(element, Severity.WARNING, "type", "has no rays, so it senses nothing", hint)
     elif element.number("distance threshold") < 0.0:
-        yield _finding(element, Severity.WARNING, "distance threshold", "asks for penetration", "0 is contact")
+        yield _finding(
+            element,
+            Severity.WARNING,
+            "distance threshold",
+            "has a negative 'distance threshold'",
+            "use 0 to detect contact",
+        )
 
 
 def camera_view(element: Element) -> Iterator[Diagnostic]:
@@ -168,11 +176,11 @@ def camera_view(element: Element) -> Iterator[Diagnostic]:
         ahead[0] * up[1] - ahead[1] * up[0],
     )
     if math.hypot(*across) <= 1e-12 * max(math.hypot(*ahead) * math.hypot(*up), 1e-12):
-        hint = "'look at' is a point, and 'up' is not along the line of sight"
-        yield _finding(element, Severity.WARNING, "look at", "looks nowhere, so it has no orientation", hint)
+        hint = "'look at' must differ from 'location', and 'up' must not be parallel to the line of sight"
+        yield _finding(element, Severity.WARNING, "look at", "has no viewing direction, so it has no orientation", hint)
     near, far = element.number("clipping plane.near"), element.number("clipping plane.far")
     if not 0.0 < near < far:
-        message = f"sees from {near:g} m to {far:g} m"
+        message = f"has its near clipping plane at {near:g} m and its far one at {far:g} m"
         yield _finding(element, Severity.WARNING, "clipping plane", message, "0 < near < far")
     for path in ("publish image interval", "publish depth interval"):
         if element.integer(path) == 0:

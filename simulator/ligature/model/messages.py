@@ -168,7 +168,7 @@ class Numbers(Field):
         if value is None and self.optional:
             return
         if self.length is not None and len(value) != self.length:
-            raise ValueError(f"{what} has {self.length} numbers, not {len(value)}")
+            raise ValueError(f"{what} must have {self.length} numbers, not {len(value)}")
         _fits(value)
         for number in value:
             if not math.isfinite(number):
@@ -235,7 +235,7 @@ def _fits(values: Any, most: int = MAX_NUMBERS) -> None:
 
 def _slice(data: bytes, at: int, end: int) -> bytes:
     if end > len(data):
-        raise CodecError("they end too early")
+        raise CodecError("the data ends too early")
     return data[at:end]
 
 

@@ -74,7 +74,7 @@ def test_every_launch_file_comes_back_with_all_that_it_names(corpus, tmp_path):
 
 
 def test_a_file_that_is_no_yaml_is_refused_with_its_place(corpus):
-    with pytest.raises(AdfError, match=r"compound_example.yaml:\d+:\d+: error: this is not YAML"):
+    with pytest.raises(AdfError, match=r"compound_example.yaml:\d+:\d+: error: invalid YAML"):
         import_file(next(corpus.rglob("compound_example.yaml")), bpy.context.scene)
 
 
