@@ -1,4 +1,4 @@
-"""Paths that a shell can hand over and no scene lies at: each command says so in words."""
+"""Paths that a shell can hand over and no scene lies at: each command reports that in words."""
 
 from __future__ import annotations
 
