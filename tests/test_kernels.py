@@ -6,6 +6,7 @@ import ast
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -92,6 +93,20 @@ def test_a_temporary_folder_that_others_can_write_is_not_taken(program: str, tmp
     assert done.returncode == 0 and f"{tmp_path}/ligature-{os.getuid()} is used" not in done.stderr
     assert list((tmp_path / f"ligature-{os.getuid()}").iterdir()) == []
     assert [path.name for path in tmp_path.glob("ligature-*")] == [f"ligature-{os.getuid()}"]
+
+
+def test_code_of_versions_that_nobody_starts_any_more_goes(program: str, tmp_path: Path) -> None:
+    folder = tmp_path / "cache" / "kernels"
+    for name, days in (("0123456789abcdef", 31), ("fedcba9876543210", 29), ("my notes", 400)):
+        (folder / name).mkdir(parents=True)
+        (folder / name / "code.nbc").write_text("")
+        os.utime(folder / name, (time.time() - days * 86400,) * 2)
+    done = run(program, LIGATURE_CACHE=str(tmp_path / "cache"))
+    mine = Path(done.stdout.split()[1])
+    assert {path.name for path in folder.iterdir()} == {mine.name, "fedcba9876543210", "my notes"}
+    os.utime(mine, (0, 0))
+    assert run(program, LIGATURE_CACHE=str(tmp_path / "cache")).stdout.split()[2] == "1"
+    assert time.time() - mine.stat().st_mtime < 600
 
 
 def test_a_disk_that_becomes_full_costs_the_cache_and_not_the_run(program: str, tmp_path: Path) -> None:

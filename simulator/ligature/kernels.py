@@ -7,9 +7,12 @@ first start after an installation compiles, which is logged every few seconds wh
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
+import os
 import re
+import shutil
 import threading
 import time
 from collections.abc import Callable
@@ -27,8 +30,12 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 FIRST_REPORT, REPORT_EVERY = 1.0, 4.0
 """Seconds of compilation before the first line about it, and between lines."""
 
+KEPT = 30 * 24 * 3600.0
+"""Seconds for which the machine code of a version is kept after the last start with it."""
+
 _PACKAGE = Path(__file__).parent
 _KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic)\b", re.MULTILINE)
+_DIGEST = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
     "kernels.py", "model/state.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
     "tissue/contact_arrays.py",
@@ -53,7 +60,19 @@ def kernel_folder() -> Path | None:
         _log.warning("%s; kernels are compiled again at every start", error)
         return None
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources())).hexdigest()[:16]
-    return root / "kernels" / digest
+    folder = root / "kernels" / digest
+    _forget_others(folder)
+    return folder
+
+
+def _forget_others(folder: Path) -> None:
+    """Delete the machine code of other versions that nothing has started with for `KEPT`: 40 MB for each version."""
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        for other in folder.parent.iterdir():
+            if _DIGEST.fullmatch(other.name) and time.time() - other.stat().st_mtime > KEPT:
+                shutil.rmtree(other, ignore_errors=True)
 
 
 def compiled(function: Function) -> Function:

@@ -51,6 +51,6 @@ def lower_priority(nice: int) -> None:
 
 
 def report(event: str, text: str = "") -> None:
-    """Report ``event`` to the parent."""
-    sys.stdout.write(f"@{event} {text}\n")
+    """Report ``event`` to the parent; names of files may hold what is no UTF-8."""
+    sys.stdout.write(f"@{event} {text}\n".encode("utf-8", "backslashreplace").decode())
     sys.stdout.flush()

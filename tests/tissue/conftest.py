@@ -44,6 +44,7 @@ class SprungNeedle:
         self.inertia = mass * (0.3 * self.length) ** 2
         self.turning = stiffness * 1e-4
         self.wrench = np.zeros(6)
+        self.free = np.zeros(3)  # motion of the tip in the last tick had there been no tissue
         self.force = 0.0
         self.impulse = np.zeros(3)
 
@@ -69,6 +70,8 @@ class SprungNeedle:
 
     def tick(self):
         H, g = self.equations()
+        free = np.linalg.solve(H, g)
+        self.free = free[:3] + np.cross(free[3:], self.tip - self.centre)
         delta, self.wrench = self.needle.couple(self.tip, self.R[:, 0], self.R[:, 1], self.centre, H, g)
         self.force = -float(self.wrench[:3] @ self.R[:, 0])
         self.impulse += self.wrench[:3] * DT

@@ -171,6 +171,23 @@ def test_tip_below_the_least_angle_slides_and_above_it_punctures(kit):
             assert np.abs(force).max() > 0.05
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_tip_that_presses_deep_stays_on_the_surface_until_it_punctures(kit, seed):
+    """However soft the tissue: a dent as deep as the pad is no way through it."""
+    random = np.random.default_rng(seed)
+    material = TissueMaterial(random.uniform(2e3, 2e4), poisson=random.uniform(0.3, 0.45), puncture_force=5.0)
+    block = kit.pad(material, cells=tuple(random.integers((6, 5, 2), (11, 9, 5)).tolist()))
+    at, tilt = random.uniform(0.4, 0.6, 2) * kit.SIZE[:2], np.deg2rad(random.uniform(0.0, 40.0))
+    needle = _down(kit, block, *at, tilt, stiffness=1e4)
+    needle.advance(1e-3, speed=0.05)
+    before = 0.0
+    for _ in range(14):
+        needle.advance(1e-3, speed=0.05)
+        assert needle.needle.where == states.TOUCHES
+        assert needle.force > before
+        before = needle.force
+
+
 def test_curved_needle_enters_and_leaves_through_the_same_surface(kit):
     block = kit.pad(MATERIAL, cells=(14, 10, 4))
     radius = 7e-3

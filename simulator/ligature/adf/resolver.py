@@ -14,6 +14,7 @@ from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
+from ligature.paths import real_path
 
 MAX_BYTES = 256 * 1024 * 1024
 """Largest file that is read unless the caller sets otherwise."""
@@ -48,7 +49,7 @@ class Resolver:
     """
 
     def __init__(self, roots: abc.Sequence[Path]) -> None:
-        self.roots = tuple(Path(root).resolve() for root in roots)
+        self.roots = tuple(real_path(Path(root)) for root in roots)
 
     @classmethod
     def for_file(cls, path: Path, extra_roots: Iterable[Path] = ()) -> Resolver:
@@ -75,10 +76,7 @@ class Resolver:
         """``path`` with links resolved, if it lies below a root; raises `ResolutionError` at ``mark``."""
         if len(str(path)) > MAX_PATH or any(len(part.encode("utf-8", "replace")) > MAX_NAME for part in path.parts):
             raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark)
-        try:
-            real = path.resolve()
-        except (OSError, RuntimeError) as error:
-            raise self._refusal(f"'{path}' cannot be resolved: {error}", mark) from error
+        real = real_path(path)
         if not any(real == root or root in real.parents for root in self.roots):
             roots = ", ".join(map(str, self.roots))
             raise self._refusal(
@@ -100,8 +98,7 @@ class Resolver:
         real = self.allow(path, mark)
         try:
             if not real.is_file():
-                reason = "is a folder" if real.is_dir() else "does not exist"
-                raise self._refusal(f"'{real}' {reason}", mark)
+                raise self._refusal(f"'{real}' {_lack(real)}", mark)
             if real.stat().st_size > limit:
                 raise self._refusal(f"'{real}' is larger than {limit} bytes", mark)
             return real.read_bytes()
@@ -134,6 +131,15 @@ class Resolver:
         return ResolutionError(Diagnostic(Severity.ERROR, message, mark, hint, "path"))
 
 
+def _lack(path: Path) -> str:
+    """Why ``path`` is not a file."""
+    if path.is_dir():
+        return "is a folder"
+    if path.is_symlink():
+        return "is a link that leads to no file"
+    return "is not a regular file" if path.exists() else "does not exist"
+
+
 def scene_root(path: Path) -> Path:
     """The folder below which the scene of ``path``, the file that the user named, may open files.
 
@@ -141,7 +147,7 @@ def scene_root(path: Path) -> Path:
     the highest launch file around it which names a file of the same branch: that launch file may open the same
     folder. Else the folder above the file's own. Never all of a disk, nor what lies above the user's home.
     """
-    folder = path.resolve().parent
+    folder = real_path(path).parent
     for candidate in (folder, *folder.parents):
         if any((candidate / sign).exists() for sign in _ROOT_SIGNS):
             return candidate
@@ -162,7 +168,7 @@ def _above_home(folder: Path) -> bool:
 
 
 def _home() -> Path:
-    return Path(os.path.expanduser("~")).resolve()
+    return real_path(Path(os.path.expanduser("~")))
 
 
 def _launches(folder: Path, branch: Path) -> bool:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError
 from ligature.adf.nodes import parse
+from ligature.paths import real_path
 
 WRITERS = 16
 """Files that are written at a time."""
@@ -61,7 +62,7 @@ def refuse_outside(files: Iterable[Path], roots: Collection[Path] | None) -> Non
     """Raise `SaveError` when a file lies outside the folders ``roots``, links resolved; None allows all."""
     if roots is None:
         return
-    allowed = [root.resolve() for root in roots]
+    allowed = [real_path(root) for root in roots]
     for path in files:
         real = _real(path)
         if not any(root in real.parents for root in allowed):
@@ -91,7 +92,7 @@ def digests(files: Mapping[Path, bytes]) -> dict[str, str]:
 
 def _real(path: Path) -> Path:
     """The path with the links of its folder resolved; a link in its own place is replaced, not followed."""
-    return path.parent.resolve() / path.name
+    return real_path(path.parent) / path.name
 
 
 def _kept(path: Path) -> str:

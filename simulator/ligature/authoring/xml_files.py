@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
 
+from ligature.paths import regular_file
+
 MOST_BYTES = 1 << 26
 MOST_ELEMENTS, MOST_LEVELS = 1_000_000, 100
 """Bounds of a file; the largest robots have some 10 000 elements, nested ten deep."""
@@ -46,7 +48,7 @@ def check_xml(path: Path) -> None:
     parser.StartDoctypeDeclHandler = declared
     parser.StartElementHandler, parser.EndElementHandler = begins, ends
     try:
-        parser.Parse(path.read_bytes(), True)
+        parser.Parse(regular_file(path).read_bytes(), True)
     except expat.ExpatError as error:
         why = expat.errors.messages[error.code]
         raise XmlError(f"{path}:{error.lineno}:{error.offset + 1}: error: not well-formed XML: {why}") from None

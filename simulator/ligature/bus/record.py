@@ -22,6 +22,7 @@ from typing import BinaryIO
 from ligature.bus.codec import CodecError, decode, encode
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
+from ligature.paths import regular_file
 
 FORMAT = "ligature record 3"
 END, BEGIN = 0xFFFFFFFF, 0xFFFFFFFE
@@ -185,7 +186,7 @@ class Record:
     @classmethod
     def read(cls, path: Path) -> Record:
         """The record ``path``; raises `RecordError`, and OSError."""
-        if path.stat().st_size > MOST_FILE_BYTES:
+        if regular_file(path).stat().st_size > MOST_FILE_BYTES:
             raise RecordError(f"{path}: has more than {MOST_FILE_BYTES >> 30} GiB; no record is as large")
         data = path.read_bytes()
         header, begin = _header(data, path)
@@ -232,7 +233,7 @@ class Record:
 
 def is_record(path: Path) -> bool:
     """Whether a file begins as a record does."""
-    with path.open("rb") as file:
+    with regular_file(path).open("rb") as file:
         return file.read(64).startswith(b'{"format": "ligature record')
 
 

@@ -52,7 +52,8 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
     if document.kind not in ("launch", "model") or (strict and not document.ok):
         return document.diagnostics
     if document.kind == "model" and not _has_bodies(document):
-        return document.diagnostics
+        alone = "the file has no body, so it runs only together with a file that has one"
+        return [*document.diagnostics, Diagnostic(Severity.INFO, alone, document.top.mark)]
     try:
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:

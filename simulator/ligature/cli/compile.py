@@ -48,7 +48,7 @@ def _start(scene: Path, console: Console) -> tuple[subprocess.Popen[str], thread
     def show() -> None:
         assert process.stdout is not None
         for line in process.stdout:
-            console.print(f"{scene.parent.name}: {line.rstrip()}", style="dim", markup=False)
+            console.print(f"{scene.parent.name or scene}: {line.rstrip()}", style="dim", markup=False)
 
     reader = threading.Thread(target=show, daemon=True)
     reader.start()
@@ -77,4 +77,7 @@ def _draw(simulation: ligature.Simulation) -> None:
 
 
 if __name__ == "__main__":
-    run_for_a_moment(Path(sys.argv[1]))
+    try:
+        run_for_a_moment(Path(sys.argv[1]))
+    except (ligature.SceneError, OSError) as error:
+        sys.exit(str(error))

@@ -15,6 +15,7 @@ from ligature.authoring.objfile import MeshWriteError, Paint, Surface, obj_texts
 from ligature.authoring.save import SaveError, checked_text, save_all
 from ligature.authoring.urdf import from_urdf
 from ligature.authoring.xml_files import XmlError, check_xml
+from ligature.paths import real_path
 
 
 def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
@@ -28,7 +29,7 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
     try:
         check_xml(source)
         converted = _mjcf(source) if _is_mjcf(source) else _urdf(source)
-        written = save_all(_files(converted, out.resolve(), namespace))
+        written = save_all(_files(converted, real_path(out), namespace))
     except (SaveError, PatchError, MeshWriteError, MissingReaderError, XmlError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
@@ -64,7 +65,7 @@ def _urdf(source: Path) -> Converted:
 
     # meshes are read by our own reader, so that the file's paths mean what its folder makes of them
     robot = yourdfpy.URDF.load(str(source), build_scene_graph=False, load_meshes=False).robot
-    return from_urdf(robot, source.resolve().parent)
+    return from_urdf(robot, real_path(source).parent)
 
 
 def _mjcf(source: Path) -> Converted:

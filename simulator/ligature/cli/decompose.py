@@ -10,6 +10,7 @@ from ligature.adf import AdfError, Resolver
 from ligature.mesh import load_mesh
 from ligature.mesh.decompose import decompose as cut
 from ligature.mesh.decompose import obj_text
+from ligature.paths import real_path
 
 
 def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, console: Console) -> int:
@@ -17,7 +18,7 @@ def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, co
     target = out or mesh.with_name(f"{mesh.stem}_collision.obj")
     library = target.with_suffix(".mtl")
     try:
-        result = cut(load_mesh(mesh.resolve(), Resolver([mesh.resolve().parent])), threshold, max_hulls)
+        result = cut(load_mesh(real_path(mesh), Resolver([real_path(mesh).parent])), threshold, max_hulls)
         text, materials = obj_text(result.hulls, library.name)
         library.write_text(materials, encoding="utf-8")
         target.write_text(text, encoding="utf-8")

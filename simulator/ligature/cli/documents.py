@@ -17,6 +17,7 @@ from ligature.authoring.shapes import shapes_properties
 from ligature.mesh.inertia import MassProperties, mass_properties
 from ligature.mesh.load import EXTENSIONS, load_mesh
 from ligature.mesh.surface import joined
+from ligature.paths import real_path
 
 
 def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> int:
@@ -59,7 +60,7 @@ def _lost(document: Document) -> str:
 
 def _save(file: Path, text: str, console: Console) -> int:
     try:
-        save_all({file.resolve(): checked_text(text, file)})
+        save_all({real_path(file): checked_text(text, file)})
     except SaveError as error:
         console.print(str(error), style="red", markup=False)
         return 1
@@ -105,7 +106,7 @@ def inertia(file: Path, density: float, mass: float | None, console: Console) ->
     resolver = Resolver.for_file(file)
     if file.suffix.lower() in EXTENSIONS:
         try:
-            solid = mass_properties(*joined(load_mesh(file.resolve(), resolver).parts), density)
+            solid = mass_properties(*joined(load_mesh(real_path(file), resolver).parts), density)
         except (AdfError, ValueError) as error:
             console.print(f"{file}: {error}", style="red", markup=False)
             return 1

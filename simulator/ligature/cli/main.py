@@ -6,7 +6,7 @@ import importlib.util
 import math
 import os
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, NoReturn, Optional
 
 import typer
 from rich.console import Console
@@ -17,6 +17,9 @@ from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices
 from ligature.cli.sampling import Sampling, picture_size
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import requested
+
+LONG = 120
+"""Characters of a path that a message quotes."""
 
 app = typer.Typer(
     add_completion=False,
@@ -556,8 +559,18 @@ def main() -> None:
         text = remedy(error.name or "")
         if not text:
             raise
-        Console(stderr=True, highlight=False, soft_wrap=True).print(text, style="red", markup=False)
-        raise SystemExit(2) from None
+        _fail(text)
+    except OSError as error:
+        # What a file system says of a path of the user's: too long a name, a full disk, no permission.
+        if error.filename is None:
+            raise
+        name = os.fsdecode(error.filename)
+        _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
+
+
+def _fail(text: str) -> NoReturn:
+    Console(stderr=True, highlight=False, soft_wrap=True).print(text, style="red", markup=False)
+    raise SystemExit(2) from None
 
 
 if __name__ == "__main__":

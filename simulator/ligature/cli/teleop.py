@@ -12,6 +12,7 @@ from rich.console import Console
 from ligature.adf.diagnostics import AdfError
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.paths import regular_file
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
 
@@ -46,7 +47,7 @@ def teleop(
 
 def _configuration(file: Path, devices: tuple[int, ...] | None) -> TeleopConfig:
     """That of a teleoperation file, or what the input devices of a launch file state."""
-    text = file.read_text("utf-8")
+    text = regular_file(file).read_text("utf-8")
     if "multibody configs" in text:
         from ligature.teleop.launch import of_launch_file
 

@@ -17,6 +17,8 @@ from typing import Any
 
 import h5py
 
+from ligature.paths import regular_file
+
 Describe = Callable[[h5py.File], None]
 """Writes into a file what holds for all episodes."""
 
@@ -178,7 +180,7 @@ def join(path: Path) -> int:
 def opened(path: Path) -> h5py.File:
     """A dataset for reading; raises `DatasetError` for a file that is none."""
     try:
-        file = h5py.File(path, "r")
+        file = h5py.File(regular_file(path), "r")
     except OSError as error:
         raise DatasetError(f"cannot read the dataset '{path}': {error}") from error
     if not str(file.attrs.get("format", "")).startswith("ligature dataset"):

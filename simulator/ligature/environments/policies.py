@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ligature.environments.experts import EXPERTS, Hand
 from ligature.environments.suturing import SuturingEnv
+from ligature.paths import real_path
 
 Act = Callable[[Any], NDArray[Any]]
 """The action (7,) for an observation; of one episode, whose first observation is the first that it is called with."""
@@ -126,7 +127,7 @@ def _function(place: str, name: str) -> Policy:
 def _module(place: str) -> Any:
     if not place.endswith(".py"):
         return importlib.import_module(place)
-    path = Path(place).resolve()
+    path = real_path(Path(place))
     if not path.is_file():
         raise FileNotFoundError(f"no file '{place}'")
     spec = importlib.util.spec_from_file_location(path.stem, path)

@@ -29,6 +29,7 @@ from ligature.model.geometry import shader_files
 from ligature.model.naming import topic_name
 from ligature.model.scene import WorldSettings
 from ligature.model.shapes import ShaderFiles
+from ligature.paths import real_path
 
 SKYBOX_FACES = ("right", "left", "top", "bottom", "front", "back")
 
@@ -219,7 +220,7 @@ def _out_of_range(message: str, document: Document, key: str) -> Diagnostic:
 
 def _name_of(path: Path) -> str:
     """A scene in ``suturing/launch.yaml`` is called ``suturing``; another launch file names its scene itself."""
-    return path.resolve().parent.name if path.stem == "launch" else path.stem
+    return real_path(path).parent.name if path.stem == "launch" else path.stem
 
 
 def _listed_arms(launch: LaunchDocument) -> dict[str, Any]:

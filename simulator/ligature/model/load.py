@@ -78,7 +78,8 @@ def load(
         builder.add(model, part)
     scene = completed(builder)
     if not scene.bodies:
+        # What kept the bodies out says enough.
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
-        message = "the file yields no body to simulate"
-        raise SceneError(Diagnostic(Severity.ERROR, message, found.start.top.mark), *errors)
+        nothing = Diagnostic(Severity.ERROR, "the file yields no body to simulate", found.start.top.mark)
+        raise SceneError(*(errors or [nothing]))
     return prefixed(scene, namespace_prefix)

@@ -18,6 +18,7 @@ from ligature.adf.nodes import Mapping as Block
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
 from ligature.adf.scalars import flag, number
 from ligature.model.frames import frame, rpy_matrix
+from ligature.paths import regular_file
 from ligature.teleop.calibration import Calibration, Unclear, axes_of_angles, axes_of_words
 from ligature.teleop.devices import KINDS, module
 from ligature.teleop.feedback import FeedbackSettings
@@ -95,7 +96,7 @@ class TeleopConfig:
 
 def read(path: Path) -> TeleopConfig:
     """The configuration in a file; raises `AdfError`, whose diagnostics name file, line and what would be right."""
-    data = path.read_bytes()
+    data = regular_file(path).read_bytes()
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

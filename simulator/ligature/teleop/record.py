@@ -14,6 +14,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from ligature.paths import regular_file
 from ligature.teleop.devices.device import Reading
 
 
@@ -92,7 +93,7 @@ VERBS: dict[str, type] = {
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:
-    with path.open("rb") as file:
+    with regular_file(path).open("rb") as file:
         for number, line in enumerate(file, 1):
             try:
                 row = json.loads(line)

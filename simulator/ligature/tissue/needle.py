@@ -53,7 +53,10 @@ CAPTURE = 1e-3
 """Distance in metres from an old path, or from its opening, at which a tip follows it."""
 
 DROP = 6e-3
-"""Time in seconds in which the force of a tip that got through falls to what resists it next."""
+"""Time in seconds in which the force of a tip that got through falls to what resists it next, at least."""
+
+RECOIL = 0.3
+"""Speed in m/s with which a dent goes back then: a deep one takes longer."""
 
 TIP_FRICTION = 0.2
 """Coulomb coefficient of a tip that slides over the surface."""
@@ -74,7 +77,8 @@ class Held(NamedTuple):
     tip_side: Integers  # (3,)
     passing: Integers  # (P,) 1 for the paths that the needle is in, -1 from their exits
     tip: Integers  # (3,) where it is, its path, its point of contact
-    limit: Array  # (1,) force at which the tip gets further
+    limit: Array  # (1,) force at which the tip gets further, or slides on
+    drop: Array  # (1,) time in which the force of a tip that got through falls, s
     room: Array  # (1,) length of the path at which the far surface stands
     normal: Array  # (3,) of the surface at the contact, outwards
     pressed: Array  # (1,) force of the sliding tip on it
@@ -106,7 +110,7 @@ def held(capacity: int, paths: int) -> Held:
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     return Held(
         i(N), i(N), z(N), z(N), z(N), z((N, 3)), z((N, 3)), i(N, 3), z((N, 3)), i(3), i(paths),
-        np.array([OUTSIDE, -1, -1]), z(1), z(1), z(3), z(1), z(4),
+        np.array([OUTSIDE, -1, -1]), z(1), np.full(1, DROP), z(1), z(3), z(1), z(4),
     )  # fmt: skip
 
 
@@ -233,6 +237,9 @@ def follow_tip(points: Points, paths: Paths, held: Held, dt: float) -> int:
     p, where = held.tip[1], held.tip[0]
     if where == TOUCHES:
         held.limit[0] = points.puncture[held.tip[2]]
+    elif where == SLIDES:
+        # What is left of a tip that has stuck until now: it begins to slide without a leap.
+        held.limit[0] *= math.exp(-dt / held.drop[0])
     if p < 0 or held.passing[p] == 0 or where in (TOUCHES, SLIDES):
         return -1
     if where in (CUTS, TENTS):
@@ -241,9 +248,9 @@ def follow_tip(points: Points, paths: Paths, held: Held, dt: float) -> int:
             held.tip[0] = TENTS
         resists = points.cutting[front] + (points.exit[front] if held.tip[0] == TENTS else 0.0)
         # Or what is left of what the tip has just broken.
-        held.limit[0] = max(resists, held.limit[0] * math.exp(-dt / DROP))
+        held.limit[0] = max(resists, held.limit[0] * math.exp(-dt / held.drop[0]))
     elif where == LEAVES:
-        held.limit[0] *= math.exp(-dt / DROP)
+        held.limit[0] *= math.exp(-dt / held.drop[0])
         if held.limit[0] < LEFT:
             held.tip[0] = OUTSIDE
             return p
@@ -334,17 +341,17 @@ def gather(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Arra
         if where == SLIDES:
             kind, other = SLIDE, RUB
             tx, ty, tz = -held.normal[0], -held.normal[1], -held.normal[2]
-            high, bound = 1e9, TIP_FRICTION * held.pressed[0]
+            high, bound = 1e9, max(TIP_FRICTION * held.pressed[0], held.limit[0])
             # Across the normal: along the tip's way, and the third.
             along = shape[3] * tx + shape[4] * ty + shape[5] * tz
             nx, ny, nz = shape[3] - along * tx, shape[4] - along * ty, shape[5] - along * tz
             size = math.sqrt(nx * nx + ny * ny + nz * nz)
             nx, ny, nz = nx / size, ny / size, nz / size
+        dx, dy, dz = dx - held.offset[i, 0], dy - held.offset[i, 1], dz - held.offset[i, 2]
         set_row(rows, m, kind, i, tx, ty, tz, rx, ry, rz)
         rows.rest[m] = tx * dx + ty * dy + tz * dz
         rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = low, high, points.soft[i], held.tip_side[0]
         m += 1
-        dx, dy, dz = dx - held.offset[i, 0], dy - held.offset[i, 1], dz - held.offset[i, 2]
         for turn in range(2):
             if turn == 1:
                 nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx

@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 FADE = 0.05
 """Time in seconds in which tissue takes the shape of a needle that passes beside a node."""
 
+FOLDED = 3.0
+"""Strain along a path above which the tissue is folded: the cell around the tip is not the one that it has come to."""
+
 AROUND = 5e-3
 """Distance in metres within which the surface says at which angle a tip meets it, not the dent that the tip makes."""
 
@@ -185,7 +188,7 @@ class NeedleInTissue:
         self._interface.equip(point, int(grid.face_cell[face]), self.radius)
         self._interface.points.soft[point] = HARD
         h.offset[point], h.torn[point], h.tip_side[:] = 0.0, 0.0, 0
-        h.normal[:], h.pressed[0], h.tip[2] = self._normal_around(crossing), 0.0, point
+        h.normal[:], h.pressed[0], h.limit[0], h.tip[2] = self._normal_around(crossing), 0.0, 0.0, point
         h.tip[0] = states.TOUCHES if self._steep() else states.SLIDES
 
     def _steep(self) -> bool:
@@ -221,6 +224,7 @@ class NeedleInTissue:
         h, paths = self._held, self._paths
         if h.tip[0] == states.TOUCHES:
             point = int(h.tip[2])
+            h.drop[0] = self._drop_of(point)
             path = begin_path(paths, point)
             h.passing[path], h.tip[:] = 1, [states.CUTS, path, -1]
             h.engaged[point], h.anchor[point], h.sigma[point], h.share[point] = 1, 0.0, 0.0, 0.0
@@ -230,6 +234,12 @@ class NeedleInTissue:
             self._find_far_surface()
         elif h.tip[0] == states.TENTS:
             h.tip[0] = states.LEAVES
+
+    def _drop_of(self, point: int) -> float:
+        """Time in which the force on a dented point falls, s."""
+        p = self._interface.points
+        rest = p.weights[point] @ self._interface.elastic.grid.nodes[p.nodes[point]]
+        return max(states.DROP, float(np.linalg.norm(p.at[point] - rest)) / states.RECOIL)
 
     def _let_go(self) -> None:
         """The tip has left the surface."""
@@ -267,11 +277,22 @@ class NeedleInTissue:
         if not h.engaged[front] or s < paths.s[path, k] + SPACING or k + 2 >= MOST_NODES or h.tip[0] == states.TENTS:
             return
         cell = self._locate(self._shape[:3])
-        if cell < 0:
+        if cell < 0 or self._away(cell, front) > FOLDED * (s - paths.s[path, k]):
             return
         point = self._add(cell)
         extend_path(paths, path, point, s)
         self._hold(point)
+        # The new node takes over the tip's force. It would have to give way first, as the old one has: the tip stands
+        # that much further beyond the cut.
+        p, t = self._interface.points, self._shape[3:6]
+        yields = t @ (p.C[point, point] - p.C[point, front]) @ t + p.soft[point] - p.soft[front]
+        paths.cut[path] -= yields * h.load[0]
+
+    def _away(self, cell: int, point: int) -> float:
+        """Distance of the place that `_locate` has found in a cell from a point, in the tissue at rest, m."""
+        grid, p = self._interface.elastic.grid, self._interface.points
+        there = p.weights[point] @ grid.nodes[p.nodes[point]]
+        return float(np.linalg.norm(self._weights8 @ grid.nodes[grid.cells[cell]] - there))
 
     def _hold(self, point: int) -> None:
         """Let a node where the tip is hold the needle from now on."""
@@ -316,20 +337,23 @@ class NeedleInTissue:
         """Follow a tip that slides over the surface; the angle decides whether it does."""
         h, x, grid = self._held, self._interface.elastic.x, self._interface.elastic.grid
         point = int(h.tip[2])
-        outside = self._shape[:3] + 3e-3 * h.normal
-        face, _ = cross_surface(x, grid.faces, outside, -h.normal, 6e-3, -1.0, self._weights4, self._normal)
-        if face < 0:
-            self._let_go()
-            return
-        h.normal[:] = self._normal_around(self._weights4 @ x[grid.faces[face]])
         if h.tip[0] == states.SLIDES:
+            outside = self._shape[:3] + 3e-3 * h.normal
+            face, _ = cross_surface(x, grid.faces, outside, -h.normal, 6e-3, -1.0, self._weights4, self._normal)
+            if face < 0:
+                self._let_go()
+                return
+            h.normal[:] = self._normal_around(self._weights4 @ x[grid.faces[face]])
             # A point on the normal through the tip keeps the pressure; its place across starts anew.
             self._interface.place(point, grid.faces[face], self._weights4)
-            h.offset[point] = 0.0
+            h.offset[point] = (h.offset[point] @ h.normal) * h.normal
             self._interface.points.cell[point] = int(grid.face_cell[face])
+        # A tip that sticks keeps the normal with which it met the surface: that of the dent says nothing of the angle.
         steep = states.TOUCHES if self._steep() else states.SLIDES
         if steep != h.tip[0]:
-            h.tip[0], h.tip_side[:] = steep, 0
+            h.tip[0], h.tip_side[:], h.drop[0] = steep, 0, self._drop_of(point)
+            p = self._interface.points
+            h.offset[point] = self._moved_tip() - p.start[point] - p.soft[point] * p.force[point]
 
     def _look_inside(self) -> None:
         """Begin a contact with tissue that has come over the tip."""
@@ -341,6 +365,15 @@ class NeedleInTissue:
         face, _ = cross_surface(elastic.x, elastic.grid.faces, start, tangent, 2e-3, -1.0, self._weights4, self._normal)
         if face >= 0:
             self._meet(face)
+            point = int(h.tip[2])
+            if point >= 0:
+                # The surface gives way to the tip by and by, as `follow` lets the offset fade.
+                h.offset[point] = self._moved_tip() - self._interface.points.at[point]
+
+    def _moved_tip(self) -> Array:
+        """Where the tip is after the last tick, (3,)."""
+        tip, centre, delta = self._shape[:3], self._shape[11:], self.arrays.delta
+        return np.asarray(tip + delta[:3] + np.cross(delta[3:], tip - centre))
 
     def _locate(self, at: Array) -> int:
         elastic = self._interface.elastic
@@ -405,7 +438,7 @@ class NeedleInTissue:
         """Take the needle out without a trace."""
         for array in self._held:
             array[:] = 0
-        self._held.tip[:] = [states.OUTSIDE, -1, -1]
+        self._held.tip[:], self._held.drop[0] = [states.OUTSIDE, -1, -1], states.DROP
         self._before[:] = np.nan
         self.arrays.delta[:], self._shape[:9], self._shape[11:] = 0.0, 0.0, 0.0
 

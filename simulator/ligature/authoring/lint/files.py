@@ -11,6 +11,7 @@ import numpy as np
 from ligature.adf import Element, ResolutionError, Severity
 from ligature.adf.update import given_values
 from ligature.authoring.lint.subject import Finding, Subject, rule
+from ligature.paths import real_path
 
 LARGEST, SMALLEST = 100.0, 1e-3
 """Metres beyond which a model is suspected of another unit."""
@@ -114,13 +115,15 @@ def low_equals_high(subject: Subject) -> Iterator[Finding]:
 @rule("file-unreferenced")
 def file_unreferenced(subject: Subject) -> Iterator[Finding]:
     """Meshes that nothing names are left over; another file of the folder may use them."""
-    used = {path.resolve() for _, _, path in _mesh_files(subject)}
-    folders = {path.parent.resolve() for path in used}
-    others = [f for f in subject.document.path.parent.glob("*.yaml") if f.resolve() != subject.document.path.resolve()]
+    used = {real_path(path) for _, _, path in _mesh_files(subject)}
+    folders = {path.parent for path in used}
+    others = [
+        f for f in subject.document.path.parent.glob("*.yaml") if real_path(f) != real_path(subject.document.path)
+    ]
     texts = [subject.resolver.read_text(f) for f in others if subject.resolver.exists(f)]
     for folder in sorted(f for f in folders if f.is_dir()):
         for file in sorted(folder.iterdir()):
-            if file.suffix.lower() not in (".obj", ".stl", ".3ds") or file.resolve() in used:
+            if file.suffix.lower() not in (".obj", ".stl", ".3ds") or real_path(file) in used:
                 continue
             if not any(file.name in text for text in texts):
                 message = f"nothing refers to '{file.name}' in {folder.name}"

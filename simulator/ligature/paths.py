@@ -1,0 +1,26 @@
+"""Paths that users name."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+
+def real_path(path: Path) -> Path:
+    """``path`` absolute, with links followed as far as they lead: opening says what is wrong with a circle of links."""
+    return Path(os.path.realpath(path))
+
+
+def regular_file(path: Path) -> Path:
+    """``path``, where it is a file to read; raises OSError.
+
+    Reading a pipe waits for who writes to it, and a device such as ``/dev/zero`` has no end.
+    """
+    mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "is not a regular file", str(path))
+    return path

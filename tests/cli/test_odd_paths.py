@@ -1,0 +1,76 @@
+"""Paths that a shell can hand over and no scene lies at: each command reports that in words."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from ligature.cli import main as cli
+
+COMMANDS = {
+    "check": ["check", "PATH"],
+    "bench": ["bench", "--seconds", "0.1", "PATH"],
+    "render": ["render", "--camera", "c", "PATH"],
+    "decompose": ["decompose", "PATH", "out.obj"],
+    "fmt": ["fmt", "PATH"],
+    "diff": ["diff", "PATH", "PATH"],
+    "inertia": ["inertia", "PATH"],
+    "convert": ["convert", "PATH"],
+    "poses": ["poses", "PATH"],
+    "replay": ["replay", "PATH"],
+    "score": ["score", "reach", "PATH"],
+    "teleop": ["teleop", "PATH"],
+    "dataset info": ["dataset", "info", "PATH"],
+    "dataset export": ["dataset", "export", "PATH", "exported"],
+}
+
+
+def _link(place: Path, to: str) -> str:
+    place.symlink_to(to)
+    return place.name
+
+
+PATHS: dict[str, Callable[[Path], str]] = {
+    "missing": lambda _: "none.yaml",
+    "circle of links": lambda folder: _link(folder / "circle.yaml", "circle.yaml"),
+    "link to nothing": lambda folder: _link(folder / "link.yaml", "none.yaml"),
+    "pipe": lambda folder: os.mkfifo(folder / "pipe.yaml") or "pipe.yaml",
+    "folder": lambda folder: (folder / "folder.yaml").mkdir() or "folder.yaml",
+    "no UTF-8": lambda _: os.fsdecode(b"\xff\xfe.yaml"),
+    "line break": lambda _: "new\nline.yaml",
+    "long name": lambda _: "x" * 300 + ".yaml",
+    "long path": lambda _: "y/" * 3000 + "z.yaml",
+    "empty": lambda _: "",
+    "device": lambda _: "/dev/null",
+    "below a file": lambda folder: (folder / "file").write_text("") and "" or "file/scene.yaml",
+}
+
+
+@pytest.mark.parametrize("path", PATHS.values(), ids=PATHS)
+@pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
+def test_commands_say_what_is_wrong_with_a_path(
+    words: list[str], path: Callable[[Path], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    place = path(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["ligature", *(place if word == "PATH" else word for word in words)])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    out, err = capfd.readouterr()
+    assert ended.value.code in (1, 2), out + err
+    assert (out + err).strip() and "Traceback" not in out + err
+
+
+@pytest.mark.parametrize("scene", ["none.yaml", "x" * 300])
+def test_compile_says_why_a_scene_cannot_run(scene: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "ligature.cli.main", "compile", scene],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode in (1, 2) and "Traceback" not in done.stdout + done.stderr
+    assert "does not exist" in done.stdout or "File name too long" in done.stderr
