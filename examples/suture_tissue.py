@@ -67,10 +67,39 @@ TIGHT, MOST_PULL, PACE, MOST_WAY = 0.2e-3, 8.0, 0.015, 0.09
 
 @dataclass(frozen=True)
 class Plan:
-    """Which bite to take: ``width`` metres of each lip at most, ``place`` metres along the wound from its middle."""
+    """Which bites to take: ``stitches`` of them, ``width`` metres of each lip at most, ``spacing`` metres apart.
 
+    ``depth``, in metres below the top where a stitch passes the walls, decides the width where it is given: the needle
+    turns on its own circle.
+    """
+
+    stitches: int = 1
     width: float = 0.0045
-    place: float = 0.0
+    spacing: float = 0.008
+    depth: float | None = None
+
+    @property
+    def places(self) -> list[float]:
+        """Places of the stitches along the wound, from its middle."""
+        return [self.spacing * (k - 0.5 * (self.stitches - 1)) for k in range(self.stitches)]
+
+    def width_for(self, gap: float, radius: float) -> float:
+        """Width of each lip that a needle of ``radius`` takes of a wound that gapes by ``gap``, metres.
+
+        Raises
+        ------
+        ValueError
+            When the needle does not get as deep as planned.
+        """
+        if self.depth is None:
+            return self.width
+        low = np.sqrt(radius**2 - 0.25 * gap**2)
+        if not 0.0 < self.depth < low:
+            raise ValueError(
+                f"a needle of radius {1e3 * radius:.1f} mm cannot pass {1e3 * self.depth:.1f} mm below the top; "
+                f"choose more than 0 and less than {1e3 * low:.1f} mm"
+            )
+        return float(np.sqrt(radius**2 - (low - self.depth) ** 2) - 0.5 * gap)
 
 
 class TissueSurgeon(Surgeon):
@@ -78,12 +107,12 @@ class TissueSurgeon(Surgeon):
 
     def __init__(self, simulation: ligature.Simulation, plan: Plan, watch: Callable[[], object] = lambda: None) -> None:
         self.plan, self.wound = plan, Wound.of(simulation.scene)
-        self.made: Stitch | None = None
+        self.made: list[Stitch | None] = []
         self.force = 0.0
         super().__init__(simulation, watch, 0)
-        self.open_gap = self.gap()
+        self.open_gap = max(self.gaps())
         reach = 2.0 * self.arc.radius * np.sin(0.5 * (max(HOLD_DEPTHS) - STANDS_OUT) / self.arc.radius)
-        self.width = min(plan.width, 0.5 * (reach - self.open_gap))
+        self.width = min(plan.width_for(self.open_gap, self.arc.radius), 0.5 * (reach - self.open_gap))
         places = self._state["body_pose"][list(self.monitor.scenery.thread), :3]
         self._spacing = float(np.linalg.norm(np.diff(places, axis=0), axis=1).mean())
 
@@ -98,8 +127,9 @@ class TissueSurgeon(Surgeon):
             self.force = max(self.force, float(self._state["tissue_peak"][self.wound.tissue.index]))
 
     def ends(self, pair: int) -> tuple[Array, Array]:
-        """Where the stitch goes in and out, (3,) each."""
-        near, far = (self.wound.point(self._state, side, self.plan.place, self.width) for side in (-1, 1))
+        """Where a stitch goes in and out, (3,) each."""
+        place = self.plan.places[pair - 1]
+        near, far = (self.wound.point(self._state, side, place, self.width) for side in (-1, 1))
         return near, far
 
     def meeting(self, throw: Throw) -> Array:
@@ -192,7 +222,7 @@ class TissueSurgeon(Surgeon):
         goals = [self.tool(name) for name in names]
         targets = [middle + side * CROSS * across + up * UP for side, up in zip((1.0, -1.0), OVER, strict=True)]
         for _ in range(round(MOST_WAY / (PACE * STREAM))):
-            if self.gap() < TIGHT or self.tension() > MOST_PULL:
+            if max(self.gaps()) < TIGHT or self.tension() > MOST_PULL:
                 break
             for name, goal, target in zip(names, goals, targets, strict=True):
                 way = target - goal[:3, 3] - PAD * goal[:3, 2]
@@ -208,30 +238,33 @@ class TissueSurgeon(Surgeon):
         """Largest tension of the thread, N."""
         return float(np.abs(self._state["rod_tension"][list(self.monitor.scenery.thread)]).max())
 
-    def gap(self) -> float:
-        """Width of the wound at the stitch."""
-        return self.wound.gap(self._state, self.plan.place)
+    def gaps(self) -> list[float]:
+        """Width of the wound at each stitch of the plan."""
+        return [self.wound.gap(self._state, place) for place in self.plan.places]
 
     # --- the suture ---------------------------------------------------------------------------
 
     def suture_wound(self, driver: str = "PSM2", puller: str = "PSM1") -> None:
-        """A stitch through both lips, and the wound drawn together."""
+        """All stitches of the plan, and the wound drawn together."""
         self.prepare()
-        throw = self.throw(1)
-        self.pick_up(puller, throw)
-        self.hand_over(puller, driver, throw)
-        self.drive(driver, throw)
-        self.made = self.wound.stitch(self._state, self.plan.place)
-        self.pull_out(puller, driver, throw)
+        self.pick_up(puller, self.throw(1))
+        for number, place in enumerate(self.plan.places, 1):
+            throw = self.throw(number)
+            self.hand_over(puller, driver, throw)
+            self.drive(driver, throw)
+            self.made.append(self.wound.stitch(self._state, place))
+            self.pull_out(puller, driver, throw)
         self.take_thread(driver, self.ends(1)[0])
         self.draw_tight((driver, puller))
 
     def score(self) -> ClosureScore:
         """How well it went until now."""
-        now = self.wound.stitch(self._state, self.plan.place)
+        state, places = self._state, self.plan.places
+        after = [self.wound.stitch(state, place) for place, _ in zip(places, self.made, strict=False)]
         return ClosureScore(
-            (1, self.width), () if self.made is None else (self.made,), self.open_gap, (self.gap(),),
-            torn([self.made], [now]), self.force, self.monitor.measures().thread_tension, self.simulation.time,
+            (self.plan.stitches, self.width), tuple(s for s in self.made if s is not None), self.open_gap,
+            tuple(self.gaps()), torn(self.made, after), self.force, self.monitor.measures().thread_tension,
+            self.simulation.time,
         )  # fmt: skip
 
 
@@ -252,13 +285,15 @@ def operate(
 def main() -> int:
     """Make a suture and print how well it went."""
     arguments = argparse.ArgumentParser(description="Two arms suture a wound in soft tissue by themselves.")
-    arguments.add_argument("--width", type=float, default=0.0045, help="metres of each lip that the stitch takes")
-    arguments.add_argument("--place", type=float, default=0.0, help="metres along the wound, from its middle")
+    arguments.add_argument("--stitches", type=int, choices=(1, 2), default=1)
+    arguments.add_argument("--width", type=float, default=0.0045, help="metres of each lip that a stitch takes")
+    arguments.add_argument("--spacing", type=float, default=0.008, help="metres between stitches")
+    arguments.add_argument("--depth", type=float, help="metres below the top at the walls, instead of a width")
     arguments.add_argument("--seed", type=int, default=0, help="where the needle lies; 0 is the scene's own place")
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
     arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file")
     given = arguments.parse_args()
-    plan = Plan(given.width, given.place)
+    plan = Plan(given.stitches, given.width, given.spacing, given.depth)
     return perform(given, lambda simulation, film: operate(simulation, plan, film))
 
 

@@ -8,72 +8,7 @@ from ligature.mesh.grid import build_grid
 from ligature.model.material import TissueMaterial
 from ligature.tissue.block import TissueBlock
 
-DT = 1e-3
-
-
-class String:
-    """Point masses on springs, each tick by Newton's method for its implicit equations, with a thread's springs."""
-
-    def __init__(self, block, thread, points, stiffness=500.0, mass=2e-6):
-        self.block, self.thread = block, thread
-        self.x = np.array(points, dtype=float)
-        self.v = np.zeros_like(self.x)
-        self.rest = np.linalg.norm(np.diff(self.x, axis=0), axis=1)
-        self.stiffness, self.mass = stiffness, mass
-        self.load = np.zeros_like(self.x)
-        self.held = {}
-        self.pull = {}
-
-    def _forces(self, x):
-        """Forces of the springs, and their stiffness."""
-        n = len(x)
-        f, K = np.zeros((n, 3)), np.zeros((n, 3, n, 3))
-        for i, rest in enumerate(self.rest):
-            d = x[i + 1] - x[i]
-            size = np.linalg.norm(d)
-            t = d / size
-            k = self.stiffness * 1e-3 / rest  # of a segment; `stiffness` is that of a millimetre
-            tension = max(k * (size - rest), 0.0)
-            block = (k if size > rest else 1e-3 * k) * np.outer(t, t) + tension / size * (np.eye(3) - np.outer(t, t))
-            f[i] += tension * t
-            f[i + 1] -= tension * t
-            K[i, :, i] += block
-            K[i + 1, :, i + 1] += block
-            K[i, :, i + 1] -= block
-            K[i + 1, :, i] -= block
-        return f, K
-
-    def _solve(self, springs):
-        x, n = self.x.copy(), len(self.x)
-        guess = x + DT * self.v
-        for _ in range(6):
-            f, K = self._forces(guess)
-            f += self.load - self.mass * ((guess - x) / DT - self.v) / DT - 2e-3 * (guess - x) / DT
-            K += np.einsum("ij,ab->iajb", np.eye(n) * (self.mass / DT**2 + 2e-3 / DT), np.eye(3))
-            for s, u, k, bias, start in zip(*springs, strict=True):
-                w = {int(s): 1.0 - u, int(s) + 1: u}
-                force = bias - k @ (sum(w[i] * guess[i] for i in w) - start)
-                for i in w:
-                    f[i] += w[i] * force
-                    for j in w:
-                        K[i, :, j] += w[i] * w[j] * k
-            for i, goal in self.held.items():
-                K[i, :, i] += 1e6 * np.eye(3)
-                f[i] += 1e6 * (goal - guess[i])
-            step = np.linalg.solve(K.reshape(3 * n, 3 * n), f.reshape(-1)).reshape(n, 3)
-            guess = guess + step
-            if np.abs(step).max() < 1e-12:
-                break
-        return guess
-
-    def tick(self):
-        springs = self.thread.springs(self.x)
-        while springs is not None:
-            ends = self._solve(springs)
-            springs = self.thread.settle(ends)
-        self.v, self.x = (ends - self.x) / DT, ends
-        for i, goal in self.held.items():
-            self.pull[i] = 1e6 * (goal - ends[i])
+from tests.tissue.strings import String
 
 
 def _block(kit, material):

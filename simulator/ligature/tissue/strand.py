@@ -1,6 +1,6 @@
 """A thread's tick in tissue, compiled: where its nodes are, the springs that hold it there, and their limits.
 
-Each node has three directions: along the path, across it where the thread presses, and the third. With C the
+Each node has three directions: along the thread, across it where the thread presses, and the third. With C the
 compliance of the node as its thread sees it and c that of its bristle, the force of the thread on the tissue is
 K (stretch + motion), K = (C + c)⁻¹, in those directions that are not at their limits. World axes, SI units.
 """
@@ -25,6 +25,15 @@ Integers = NDArray[np.int64]
 OVER = 1.0 + 1e-9
 """Part of its limit up to which a force keeps to it: rounding is no slip."""
 
+APART = 1e-7
+"""Length of thread in metres between two of its nodes, at least: they keep their order."""
+
+RIM = 1.25e-3
+"""Length of thread in metres to both sides of a node that says in which direction it slips there."""
+
+HAIRPIN = 0.1
+"""Part of its length by which a thread gets on around a node, below which it turns right round there."""
+
 
 class Held(NamedTuple):
     """What a thread keeps from tick to tick, by point of the interface."""
@@ -47,6 +56,7 @@ class Rows(NamedTuple):
     part: Array  # (N,) of the segment
     before: Array  # (N,) scratch: last place along the thread
     nearest: Array  # (N,) scratch: square of the distance from it
+    along: Array  # (N,) place along the thread
     start: Array  # (N, 3) point of the thread when the tick begins
     E: Array  # (N, 3, 3)
     stretch: Array  # (N, 3) when the tick begins
@@ -66,7 +76,6 @@ class Strand(NamedTuple):
 
     held: Held
     rows: Rows
-    tangent: Array  # (N, 3) direction of the path, towards the thread's last point
     three: Array  # (3, 3) scratch
     friction: Array  # (1,) of the thread over that of a needle
 
@@ -76,11 +85,11 @@ def strand(points: int) -> Strand:
     N, z = points, np.zeros
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     rows = Rows(
-        i(1), i(N), i(N), z(N), z(N), z(N), z((N, 3)), z((N, 3, 3)), z((N, 3)), z((N, 3, 3)), z((N, 2)),
+        i(1), i(N), i(N), z(N), z(N), z(N), z(N), z((N, 3)), z((N, 3, 3)), z((N, 3)), z((N, 3, 3)), z((N, 2)),
         z((N, 3, 3)), z((N, 3)), z((N, 3)), z((N, 3)), z((N, 3, 3)), z((N, 3)), z((N, 3)),
     )  # fmt: skip
     held = Held(i(N), z(N), z(N), z((N, 3)), i(N, 2), z(N), i(N))
-    return Strand(held, rows, z((N, 3)), z((3, 3)), z(1))
+    return Strand(held, rows, z((3, 3)), z(1))
 
 
 open_strand = opener(strand(1))
@@ -90,93 +99,120 @@ open_strand = opener(strand(1))
 
 
 @inlined
-def _find(points: Points, held: Held, rows: Rows, line: Array) -> None:
-    """Where along the thread its nodes are now; those off its ends are let go."""
-    n, last = 0, line.shape[0] - 2
+def _list_nodes(points: Points, held: Held, rows: Rows) -> int:
+    """The nodes that hold the thread, from its first point on; how many. No node passes another on the thread."""
+    n = 0
     for u in range(points.filled[0]):
         i = points.used[u]
         if held.engaged[i]:
-            rows.node[n], rows.segment[n], rows.nearest[n], rows.before[n] = i, -1, math.inf, held.at[i]
+            r = n
+            while r > 0 and rows.before[r - 1] > held.at[i]:
+                rows.node[r], rows.before[r] = rows.node[r - 1], rows.before[r - 1]
+                r -= 1
+            rows.node[r], rows.before[r] = i, held.at[i]
             n += 1
+    return n
+
+
+@inlined
+def _find_nearest(points: Points, rows: Rows, line: Array, n: int) -> float:
+    """Fill ``rows.along`` with the nearest place on the thread within `CAPTURE` of the last; the thread's length.
+
+    A thread may pass a node more than once, and a long element may bring its nearest point from afar in one tick:
+    within the window there is always a place, so that no node loses its thread but off the thread's own ends.
+    """
+    for r in range(n):
+        rows.nearest[r], rows.along[r] = math.inf, 0.0
     begin = 0.0
-    for s in range(last + 1):
+    for s in range(line.shape[0] - 1):
         ex, ey, ez = line[s + 1, 0] - line[s, 0], line[s + 1, 1] - line[s, 1], line[s + 1, 2] - line[s, 2]
         square = ex * ex + ey * ey + ez * ez
         size = math.sqrt(square)
         for r in range(n):
-            # The nearest of those that lie near its last place: a thread may pass a node more than once.
             before = rows.before[r]
-            if before < begin - CAPTURE or before > begin + size + CAPTURE:
+            if before + CAPTURE < begin or before - CAPTURE > begin + size:
                 continue
             y = points.at[rows.node[r]]
             ax, ay, az = y[0] - line[s, 0], y[1] - line[s, 1], y[2] - line[s, 2]
-            part = min(max((ax * ex + ay * ey + az * ez) / square, 0.0), 1.0)
-            along = begin + part * size
-            if abs(along - before) < CAPTURE:
-                ax, ay, az = ax - part * ex, ay - part * ey, az - part * ez
-                away = ax * ax + ay * ay + az * az
-                if away < rows.nearest[r]:
-                    rows.nearest[r], rows.segment[r], rows.part[r] = away, s, part
-                    held.at[rows.node[r]] = along
+            low, high = max((before - CAPTURE - begin) / size, 0.0), min((before + CAPTURE - begin) / size, 1.0)
+            part = min(max((ax * ex + ay * ey + az * ez) / square, low), high)
+            ax, ay, az = ax - part * ex, ay - part * ey, az - part * ez
+            away = ax * ax + ay * ay + az * az
+            if away < rows.nearest[r]:
+                rows.nearest[r], rows.along[r] = away, begin + part * size
         begin += size
-    kept = 0
     for r in range(n):
-        i, s, part = rows.node[r], rows.segment[r], rows.part[r]
-        if s < 0 or (s == 0 and part == 0.0) or (s == last and part == 1.0):
+        if rows.nearest[r] == math.inf:
+            rows.along[r] = begin
+    return begin
+
+
+@inlined
+def _keep_order(rows: Rows, n: int) -> None:
+    """Bring ``rows.along`` into order with the least sum of squares: neighbours in disorder take their mean."""
+    mean, count, m = rows.nearest, rows.before, 0
+    for r in range(n):
+        mean[m], count[m] = rows.along[r] - r * APART, 1.0
+        m += 1
+        while m > 1 and mean[m - 2] > mean[m - 1]:
+            both = count[m - 2] + count[m - 1]
+            mean[m - 2] = (count[m - 2] * mean[m - 2] + count[m - 1] * mean[m - 1]) / both
+            count[m - 2] = both
+            m -= 1
+    r = 0
+    for k in range(m):
+        for _ in range(int(count[k])):
+            rows.along[r] = mean[k] + r * APART
+            r += 1
+
+
+@inlined
+def _find(points: Points, held: Held, rows: Rows, line: Array) -> None:
+    """Where along the thread its nodes are now; those off its ends are let go."""
+    n = _list_nodes(points, held, rows)
+    length = _find_nearest(points, rows, line, n)
+    _keep_order(rows, n)
+    kept, s, begin, size = 0, -1, 0.0, 0.0
+    for r in range(n):
+        i, along = rows.node[r], rows.along[r]
+        if not n * APART < along < length - n * APART:
             held.engaged[i] = 0
             points.force[i, 0], points.force[i, 1], points.force[i, 2] = 0.0, 0.0, 0.0
-        else:
-            rows.node[kept], rows.segment[kept], rows.part[kept] = i, s, part
-            held.segment[i] = s
-            kept += 1
+            continue
+        while s < 0 or along > begin + size:
+            begin, s = begin + size, s + 1
+            ex, ey, ez = line[s + 1, 0] - line[s, 0], line[s + 1, 1] - line[s, 1], line[s + 1, 2] - line[s, 2]
+            size = math.sqrt(ex * ex + ey * ey + ez * ez)
+        rows.node[kept], rows.segment[kept], rows.part[kept] = i, s, (along - begin) / size
+        held.at[i], held.segment[i] = along, s
+        kept += 1
     rows.filled[0] = kept
 
 
 @inlined
-def _share_out(points: Points, paths: Paths, held: Held, tangent: Array) -> None:
-    """Length of path that each node stands for, and the direction of the path there."""
-    for u in range(points.filled[0]):
-        i = points.used[u]
-        tangent[i, 0], tangent[i, 1], tangent[i, 2] = 0.0, 0.0, 0.0
+def _share_out(paths: Paths, held: Held) -> None:
+    """Length of path that each node stands for."""
     for p in range(paths.count.shape[0]):
-        n, first, last, before = paths.count[p], -1, -1, -1
+        n, last, edge = paths.count[p], -1, 0.0
         for k in range(n):
-            if held.engaged[paths.node[p, k]]:
-                first = k if first < 0 else first
-                last = k
-        if first < 0:
-            continue
-        # A thread may turn where it enters.
-        turned = 1.0 if held.at[paths.node[p, last]] > held.at[paths.node[p, first]] else -1.0
-        # Up to the path's ends where the thread leaves, half-way to the neighbours inside.
-        edge = 0.0 if first == 0 else paths.s[p, first]
-        for k in range(first, last + 1):
             i = paths.node[p, k]
             if not held.engaged[i]:
                 continue
-            if before >= 0:
-                j = paths.node[p, before]
-                middle = 0.5 * (paths.s[p, k] + paths.s[p, before])
-                held.share[j] = middle - edge
+            # Up to the path's ends where the thread leaves, half-way to the neighbours inside.
+            if last < 0:
+                edge = 0.0 if k == 0 else paths.s[p, k]
+            else:
+                middle = 0.5 * (paths.s[p, k] + paths.s[p, last])
+                held.share[paths.node[p, last]] = middle - edge
                 edge = middle
-                x, y, z = (points.at[i, 0] - points.at[j, 0], points.at[i, 1] - points.at[j, 1],
-                           points.at[i, 2] - points.at[j, 2])  # fmt: skip
-                scale = turned / math.sqrt(x * x + y * y + z * z)
-                x, y, z = scale * x, scale * y, scale * z
-                tangent[j, 0], tangent[j, 1], tangent[j, 2] = tangent[j, 0] + x, tangent[j, 1] + y, tangent[j, 2] + z
-                tangent[i, 0], tangent[i, 1], tangent[i, 2] = x, y, z
-            before = k
+            last = k
+        if last < 0:
+            continue
         end = paths.s[p, last]
         if last == n - 1:
             length = paths.length[p] if paths.length[p] < math.inf else paths.cut[p]
             end = max(length, end)
         held.share[paths.node[p, last]] = end - edge
-        for k in range(first, last + 1):
-            i = paths.node[p, k]
-            t = tangent[i]
-            size = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-            if held.engaged[i] and size > 0.0:
-                t[0], t[1], t[2] = t[0] / size, t[1] / size, t[2] / size
 
 
 # --- springs ----------------------------------------------------------------------------------
@@ -191,10 +227,8 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
         E, start = rows.E[r], rows.start[r]
         ex, ey, ez = line[s + 1, 0] - line[s, 0], line[s + 1, 1] - line[s, 1], line[s + 1, 2] - line[s, 2]
         start[0], start[1], start[2] = line[s, 0] + part * ex, line[s, 1] + part * ey, line[s, 2] + part * ez
-        tx, ty, tz = strand.tangent[i, 0], strand.tangent[i, 1], strand.tangent[i, 2]
-        if tx == 0.0 and ty == 0.0 and tz == 0.0:
-            size = math.sqrt(ex * ex + ey * ey + ez * ez)
-            tx, ty, tz = ex / size, ey / size, ez / size
+        y = points.at[i]
+        tx, ty, tz = _ring_axis(line, s, part, start[0] - y[0], start[1] - y[1], start[2] - y[2])
         # As the thread sees it: all of its nodes move together.
         for a in range(3):
             for b in range(3):
@@ -229,7 +263,7 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
         E[0, 0], E[0, 1], E[0, 2] = tx, ty, tz
         E[1, 0], E[1, 1], E[1, 2] = nx, ny, nz
         E[2, 0], E[2, 1], E[2, 2] = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
-        # Along the thread its own length counts: towards its first point the tangent turns round.
+        # Along the thread its own length counts.
         slid = tx * (points.at[i, 0] - x) + ty * (points.at[i, 1] - y) + tz * (points.at[i, 2] - z)
         rows.stretch[r, 0], rows.stretch[r, 1], rows.stretch[r, 2] = held.anchor[i] - held.at[i] + slid, across, 0.0
         for a in range(3):
@@ -241,6 +275,42 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
         rows.limit[r, 0] = strand.friction[0] * points.friction[i] * held.share[i]
         # The first node of a path stands for no length while the needle has the others; it tears no sooner than they.
         rows.limit[r, 1] = points.strength[i] * max(held.share[i], LEAST_SHARE)
+
+
+@inlined
+def _ring_axis(line: Array, s: int, part: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Direction in which the thread slips through a node of its path; (x, y, z) leads from the node to the thread.
+
+    A node holds the thread like a smooth ring: of a tension T that comes in the direction t and goes in the direction
+    u it bears T (u - t), which lies across t + u. So it holds also where the thread turns at the end of its path,
+    over the rim, and friction apart passes its tension on. Where the thread turns right round, t + u is 0, and the
+    way from the node to the thread is across.
+    """
+    ahead, behind = _way(line, s, part, 1), _way(line, s, part, -1)
+    tx, ty, tz = ahead[0] - behind[0], ahead[1] - behind[1], ahead[2] - behind[2]
+    both, away = ahead[3] + behind[3], x * x + y * y + z * z
+    if tx * tx + ty * ty + tz * tz < (HAIRPIN * both) ** 2 and away > 0.0:
+        along = (tx * x + ty * y + tz * z) / away
+        tx, ty, tz = tx - along * x, ty - along * y, tz - along * z
+        if not tx * tx + ty * ty + tz * tz > (1e-6 * both) ** 2:
+            tx, ty, tz = _beside(x, y, z)
+    size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    return tx / size, ty / size, tz / size
+
+
+@inlined
+def _way(line: Array, s: int, part: float, sense: int) -> tuple[float, float, float, float]:
+    """From a place on the thread to one `RIM` further along it, or back for -1; and how far that is along it."""
+    x, y, z, left, share = 0.0, 0.0, 0.0, RIM, 1.0 - part if sense > 0 else part
+    while left > 0.0 and 0 <= s < line.shape[0] - 1:
+        ex, ey, ez = line[s + 1, 0] - line[s, 0], line[s + 1, 1] - line[s, 1], line[s + 1, 2] - line[s, 2]
+        size = math.sqrt(ex * ex + ey * ey + ez * ez)
+        here = min(share, left / size)
+        x, y, z, left = x + sense * here * ex, y + sense * here * ey, z + sense * here * ez, left - here * size
+        if here < share:
+            break
+        s, share = s + sense, 1.0
+    return x, y, z, RIM - left
 
 
 @inlined
@@ -298,7 +368,7 @@ def _invert_free(S: Array, first: bool, second: bool, K: Array) -> None:
 def prepare(points: Points, paths: Paths, strand: Strand, line: Array, fraction: float) -> None:
     """Find the springs of a tick that begins with the thread's points at ``line`` (n, 3)."""
     _find(points, strand.held, strand.rows, line)
-    _share_out(points, paths, strand.held, strand.tangent)
+    _share_out(paths, strand.held)
     _gather(points, strand, line, fraction)
     _apply_law(strand.held, strand.rows)
 
