@@ -61,6 +61,9 @@ Cameras = Annotated[
 
 Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies the scene gets.")]  # noqa: UP045
 
+FIRST_THROW = Path("needle_insertion")
+"""Scene of the cockpit for who names none."""
+
 CockpitAddress = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
@@ -187,7 +190,7 @@ def _served_at(text: str | None) -> str:
 
 @app.command()
 def cockpit(
-    launch: Launch,
+    launch: Launch = FIRST_THROW,
     models: Models = None,
     root: Roots = None,
     at: CockpitAddress = None,
@@ -195,7 +198,10 @@ def cockpit(
     speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
     devices: Devices = None,
 ) -> None:
-    """Run a scene with a live web page and without ROS; see `run --cockpit` for both."""
+    """Run a scene with a live web page and without ROS; see `run --cockpit` for both.
+
+    Without LAUNCH it is the scene of a first throw: one arm, a needle, and tissue.
+    """
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
         cockpit=_served_at(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
