@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -47,9 +47,11 @@ def until(condition: Callable[[], Any], what: str | Callable[[], str], seconds: 
 class Served:
     """A simulation with a page, and its state as the physics process writes it."""
 
-    def __init__(self, *arguments: str, scene: Path = SMALL, folder: Path | None = None) -> None:
+    def __init__(
+        self, *arguments: str, scene: Path = SMALL, folder: Path | None = None, prefix: Sequence[str] = ()
+    ) -> None:
         self.lines: list[str] = []
-        command = [str(Path(sys.executable).parent / "ligature"), "cockpit", str(scene), "--at", "127.0.0.1:0"]
+        command = [*prefix, str(Path(sys.executable).parent / "ligature"), "cockpit", str(scene), "--at", "127.0.0.1:0"]
         self.process = subprocess.Popen(
             [*command, "-p", "250", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env=dict(os.environ, COLUMNS="200"), cwd=folder, preexec_fn=end_with_parent,
