@@ -59,7 +59,7 @@ def sound(order: Order) -> bool:
     if word == "drag":
         return value.phase in PHASES and max(abs(value.right), abs(value.up)) <= FARTHEST
     if word == "view":
-        return type(value.large) is bool and type(value.stereo) is bool and 1 <= value.height <= MOST_HEIGHT
+        return type(value.large) is bool and type(value.stereo) is bool and 0 <= value.height <= MOST_HEIGHT
     if word == "speed":
         return value in MODES
     if word == "dark":

@@ -89,6 +89,16 @@ def test_hands_work_while_the_drawing_of_pictures_is_frozen(running: Served, ope
     until(lambda: operator.pictures > before + 3, "pictures come again")
 
 
+def test_nothing_is_drawn_for_a_browser_that_nobody_sees(running: Served, operator: Wired) -> None:
+    until(lambda: operator.pictures > 0, "pictures come")
+    operator.orders("view", [False, 0, False])
+    time.sleep(1.0)
+    before = operator.pictures
+    stays(lambda: operator.pictures == before, "no pictures", 1.5)
+    operator.orders("view", [False, 240, False])
+    until(lambda: operator.pictures > before + 2, "pictures come again")
+
+
 def test_a_page_over_a_bad_network_is_slower_and_safe(monkeypatch: pytest.MonkeyPatch) -> None:
     """50 ms each way and 2 % loss: the arm follows, and stands when the network is gone."""
     monkeypatch.setenv("LIGATURE_COCKPIT_TOKEN", TOKEN)

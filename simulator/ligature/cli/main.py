@@ -451,6 +451,14 @@ def replay(
         Optional[Path],  # noqa: UP045
         typer.Option(help="For a record: HDF5 file to write pictures and motion to."),
     ] = None,
+    page: Annotated[
+        bool, typer.Option("--page", help="For a record: show it on a web page, with a slider through its time.")
+    ] = False,
+    compare: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="For a page: another record of the scene, shown beside the first."),
+    ] = None,
+    at: CockpitAddress = None,
     rate: Rate = None,
     size: Size = None,
     camera: Cameras = None,
@@ -467,6 +475,12 @@ def replay(
     text: Annotated[str, typer.Option(help="For a dataset: the task as an instruction in words.")] = "",
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
+    if page or compare is not None:
+        address = _served_at(at)
+        from ligature.cli.replay_page import show
+
+        files = [file] if compare is None else [file, compare]
+        raise typer.Exit(show(files, scene, address, Console(highlight=False, soft_wrap=True)))
     from ligature.cli.replay import replay as run_replay
     from ligature.cli.sampling import Sampled
 

@@ -489,15 +489,17 @@ class Cockpit:
                 self._run_controls.show_recording(self._recording)
             self._inform()
             self._show_ros()
-        self._pictures.want(self._wish() if self._audience.clients else None)
+        self._pictures.want(self._wish())
         return WORDS_PERIOD
 
     def _wish(self) -> Wish | None:
         """The picture that the browsers want: as large as the largest of them."""
         sight = self._sights.get(self._sight)
         self._views = {client: view for client, view in self._views.items() if client in self._audience.clients}
-        large = [view for view in self._views.values() if view.large]
-        if sight is None:
+        views = [self._views.get(client, SMALL_VIEW) for client in self._audience.clients]
+        seen = [view for view in views if view.height > 0]
+        large = [view for view in seen if view.large]
+        if sight is None or not seen:
             return None
         if large and not any(view.stereo for view in large):
             sight = sight.mono

@@ -45,7 +45,10 @@ class Drag(NamedTuple):
 
 
 class View(NamedTuple):
-    """What a browser shows: whether the picture is large, its pixels from top to bottom, and whether of both eyes."""
+    """What a browser shows: whether the picture is large, its pixels from top to bottom, and whether of both eyes.
+
+    A browser that nobody sees wants a picture of no pixels.
+    """
 
     large: bool
     height: int
@@ -125,7 +128,7 @@ def _view(value: Any) -> View:
     if not isinstance(value, list) or len(value) != 3:
         raise ValueError
     height = int(_number(value[1], MOST_HEIGHT))
-    if height < 1:
+    if height < 0:
         raise ValueError
     return View(_flag(value[0]), height, _flag(value[2]))
 

@@ -111,7 +111,7 @@
     moves();
   }, true);
   addEventListener("blur", rest);
-  document.addEventListener("visibilitychange", rest);
+  document.addEventListener("visibilitychange", () => { rest(); sendView(); });
 
   const readPad = () => {
     const found = [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected);
@@ -143,7 +143,7 @@
   };
   const sendView = () => {
     const high = Math.min(Math.round((main.clientHeight || 240) * devicePixelRatio), 480);
-    order("view", [large, large ? Math.max(high, 120) : 240, stereo]);
+    order("view", [large, document.hidden ? 0 : large ? Math.max(high, 120) : 240, stereo]);
   };
   const swap = () => {
     if (!facts.eyes) return;
@@ -316,6 +316,7 @@
   const inform = (news) => { facts = news; if (!facts.operates) { held.clear(); touched.clear(); sent = ""; } update(); };
   const set = (element, text) => { if (element.textContent !== text) element.textContent = text; };
   const update = () => {
+    root.hidden = !pass; // a page of recorded runs has nothing to operate
     const light = document.documentElement.dataset.mantineColorScheme === "light";
     set(themeButton, light ? "Dark" : "Light");
     welcome.hidden = watching || facts.operates || !facts.free;
