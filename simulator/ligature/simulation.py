@@ -123,7 +123,7 @@ class BodyHandle:
 
     @property
     def pose(self) -> Array:
-        """Pose (7,) of the body frame in world axes."""
+        """Pose (7,) of the body frame in world axes: x y z in metres, qx qy qz qw."""
         return np.array(self._simulation.state["body_pose"][0, self.body.index])
 
     @property
