@@ -144,7 +144,8 @@ class Cockpit:
             panels[1].dock_below(panels[0])
             panels[0].set_height(CAMERA_HEIGHT)
         self._stage = Stage(server, scene)
-        self._tube = True
+        self._tube = False  # the first view is from behind it
+        self._stage.show_endoscope(self._tube)
 
     @property
     def url(self) -> str:
