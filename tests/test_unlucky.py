@@ -26,7 +26,7 @@ from ligature.datasets import DatasetError, DatasetWriter
 from ligature.datasets.store import episode_names
 path = Path(sys.argv[1]) / "a.h5"
 simulation = ligature.Simulation(ligature.load(sys.argv[2], (3, 4)))
-ended, said = 0, ""
+ended, printed = 0, ""
 try:
     with DatasetWriter(path, simulation, cameras=(), rate=500.0) as writer:
         for number in range(10_000):
@@ -36,12 +36,12 @@ try:
             writer.end_episode(True, number=number)
             ended += 1
 except DatasetError as error:
-    said = str(error)
+    printed = str(error)
 whole = 0
 with h5py.File(path) as file:
     for name in episode_names(file):
         whole += len(file[name]["time"][:]) == 100
-print(json.dumps({"ended": ended, "whole": whole, "said": said}))
+print(json.dumps({"ended": ended, "whole": whole, "printed": printed}))
 """
 
 
@@ -65,7 +65,7 @@ def test_a_full_disk_ends_a_dataset_with_words_and_keeps_its_episodes(tmp_path: 
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["ended"] >= 1, "there was room for an episode"
-    assert "No space left on device" in found["said"], found
+    assert "No space left on device" in found["printed"], found
     assert found["whole"] >= found["ended"], "what had ended can be read"
 
 
@@ -88,9 +88,9 @@ def test_a_mesh_that_is_a_link_out_of_the_scene_is_reported_and_not_read(tmp_pat
     done = subprocess.run(
         [LIGATURE, "check", here / "peg_transfer" / "launch.yaml"], capture_output=True, text=True, timeout=200
     )
-    said = " ".join((done.stdout + done.stderr).split())
-    assert re.search(r"task\.yaml:\d+:\d+: error: '\S*secret\.obj' lies outside the scene's folders", said), said
-    assert "Traceback" not in said
+    printed = " ".join((done.stdout + done.stderr).split())
+    assert re.search(r"task\.yaml:\d+:\d+: error: '\S*secret\.obj' lies outside the scene's folders", printed), printed
+    assert "Traceback" not in printed
 
 
 def test_a_clock_that_jumps_changes_stamps_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 
@@ -24,4 +25,4 @@ def test_a_console_drives_arms_over_a_bad_network_as_over_a_good_one() -> None:
             env=dict(os.environ, LIGATURE_TEST_FAR=str(far.pid)), capture_output=True, text=True, cwd=ROOT, timeout=500,
         )  # fmt: skip
     assert done.returncode == 0, done.stdout[-4000:]
-    assert f"{len(TESTS)} passed" in done.stdout
+    assert re.search(r"\b6 passed", done.stdout), done.stdout[-500:]

@@ -43,8 +43,8 @@ CLOSING, STUCK = 0.6, 1.0
 SETTLING = 0.2
 """Seconds in which an arm comes to rest at its set-point."""
 
-THROUGH = 0.15
-"""Angle of the tip beyond the exit from which the needle counts as through."""
+THROUGH, BESIDE = 0.15, 0.004
+"""Angle of the tip beyond the exit from which the needle counts as through, and metres from it to its puncture."""
 
 Steps = Generator[None, None, None]
 
@@ -146,7 +146,7 @@ class Assist:
             angle = planner.angle(state, throw)
             shown["driven"] = round((angle + BEFORE) / (throw.towards_exit + BEYOND + BEFORE), 3)
             shown["inside"] = self._inside(state)
-            shown["through"] = self._inside(state) and angle > throw.towards_exit + THROUGH
+            shown["through"] = angle > throw.towards_exit + THROUGH and self._out(state, planner.exit(throw))
         return shown
 
     def aim(self, arm: int, state: Any) -> tuple[Array, Array] | None:
@@ -175,6 +175,18 @@ class Assist:
     def _inside(self, state: Any) -> bool:
         count = int(state["insertion_count"])
         return bool((state["insertion_body"][:count] == self._needle).any())
+
+    def _out(self, state: Any, exit: Array) -> bool:
+        """Whether the needle, which is in something, has come out of it at ``exit`` (3,).
+
+        Tissue bulges before it is punctured from inside: where the tip is does not decide.
+        """
+        count = int(state["insertion_count"])
+        holes = state["insertion_hole"][:count][state["insertion_body"][:count] == self._needle]
+        if not (holes < 0).any():
+            return len(holes) > 1
+        places = [points[: int(n)] for points, n in zip(state["puncture_point"], state["puncture_count"], strict=True)]
+        return bool((np.linalg.norm(np.concatenate(places) - exit, axis=1) < BESIDE).any())
 
     # --- deeds: each step ends a turn of the loop ---------------------------------------------------
 
