@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 
 from . import making
-from .collecting import deleted_end, deleted_owner, notes_of
+from .export_checks import deleted_end, deleted_owner, notes_of
 from .ligature.adf import AdfError, Resolver
 from .ligature.adf.diagnostics import Severity
 from .ligature.adf.reader import read_text

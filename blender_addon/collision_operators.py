@@ -10,8 +10,9 @@ from .ligature.authoring.rings import capsules_along, edge_loops
 from .ligature.authoring.shapes import Shape, fitted, oriented
 from .mesh_data import points_of, surfaces_of
 from .object_operators import NeedsBody, active_body
-from .placing import own_solid, scaling
+from .placing import scaling
 from .properties import SHAPE_KINDS, USES
+from .solids import own_solid
 
 
 class ADF_OT_add_shape(NeedsBody, bpy.types.Operator):

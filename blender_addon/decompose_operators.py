@@ -19,8 +19,9 @@ from . import compat, making
 from .ligature.mesh.cache import write_atomically
 from .mesh_data import points_of
 from .object_operators import NeedsBody, active_body
-from .placing import children_with, own_solid
+from .placing import children_with
 from .quality import measure
+from .solids import own_solid
 
 WORKER = Path(__file__).with_name("decompose_worker.py")
 

@@ -9,14 +9,15 @@ from pathlib import Path
 import bpy
 
 from .folders import allowed_folders, own_files, remember_written
+from .in_file import top_values
 from .ligature.adf import AdfError, Resolver, read_any, read_launch, read_world
 from .ligature.adf.nodes import parse
 from .ligature.adf.patch import PatchError
 from .ligature.adf.update import given_values, new_text, updated
 from .ligature.authoring.save import SaveError, checked_text, foreign
 from .read_file import Import, import_file
-from .schema_properties import fetch, store
-from .write_file import Export, ExportError, after_export, prepared, unheld_top, write
+from .schema_properties import fetch, store, unheld
+from .write_file import Export, ExportError, after_export, prepared, write
 
 WORLD_TEXT = "namespace: /ambf/env/\ngravity: {x: 0.0, y: 0.0, z: -9.8}\nmax iterations: 10\n"
 DEVICES_TEXT = "input devices: []\n"
@@ -236,4 +237,4 @@ def launch_text(scene: bpy.types.Scene, names: _Names) -> str:
     if not stored.source:
         return new_text("launch", top, [])
     root = parse(stored.source, Path(stored.filepath))
-    return updated(stored.source, "launch", {**unheld_top("launch", root), **top}, [], (), root)
+    return updated(stored.source, "launch", {**unheld("launch", top_values("launch", root)), **top}, [], (), root)

@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -19,18 +18,7 @@ import numpy as np
 from . import compat
 from .ligature.authoring.objfile import Paint, Surface
 from .ligature.mesh.mesh import Material, Mesh, MeshPart
-
-
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """An object as a shape of an owner: what its transform leaves beside a rigid pose, (4, 4), and that pose.
-
-    ``T_owner`` (4, 4) is None for the owner itself, whose pose is left out.
-    """
-
-    obj: bpy.types.Object
-    scale: np.ndarray
-    T_owner: np.ndarray | None = None
+from .solids import Solid
 
 
 class MeshMaker:

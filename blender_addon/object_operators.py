@@ -12,8 +12,9 @@ from .ligature.authoring.generate import mass_keys
 from .ligature.authoring.shapes import Shape, shapes_properties
 from .ligature.mesh.inertia import combined, mass_properties
 from .mesh_data import points_of
-from .placing import SHAPED, children_with, own_solid, relative_pose, rest_pose, shape_of, shapes_of
+from .placing import SHAPED, children_with, relative_pose, rest_pose, shape_of, shapes_of
 from .properties import ROLES
+from .solids import own_solid
 from .write_file import NO_MESH
 
 JOINT_KINDS = [

@@ -16,7 +16,6 @@ from .decimals import decimal, decimals
 from .ligature.adf.frames import matrix_quaternion
 from .ligature.authoring.placement import JointKeys, joint_pose, light_pose, matrix_of, rigid, view_pose
 from .ligature.authoring.shapes import Shape
-from .mesh_data import Solid
 from .placed import JointFrames, Placed, PlacedShape
 from .properties import KIND_OF_ROLE
 from .references import reference
@@ -170,17 +169,6 @@ def _joint_frames(obj: bpy.types.Object, parent: bpy.types.Object, child: bpy.ty
 def is_prismatic(obj: bpy.types.Object) -> bool:
     """Whether the joint moves along its X instead of about its Z."""
     return obj.adf.joint.type == "prismatic"
-
-
-def solids_of(obj: bpy.types.Object) -> list[Solid]:
-    """What the mesh files of an object are made of: itself, then the convex parts of its collision shape."""
-    hulls = [Solid(hull, scaling(hull), relative_pose(obj, hull)) for hull in children_with(obj, "HULL")]
-    return [own_solid(obj), *hulls]
-
-
-def own_solid(obj: bpy.types.Object) -> Solid:
-    """An object with its scale, in its own pose."""
-    return Solid(obj, scaling(obj))
 
 
 def place_view(values: dict) -> np.ndarray:

@@ -26,10 +26,11 @@ from .ligature.authoring.placement import matrix_of
 from .ligature.authoring.shapes import Shape, shape_mesh
 from .ligature.mesh import Mesh, MeshError, load_mesh
 from .mesh_data import MeshMaker, mesh_print, shape_data
-from .placing import SHAPED, hang, place, place_joint, place_light, place_view, placed, rest_pose, solids_of
+from .placing import SHAPED, hang, place, place_joint, place_light, place_view, placed, rest_pose
 from .properties import ROLE_OF_KIND
 from .references import qualified
 from .schema_properties import fetch, identifier, state_text, store
+from .solids import solids_of
 
 EMPTY_LOOK = {"joint": "SINGLE_ARROW", "sensor": "CONE", "actuator": "SPHERE", "suture": "SINGLE_ARROW"}
 SHAPE_COLOUR = {"COLLISION": (0.95, 0.75, 0.1, 0.35), "VISUAL": (0.7, 0.7, 0.7, 1.0)}

@@ -19,6 +19,11 @@ def file_of(obj: bpy.types.Object | None) -> bpy.types.Collection | None:
     )
 
 
+def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """The objects of a file, in the order in which they were brought in or made; hidden ones too."""
+    return [obj for obj in collection.all_objects if obj.adf.role in KIND_OF_ROLE and obj.adf.export]
+
+
 def qualified(collection: bpy.types.Collection, obj: bpy.types.Object) -> str:
     """The object's identifier with its namespace (ADF §4.1)."""
     own = getattr(obj.adf, identifier(KIND_OF_ROLE[obj.adf.role]))
@@ -28,6 +33,13 @@ def qualified(collection: bpy.types.Collection, obj: bpy.types.Object) -> str:
 def topic_name(name: str) -> str:
     """A name that ROS takes in topics: Blender counts copies behind a dot, which is none of theirs."""
     return re.sub(r"[^A-Za-z0-9_/ ]", "_", name)
+
+
+def new_name(obj: bpy.types.Object) -> str:
+    """The name for the file of an object that was renamed in Blender since it was opened or written."""
+    if not obj.adf.called or obj.adf.called == obj.name:
+        return ""
+    return obj.name if obj.adf.role == "JOINT" else topic_name(obj.name)
 
 
 def _namespace(collection: bpy.types.Collection | None) -> str:

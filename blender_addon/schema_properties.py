@@ -195,6 +195,11 @@ def unheld_paths(kind: str) -> list[str]:
     ]
 
 
+def unheld(kind: str, values: dict) -> dict:
+    """The values of `unheld_paths` among all ``values`` of an object in the file."""
+    return {path: values[path] for path in unheld_paths(kind) if path in values}
+
+
 @cache
 def unheld_in_lists(kind: str) -> frozenset[str]:
     """Keys of items of lists that neither properties nor placing hold: they stay as the file has them."""

@@ -1,25 +1,25 @@
 """Writes a collection back to its file: only what changed in Blender changes in the text.
 
-An export collects from the scene (`collecting`), converts plain data (`mesh_files`, `file_text`), and then writes. The
-scene is read, never touched. Everything is prepared and checked before the first file is written, and a failure leaves
-files and scene as they were.
+An export collects from the scene (`collecting`) and from the old files (`old_meshes`), converts plain data
+(`mesh_files`, `file_text`), and then writes (`saving`). The scene is read, never touched. Everything is prepared and
+checked before the first file is written, and a failure leaves files and scene as they were.
 """
 
 from __future__ import annotations
 
 import json
 from codecs import BOM_UTF8
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from .collecting import FILE_KINDS, Collected, ExportError, collect, folder_of, has_mesh, members
-from .file_text import text_of, top_values, unheld_top
-from .folders import allowed_folders, own_files, remember_written
+from .collecting import FILE_KINDS, collect, folder_of
+from .collecting_meshes import has_mesh
+from .export_checks import ExportError
+from .file_text import text_of
+from .folders import own_files, remember_written
+from .in_file import top_values
 from .ligature.adf import AdfError, Element, Resolver
 from .ligature.adf.frames import pose_matrix
 from .ligature.adf.nodes import parse
@@ -28,52 +28,17 @@ from .ligature.adf.update import Item, given_values, updated
 from .ligature.authoring.motion import moved_pose
 from .ligature.authoring.objfile import MeshWriteError
 from .ligature.authoring.placement import matrix_of
-from .ligature.authoring.save import SaveError, checked_text, foreign, save_all
+from .ligature.authoring.save import SaveError, checked_text, foreign
 from .mesh_data import mesh_print
 from .mesh_files import NO_MESH, MeshFiles
+from .old_meshes import OldMeshes
 from .placed import ZERO
-from .placing import SHAPED, owner_of, placed, shapes_of, solids_of
+from .placing import SHAPED, owner_of, placed, shapes_of
 from .properties import KIND_OF_ROLE
+from .references import members
+from .saving import Export, ForeignFiles, write
 from .schema_properties import identifier, state_text, store
-
-
-@dataclass
-class Export:
-    """What an export writes, and what it noticed.
-
-    Attributes
-    ----------
-    files
-        All files with their content, also those that have it already.
-    roots
-        Folders outside which nothing is written.
-    notes
-        What the user should know before anything is written.
-    foreign
-        Existing files that would be replaced and that are not this export's own.
-    """
-
-    files: dict[Path, bytes] = field(default_factory=dict)
-    roots: tuple[Path, ...] = ()
-    text: str = ""
-    notes: list[str] = field(default_factory=list)
-    problems: list[str] = field(default_factory=list)
-    foreign: list[Path] = field(default_factory=list)
-    written: list[Path] = field(default_factory=list)
-
-
-class ForeignFiles(ExportError):
-    """An export that would replace files that are not its own; nothing was written."""
-
-    def __init__(self, files: list[Path]) -> None:
-        listed = ", ".join(f"'{file}'" for file in files[:8]) + (
-            f" and {len(files) - 8} more" if len(files) > 8 else ""
-        )
-        super().__init__(
-            f"{listed} would be replaced, and the scene neither was opened from there nor wrote that; allow it with "
-            "'Replace Files', or choose an empty folder"
-        )
-        self.files = files
+from .solids import solids_of
 
 
 def export_file(collection: bpy.types.Collection, path: Path, replace: bool = False, remember: bool = True) -> Export:
@@ -88,54 +53,25 @@ def export_file(collection: bpy.types.Collection, path: Path, replace: bool = Fa
     return done
 
 
-def write(done: Export, replace: bool = False) -> None:
-    """Write what was prepared, all of it or nothing; raises `ExportError`."""
-    if done.foreign and not replace:
-        raise ForeignFiles(done.foreign)
-    try:
-        done.written = save_all(done.files, done.roots)
-    except SaveError as error:
-        raise ExportError(str(error)) from error
-
-
 def prepared(collection: bpy.types.Collection, path: Path, root: Path | None = None, top: dict | None = None) -> Export:
     """A collection's file at ``path`` and its meshes, checked and not yet written; raises `ExportError`.
 
     Nothing lies outside ``root``, the folder of the file by default. ``top`` are keys of the file that differ from the
     scene's for this export.
     """
+    root, top = root or path.parent, top or {}
     try:
         found = collect(collection, with_meshes=True)
-        done = _converted(found, path, root or path.parent, top or {})
+        before = Path(found.path) if found.path and found.source else None
+        old = OldMeshes(found.meshes, found.top, path, before, Resolver.for_file(before or path, found.folders))
+        meshes = MeshFiles(found.meshes, old, path, root)
+        text = text_of(found, meshes.keys, {**meshes.top, **top})
+        data = text.encode("utf-8") if text == found.source else checked_text(text, path)
     except (ValueError, AdfError, SaveError, PatchError, MeshWriteError) as error:
         raise ExportError(str(error)) from error
-    done.foreign = foreign(done.files, own_files(collection.adf))
-    return done
-
-
-def _converted(found: Collected, path: Path, root: Path, top: dict) -> Export:
-    before = Path(found.path) if found.path and found.source else None
-    resolver = Resolver.for_file(before or path, allowed_folders())
-    meshes = MeshFiles(found.meshes, found.top, path, before, root, _reader(resolver))
-    text = text_of(found, meshes.keys, {**meshes.top, **top})
-    data = text.encode("utf-8") if text == found.source else checked_text(text, path)
-    if found.byte_order_mark:
-        data = BOM_UTF8 + data
+    files = {**meshes.files, path: BOM_UTF8 + data if found.byte_order_mark else data}
     problems = list(dict.fromkeys(meshes.problems))
-    return Export({**meshes.files, path: data}, (root,), text, found.notes, problems)
-
-
-def _reader(resolver: Resolver) -> Callable[[Path], bytes | None]:
-    """Reads files that the scene may open; None for others."""
-
-    @cache
-    def read(path: Path) -> bytes | None:
-        try:
-            return resolver.read_bytes(path)
-        except (AdfError, OSError):
-            return None
-
-    return read
+    return Export(files, (root,), text, found.notes, problems, foreign(files, found.own))
 
 
 def current_text(collection: bpy.types.Collection) -> str:
@@ -206,5 +142,5 @@ def after_export(collection: bpy.types.Collection, path: Path, text: str) -> Non
 
 __all__ = [
     "NO_MESH", "Export", "ExportError", "ForeignFiles", "after_export", "current_text", "export_file", "has_mesh",
-    "members", "prepared", "prepared_variants", "unheld_top", "write",
+    "members", "prepared", "prepared_variants", "write",
 ]  # fmt: skip

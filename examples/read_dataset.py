@@ -41,7 +41,7 @@ def main() -> int:
         arguments.error(f"cannot read '{path}': {error}")
     with file:
         if "format" not in file.attrs:
-            arguments.error(f"'{path}' is an HDF5 file, but no dataset of Ligature")
+            arguments.error(f"'{path}' is an HDF5 file, but not a Ligature dataset")
         print(f"{file.attrs['format']}, scene '{file.attrs['scene']}', {file.attrs['rate']:g} samples a second")
         for name, episode in file.items():
             if not name.startswith("episode_"):

@@ -217,7 +217,7 @@ class Surgeon:
         kinematics, base = self.arms[name].kinematics, self._base[name]
         grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.ends(1)[0], upright)
         if grasp is None:
-            raise Failure(f"{name} cannot hold the needle so that it reaches the whole throw")
+            raise Failure(f"{name} has no grasp of the needle that reaches the whole throw")
         return grasp.tool_in_arc(self.arc)
 
     def drive(self, name: str, throw: Throw) -> None:

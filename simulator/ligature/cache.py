@@ -39,7 +39,7 @@ def cache_folder() -> Path:
 def _writable(wanted: Path) -> Path:
     try:
         if not wanted.is_absolute() and str(wanted).startswith("~"):
-            raise FileNotFoundError(errno.ENOENT, "the user has no home")
+            raise FileNotFoundError(errno.ENOENT, "the user has no home folder")
         wanted.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=wanted).close()
         return wanted

@@ -39,7 +39,7 @@ def message_class(type_: str, md5: str, definition: str) -> Any:
     Raises `DefinitionError`.
     """
     if not _TYPE.fullmatch(type_):
-        raise DefinitionError(f"'{type_[:60]}' is no type of messages")
+        raise DefinitionError(f"'{type_[:60]}' is not a message type")
     try:
         installed = roslib.message.get_message_class(type_)
     except Exception:  # whatever a broken package raises

@@ -362,8 +362,7 @@ class Simulation:
         What an arm rejects becomes its warning, what goes wrong in it its FAULT. What goes wrong in another object
         clears its command and is among `problems`.
         """
-        command.check()
-        command.check_indices(self._counts)
+        command.check(self._counts)
         try:
             handle(self._handlers, command)
         except Exception as error:  # no command ends a run

@@ -77,7 +77,7 @@ def test_a_file_without_a_mapping_reports_it(text: str) -> None:
 
 
 def test_broken_yaml_names_the_place() -> None:
-    with pytest.raises(AdfError, match=r"scene.yaml:2:\d+: error: this is not YAML"):
+    with pytest.raises(AdfError, match=r"scene.yaml:2:\d+: error: invalid YAML"):
         parse("a: [1, 2\nb: }\n", FILE)
 
 

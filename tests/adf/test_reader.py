@@ -73,7 +73,7 @@ def test_keys_that_ambf_ignores_are_reported_at_debug_only(model) -> None:
 
 
 def test_a_key_that_stands_twice_is_reported(model) -> None:
-    assert "key 'mass' stands twice; the first one counts" in messages(model(BODY + "  mass: 3\n"))[0]
+    assert "key 'mass' appears twice; the first one is used" in messages(model(BODY + "  mass: 3\n"))[0]
 
 
 def test_a_bad_value_of_the_file_itself_is_reported_and_its_default_taken(model) -> None:

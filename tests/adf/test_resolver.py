@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from ligature.adf import ResolutionError, Resolver
-from ligature.adf.resolver import SEARCH_PATH, scene_root
+from ligature.adf.resolver import MAX_LAUNCH_BYTES, MAX_LAUNCH_FILES, SEARCH_PATH, scene_root
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_a_link_that_leaves_is_refused(lab: Path) -> None:
 
 
 def test_a_url_is_refused(lab: Path) -> None:
-    with pytest.raises(ResolutionError, match="is a URL; only files are opened"):
+    with pytest.raises(ResolutionError, match="is a URL; give the path of a file"):
         Resolver([lab]).resolve("http://example.org/mesh.obj", lab)
 
 
@@ -55,6 +55,52 @@ def test_a_large_file_is_refused(lab: Path) -> None:
     (lab / "big.obj").write_bytes(b"0" * 100)
     with pytest.raises(ResolutionError, match="larger than 10 bytes"):
         Resolver([lab]).read_bytes(lab / "big.obj", limit=10)
+
+
+@given(st.integers(0, 50), st.integers(0, 50))
+def test_a_file_is_read_up_to_the_largest_size(size: int, limit: int) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder).resolve() / "mesh.obj"
+        path.write_bytes(b"v" * size)
+        resolver = Resolver([path.parent])
+        if size <= limit:
+            assert resolver.read_bytes(path, limit) == b"v" * size
+        else:
+            with pytest.raises(ResolutionError, match=f"is larger than {limit} bytes"):
+                resolver.read_bytes(path, limit)
+
+
+def test_a_file_of_more_than_256_mib_is_not_read(lab: Path) -> None:
+    """The file is sparse, so that it takes no space."""
+    path = lab / "huge.obj"
+    path.touch()
+    os.truncate(path, 256 * 2**20 + 1)
+    with pytest.raises(ResolutionError, match="is larger than 268435456 bytes"):
+        Resolver([lab]).read_bytes(path)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_launch_file_of_up_to_a_mebibyte_widens_the_root(tmp_path: Path, more: int) -> None:
+    """The scene is two folders above the model; a larger file is no launch file, and is not read for that."""
+    (tmp_path / "outer" / "scene" / "models").mkdir(parents=True)
+    model = tmp_path / "outer" / "scene" / "models" / "m.yaml"
+    model.write_text("bodies: []\n")
+    text = "multibody configs: [scene/models/m.yaml]\n#"
+    (tmp_path / "outer" / "launch.yaml").write_text(text + "x" * (2**20 + more - len(text)))
+    assert MAX_LAUNCH_BYTES == 2**20
+    assert scene_root(model) == (tmp_path / "outer" / "scene" if more else tmp_path)
+
+
+@pytest.mark.parametrize("others", [199, 200])
+def test_the_first_200_files_of_a_folder_may_be_launch_files(tmp_path: Path, others: int) -> None:
+    (tmp_path / "outer" / "scene" / "models").mkdir(parents=True)
+    model = tmp_path / "outer" / "scene" / "models" / "m.yaml"
+    model.write_text("bodies: []\n")
+    for k in range(others):
+        (tmp_path / "outer" / f"a{k:03}.yaml").write_text("bodies: []\n")
+    (tmp_path / "outer" / "launch.yaml").write_text("multibody configs: [scene/models/m.yaml]\n")
+    assert MAX_LAUNCH_FILES == 200
+    assert scene_root(model) == (tmp_path / "outer" / "scene" if others == 200 else tmp_path)
 
 
 def test_a_missing_file_and_a_folder_state_which(lab: Path) -> None:

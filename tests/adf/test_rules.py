@@ -43,7 +43,7 @@ def findings(tmp_path: Path, text: str, least: Severity = Severity.DEBUG) -> str
             "  joint limits: {low: -1.2, high: 1.2}\n",
             "debug: joint 'J' is fixed, so 'joint limits' has no effect",
         ),
-        ("revolute", "  offset: 1\n  child offset: 2\n", "has 'offset' too, which wins; remove one"),
+        ("revolute", "  offset: 1\n  child offset: 2\n", "also has 'offset', which takes precedence; remove one"),
     ],
 )
 def test_joint_keys_that_contradict_the_type_are_reported(tmp_path: Path, kind: str, keys: str, words: str) -> None:
@@ -53,11 +53,14 @@ def test_joint_keys_that_contradict_the_type_are_reported(tmp_path: Path, kind: 
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ("  look at: {x: 0, y: 0, z: 0}\n", "looks nowhere, so it has no orientation"),
-        ("  look at: {x: 0, y: 0, z: 1}\n", "'look at' is a point, and 'up' is not along the line of sight"),
+        ("  look at: {x: 0, y: 0, z: 0}\n", "has no viewing direction, so it has no orientation"),
+        (
+            "  look at: {x: 0, y: 0, z: 1}\n",
+            "'look at' must differ from 'location', and 'up' must not be parallel to the line of sight",
+        ),
         (
             "  look at: {x: 1, y: 0, z: 0}\n  clipping plane: {near: 2, far: 1}\n",
-            "sees from 2 m to 1 m; 0 < near < far",
+            "has its near clipping plane at 2 m and its far one at 1 m; 0 < near < far",
         ),
         (
             "  look at: {x: 1, y: 0, z: 0}\n  publish image interval: 0\n",
@@ -75,10 +78,10 @@ def test_cameras_that_show_nothing_are_reported(tmp_path: Path, keys: str, words
         ("bodies", "  collision shape: BOX\n  collision geometry: {x: 1, y: 1}\n", "is a BOX without 'z' in 'collision geometry'"),
         ("bodies", "  compound collision shape: []\n", "has an empty 'compound collision shape'"),
         ("bodies", "  namespace: /a\n", "has a namespace without '/' at its end; write '/a/'"),
-        ("bodies", "  publish frequency: {low: 9, high: 3}\n", "publishes at 9 Hz without commands and at 3 Hz with them"),
+        ("bodies", "  publish frequency: {low: 9, high: 3}\n", "has a low publish frequency of 9 Hz, above the high one of 3 Hz"),
         ("bodies", "  plugins: [{name: p}]\n", "a plug-in of body 'X' lacks name or filename; it is left out"),
         ("sensors", "  type: proximity\n", "has no rays, so it senses nothing; add 'array', 'mesh' or 'parametric'"),
-        ("sensors", "  type: contact\n  distance threshold: -1\n", "asks for penetration; 0 is contact"),
+        ("sensors", "  type: contact\n  distance threshold: -1\n", "has a negative 'distance threshold'; use 0 to detect contact"),
         ("bodies", "  mass: -1\n", "'mass' of body 'X' is not usable; expected at least 0, not -1"),
     ],
 )  # fmt: skip
@@ -105,4 +108,4 @@ def test_a_listed_object_under_a_slightly_different_name_is_suggested(tmp_path: 
 )
 def test_what_is_at_the_edge_of_a_rule_is_no_finding(tmp_path: Path, text: str) -> None:
     found = findings(tmp_path, text, Severity.WARNING)
-    assert "penetration" not in found and "without limits" not in found
+    assert "negative" not in found and "without limits" not in found

@@ -137,7 +137,7 @@ def test_a_new_file_is_canonical_and_states_the_same(tmp_path: Path) -> None:
     again = read(tmp_path, text)
     assert items_of(again) == items_of(document)
     assert new_text(again.kind, given_values(again.top), items_of(again)) == text
-    with pytest.raises(PatchError, match="'joints' names two things"):
+    with pytest.raises(PatchError, match="'joints' is the identifier of two objects"):
         new_text("model", {}, [Item("joint", "joints", {})])
 
 

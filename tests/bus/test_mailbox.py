@@ -126,3 +126,22 @@ def test_a_paused_world_runs_again_when_its_front_end_dies(scene: Scene, ring: R
     box.take()
     ring._beat[0] -= 1.0
     assert box.take() == [Throttle(False, False, 0)]
+
+
+@pytest.mark.parametrize("lives", [True, False])
+def test_a_front_end_that_was_released_owns_only_what_it_commands_since(scene: Scene, ring: Ring, lives: bool) -> None:
+    """It is watched again from its next sign of life on; until then it counts as one that gives none, and may be silent."""
+    box = Mailbox(scene, {"ros": ring})
+    ring.beat()
+    push(ring, force(3, 1.0))
+    box.take()
+    ring._beat[0] -= 1.0
+    assert box.take() == [Release("body", 3)]
+    assert ring.silence == 0.0
+    if lives:
+        ring.beat()
+    push(ring, force(4, 1.0))
+    assert box.take() == [force(4, 1.0)]
+    if lives:
+        ring._beat[0] -= 1.0
+    assert box.take() == ([Release("body", 4)] if lives else [])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from pathlib import Path
@@ -10,6 +11,7 @@ from tempfile import TemporaryDirectory
 import pytest
 from hypothesis import given, strategies
 from hypothesis.strategies import DataObject, integers
+from ligature.bus import record as records
 from ligature.bus.record import MOST_UPDATES, Excerpt, Header, Moment, Record, RecordError, RecordWriter, is_record
 from ligature.model.commands import BodyCommand, Command, CommandType, Reset
 from ligature.robots.commands import ServoJp
@@ -172,3 +174,82 @@ def test_a_full_disk_leaves_nothing_under_the_final_name(tmp_path: Path) -> None
     with pytest.raises(OSError, match="No space left"):
         RecordWriter(path, HEADER)
     assert not path.exists()
+
+
+def test_the_longest_run_is_read(tmp_path: Path) -> None:
+    writer = RecordWriter(tmp_path / "run.record", HEADER)
+    writer.finish(MOST_UPDATES, "cd" * 32)
+    assert Record.read(tmp_path / "run.record").updates == MOST_UPDATES == 10**9
+
+
+def test_a_file_larger_than_any_record_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file is sparse, so that it takes no space; to read it would take 4 GiB of memory."""
+    monkeypatch.setattr(Path, "read_bytes", lambda path: pytest.fail(f"{path} is read"))
+    path = tmp_path / "run.record"
+    path.touch()
+    os.truncate(path, 4 * 2**30 + 1)
+    with pytest.raises(RecordError, match="has more than 4 GiB; no record is as large"):
+        Record.read(path)
+
+
+@given(integers(-40, 40))
+def test_a_record_is_read_up_to_the_largest_size(more: int) -> None:
+    with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        path = Path(folder, "run.record")
+        RecordWriter(path, HEADER).finish(9, "cd" * 32)
+        patch.setattr(records, "MOST_FILE_BYTES", path.stat().st_size + more)
+        if more >= 0:
+            assert Record.read(path).updates == 9
+        else:
+            with pytest.raises(RecordError, match="no record is as large"):
+                Record.read(path)
+
+
+def open_files(folder: Path) -> set[str]:
+    """The files below a folder that this process has open."""
+    links = (Path("/proc/self/fd", name) for name in os.listdir("/proc/self/fd"))
+    return {target.name for link in links if link.is_symlink() and (target := link.readlink()).is_relative_to(folder)}
+
+
+def test_commands_are_on_the_disk_after_a_flush_and_when_a_run_is_given_up(tmp_path: Path) -> None:
+    """What a killed run leaves is what `flush` handed over; who gives a run up keeps everything and no open file."""
+    writer = RecordWriter(tmp_path / "run.record", HEADER)
+    part = tmp_path / "run.record.active"
+    size = part.stat().st_size
+    for update, command in COMMANDS:
+        writer.write(update, command)
+        writer.flush()
+        assert part.stat().st_size > size
+        size = part.stat().st_size
+    writer.write(9, COMMANDS[0][1])
+    assert open_files(tmp_path) == {part.name}
+    assert writer.abandon() == part
+    assert part.stat().st_size > size
+    assert open_files(tmp_path) == set()
+
+
+def test_a_part_that_is_dropped_leaves_no_file_open(tmp_path: Path) -> None:
+    writer = RecordWriter(tmp_path / "run.record", HEADER)
+    part = Excerpt(tmp_path / "part.record", writer, writer.moment(1, "ef" * 32))
+    assert open_files(tmp_path) == {"run.record.active", "part.record.active"}
+    part.drop()
+    assert open_files(tmp_path) == {"run.record.active"}
+    assert [path.name for path in tmp_path.iterdir()] == ["run.record.active"]
+
+
+@given(strategies.lists(integers(0, 200_000), min_size=2, max_size=2).map(sorted), integers(0, 70_000))
+def test_any_bytes_of_a_journal_are_copied(ends: list[int], more: int) -> None:
+    """Those from the first to the last that were asked for, in parts, and nothing that was written after them."""
+    begin, end = ends
+    content = bytes(i * 7 % 251 for i in range(end + more))
+    with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(records, "_CHUNK", 65_536)
+        with Path(folder, "journal").open("w+b") as file:
+            journal = records.Journal(file, HEADER)
+            head = journal.moment(1, "").size
+            file.write(content)
+            file.flush()
+            copied: list[bytes] = []
+            journal.copy(copied.append, head + begin, head + end)
+            assert b"".join(copied) == content[begin:end]
+            assert all(0 < len(part) <= 65_536 for part in copied)

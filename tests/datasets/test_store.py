@@ -167,7 +167,7 @@ def test_a_dropped_episode_leaves_no_gap(simulation: ligature.Simulation, tmp_pa
 def test_what_a_killed_writer_left_is_not_written_over(simulation: ligature.Simulation, tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     episode_folder(path).mkdir()
-    with pytest.raises(DatasetError, match="is left of a recording that was killed"):
+    with pytest.raises(DatasetError, match="belongs to a recording that is still running or was killed"):
         written(path, simulation)
     assert list(tmp_path.iterdir()) == [episode_folder(path)]
 
@@ -178,6 +178,6 @@ def test_other_files_are_no_datasets(tmp_path: Path) -> None:
         file["x"] = 1
     with pytest.raises(DatasetError, match="cannot read the dataset"):
         join(tmp_path / "text")
-    with pytest.raises(DatasetError, match="no dataset of Ligature"):
+    with pytest.raises(DatasetError, match="not a Ligature dataset"):
         join(tmp_path / "other.h5")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["other.h5", "text"]

@@ -94,7 +94,7 @@ def test_a_launch_file_may_declare_that_there_are_none(tmp_path: Path) -> None:
         ("{name: A, kind: psm, base: nowhere}", "A: base 'nowhere' names no body, or several"),
         ("{name: A, kind: psm, base: BODY CameraFrame}", "A: no revolute joint 'yaw' is attached to"),
         ("{name: A, kind: mtm, colour: red}", "there is no key 'colour'"),
-        ("just words", "'just words' is no map"),
+        ("just words", "'just words' is not a mapping"),
     ],
 )
 def test_a_wrong_declaration_is_reported_and_the_others_stand(tmp_path: Path, entry: str, why: str) -> None:

@@ -38,10 +38,12 @@ def test_a_stereo_camera_gets_the_eyes_of_the_scope_and_a_single_one_none() -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "size"), [("Classic_SD", (640, 480)), ("Classic_HD", (1280, 720)), ("Si_HD", (1920, 1080))]
+    ("name", "size", "rate"),
+    [("Classic_SD", (640, 480), 30.0), ("Classic_HD", (1280, 720), 60.0), ("Si_HD", (1920, 1080), 30.0)],
 )
-def test_pictures_have_the_size_of_the_video_standard(name: str, size: tuple[int, int]) -> None:
-    assert ENDOSCOPES[name].resolution == size
+def test_pictures_have_the_size_and_rate_of_the_video_standard(name: str, size: tuple[int, int], rate: float) -> None:
+    """NTSC has 60 fields and 1080i 60 fields a second, two of which are a picture; 720p has 60 pictures."""
+    assert (ENDOSCOPES[name].resolution, ENDOSCOPES[name].rate) == (size, rate)
 
 
 def test_an_unknown_endoscope_is_named_with_those_there_are() -> None:

@@ -140,7 +140,7 @@ def test_tissue_is_fixed_to_the_body_that_carries_it(tmp_path: Path) -> None:
             LINE + "    slits: [{from: {x: 0, y: 0, z: 0}, to: {x: 1, y: 0, z: 0}}]\n",
             "no rectangle or box inside",
         ),
-        (LINE, LINE + "    slits: [{from: {x: -1, y: -1, z: 0}, to: {x: 1, y: 1, z: 0}}]\n", "nothing holds"),
+        (LINE, LINE + "    slits: [{from: {x: -1, y: -1, z: 0}, to: {x: 1, y: 1, z: 0}}]\n", "are not held"),
         (LINE, LINE + "    layers: [{material: fat}, {material: skin}]\n", "layer without thickness"),
         (
             LINE,

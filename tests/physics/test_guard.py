@@ -47,7 +47,7 @@ def test_energy_from_nowhere_is_reported_below_fifty_metres_a_second(tmp_path: P
     place.set_twist(np.array([15.0, 0.0, 0.0]), np.zeros(3))
     simulation.step(10)
     (alarm,) = alarms(simulation)
-    assert "moves at 15 m/s, which no command asks for" in alarm.message
+    assert "moves at 15 m/s, without a command for it" in alarm.message
 
 
 def test_a_body_that_is_hit_is_not_reported(tmp_path: Path) -> None:

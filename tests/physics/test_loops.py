@@ -164,7 +164,7 @@ def test_a_body_that_its_joint_holds_elsewhere_is_reported(tmp_path: Path) -> No
     )
     scene = ligature.load(tmp_path / "model.yaml")
     (found,) = [d for d in scene.diagnostics if d.code == "moved"]
-    assert found.message == "'/n/B' starts 300 mm and 0 rad off its location, where 'J' holds it"
+    assert found.message == "'/n/B' starts 300 mm and 0 rad away from its location: joint 'J' requires it"
     assert scene.start.coordinates[0] == (0.0,)
 
 

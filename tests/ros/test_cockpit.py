@@ -49,7 +49,7 @@ def remote(node: Any, teleop: Any) -> Iterator[Any]:
     found = TeleopRemote()
 
     def known() -> bool:
-        found.look()
+        found.find_pairs()
         return set(found.pairs) == {"pen_PSM1", "pen_PSM2"}
 
     until(known, "both pairs are found")

@@ -65,7 +65,7 @@ def test_a_fixed_camera_stands_in_the_world() -> None:
         ("scale: 0.3", "scale: -1", "scale must be within 0"),
         ("grey: clutch", "grey: fly", "a button cannot 'fly'; it can clutch, camera"),
         ("[right, up, near]", "[right, up, away]", "axes right, up, away do not form a right-handed frame"),
-        ("pen: PSM2", "pen: PSM1", "pen and MTMR would both begin with PSM1"),
+        ("pen: PSM2", "pen: PSM1", "pen and MTMR would both start with PSM1"),
         ("pen: PSM2", "pan: PSM2", "there is no device 'pan'; there are MTMR, pen, pad"),
         ('["-0", "-1", "+7"]', '["-0", "-1"]', "moves must be a list of 3"),
         ("[[-1, -1, 0], [1, 1, 1]]", "[[1, 1, 1], [0, 0, 0]]", "first corner of the workspace must be below"),

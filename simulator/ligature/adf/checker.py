@@ -66,9 +66,9 @@ def suggestion(name: str, known: Collection[str]) -> str:
 
 def repeated_keys(node: Mapping) -> list[Diagnostic]:
     """Keys that stand twice in one block."""
-    message = "key '{}' stands twice"
+    message = "key '{}' appears twice"
     return [
-        Diagnostic(Severity.WARNING, message.format(shortened(d.text)), d.mark, "the first one counts", "twice")
+        Diagnostic(Severity.WARNING, message.format(shortened(d.text)), d.mark, "the first one is used", "twice")
         for d in node.duplicates[:MAX_FINDINGS]
     ]
 

@@ -108,12 +108,12 @@ def _yaml_diagnostic(error: yaml.YAMLError, parsed: Relaxed, file: Path) -> Diag
     if mark is not None:
         column, _ = parsed.original(mark.line, mark.column, mark.index)
         place = Mark(file, mark.line + 1, column + 1)
-        message = f"this is not YAML: {getattr(error, 'problem', None) or 'it ends too early'}"
+        message = f"invalid YAML: {getattr(error, 'problem', None) or 'it ends too early'}"
         return Diagnostic(Severity.ERROR, message, place, str(getattr(error, "context", None) or ""), "yaml")
     number = getattr(error, "character", None)
     what = f"character U+{number:04X}" if isinstance(number, int) else "a character"
     return Diagnostic(
-        Severity.ERROR, f"this is not YAML: {what} is not allowed", _first_control(parsed, file), "remove it", "yaml"
+        Severity.ERROR, f"invalid YAML: {what} is not allowed", _first_control(parsed, file), "remove it", "yaml"
     )
 
 
@@ -150,7 +150,7 @@ class _Composer:
         if root is None:
             raise self._error(Mark(self._file, 1, 1), "the file is empty", "a mapping of keys was expected")
         if not isinstance(root, Mapping):
-            raise self._error(root.mark, "the file does not hold a mapping", "write 'key: value' lines")
+            raise self._error(root.mark, "the top level of the file is not a mapping", "write 'key: value' lines")
         return root
 
     def _error(self, mark: Mark, message: str, hint: str = "") -> AdfError:

@@ -177,14 +177,7 @@ def _top(source: _Source, kind: str) -> tuple[Element, list[Diagnostic]]:
         if not errors(of_key):
             sound[name] = entry
     top = Element(kind, source.path.name, replace(source.root, entries=sound, duplicates=[]))
-    return top, [*found, *rule_findings(top), *_version(top)]
-
-
-def _version(top: Element) -> list[Diagnostic]:
-    if not top.has("adf version") or top.text("adf version") == "1.0":
-        return []
-    message = "'adf version' is not 1.0"
-    return [Diagnostic(Severity.ERROR, message, top.mark_of("adf version"), "write 1.0", "version")]
+    return top, [*found, *rule_findings(top)]
 
 
 def _listed(root: Mapping, kind: str) -> set[str]:

@@ -66,9 +66,9 @@ class Resolver:
         Raises `ResolutionError`, which names ``mark``, the place in the file that refers to it.
         """
         if "\0" in reference:
-            raise self._refusal("the path holds a zero byte", mark)
+            raise self._refusal("the path contains a zero byte", mark)
         if _URL.match(reference):
-            raise self._refusal(f"'{reference}' is a URL", mark, "only files are opened; give a path")
+            raise self._refusal(f"'{reference}' is a URL", mark, "give the path of a file")
         return self.allow(Path(os.path.join(base, reference)), mark)
 
     def allow(self, path: Path, mark: Mark | None = None) -> Path:
@@ -78,7 +78,7 @@ class Resolver:
         try:
             real = path.resolve()
         except (OSError, RuntimeError) as error:
-            raise self._refusal(f"'{path}' cannot be followed: {error}", mark) from error
+            raise self._refusal(f"'{path}' cannot be resolved: {error}", mark) from error
         if not any(real == root or root in real.parents for root in self.roots):
             roots = ", ".join(map(str, self.roots))
             raise self._refusal(

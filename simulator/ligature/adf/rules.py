@@ -35,7 +35,7 @@ def names(element: Element) -> Iterator[Diagnostic]:
     """Objects with topics need a name that ROS takes (§4.1, §4.3)."""
     name = element.text("name").replace(" ", "")
     if not name:
-        yield _finding(element, Severity.WARNING, "name", "has no name, and so has its topic", "add name: …", "name")
+        yield _finding(element, Severity.WARNING, "name", "has no name, so its topic has none", "add name: …", "name")
     elif not _ROS_NAME.match(name) and not element.flag("passive"):
         hint = "letters, digits and '_' make a topic"
         yield _finding(element, Severity.WARNING, "name", f"is called '{name}'", hint, "name")
@@ -50,12 +50,19 @@ def namespaces(element: Element) -> Iterator[Diagnostic]:
         yield _finding(element, Severity.INFO, "namespace", "has a namespace without '/' at its end", hint, "name")
 
 
+def version(element: Element) -> Iterator[Diagnostic]:
+    """Files of another version than 1.0 are none of this format (§1.4)."""
+    if element.has("adf version") and element.text("adf version") != "1.0":
+        message = "'adf version' is not 1.0"
+        yield Diagnostic(Severity.ERROR, message, element.mark_of("adf version"), "write 1.0", "version")
+
+
 def frequencies(element: Element) -> Iterator[Diagnostic]:
     """Rates of publishing (§10.1)."""
     low, high = element.integer("publish frequency.low"), element.integer("publish frequency.high")
     if low > high:
-        message = f"publishes at {low} Hz without commands and at {high} Hz with them"
-        yield _finding(element, Severity.WARNING, "publish frequency", message, "write low, then high")
+        message = f"has a low publish frequency of {low} Hz, above the high one of {high} Hz"
+        yield _finding(element, Severity.WARNING, "publish frequency", message, "set low to at most high")
 
 
 def plugins(element: Element) -> Iterator[Diagnostic]:
@@ -69,7 +76,7 @@ def plugins(element: Element) -> Iterator[Diagnostic]:
             message = f"a plug-in of {element.kind} '{element.key}' lacks name or filename"
             yield Diagnostic(Severity.WARNING, message, entry.mark, "it is left out", "plugin")
     if entries:
-        yield _finding(element, Severity.INFO, "plugins", "has plug-ins, which are not run", "", "plugin")
+        yield _finding(element, Severity.INFO, "plugins", "has plug-ins, which Ligature does not load", "", "plugin")
 
 
 def shapes(element: Element) -> Iterator[Diagnostic]:
@@ -138,7 +145,9 @@ def joint_without_effect(element: Element) -> Iterator[Diagnostic]:
             if element.has(path):
                 yield _finding(element, Severity.DEBUG, path, f"is fixed, so '{path}' has no effect")
     if element.has("offset") and element.has("child offset"):
-        yield _finding(element, Severity.WARNING, "child offset", "has 'offset' too, which wins", "remove one")
+        yield _finding(
+            element, Severity.WARNING, "child offset", "also has 'offset', which takes precedence", "remove one"
+        )
 
 
 def sensor_rays(element: Element) -> Iterator[Diagnostic]:
@@ -148,7 +157,13 @@ def sensor_rays(element: Element) -> Iterator[Diagnostic]:
             hint = "add 'array', 'mesh' or 'parametric'"
             yield _finding(element, Severity.WARNING, "type", "has no rays, so it senses nothing", hint)
     elif element.number("distance threshold") < 0.0:
-        yield _finding(element, Severity.WARNING, "distance threshold", "asks for penetration", "0 is contact")
+        yield _finding(
+            element,
+            Severity.WARNING,
+            "distance threshold",
+            "has a negative 'distance threshold'",
+            "use 0 to detect contact",
+        )
 
 
 def camera_view(element: Element) -> Iterator[Diagnostic]:
@@ -161,11 +176,11 @@ def camera_view(element: Element) -> Iterator[Diagnostic]:
         ahead[0] * up[1] - ahead[1] * up[0],
     )
     if math.hypot(*across) <= 1e-12 * max(math.hypot(*ahead) * math.hypot(*up), 1e-12):
-        hint = "'look at' is a point, and 'up' is not along the line of sight"
-        yield _finding(element, Severity.WARNING, "look at", "looks nowhere, so it has no orientation", hint)
+        hint = "'look at' must differ from 'location', and 'up' must not be parallel to the line of sight"
+        yield _finding(element, Severity.WARNING, "look at", "has no viewing direction, so it has no orientation", hint)
     near, far = element.number("clipping plane.near"), element.number("clipping plane.far")
     if not 0.0 < near < far:
-        message = f"sees from {near:g} m to {far:g} m"
+        message = f"has its near clipping plane at {near:g} m and its far one at {far:g} m"
         yield _finding(element, Severity.WARNING, "clipping plane", message, "0 < near < far")
     for path in ("publish image interval", "publish depth interval"):
         if element.integer(path) == 0:
@@ -202,9 +217,10 @@ def world_surroundings(element: Element) -> Iterator[Diagnostic]:
 
 _COMMON: tuple[Rule, ...] = (names, frequencies, plugins)
 RULES: dict[str, tuple[Rule, ...]] = {
-    "launch": (plugins,),
-    "world": (namespaces, world_surroundings, plugins),
-    "model": (namespaces, plugins),
+    "launch": (plugins, version),
+    "world": (namespaces, world_surroundings, plugins, version),
+    "model": (namespaces, plugins, version),
+    "input devices": (version,),
     "body": (*_COMMON, shapes),
     "joint": (plugins, joint_limits, joint_springs, joint_without_effect),
     "ghost object": (*_COMMON, shapes),

@@ -97,7 +97,7 @@ def new_text(kind: str, top: Mapping[str, Any], items: Sequence[Item]) -> str:
         values.setdefault(PLURALS[item.kind], []).append(item.key)
     for item in items:
         if item.key in values:
-            raise PatchError(f"'{item.key}' names two things; give one of them another identifier")
+            raise PatchError(f"'{item.key}' is the identifier of two objects; rename one of them")
         values[item.key] = {**_nested(item.kind, item.values), **item.extra}
     return write_document(kind, values)
 
@@ -123,7 +123,7 @@ def updated(
         if not edits:
             return text
         text = apply(text, edits)
-    raise PatchError("the file cannot be changed as wanted; aliases form a circle")
+    raise PatchError("cannot change the file: its aliases refer to each other in a cycle")
 
 
 def _renamed(text: str, kind: str, items: Sequence[Item]) -> str:

@@ -32,36 +32,37 @@ class Mailbox:
 
     def take(self) -> list[Message]:
         """All commands of this update, the newest of each object, events in their order."""
+        arrived = [(name, list(ring.drain()), ring.silence > SILENCE) for name, ring in self._rings.items()]
+        valid = [(name, self._valid(commands), silent) for name, commands, silent in arrived]
         box = Newest()
-        for name, ring in self._rings.items():
-            for data in ring.drain():
-                self.received += 1
-                try:
-                    message = decode(data)
-                    message.check()
-                    message.check_indices(self._counts)
-                except (CodecError, ValueError) as error:
-                    self.reject(error)
-                    continue
-                self._put(box, name, message)
-            self._release_client(box, name, ring)
+        for name, messages, silent in valid:
+            owned = self._owned[name]
+            for message in messages:
+                self.coalesced += box.put(message)
+                if message.object is not None:
+                    owned.discard(message.object) if message.releases else owned.add(message.object)
+            if silent and owned:
+                for item in sorted(owned):
+                    box.put(Throttle(False, False, 0) if item == WORLD else Release(*item))
+                owned.clear()
+                self._rings[name].reset()
         return box.messages()
+
+    def _valid(self, commands: list[bytes]) -> list[Message]:
+        """The messages of these bytes; what is invalid is counted."""
+        messages = []
+        for data in commands:
+            self.received += 1
+            try:
+                message = decode(data)
+                message.check(self._counts)
+            except (CodecError, ValueError) as error:
+                self.reject(error)
+                continue
+            messages.append(message)
+        return messages
 
     def reject(self, error: ValueError) -> None:
         """Count a command that is not carried out."""
         self.rejected += 1
         self.last_rejection = str(error)
-
-    def _put(self, box: Newest, producer: str, message: Message) -> None:
-        owned = self._owned[producer]
-        if message.object is not None:
-            owned.discard(message.object) if message.releases else owned.add(message.object)
-        self.coalesced += box.put(message)
-
-    def _release_client(self, box: Newest, producer: str, ring: Ring) -> None:
-        """Release what a dead front end commanded."""
-        if self._owned[producer] and ring.silence > SILENCE:
-            for item in sorted(self._owned[producer]):
-                box.put(Throttle(False, False, 0) if item == WORLD else Release(*item))
-            self._owned[producer].clear()
-            ring.reset()

@@ -257,7 +257,7 @@ def _check_whole(data: bytes, end: int, path: Path) -> None:
     digest = _new_digest()
     digest.update(memoryview(data)[:end])
     if data[end:] != digest.digest():
-        raise RecordError(f"{path}: at byte {end}: the record is damaged: its digest does not fit what it holds")
+        raise RecordError(f"{path}: at byte {end}: the record is damaged: its checksum does not match its content")
 
 
 def _frames(data: bytes, at: int, path: Path) -> Iterator[tuple[int, int, int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ligature.model.messages import Message, Text, wire
@@ -17,7 +18,7 @@ class Recording(Message, code=11):
 
     name: str = wire(Text())
 
-    def check(self) -> None:  # noqa: D102
+    def check_together(self, counts: Mapping[str, int] | None) -> None:  # noqa: D102
         file_name(self.name)
 
 

@@ -49,7 +49,7 @@ def _on_ros(prefix: str) -> tuple[TopicHealth, TeleopRemote]:
 
     begin_node()
     remote = TeleopRemote("/" + "".join(f"{part}/" for part in prefix.split("/") if part))
-    health = TopicHealth(remote.look)
+    health = TopicHealth(remote.find_pairs)
     health.start()
     return health, remote
 

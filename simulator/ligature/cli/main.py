@@ -16,7 +16,7 @@ from ligature.cli.missing import remedy
 from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, rate_notes
 from ligature.cli.sampling import Sampling, picture_size
 from ligature.cli.supervisor import supervise
-from ligature.model.softening import Softening
+from ligature.model.softening import requested
 
 app = typer.Typer(
     add_completion=False,
@@ -161,7 +161,7 @@ def run(
     try:
         for text in arms:
             arm_entry(text)
-        Softening(soft or ())
+        requested(soft or ())
         names_of_arms = arm_names(only)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error

@@ -54,7 +54,9 @@ def _again(record: Record, scene: Path | None, dataset: Sampled | None, console:
         console.print(f"the recording covers the last {simulation.time - begin:.3f} s", markup=False)
     simulation.close()
     if found != record.end:
-        console.print(f"the run ended in another state: {found}, not {record.end}", style="red", markup=False)
+        console.print(
+            f"the run ended in another state than recorded: {found} instead of {record.end}", style="red", markup=False
+        )
         return 1
     console.print(f"the same bits: {found}", markup=False)
     return 0

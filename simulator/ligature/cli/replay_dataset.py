@@ -66,7 +66,7 @@ class _Sampler:
 def sampled(record: Record, scene: Path | None, dataset: Sampled) -> tuple[ligature.Simulation, str]:
     """Simulate ``record`` again into ``dataset``; returns the simulation at its end, and how the episode went."""
     if dataset.task == NEEDS_REPORT:
-        raise ValueError(f"a record of a run holds no reported pose, so that '{NEEDS_REPORT}' cannot be judged")
+        raise ValueError(f"a record of a run holds no reported pose, which '{NEEDS_REPORT}' needs")
     recorded = RunOptions.from_text(record.header.options).task
     task = dataset.task or (recorded if recorded != NEEDS_REPORT else "")
     with interrupted_once(), ExitStack() as files:

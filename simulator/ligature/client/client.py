@@ -28,16 +28,16 @@ KINDS: dict[str, type[BaseObject]] = {
 """The handle of every type of state message."""
 
 STATE = "/State"
-DISCOVERY_PAUSE = 1.0
+DISCOVERY_PERIOD = 1.0
 """Seconds between two attempts to find a simulator."""
-SETTLING = 0.1
+SETTLING_TIME = 0.1
 """Seconds in which a simulator that is just starting must not have advertised more, to be taken as complete."""
 CONNECTING = 2.0
 """Seconds that the simulator has to connect to all topics; what is sent before that is lost."""
 FIRST_STATE_TIMEOUT = 0.5
 """Seconds to wait for an object's first state when its handle is given out."""
 POLL = 0.02
-COMPLAINT_PAUSE = 5.0
+WARNING_PERIOD = 5.0
 NAMED, LINES, LINE = 4, 2, 120
 """A failed look-up names so many of the closest objects, in so many lines of so many characters."""
 
@@ -154,10 +154,10 @@ class Client:
     def _discover(self) -> dict[str, type[BaseObject]]:
         for attempt in range(max(self._attempts, 1)):
             if attempt:
-                time.sleep(DISCOVERY_PAUSE)
+                time.sleep(DISCOVERY_PERIOD)
             found = self._advertised()
             while found and not rospy.is_shutdown():
-                time.sleep(SETTLING)
+                time.sleep(SETTLING_TIME)
                 before, found = found, self._advertised()
                 if found == before:
                     return found
@@ -189,12 +189,12 @@ class Client:
         if len(matches) == 1:
             return self._objects[matches[0]]
         if matches:
-            rospy.logwarn(f"{name!r} is a part of {len(matches)} names, give more of one\n" + _some(matches))
+            rospy.logwarn(f"{name!r} is a part of {len(matches)} names, give more of one\n" + _listed(matches))
         elif self._objects:
             close = sorted(self._objects, key=lambda key: -SequenceMatcher(None, name, key).ratio())
             rospy.logwarn(
                 f"no object's name contains {name!r} (get_obj_names() lists all {len(close)}); the closest are\n"
-                + _some(close[:NAMED])
+                + _listed(close[:NAMED])
             )
         else:
             rospy.logwarn(f"no object's name contains {name!r}: there are no objects; is the simulator running?")
@@ -211,7 +211,7 @@ class Client:
             time.sleep(due - now)
 
 
-def _some(names: Sequence[str]) -> str:
+def _listed(names: Sequence[str]) -> str:
     """One or two lines of names, and how many more there are."""
     lines = [""]
     for count, name in enumerate(names):
@@ -231,4 +231,4 @@ def _send(handle: BaseObject) -> None:
     except (rospy.ROSException, rospy.ROSSerializationException) as error:
         if rospy.core.is_shutdown_requested():
             return
-        rospy.logerr_throttle(COMPLAINT_PAUSE, f"{handle.get_name()}: cannot send the command: {error}")
+        rospy.logerr_throttle(WARNING_PERIOD, f"{handle.get_name()}: cannot send the command: {error}")

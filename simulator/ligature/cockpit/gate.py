@@ -81,7 +81,7 @@ class Gate:
         found = self.answer(request, who)
         if found is None and self.connections >= MOST_CONNECTIONS:
             self.complain()
-            return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers watch already.")
+            return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers are connected.")
         return found
 
     def complain(self) -> None:
@@ -102,7 +102,7 @@ class Gate:
     def _answer(self, request: Request, who: str) -> Response | None:
         hosts = request.headers.get_all("Host")
         if len(hosts) != 1 or len(request.path) > MOST_PATH:
-            return _refusal(http.HTTPStatus.BAD_REQUEST, "A request has one host and a short address.")
+            return _refusal(http.HTTPStatus.BAD_REQUEST, "A request must name one host and have a short address.")
         (host,) = hosts
         if self._local and not _names_this_machine(host):
             return _refusal(http.HTTPStatus.FORBIDDEN, f"'{host}' is not a name of this machine.")

@@ -93,8 +93,8 @@ class EpisodeStore:
             raise DatasetError(f"'{path}' exists already; choose another name")
         if self._folder.exists():
             raise DatasetError(
-                f"'{self._folder}' is left of a recording that was killed before an episode ended, or belongs to "
-                "one that goes on; remove it or choose another name"
+                f"'{self._folder}' belongs to a recording that is still running or was killed; "
+                "delete it or choose another name"
             )
         self._folder.mkdir()
         self._open: PartFile | None = None
@@ -183,7 +183,7 @@ def opened(path: Path) -> h5py.File:
         raise DatasetError(f"cannot read the dataset '{path}': {error}") from error
     if not str(file.attrs.get("format", "")).startswith("ligature dataset"):
         file.close()
-        raise DatasetError(f"'{path}' is an HDF5 file, but no dataset of Ligature")
+        raise DatasetError(f"'{path}' is an HDF5 file, but not a Ligature dataset")
     return file
 
 

@@ -82,7 +82,7 @@ class Hand:
         depths = (0.004, 0.006, 0.5 * self.arc.length)
         found = best_grasp(self.arc, depths, self.arm.kinematics, self.base, [raised], now, surface, upright=True)
         if found is None:
-            raise ValueError("the needle lies where the arm cannot grasp it so that it can lift it")
+            raise ValueError("the arm cannot reach a grasp from which it could lift the needle")
         return now @ found.tool_in_arc(self.arc)
 
     def take(self, T: Array) -> Iterator[Array]:

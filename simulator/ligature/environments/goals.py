@@ -283,7 +283,7 @@ class Insert(Goal):
         way = [self.throw.arc_at(a, self.arc) for a in np.linspace(-self.BEFORE, self._last, 12)]
         grasp = best_grasp(self.arc, self.DEPTHS, arm.kinematics, T_base, way, way[0], entry)
         if grasp is None:
-            raise ValueError(f"{arm.name} cannot hold the needle so that it reaches the whole throw")
+            raise ValueError(f"{arm.name} has no grasp of the needle that reaches the whole throw")
         self._first = way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc)
 
     def _ends(self) -> tuple[Array, Array]:

@@ -258,7 +258,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         """
         if options:
             raise ValueError(
-                f"reset has no options, not {', '.join(map(repr, options))}; options are given to the class"
+                f"reset takes no options, but got {', '.join(map(repr, options))}; pass options to the class"
             )
         super().reset(seed=seed)
         self._simulation.restore(self._settled)
@@ -270,7 +270,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for 20 ms."""
         if self._progress is None:
-            raise RuntimeError("step comes after reset: no episode has begun")
+            raise RuntimeError("no episode has begun: call reset() before step()")
         wanted = np.array(action, dtype=float)
         wanted[np.isnan(wanted)] = 0.0
         wanted = np.minimum(np.maximum(wanted, -1.0), 1.0)
@@ -326,7 +326,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         last bits as all that are restored from it, and with others than one that was never saved.
         """
         if self._progress is None:
-            raise RuntimeError("save comes after reset: no episode has begun")
+            raise RuntimeError("no episode has begun: call reset() before save()")
         return EnvState(
             self._options, self._simulation.snapshot(), self._goal.snapshot(), self._progress, self._count,
             deepcopy(self.np_random.bit_generator.state),

@@ -112,7 +112,7 @@ class Fingers:
             speed = (PUSH_SPEED + max(face.gap, 0.0) / (APPROACH * self._world.dt)) / lever
             strength = PUSH * lever if face.gap < 10 * TOUCH else np.inf
             low, high = (-speed, np.inf) if opening > 0.0 else (-np.inf, speed)
-            self._world.joints.slow(joint, low, high, strength)
+            self._world.joints.limit_velocity(joint, low, high, strength)
 
     def approach_thread(self, box: Array) -> None:
         """Slow the fingers as they close on a thread within their box (2, 3)."""
@@ -140,7 +140,7 @@ class Fingers:
         if self._slowed:
             self._slowed = False
             for joint in self.jaw.joints:
-                self._world.joints.let(joint)
+                self._world.joints.resume(joint)
 
     def reset(self) -> None:
         """Follow commands, after the world was reset."""

@@ -141,7 +141,7 @@ def _declared(
 def _entry(bodies: Sequence[Body], chains: Chains, entry: Any) -> ArmDescription:
     """One declared arm; raises ValueError with what is wrong with it."""
     if not isinstance(entry, Mapping):
-        raise ValueError(f"'{entry}' is no map")
+        raise ValueError(f"'{entry}' is not a mapping")
     unknown = [str(key) for key in entry if key not in KEYS]
     if unknown:
         raise ValueError(f"there is no key '{unknown[0]}'")

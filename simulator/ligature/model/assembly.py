@@ -197,7 +197,8 @@ class _Assembly:
         if metres > REPORTED_M or radians > REPORTED_RAD:
             name, key = self.bodies[outer].identity.identifier, joint.identity.key
             message = (
-                f"'{name}' starts {1e3 * metres:.3g} mm and {radians:.3g} rad off its location, where '{key}' holds it"
+                f"'{name}' starts {1e3 * metres:.3g} mm and {radians:.3g} rad away from its location: "
+                f"joint '{key}' requires it"
             )
             hint = "move the body, or the joint's pivots, axes, offset and limits"
             self.diagnostics.append(Diagnostic(Severity.INFO, message, joint.identity.mark, hint, "moved"))
@@ -362,7 +363,7 @@ class _Assembly:
         others = len(mechanism.chains) - 1
         loops = f"'{first.key}'" + (f" and {others} more" if others else "")
         if left > OPEN:
-            message = f"the loop of joint {loops} does not close: {1e3 * left:.3g} mm remain, and are held as they are"
+            message = f"the loop of joint {loops} does not close: {1e3 * left:.3g} mm remain and are kept"
             hint = "correct the joint's pivots, or widen the limits of the joints of the loop"
             self.diagnostics.append(Diagnostic(Severity.WARNING, message, first.mark, hint, "loop"))
         elif file_gap > OPEN:
@@ -378,8 +379,8 @@ class _Assembly:
         joint = self.joints[chain.joint]
         if slack > OPEN:
             message = (
-                f"joint '{joint.identity.key}' repeats what the other joints of its loop hold; "
-                f"where they differ it opens, by up to {1e3 * slack:.2g} mm"
+                f"joint '{joint.identity.key}' is redundant in its loop; "
+                f"where it contradicts the other joints, it opens by up to {1e3 * slack:.2g} mm"
             )
             self.diagnostics.append(Diagnostic(Severity.INFO, message, joint.identity.mark, "", "loop"))
 

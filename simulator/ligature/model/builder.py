@@ -1,8 +1,8 @@
 """Builds a scene file by file, in the order in which AMBF creates objects.
 
-A file is converted whole (`ligature.model.conversion`); here its parts get their names, find the bodies that they name
+A file comes converted (`ligature.model.conversion`); here its parts get their names, find the bodies that they name
 and are joined. Parents of mounted objects are settled when they arrive. An object that cannot be built is reported and
-left out; the rest goes on.
+left out; the rest goes on. What needs all objects of the scene comes afterwards (`ligature.model.completion`).
 """
 
 from __future__ import annotations
@@ -12,24 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from ligature.adf import Diagnostic, Document, Element, Resolver, Severity
+from ligature.adf import Diagnostic, Document, Element, Severity
 from ligature.adf.nodes import Scalar, Sequence
-from ligature.model import proxies, trees
-from ligature.model.arms import find_arms
-from ligature.model.assembly import assemble
-from ligature.model.conversion import ModelParts, Mounts, Part, converted, mounts
+from ligature.model import proxies
+from ligature.model.conversion import ModelParts, Mounts, Part
+from ligature.model.files import ModelFile, SceneFiles
 from ligature.model.frames import Array
 from ligature.model.geometry import GeometryError
-from ligature.model.holes import find_holes
-from ligature.model.jaws import find_jaws
 from ligature.model.joints import fixed_joint, joint_of
 from ligature.model.lookup import candidates
 from ligature.model.lost import LostBodies
 from ligature.model.mounted import actuator_of
 from ligature.model.naming import Names, merged
-from ligature.model.needles import find_needles
 from ligature.model.parenting import Arrivals
-from ligature.model.rods import find_rods
 from ligature.model.scene import (
     Actuator,
     Body,
@@ -40,27 +35,38 @@ from ligature.model.scene import (
     Joint,
     Light,
     Model,
-    Scene,
     Sensor,
     SensorType,
-    WorldSettings,
 )
-from ligature.model.shapes import ShaderFiles
-from ligature.model.softening import Softening
 from ligature.model.sutures import thread
-from ligature.model.tissue import tissue_findings
 
 KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
 
 
 class SceneBuilder:
-    """Collects the objects of a scene; `finish` settles what needs all of them."""
+    """Collects the objects of a scene.
 
-    def __init__(self, name: str, resolver: Resolver, world: WorldSettings, softening: Softening | None = None) -> None:
-        self.name = name
-        self.resolver = resolver
-        self.world = world
-        self.diagnostics: list[Diagnostic] = []
+    Attributes
+    ----------
+    bodies, joints, …
+        The objects so far, by index.
+    diagnostics
+        Findings about the files and their objects.
+    arrivals, lost
+        Mounted objects and their parents, and bodies that could not be built.
+    groups
+        Collision groups of each body.
+    silent_files
+        Bodies of each file whose bodies do not collide with each other.
+    linked
+        Pairs of bodies, joined by a joint, that do not collide.
+    no_rod
+        Bodies that are part of no rod, though they might look like one.
+    """
+
+    def __init__(self, files: SceneFiles) -> None:
+        self.files = files
+        self.diagnostics = list(files.findings)
         self.models: list[Model] = []
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
@@ -69,33 +75,39 @@ class SceneBuilder:
         self.actuators: list[Actuator] = []
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
-        self.devices: list[InputDevice] = []
+        self.devices = [_device(element) for element in files.devices]
+        self.arrivals = Arrivals()
+        self.lost = LostBodies()
+        self.groups: list[tuple[int, ...]] = []
+        self.silent_files: list[list[int]] = []
+        self.linked: list[tuple[int, int]] = []
+        self.no_rod: set[int] = set()
         self._names = {kind: Names() for kind in (*KINDS, "suture")}
-        self._arrivals = Arrivals()
         self._scales: list[float] = []
-        self._groups: list[tuple[int, ...]] = []
-        self._silent_files: list[list[int]] = []
-        self._linked: list[tuple[int, int]] = []
-        self._no_rod: set[int] = set()
-        self._lost = LostBodies()
-        self.softening = softening or Softening(())
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
         self.diagnostics.append(diagnostic)
 
-    def add_model(self, document: Document, shaders: ShaderFiles | None) -> None:
-        """Create the objects of one model file."""
+    def add(self, file: ModelFile, parts: ModelParts) -> None:
+        """Create the objects of one file from its converted parts; of the world file, the cameras and lights."""
+        before = {kind: len(self._list(kind)) for kind in KINDS}
+        if file.document.kind == "world":
+            self._add_mounts(parts.mounts, Model(-1, file.document.path, file.document.top.text("namespace")))
+        else:
+            self._add_model(file.document, parts)
+        self._enter(before)
+        if file.device is not None:
+            self._place_proxy(file.device, before)
+
+    def _add_model(self, document: Document, parts: ModelParts) -> None:
         top = document.top
         model = Model(len(self.models), document.path, top.text("namespace"))
         self.models.append(model)
-        before = {kind: len(self._list(kind)) for kind in KINDS}
         self._note_unusable(document, model)
-        self.softening.apply(document)
-        parts = converted(document, self.resolver, shaders, self.world.gravity)
         local = self._add_bodies(parts, model)
         if not top.flag("ligature rod"):
-            self._no_rod.update(local)
+            self.no_rod.update(local)
         self._add_sutures(document, parts.gravity, model, local)
         self._add_ghosts(parts, model)
         self._add_sensors(parts, model, local)
@@ -104,85 +116,25 @@ class SceneBuilder:
         self._carry_tissues(document, model, local)
         self._add_mounts(parts.mounts, model)
         if top.flag("ignore inter-collision"):
-            self._silent_files.append(local)
-        self.arrive(before)
+            self.silent_files.append(local)
 
-    def add_proxy(self, document: Document, shaders: ShaderFiles | None, device: Element) -> int:
-        """Create the proxy of an input device; the index of its root link, -1 when it has no body."""
-        before = self.counts()
-        self.add_model(document, shaders)
+    def _place_proxy(self, device: int, before: dict[str, int]) -> None:
+        """Put the proxy of an input device, all objects since ``before``, where the device has it."""
         first = before["body"]
         children = {joint.child for joint in self.joints[before["joint"] :]}
         taken = {body.identity.topic for body in self.bodies}
-        self.bodies[first:], root = proxies.placed(device, self.bodies[first:], children, taken)
-        return -1 if root is None else root
+        element = self.files.devices[device]
+        self.bodies[first:], root = proxies.placed(element, self.bodies[first:], children, taken)
+        self.devices[device] = replace(self.devices[device], proxy=-1 if root is None else root)
 
-    def arrive(self, before: dict[str, int]) -> None:
+    def _enter(self, before: dict[str, int]) -> None:
         """Let all objects created since ``before`` (count by kind) enter the world."""
         newcomers = [
             (kind, item.index, item.identity.identifier, item.identity.key)
             for kind in KINDS
             for item in self._list(kind)[before[kind] :]
         ]
-        self._arrivals.enter(newcomers)
-
-    def counts(self) -> dict[str, int]:
-        """Number of objects by kind."""
-        return {kind: len(self._list(kind)) for kind in KINDS}
-
-    def add_world(self, document: Document) -> None:
-        """Create the cameras and lights of the world file."""
-        before = self.counts()
-        self._add_mounts(mounts(document), Model(-1, document.path, document.top.text("namespace")))
-        self.arrive(before)
-
-    def finish(self) -> Scene:
-        """The scene of everything added."""
-        self._arrivals.report_orphans()
-        ghosts, cameras, lights = (
-            self._arrivals.attached(kind, self._list(kind)) for kind in ("ghost", "camera", "light")
-        )
-        self._lost.name_what_goes_along(self.diagnostics)
-        self.diagnostics += self._arrivals.diagnostics
-        rods, placed, found = find_rods(self.bodies, self.joints, self.sensors, frozenset(self._no_rod))
-        self.diagnostics += found
-        rod_bodies = frozenset(b for rod in rods for b in rod.bodies)
-        rod_joints = frozenset(j for rod in rods for j in (*rod.joints, *rod.anchors))
-        bodies = trees.connected(placed, self.joints, self._linked, self._silent_files, self._groups)
-        forest, loops = trees.articulations(bodies, self.joints, rod_bodies, rod_joints)
-        start, closures, found = assemble(bodies, self.joints, forest, loops)
-        self.diagnostics += found
-        movable = [joint for joint in self.joints if joint.index not in {*loops, *rod_joints}]
-        arms, found = find_arms(bodies, movable, self.world.extra.get("ligature arms"))
-        self.diagnostics += found
-        needles, found = find_needles(bodies, self.joints, forest, rods)
-        self.diagnostics += found + tissue_findings(bodies)
-        holes, found = find_holes(ghosts, bodies)
-        self.diagnostics += found
-        return Scene(
-            name=self.name,
-            world=self.world,
-            models=tuple(self.models),
-            bodies=bodies,
-            joints=tuple(self.joints),
-            ghosts=ghosts,
-            sensors=tuple(self.sensors),
-            actuators=tuple(self.actuators),
-            cameras=cameras,
-            lights=lights,
-            input_devices=tuple(self.devices),
-            articulations=forest,
-            loops=loops,
-            start=start,
-            closures=closures,
-            rods=rods,
-            needles=needles,
-            holes=holes,
-            arms=arms,
-            jaws=find_jaws(bodies, movable, arms),
-            diagnostics=tuple(self.diagnostics),
-            roots=self.resolver.roots,
-        )
+        self.arrivals.enter(newcomers)
 
     def _list(self, kind: str) -> list[Any]:
         lists: dict[str, list[Any]] = {
@@ -195,7 +147,7 @@ class SceneBuilder:
         return self._names[kind].identity(element, model.namespace, model.index)
 
     def _wait(self, kind: str, identity: Identity, index: int) -> None:
-        self._arrivals.wait(kind, index, identity.identifier, identity.parent_text, identity.mark)
+        self.arrivals.wait(kind, index, identity.identifier, identity.parent_text, identity.mark)
 
     def _add_bodies(self, parts: ModelParts, model: Model) -> list[int]:
         local = []
@@ -204,14 +156,14 @@ class SceneBuilder:
             self.diagnostics += part.findings
             if part.make is None:
                 self._names["body"].identifiers.pop()
-                self._lost.add(identity.identifier, len(self.diagnostics) - 1)
+                self.lost.add(identity.identifier, len(self.diagnostics) - 1)
                 continue
             body = part.make(index=len(self.bodies), identity=identity)
             self.bodies.append(body)
             self._scales.append(element.number("scale"))
-            self._groups.append(self._valid_groups(element))
+            self.groups.append(self._valid_groups(element))
             if not element.flag("ligature rod"):
-                self._no_rod.add(body.index)
+                self.no_rod.add(body.index)
             local.append(body.index)
         return local
 
@@ -224,7 +176,7 @@ class SceneBuilder:
                 continue
             for place, finding in enumerate(self.diagnostics):
                 if finding.severity >= Severity.ERROR and f"body '{item.text}'" in finding.message:
-                    self._lost.add(model.namespace + item.text, place)
+                    self.lost.add(model.namespace + item.text, place)
                     break
 
     def _add_sutures(self, document: Document, gravity: Array, model: Model, local: list[int]) -> None:
@@ -242,8 +194,8 @@ class SceneBuilder:
             self.bodies += bodies
             self.joints += joints
             self._scales += [1.0] * len(bodies)
-            self._groups += [()] * len(bodies)
-            self._linked += [(joint.parent, joint.child) for joint in joints]
+            self.groups += [()] * len(bodies)
+            self.linked += [(joint.parent, joint.child) for joint in joints]
             for kind, made in (("body", bodies), ("joint", joints)):
                 self._names[kind].identifiers += [item.identity.identifier for item in made]
             local += [body.index for body in bodies]
@@ -324,9 +276,9 @@ class SceneBuilder:
                 joint_of(element, len(self.joints), identity, self.bodies[parent], self.bodies[child], scales)
             )
             if element.flag("ignore inter-collision"):
-                self._linked.append((parent, child))
+                self.linked.append((parent, child))
             if not element.flag("ligature rod"):
-                self._no_rod.update((parent, child))
+                self.no_rod.update((parent, child))
 
     def _carry_tissues(self, document: Document, model: Model, local: list[int]) -> None:
         """Fix bodies of tissue to the bodies that carry them."""
@@ -354,7 +306,7 @@ class SceneBuilder:
                 identity = replace(tissue.identity, key=f"{element.key} carrier", passive=True)
                 self.joints.append(fixed_joint(len(self.joints), identity, carrier, tissue))
                 self._names["joint"].identifiers.append(identity.identifier)
-                self._linked.append((parent, child))
+                self.linked.append((parent, child))
 
     def _body(self, element: Element, key: str, local: list[int], namespace: str) -> int | None:
         """The body that ``element`` names under ``key``, by the search order of §4.5."""
@@ -375,7 +327,7 @@ class SceneBuilder:
             if len(found) == 1:
                 return local[found[0]] if pool is local_names else found[0]
             ambiguous += [pool[i] for i in found]
-        if not ambiguous and self._lost.took_along(f"{element.kind} '{element.key}'", (text, namespace + text)):
+        if not ambiguous and self.lost.took_along(f"{element.kind} '{element.key}'", (text, namespace + text)):
             return None
         reason = f"is ambiguous ({', '.join(ambiguous[:3])}, …)" if ambiguous else "does not exist"
         message = f"{element.kind} '{element.key}' is left out: its {key} '{text}' {reason}"
@@ -389,3 +341,9 @@ class SceneBuilder:
             )
         )
         return None
+
+
+def _device(element: Element) -> InputDevice:
+    return InputDevice(
+        element.key, element.text("hardware name"), element.text("root link"), element.raw(), element.mark
+    )

@@ -81,8 +81,7 @@ class BodyCommand(Command, code=1):
     def object(self) -> tuple[str, int]:  # noqa: D102
         return "body", self.body
 
-    def check(self) -> None:  # noqa: D102
-        super().check()
+    def check_together(self, counts: Mapping[str, int] | None) -> None:  # noqa: D102
         _TARGETS[self.type].check(f"a {self.type.name} command", self.target)
 
 
@@ -135,9 +134,8 @@ class ParentCommand(_Mounted, code=8):
     def slot(self) -> Hashable:  # noqa: D102
         return self.object, "parent"
 
-    def check_indices(self, counts: Mapping[str, int]) -> None:  # noqa: D102
-        super().check_indices(counts)
-        if not 0 <= (self.parent or 0) < counts["body"]:
+    def check_together(self, counts: Mapping[str, int] | None) -> None:  # noqa: D102
+        if counts is not None and not 0 <= (self.parent or 0) < counts["body"]:
             raise ValueError(f"the scene has no body number {self.parent} to mount a {self.kind} on")
 
 
@@ -172,7 +170,7 @@ class WatchContacts(Command, code=9):
 
 
 def object_counts(scene: Scene) -> dict[str, int]:
-    """How many objects of each kind that can be commanded a scene has, for `Message.check_indices`."""
+    """How many objects of each kind that can be commanded a scene has, for `Message.check`."""
     return {
         "body": len(scene.bodies),
         "actuator": len(scene.actuators),

@@ -44,7 +44,7 @@ def find_holes(ghosts: Sequence[Ghost], bodies: Sequence[Body]) -> tuple[tuple[H
             found.append(
                 Hole(len(found), ghost.identity.identifier, ghost.index, body.index, T_body_hole, half, ghost.tissue)
             )
-            message = f"'{ghost.identity.identifier}' is a tissue hole: it holds what passes through it"
+            message = f"'{ghost.identity.identifier}' is a tissue hole: it constrains the needle and thread inside it"
             hint = "opt out with 'ligature hole: false'"
             findings.append(Diagnostic(Severity.INFO, message, ghost.identity.mark, hint, "hole"))
     return tuple(found), findings

@@ -64,7 +64,7 @@ class Packed(Field):
 
 
 INDEX = Packed("<i", int)
-"""Number of an object of the scene; `Message.check_indices` bounds it."""
+"""Number of an object of the scene; `Message.check` bounds it."""
 
 COUNT = Packed("<I", int)
 """A whole number from 0 to 2³² − 1."""
@@ -168,7 +168,7 @@ class Numbers(Field):
         if value is None and self.optional:
             return
         if self.length is not None and len(value) != self.length:
-            raise ValueError(f"{what} has {self.length} numbers, not {len(value)}")
+            raise ValueError(f"{what} must have {self.length} numbers, not {len(value)}")
         _fits(value)
         for number in value:
             if not math.isfinite(number):
@@ -235,7 +235,7 @@ def _fits(values: Any, most: int = MAX_NUMBERS) -> None:
 
 def _slice(data: bytes, at: int, end: int) -> bytes:
     if end > len(data):
-        raise CodecError("they end too early")
+        raise CodecError("the data ends too early")
     return data[at:end]
 
 
@@ -278,20 +278,24 @@ class Message:
 
     @property
     def releases(self) -> bool:
-        """Whether nothing is commanded to its object any more."""
+        """Whether it ends what was commanded to its object."""
         return False
 
-    def check(self) -> None:
-        """Raise ValueError, with what was expected, when a value is invalid."""
+    def check(self, counts: Mapping[str, int] | None = None) -> None:
+        """Raise ValueError, with what was expected, when a value is invalid.
+
+        With ``counts``, the number of objects of each kind in the scene, also when the scene lacks the object.
+        """
         for name, what, field in self.fields():
             field.check(what, getattr(self, name))
-
-    def check_indices(self, counts: Mapping[str, int]) -> None:
-        """Raise ValueError when the scene, with ``counts`` objects of each kind, lacks the object."""
-        if self.object is not None:
+        self.check_together(counts)
+        if counts is not None and self.object is not None:
             kind, index = self.object
             if not 0 <= index < counts.get(kind, 0):
                 raise ValueError(f"the scene has no {kind} number {index}")
+
+    def check_together(self, counts: Mapping[str, int] | None) -> None:
+        """Raise ValueError when valid values do not fit each other or, with ``counts``, the scene."""
 
 
 def handle(handlers: Mapping[type[Message], Callable[[Any], Result]], message: Message) -> Result:

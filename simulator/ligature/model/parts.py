@@ -12,8 +12,9 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Element, Severity
 from ligature.mesh import box_inertia
+from ligature.model.extents import estimate_size, mesh_centroid
 from ligature.model.frames import Array, frame, pose_matrix
-from ligature.model.geometry import FileContext, colliders, estimate_size, mesh_centroid, visual
+from ligature.model.geometry import FileContext, colliders, visual
 from ligature.model.scene import (
     Body,
     CartesianController,

@@ -19,19 +19,19 @@ from ligature.model.scene import Joint, JointType, Scene
 
 Array = NDArray[np.float64]
 
-DRIVEN = (JointType.REVOLUTE, JointType.PRISMATIC)
+MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 """Joints with motors."""
 
 PARTS, HALVINGS = 16, 4
 """Steps along the range of a joint, and halvings of the one at which its loop opens."""
 
-SHORT = 0.02
+UNREPORTED = 0.02
 """Part of its range by which a joint may stop short of its limit without a report."""
 
 AT_LIMIT = 1e-6
 """Distance from a limit at which a joint counts as stopped by it."""
 
-LARGEST = 64
+MAX_COORDINATES = 64
 """Coordinates of the largest mechanism that is looked at: the time grows with their third power."""
 
 
@@ -56,13 +56,13 @@ def reaches(scene: Scene) -> list[Reach]:
     found = []
     for mechanism, members in _mechanisms(scene, chains):
         x = mechanism.gather(coordinates, scene.start.roots)
-        if len(x) > LARGEST:
+        if len(x) > MAX_COORDINATES:
             continue
         allowed = np.maximum(mechanism.gaps(x)[:, 0], [slack[chain.joint] for chain in members]) + OPEN
         found += [
             _reach(mechanism, x, scene.joints[index], allowed)
             for index in sorted(mechanism.inner_of())
-            if index in commanded and scene.joints[index].type in DRIVEN and _limited(scene.joints[index])
+            if index in commanded and scene.joints[index].type in MOTORISED and _limited(scene.joints[index])
         ]
     return found
 
@@ -82,17 +82,17 @@ def findings(scene: Scene) -> list[Diagnostic]:
     found = []
     for mechanism, members in _mechanisms(scene, _chains(scene)):
         size = len(mechanism.gather(coordinates, scene.start.roots))
-        if size > LARGEST:
+        if size > MAX_COORDINATES:
             joint = scene.joints[members[0].joint]
             message = (
-                f"the loop of joint '{joint.identity.key}' has {size} coordinates, more than the {LARGEST} of which "
-                "reaches are computed: its joints may stop short of their limits"
+                f"the loop of joint '{joint.identity.key}' has {size} coordinates; reaches are computed for at most "
+                f"{MAX_COORDINATES}, so its joints may stop short of their limits"
             )
             found.append(Diagnostic(Severity.INFO, message, joint.identity.mark, "", "reach"))
     for reach in reaches(scene):
         joint = scene.joints[reach.joint]
         assert joint.low is not None and joint.high is not None
-        short = SHORT * (joint.high - joint.low)
+        short = UNREPORTED * (joint.high - joint.low)
         for stop, limit, stopping in (
             (reach.low, joint.low, reach.stopped_low), (reach.high, joint.high, reach.stopped_high),
         ):  # fmt: skip
@@ -114,13 +114,13 @@ def _reach(mechanism: Mechanism, x: Array, joint: Joint, allowed: Array) -> Reac
     ends, stopping = [], []
     assert joint.low is not None and joint.high is not None
     for limit in (joint.low, joint.high):
-        end, stopped = _march(mechanism, x, column, limit, (joint.high - joint.low) / PARTS, allowed)
+        end, stopped = _move_to(mechanism, x, column, limit, (joint.high - joint.low) / PARTS, allowed)
         ends.append(float(end[column]))
         stopping.append(() if stopped is None else _at_limits(mechanism, stopped, column))
     return Reach(joint.index, float(x[column]), ends[0], ends[1], stopping[0], stopping[1])
 
 
-def _march(
+def _move_to(
     mechanism: Mechanism, x: Array, column: int, limit: float, step: float, allowed: Array
 ) -> tuple[Array, Array | None]:
     """The last configuration (n,) with closed loops on the way to ``limit``, and the open one beyond it, or None."""

@@ -117,8 +117,8 @@ def _joined(
             moved[body.index] = body.T_world_body.copy()
             moved[body.index][:3, 3] += at - own
             message = (
-                f"'{body.identity.identifier}' starts {1e3 * off:.3g} mm off its location, where "
-                f"'{joint.identity.key}' holds it as an element of a rod"
+                f"'{body.identity.identifier}' starts {1e3 * off:.3g} mm away from its location: "
+                f"joint '{joint.identity.key}' requires it, as an element of a rod"
             )
             hint = "move the body, or the joint's pivots"
             found.append(Diagnostic(Severity.INFO, message, joint.identity.mark, hint, "moved"))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ligature.model.shapes import Collider, Visual
 
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
-USUAL_CELLS = 600
+DEFAULT_CELLS = 600
 """Cells of a body whose cell size the file does not state, about."""
 
 MOST_NODES = 6000
@@ -48,7 +48,7 @@ def tissue_of(
     vertices, faces = _surface(element, context, visual, colliders)
     cell = element.value("ligature tissue.cell size")
     if cell is None:
-        cell = float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / USUAL_CELLS)) or 1e-3
+        cell = float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / DEFAULT_CELLS)) or 1e-3
     if not cell > 0.0:
         raise _error(element, "ligature tissue.cell size", f"has cells of {cell:g} m", "give metres above 0")
     cells = np.prod(np.ceil(np.ptp(vertices, axis=0) / cell) + 1.0)
@@ -144,7 +144,7 @@ def _fixed(element: Element, grid: Grid) -> NDArray[np.bool_]:
     if fixed.any():
         loose = sorted(set(pieces.tolist()) - set(pieces[fixed].tolist()))
         if loose:
-            raise _error(element, "ligature tissue.fixed", f"has {len(loose)} pieces that nothing holds",
+            raise _error(element, "ligature tissue.fixed", f"has {len(loose)} pieces that are not held",
                          "hold them by a further face, shorten the slits, or use smaller cells")  # fmt: skip
     elif pieces.max() > 0:
         raise _error(element, "ligature tissue", f"falls into {pieces.max() + 1} pieces",

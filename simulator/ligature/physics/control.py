@@ -166,7 +166,7 @@ class TreeControl:
         if (self.mode[rows] != FORCE).any():
             self._enter(rows, FORCE)
 
-    def let_go(self, rows: Integers) -> None:
+    def release_rows(self, rows: Integers) -> None:
         """Let the axes ``rows`` (k,) go limp."""
         self.owned[rows] = False
         self.target[rows] = 0.0
@@ -193,7 +193,7 @@ class TreeControl:
         if fresh:
             self._sort()
 
-    def slow(self, joint: int, low: float, high: float, strength: float) -> None:
+    def limit_velocity(self, joint: int, low: float, high: float, strength: float) -> None:
         """Keep the velocity of one motor between ``low`` and ``high``, its effort below ``strength``, until `let`."""
         row, own = self.row[joint], self.axes
         fresh = not own.slowed[row]
@@ -202,7 +202,7 @@ class TreeControl:
         if fresh:
             self._sort()
 
-    def let(self, joint: int) -> None:
+    def resume(self, joint: int) -> None:
         """End `stop` and `slow`."""
         row, own = self.row[joint], self.axes
         self._motions.send(self.first_axis + row, None)
@@ -217,7 +217,7 @@ class TreeControl:
         for array in (own.stop, own.lower_speed, own.upper_speed, own.upper_effort):
             array[rows] = 0.0
 
-    def pull(self, joint: int, stiffness: float) -> float:
+    def requested_effort(self, joint: int, stiffness: float) -> float:
         """Effort that the command of one joint asks for, were the joint stopped where it is.
 
         A motor with a set-point pulls in proportion to its following error, with ``stiffness`` (N·m/rad, N/m)
@@ -253,7 +253,7 @@ class TreeControl:
         """Positions, velocities and motor efforts (3, k) of the axes ``rows`` (k,) now."""
         return self._motions.joints(self._index)[:, rows]
 
-    def put(self, rows: Iterable[int], positions: Iterable[float], velocity: float = 0.0) -> None:
+    def set_state(self, rows: Iterable[int], positions: Iterable[float], velocity: float = 0.0) -> None:
         """Set axes to positions and a velocity at once, without dynamics."""
         for row, position in zip(rows, positions, strict=True):
             pybullet.resetJointState(self.tree.uid, self.links[row], position, velocity, physicsClientId=self._client)

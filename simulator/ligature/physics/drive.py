@@ -63,11 +63,11 @@ class Drive:
 
     def free(self) -> None:
         """Let the joints go limp."""
-        self._control.let_go(self._rows)
+        self._control.release_rows(self._rows)
 
     def place(self, position: Array) -> None:
         """Put the joints somewhere at once, at rest."""
-        self._control.put(self._rows.tolist(), position.tolist())
+        self._control.set_state(self._rows.tolist(), position.tolist())
 
     def reset(self) -> None:
         """Nothing: the joints belong to the physics, which put them back."""

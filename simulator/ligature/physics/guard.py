@@ -97,7 +97,7 @@ class Guard:
         speed, turn = np.linalg.norm(self._twist[index, :3]), np.linalg.norm(self._twist[index, 3:])
         what = f"moves at {speed:.3g} m/s" if speed > LEAP else f"turns at {turn:.3g} rad/s"
         cause, remedy = self._cause(body, members)
-        message = f"'{body.identity.identifier}' {what}, which no command asks for; likely cause: {cause}"
+        message = f"'{body.identity.identifier}' {what}, without a command for it; likely cause: {cause}"
         return Diagnostic(Severity.WARNING, message, body.identity.mark, remedy, "speed")
 
     def _cause(self, body: Body, members: set[int]) -> tuple[str, str]:

@@ -38,7 +38,7 @@ class Joints:
             for k, tree in enumerate(engine.trees)
         ]
         self._control_of = {joint: control for control in self.controls for joint in control.row}
-        self.jointed = [control for control in self.controls if control.links]
+        self.moving = [control for control in self.controls if control.links]
 
     def act(self) -> None:
         """Set motors and efforts of all joints for the coming tick."""
@@ -47,7 +47,7 @@ class Joints:
             motions.everything()
         act(motions.handle, motions.table, self._table, self._engine.dt)
         if not motions.handle:
-            for control in self.jointed:
+            for control in self.moving:
                 control.send()
 
     def held(self) -> list[dict[str, Any]]:
@@ -85,11 +85,11 @@ class Joints:
             if joint in self._control_of:
                 self._control_of[joint].release(joint)
 
-    def let_go(self, root: int | None = None) -> None:
+    def release_tree(self, root: int | None = None) -> None:
         """Let all joints of the tree with a root body go limp, or of all trees, those that arms own, too."""
-        for control in self.jointed:
+        for control in self.moving:
             if root in (None, control.tree.root):
-                control.let_go(np.arange(len(control.links)))
+                control.release_rows(np.arange(len(control.links)))
 
     def commanded(self, bodies: set[int]) -> bool:
         """Whether a client commands a joint of a tree with any of ``bodies``."""
@@ -97,22 +97,22 @@ class Joints:
 
     # --- single joints ----------------------------------------------------------------------
 
-    def put(self, joint: int, position: float, velocity: float) -> None:
+    def set_state(self, joint: int, position: float, velocity: float) -> None:
         """Set a joint to a position and velocity at once, without dynamics."""
         control = self._control_of[joint]
-        control.put([control.row[joint]], [position], velocity)
+        control.set_state([control.row[joint]], [position], velocity)
 
     def stop(self, joint: int, position: float, effort: float) -> None:
         """Stop a joint at ``position`` whatever its command; it reports ``effort``."""
         self._control_of[joint].stop(joint, position, effort)
 
-    def slow(self, joint: int, low: float, high: float, strength: float) -> None:
+    def limit_velocity(self, joint: int, low: float, high: float, strength: float) -> None:
         """Keep the velocity of a joint's motor between ``low`` and ``high``, and its effort below ``strength``."""
-        self._control_of[joint].slow(joint, low, high, strength)
+        self._control_of[joint].limit_velocity(joint, low, high, strength)
 
-    def let(self, joint: int) -> None:
-        """End `stop` and `slow`."""
-        self._control_of[joint].let(joint)
+    def resume(self, joint: int) -> None:
+        """End `stop` and `limit_velocity`."""
+        self._control_of[joint].resume(joint)
 
     def driven(self, joint: int) -> bool:
         """Whether a command drives a joint."""
@@ -125,8 +125,8 @@ class Joints:
         return float(control.read(np.array([control.row[joint]]))[0, 0])
 
     def requested_effort(self, joint: int, stiffness: float) -> float:
-        """Effort that a joint's command requests; see `TreeControl.pull`."""
-        return self._control_of[joint].pull(joint, stiffness)
+        """Effort that a joint's command requests; see `TreeControl.requested_effort`."""
+        return self._control_of[joint].requested_effort(joint, stiffness)
 
     # --- snapshots --------------------------------------------------------------------------
 

@@ -40,7 +40,7 @@ class Overlap:
         one, other = (scene.bodies[i].identity for i in (self.body, self.other))
         message = (
             f"'{one.identifier}' starts {1e3 * self.depth:.3g} mm inside '{other.identifier}', where joints hold it; "
-            "they do not collide until they have parted"
+            "they do not collide until they have separated"
         )
         return Diagnostic(Severity.WARNING, message, one.mark, "move them apart, or disable their collision", "overlap")
 

@@ -203,7 +203,7 @@ class World(Subsystem):
             self.joints.act()
         except Exception as error:  # no command ends a run
             self.report(failure("the controllers of all joints", error))
-            self.joints.let_go()
+            self.joints.release_tree()
         self._damping.step()
         self._lifts.step()
         for body, command in self.commands.all:
@@ -216,7 +216,7 @@ class World(Subsystem):
         """Clear the commands of a body, and of all joints of its tree, whose controller failed."""
         self.report(failure(f"the controller of '{self.scene.bodies[body].identity.identifier}'", error))
         self.release(body)
-        self.joints.let_go(body)
+        self.joints.release_tree(body)
 
     def step(self, tick: int = 0) -> None:
         """Advance Bullet by one tick, and put back what diverged in it."""
@@ -235,7 +235,7 @@ class World(Subsystem):
         found = diverged(self.engine)
         for k in found:
             name = self.scene.bodies[self.engine.trees[k].root].identity.identifier
-            message = f"'{name}' diverged and was put back to its initial pose"
+            message = f"'{name}' diverged and was reset to its initial pose"
             self.report(Diagnostic(Severity.ERROR, message, code="diverged"))
         for k in sorted(joined(self.engine, found)):
             self.engine.restart(k)
@@ -286,7 +286,7 @@ class World(Subsystem):
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
         """Set a joint to a position and velocity at once, without dynamics."""
-        self.joints.put(joint, position, velocity)
+        self.joints.set_state(joint, position, velocity)
         self._parting.begin()
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:

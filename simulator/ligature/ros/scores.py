@@ -27,9 +27,9 @@ def next_score(task: str, timeout: float) -> tuple[dict[str, object], dict[str, 
     while not (scores and measures):
         waited = time.monotonic() - begin
         if subscriber.get_num_connections() == 0 and waited > LOOKING:
-            raise RuntimeError(f"no simulator judges '{task}'; start it with 'ligature run … --task {task}'")
+            raise RuntimeError(f"no simulator scores '{task}'; start it with 'ligature run … --task {task}'")
         if waited > timeout:
-            raise RuntimeError(f"nobody reported the end of '{task}' within {timeout:g} s")
+            raise RuntimeError(f"no one reported the end of '{task}' within {timeout:g} s")
         time.sleep(0.02)
     return _values(scores[-1]), _values(measures[-1])
 

@@ -127,7 +127,7 @@ class Actuators(Subsystem):
         bodies = self._rays.hits.body[self._rays.slices[found]]
         triggered = bodies[bodies >= 0]
         if not len(triggered):
-            raise LookupError(f"actuator {actuator}: sensor '{text}' senses nothing")
+            raise LookupError(f"actuator {actuator}: sensor '{text}' detects nothing")
         return int(triggered[-1])
 
     def _hold(self, command: ActuatorCommand, body: int, body_pose: Array) -> None:

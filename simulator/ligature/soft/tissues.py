@@ -36,7 +36,7 @@ class Tissues(Subsystem):
             piece.end()
             if piece.contacts.overflow and name not in self._reported:
                 self._reported.add(name)
-                message = f"'{name}' has no room for more points of contact; bodies press it with those that it has"
+                message = f"'{name}' has reached its maximum number of contact points; it ignores further ones"
                 hint = "use larger cells, or fewer bodies on it"
                 self._problems.append(Diagnostic(Severity.WARNING, message, hint=hint, code="tissue"))
 

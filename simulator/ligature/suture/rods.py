@@ -164,14 +164,14 @@ class Rods:
         )
         message = (
             f"'{one}' of an attached rod starts {1e3 * depth:.3g} mm inside '{other}'; such elements do not collide "
-            "with it until they have parted"
+            "with it until they have separated"
         )
         self.problems.append(Diagnostic(Severity.WARNING, message, None, "move the rod or the body", "overlap"))
 
     def _heal(self, rod: Rod) -> None:
         """Put a rod that diverged back to its initial shape, and report it."""
         rod.reset()
-        message = f"rod '{rod.description.name}' diverged and was put back to its initial shape"
+        message = f"rod '{rod.description.name}' diverged and was reset to its initial shape"
         self.problems.append(Diagnostic(Severity.ERROR, message, code="diverged"))
 
     def snapshot(self) -> dict[str, Any]:

@@ -216,7 +216,7 @@ class _Reader:
             for other, others in pairs.items():
                 if followers and followers[:1] == others[:1] and not waiting & {name, other}:
                     raise self.fail(
-                        node.mark, f"{name} and {other} would both begin with {followers[0]}",
+                        node.mark, f"{name} and {other} would both start with {followers[0]}",
                         f"begin one of the lists with another arm, or with '{NOBODY}' to make it wait",
                     )  # fmt: skip
             pairs[name] = followers

@@ -41,7 +41,7 @@ class TeleopRemote:
         self._prefix = prefix
         self.pairs: dict[str, PairState] = {}
         self.scale = 0.0
-        self._early: dict[str, bool] = {}
+        self._selected: dict[str, bool] = {}
         self._subscribers: list[Any] = []
         console = f"{prefix}console/"
         self._enable = rospy.Publisher(f"{console}teleop/enable", Bool, queue_size=5)
@@ -57,11 +57,11 @@ class TeleopRemote:
         self._subscribers.append(rospy.Subscriber(topic, type_, take, queue_size=10))
 
     def _choose(self, pair: str, selected: bool) -> None:
-        self._early[pair] = selected
+        self._selected[pair] = selected
         if pair in self.pairs:
             self.pairs[pair].selected = selected
 
-    def look(self) -> None:
+    def find_pairs(self) -> None:
         """Ask the master for pairs that were missing before; raises `rosgraph.MasterException`, OSError."""
         for topic, type_ in rosgraph.Master(rospy.get_name()).getTopicTypes():
             match = _PAIR.match("/" + topic.removeprefix(self._prefix)) if type_ == "std_msgs/Bool" else None
@@ -70,14 +70,14 @@ class TeleopRemote:
             pair = PairState(match["leader"], match["follower"])
             if pair.name in self.pairs:
                 continue
-            pair.selected = self._early.get(pair.name, False)
+            pair.selected = self._selected.get(pair.name, False)
             self.pairs[pair.name] = pair
             root = topic.rpartition("/")[0]
             for name, kind in (("current_state", String), ("status", String), ("following", Bool)):
-                self._listen(f"{root}/{name}", kind, self._keeper(pair, name))
+                self._listen(f"{root}/{name}", kind, self._setter(pair, name))
 
     @staticmethod
-    def _keeper(pair: PairState, name: str) -> Any:
+    def _setter(pair: PairState, name: str) -> Any:
         return lambda message: setattr(pair, name, message.data)
 
     # --- what a console asks for ---------------------------------------------------------------

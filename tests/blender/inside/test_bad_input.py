@@ -32,7 +32,7 @@ def fails(operator, words, **arguments):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"a: [1\nb: }", r"bad.yaml:2:\d+: error: this is not YAML"),
+        (b"a: [1\nb: }", r"bad.yaml:2:\d+: error: invalid YAML"),
         (b"\x00\xff\xfe\x80", "bad.yaml"),
         (b"", "bad.yaml"),
         (b"- 1\n- 2\n", "bad.yaml"),

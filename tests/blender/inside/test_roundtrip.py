@@ -61,8 +61,8 @@ def test_every_launch_file_comes_back_with_all_that_it_names(corpus, tmp_path):
         done, _ = prepared_scene(bpy.context.scene, file)  # what an export in its place would write
         assert {path.resolve(): data for path, data in done.files.items()} == {
             path: path.read_bytes()
-            for path in {(file.parent / name).resolve() for name in (".", *here)} - {file.parent}
-        } | {file: file.read_bytes()}, file
+            for path in {(file.parent / name).resolve() for name in (".", *here)} - {file.parent.resolve()}
+        } | {file.resolve(): file.read_bytes()}, file
         target = tmp_path / str(number) / "a" / "launch.yaml"
         assert bpy.ops.adf.export_scene(filepath=str(target)) == {"FINISHED"}
         assert all(target.parent in p.parents for p in (tmp_path / str(number)).rglob("*") if p.is_file())
@@ -74,7 +74,7 @@ def test_every_launch_file_comes_back_with_all_that_it_names(corpus, tmp_path):
 
 
 def test_a_file_that_is_no_yaml_is_refused_with_its_place(corpus):
-    with pytest.raises(AdfError, match=r"compound_example.yaml:\d+:\d+: error: this is not YAML"):
+    with pytest.raises(AdfError, match=r"compound_example.yaml:\d+:\d+: error: invalid YAML"):
         import_file(next(corpus.rglob("compound_example.yaml")), bpy.context.scene)
 
 

@@ -65,8 +65,8 @@ def inertia_unlike_geometry(subject: Subject) -> Iterator[Finding]:
         given = np.sort([body.number(f"inertia.{i}") for i in ("ix", "iy", "iz")])
         ratio = float(np.max(np.maximum(given / expected, expected / np.maximum(given, 1e-300))))
         if ratio > INERTIA_RATIO:
-            message = f"its inertia is {ratio:.3g} times off that of its geometry"
-            hint = "set it from the geometry, or inflate it by a remembered factor"
+            message = f"its inertia is {ratio:.3g} times larger or smaller than that of its geometry"
+            hint = "compute it from the geometry, or inflate it by a factor that the file keeps"
             yield Finding("inertia-unlike-geometry", Severity.WARNING, body.key, message, hint)
 
 
@@ -183,7 +183,7 @@ def thin_for_margin(subject: Subject) -> Iterator[Finding]:
         sizes = [_thickness(shape) for shape, _ in subject.shapes(body) if shape.kind != "PLANE"]
         margin = body.number("collision margin")
         if sizes and min(sizes) < MARGIN_RATIO * margin:
-            message = f"its margin of {margin:g} m is thick beside its thinnest part of {min(sizes):g} m"
+            message = f"its margin of {margin:g} m is large for its thinnest part of {min(sizes):g} m"
             fix = {"collision margin": float(f"{min(sizes) / 10.0:.3g}")}
             hint = f"take {fix['collision margin']:g} m"
             yield Finding("thin-for-margin", Severity.WARNING, body.key, message, hint, fix)
@@ -202,8 +202,8 @@ def name_clash(subject: Subject) -> Iterator[Finding]:
             continue
         name = (element.text("namespace"), element.text("name").replace(" ", ""))
         if name in users and name[1]:
-            message = f"its name '{element.text('name')}' makes the same topics as that of '{users[name].key}'"
-            yield Finding("name-clash", Severity.ERROR, element.key, message, "blanks do not count; rename one of them")
+            message = f"its name '{element.text('name')}' gives the same topics as the name of '{users[name].key}'"
+            yield Finding("name-clash", Severity.ERROR, element.key, message, "spaces are ignored; rename one of them")
         users.setdefault(name, element)
 
 

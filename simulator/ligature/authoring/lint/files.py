@@ -26,7 +26,7 @@ _OLD_KEYS = ("detached", "redundant", "controller gains")
 def duplicate_identifier(subject: Subject) -> Iterator[Finding]:
     """Of two definitions with one key the second is lost."""
     for twice in subject.document.root.duplicates:
-        message = f"'{twice.text}' is defined twice; the second definition is lost (line {twice.mark.line})"
+        message = f"'{twice.text}' is defined twice; the second definition is ignored (line {twice.mark.line})"
         yield Finding(
             "duplicate-identifier", Severity.ERROR, twice.text, message, "give one of them another identifier"
         )
@@ -123,7 +123,7 @@ def file_unreferenced(subject: Subject) -> Iterator[Finding]:
             if file.suffix.lower() not in (".obj", ".stl", ".3ds") or file.resolve() in used:
                 continue
             if not any(file.name in text for text in texts):
-                message = f"nothing names '{file.name}' in {folder.name}"
+                message = f"nothing refers to '{file.name}' in {folder.name}"
                 yield Finding("file-unreferenced", Severity.WARNING, "", message, "remove it")
 
 

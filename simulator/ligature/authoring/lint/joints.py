@@ -60,7 +60,7 @@ def mass_ratio(subject: Subject) -> Iterator[Finding]:
     for joint, parent, child in _ends(subject):
         a, b = parent.number("mass"), child.number("mass")
         if min(a, b) > 0.0 and max(a, b) > MASS_RATIO * min(a, b):
-            message = f"it joins {a:g} kg and {b:g} kg, a ratio of {max(a, b) / min(a, b):.3g}"
+            message = f"it connects {a:g} kg and {b:g} kg, a ratio of {max(a, b) / min(a, b):.3g}"
             yield Finding("mass-ratio", Severity.WARNING, joint.key, message, "keep masses within a factor of 100")
 
 
@@ -137,7 +137,7 @@ def axes_nearly_antiparallel(subject: Subject) -> Iterator[Finding]:
             continue
         angle = float(np.arccos(np.clip(a @ b / length, -1.0, 1.0)))
         if 3.13 < angle < np.pi - 1e-6:
-            message = f"its axes are {angle:.5f} rad apart, where loaders disagree about the turn"
+            message = f"its axes are {angle:.5f} rad apart, where simulators disagree about the rotation of the child"
             yield Finding(
                 "axes-nearly-antiparallel", Severity.WARNING, joint.key, message, "make them exactly antiparallel"
             )
@@ -156,7 +156,7 @@ def joint_residual(subject: Subject) -> Iterator[Finding]:
             continue
         metres, radians = residual(joint, kind, parent, child)
         if metres > RESIDUAL_M or radians > RESIDUAL_RAD:
-            message = f"it is off by {1e3 * metres:.3g} mm and {radians:.3g} rad where its bodies stand"
+            message = f"it is off by {1e3 * metres:.3g} mm and {radians:.3g} rad at the poses of its bodies"
             hint = "move the child to where the joint holds it, or solve the joint again"
             yield Finding("joint-residual", Severity.ERROR, joint.key, message, hint)
 

@@ -9,8 +9,8 @@ import numpy as np
 import pybullet
 import pytest
 from ligature.mesh import box_inertia
+from ligature.model.extents import estimate_size, mesh_centroid
 from ligature.model.frames import frame, matrix_quaternion, pose_matrix, rpy_matrix
-from ligature.model.geometry import estimate_size, mesh_centroid
 from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Plane, Shape, Sphere, TriMesh
 
 TURN = rpy_matrix(0.5, 0.3, -0.2)

@@ -1,0 +1,68 @@
+"""Reads the meshes of a collection's objects, the triangles of those alone whose files have to be written."""
+
+from __future__ import annotations
+
+import bpy
+
+from .mesh_data import Textures, mesh_print, surfaces_of
+from .mesh_source import HIGH, LOW, MeshSource
+from .placing import SHAPED
+from .properties import KIND_OF_ROLE
+from .schema_properties import identifier
+from .solids import Solid, solids_of
+
+
+def has_mesh(obj: bpy.types.Object) -> bool:
+    """Whether an object has a visual mesh of its own."""
+    return obj.adf.role in SHAPED and obj.type == "MESH"
+
+
+def mesh_sources(objects: list[bpy.types.Object]) -> list[MeshSource]:
+    """The meshes of all objects; the triangles of those alone whose files have to be written."""
+    shaped = [obj for obj in objects if obj.adf.role in SHAPED]
+    own = {obj.name_full: _own(obj) for obj in shaped}
+    solids = {obj.name_full: solids_of(obj) for obj in shaped}
+    prints = {name: mesh_print(parts) for name, parts in solids.items()}
+    groups = {o.name_full: getattr(o.adf, o.adf.role.lower()) for o in bpy.data.objects if o.adf.role in SHAPED}
+    names = {name: {g.mesh.lower(), g.collision_mesh.lower()} for name, g in groups.items()}
+    written: set[str] = set()
+    found = []
+    for obj in shaped:
+        now = prints[obj.name_full]
+        source = MeshSource(
+            key=obj.adf.key, name=obj.name, clean_name=bpy.path.clean_name(obj.name), type=obj.type, print=now,
+            **own[obj.name_full],
+        )  # fmt: skip
+        if obj.adf.mesh_print != now:
+            # a file that looks the same for all who use it is changed for all of them
+            source.taken = set().union(*(used for name, used in names.items() if prints.get(name) != now))
+            whole = obj.type == "MESH" and (now not in written or bool(source.mesh))
+            _read_triangles(source, solids[obj.name_full], whole)
+            written |= {now} if obj.type == "MESH" else set()
+        found.append(source)
+    return found
+
+
+def _own(obj: bpy.types.Object) -> dict:
+    """Names and scale of an object's mesh files, and the folders below the model's that it states."""
+    own = getattr(obj.adf, identifier(KIND_OF_ROLE[obj.adf.role]))
+    return {
+        "mesh": own.mesh,
+        "collision_mesh": own.collision_mesh,
+        "scale": own.scale or 1.0,
+        "collision_type_given": own.is_property_set("collision_mesh_type"),
+        "places": {
+            HIGH: (getattr(own, "high_resolution_path", ""), own.mesh),
+            LOW: (getattr(own, "low_resolution_path", ""), own.collision_mesh or own.mesh),
+        },
+    }
+
+
+def _read_triangles(source: MeshSource, solids: list[Solid], whole: bool) -> None:
+    """Read the triangles of an object, where it has them and needs a file of its own, and of its convex parts."""
+    textures = Textures()
+    source.changed = True
+    if whole:
+        source.surfaces = surfaces_of(solids[0], textures)
+    source.hulls = [surfaces_of(hull, corners=False) for hull in solids[1:]]
+    source.textures, source.problems = textures.files, textures.problems

@@ -1,0 +1,139 @@
+"""What of a collection cannot be written, and what surprises about it. Errors name the object."""
+
+from __future__ import annotations
+
+import json
+from math import isfinite
+
+import bpy
+
+from .ligature.adf.references import merged
+from .placed import Placed, State
+from .placing import SHAPED, children_with, owner_of, shapes_of
+from .references import file_of, members, qualified
+
+
+class ExportError(Exception):
+    """A collection that cannot be written; nothing was changed. The message names the object, ``obj`` if it is one."""
+
+    def __init__(self, message: str, obj: bpy.types.Object | None = None) -> None:
+        super().__init__(message)
+        self.obj = obj
+
+
+def check_values(objects: list[bpy.types.Object], values: list[dict]) -> None:
+    """Raise `ExportError` unless every object has an identifier of its own, and finite numbers."""
+    users: dict[str, str] = {}
+    for obj in objects:
+        if not obj.adf.key:
+            raise ExportError(f"'{obj.name}' has no identifier; give it one in the Physics tab", obj)
+        if obj.adf.key in users:
+            words = f"'{obj.name}' and '{users[obj.adf.key]}' have one identifier, '{obj.adf.key}'"
+            raise ExportError(f"{words}; Check Scene can give the copy its own", obj)
+        users[obj.adf.key] = obj.name
+    for obj, found in zip(objects, values, strict=True):
+        for path, value in found.items():
+            numbers = value if isinstance(value, (tuple, list)) else (value,)
+            if any(isinstance(v, float) and not isfinite(v) for v in numbers):
+                raise ExportError(f"'{obj.name}' has a {path} that is not a finite number; give it one", obj)
+
+
+def check_ends(
+    collection: bpy.types.Collection,
+    objects: list[bpy.types.Object],
+    places: list[Placed],
+    unchanged: list[set[str]],
+) -> None:
+    """Raise `ExportError` for instances of collections, and for objects whose bodies were deleted."""
+    for obj, place, same in zip(objects, places, unchanged, strict=True):
+        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None and obj.adf.role in SHAPED:
+            words = f"'{obj.name}' shows the collection '{obj.instance_collection.name}', whose objects are not written"
+            raise ExportError(f"{words}; use Object > Apply > Make Instances Real, and join them", obj)
+        if place.ends is None:
+            gone = deleted_owner(collection, objects, obj)
+            if gone:
+                raise ExportError(
+                    f"'{obj.name}' hangs on '{gone}', which was deleted; parent it to another, or delete it", obj
+                )
+        else:
+            _check_joint(collection, objects, obj, place, same)
+
+
+def _check_joint(
+    collection: bpy.types.Collection,
+    objects: list[bpy.types.Object],
+    obj: bpy.types.Object,
+    place: Placed,
+    unchanged: set[str],
+) -> None:
+    """Raise `ExportError` for a joint without two bodies that the file can name."""
+    for end in ("parent", "child"):
+        gone = deleted_end(collection, objects, obj, end)
+        if gone:
+            words = f"'{obj.name}' joins '{gone}', which was deleted"
+            raise ExportError(f"{words}; choose another {end} body in the Physics tab, or delete the joint", obj)
+    if "ends" in unchanged:
+        return
+    for end, key in zip(("parent", "child"), place.ends, strict=True):
+        if not key:
+            raise ExportError(f"'{obj.name}' has no {end} body; choose one in the Physics tab, or delete it", obj)
+    if place.frames is None and not obj.adf.was:
+        raise ExportError(f"'{obj.name}' joins a body of a file that is not open, so that it has no place there", obj)
+
+
+def deleted_end(
+    collection: bpy.types.Collection, objects: list[bpy.types.Object], joint: bpy.types.Object, end: str
+) -> str:
+    """What a joint calls a body that is no more; empty when the body is there, or of a file that is not open."""
+    body, text = getattr(joint.adf, f"{end}_object"), getattr(joint.adf, f"{end}_text")
+    if body is None:
+        return text if _was_here(collection, objects, text) else ""
+    there = file_of(body)
+    if there is None:  # its file was closed, or it was deleted from this one
+        return body.name if not text or _was_here(collection, objects, text) else ""
+    return "" if body in (objects if there is collection else members(there)) else body.name
+
+
+def deleted_owner(collection: bpy.types.Collection, objects: list[bpy.types.Object], obj: bpy.types.Object) -> str:
+    """What an object calls the body that it hung on and that is no more."""
+    owner = owner_of(obj)
+    if owner is not None:
+        return "" if owner.users_collection else owner.name
+    return obj.adf.parent_text if obj.adf.hung and _was_here(collection, objects, obj.adf.parent_text) else ""
+
+
+def _was_here(collection: bpy.types.Collection, objects: list[bpy.types.Object], text: str) -> bool:
+    """Whether a text names an object that the file had and that is no more."""
+    now = [qualified(collection, obj) for obj in objects]
+    space = getattr(getattr(collection.adf, collection.adf.kind.lower(), None), "namespace", "")
+    had = [merged(space, "") + key for key in json.loads(collection.adf.imported_keys or "[]")]
+    return bool(text) and any(n.endswith(text) for n in had) and not any(n.endswith(text) for n in now)
+
+
+def kept_joints(
+    objects: list[bpy.types.Object], places: list[Placed], states: list[State | None], unchanged: list[set[str]]
+) -> list[str]:
+    """Joints that were moved, of which the file keeps its own pose since not both bodies are open."""
+    return [
+        f"'{obj.name}' was moved, and joins a body that is not open: its pose in the file stays"
+        for obj, place, before, same in zip(objects, places, states, unchanged, strict=True)
+        if place.ends is not None and place.frames is None and before and "pose" in before and "pose" not in same
+    ]
+
+
+def notes_of(obj: bpy.types.Object) -> list[str]:
+    """What surprises about an object that is not in the file yet."""
+    if obj.adf.was or obj.adf.role not in SHAPED:
+        return []
+    if obj.type not in ("MESH", "EMPTY"):
+        return [f"is a {obj.type.lower()}, whose shape is not written; convert it to a mesh"]
+    if obj.adf.role == "BODY" and obj.type == "MESH" and collides_as_triangles(obj):
+        return ["moves and collides as a triangle mesh; decompose it into convex pieces, or fit primitives"]
+    return []
+
+
+def collides_as_triangles(obj: bpy.types.Object) -> bool:
+    """Whether a moving body has neither primitives nor convex pieces, nor a hull around its mesh."""
+    own = obj.adf.body
+    parts = shapes_of(obj, "COLLISION") or children_with(obj, "HULL")
+    return not parts and own.collision_mesh_type == "CONCAVE_MESH" and own.mass > 0.0
