@@ -1,126 +1,91 @@
-"""A newcomer's first minutes by the page alone, as a series of pictures: from the start page towards the needle.
+"""A newcomer's first throw by the page alone, as a series of pictures: from the start page to a needle through tissue.
 
-    python -m tests.bench.newcomer [--to FOLDER]
+    python -m tests.bench.newcomer [--to FOLDER] [--docs]
 
-A browser is driven as a person uses it: one button, one key, drags in the camera's picture; where the needle lies it takes
-from the scene, as a person from the picture. Each step leaves ``newcomer-N.png`` at desk size, and a line of how long it took and
-how far the tip is from the needle. Needs Chromium.
+A browser is driven as a person uses it who has not read anything: whatever the page offers next is pressed, at last its
+slider is pulled. Each step leaves ``newcomer-N.png``, and a line of how long it took; ``--docs`` writes those that
+the documentation shows to ``docs/pictures``. Exit status 1 when the needle is not through. Needs Chromium.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
+import sys
 import time
 from pathlib import Path
 
-import numpy as np
-from ligature.cockpit.hands import Sightline
-from selenium.webdriver.common.action_chains import ActionChains
+from PIL import Image
 
-from tests.cockpit.conftest import Person, Served, somebody, tip, until
-from tests.waiting import steady
+from tests.cockpit.conftest import ROOT, Newcomer, Served, somebody
 
 DESK = (1440, 900)
-ARM = "PSM1"
+SHOWN = {1: "cockpit_start", 3: "cockpit_pick", 5: "cockpit_bring", 6: "cockpit_drive", 7: "cockpit"}
+"""Steps whose pictures the documentation has."""
 
 
-class Newcomer:
-    """Somebody who has never seen the page."""
+class Album:
+    """Takes pictures of what is to be seen."""
 
-    def __init__(self, served: Served, person: Person, folder: Path) -> None:
-        self._served, self._person, self._folder = served, person, folder
+    def __init__(self, one: Newcomer, folder: Path, docs: bool) -> None:
+        self._one, self._folder, self._docs = one, folder, docs
         self._begin, self._count = time.monotonic(), 0
 
-    @property
-    def sight(self) -> Sightline:
-        """How the endoscope looks."""
-        return Sightline.of(self._served.scene.cameras[0], self._served.state["camera_world"][0])
-
-    @property
-    def needle(self) -> np.ndarray:
-        """Where the needle is, (3,)."""
-        return np.asarray(self._served.state["body_pose"][self._served.scene.needles[0].body][:3])
-
-    def leaves(self, what: str) -> None:
-        """Take a picture of what is to be seen now."""
+    def keep(self, what: str) -> None:
+        """Take one."""
         self._count += 1
-        self._person.driver.save_screenshot(str(self._folder / f"newcomer-{self._count}.png"))
-        away = 1e3 * float(np.linalg.norm(tip(self._served, ARM)[:3, 3] - self.needle))
-        print(f"{time.monotonic() - self._begin:6.1f} s  {what}; tip {away:.0f} mm from the needle")  # noqa: T201
-
-    def stands(self) -> None:
-        """Wait until the tip stands."""
-        steady(lambda: tip(self._served, ARM).copy(), 0.5, 1e-6, "the tip stands")
-
-    def presses(self, identity: str) -> None:
-        """Press a button."""
-        until(lambda: self._person.driver.find_elements("id", identity), identity)
-        until(lambda: self._person.driver.find_element("id", identity).is_displayed(), f"{identity} is shown")
-        self._person.driver.execute_script("document.getElementById(arguments[0]).click()", identity)
-
-    def drags_to_needle(self) -> None:
-        """Drag the tip in the picture to where the needle is seen."""
-        x, y, width, height, wide, high = self._person.driver.execute_script(
-            "const i = document.getElementById('lig-image'), r = i.getBoundingClientRect();"
-            "return [r.x, r.y, r.width, r.height, i.naturalWidth, i.naturalHeight]"
-        )
-        shown = min(height, width * high / wide)
-        middle = np.array([x + width / 2, y + height / 2])
-        sight = self.sight
-        begin = middle + sight.place(tip(self._served, ARM)[:3, 3]) * shown * [1, -1]
-        end = middle + sight.place(self.needle) * shown * [1, -1]
-        steps = [(end - begin) / 10] * 10
-        self._person.holds_at(float(begin[0]), float(begin[1]), [(float(s[0]), float(s[1])) for s in steps])
-        self._person.lets_go()
-        self.stands()
-
-    def holds(self, key: str, seconds: float) -> None:
-        """Hold a key."""
-        ActionChains(self._person.driver).key_down(key).pause(seconds).key_up(key).perform()
-        self.stands()
+        picture = Image.open(io.BytesIO(self._one.person.driver.get_screenshot_as_png())).convert("RGB")
+        picture.save(self._folder / f"newcomer-{self._count}.png")
+        if self._docs and self._count in SHOWN:
+            small = picture.resize((DESK[0] * 2 // 3, DESK[1] * 2 // 3), Image.Resampling.LANCZOS)
+            small.quantize(128).save(ROOT / "docs" / "pictures" / f"{SHOWN[self._count]}.png", optimize=True)
+        sys.stdout.write(f"{time.monotonic() - self._begin:6.1f} s  {what}: {self._one.words or '…'}\n")
+        sys.stdout.flush()
 
 
-def main() -> None:
+def main() -> int:
     """Play a newcomer."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--to", type=Path, default=Path("build"))
-    folder = parser.parse_args().to
-    served = Served()
+    parser.add_argument("--docs", action="store_true")
+    given = parser.parse_args()
+    served = Served(scene=ROOT / "scenes" / "needle_insertion" / "launch.yaml")
     try:
         with somebody() as person:
-            person.driver.execute_cdp_cmd(
-                "Emulation.setDeviceMetricsOverride",
-                {"width": DESK[0], "height": DESK[1], "deviceScaleFactor": 1, "mobile": False},
-            )
-            person.opens(served.url)
-            one = Newcomer(served, person, folder)
-            until(lambda: person.driver.find_elements("id", "lig-start"), "there is a button")
-            one.leaves("the start page")
+            size = {"width": DESK[0], "height": DESK[1], "deviceScaleFactor": 1, "mobile": False}
+            person.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            person.opens(served.url, 0.6)
+            one = Newcomer(served, person)
+            album = Album(one, given.to, given.docs)
+            one.waits_for("lig-start")
+            time.sleep(3.0)  # pictures come
+            album.keep("the start page")
             one.presses("lig-start")
-            until(lambda: served.arm(ARM)["homed"] and not served.arm(ARM)["busy"], "instruments are ready")
-            one.stands()
-            one.leaves("Start: powered, homed and in view")
+            one.waits_for("lig-pick")
+            album.keep("Start")
             one.presses("lig-swap")
-            size = "return document.getElementById('lig-image').naturalHeight > 300"
-            until(lambda: person.driver.execute_script(size), "the picture is large")
+            one.sees_the_picture()
             time.sleep(2.0)
-            one.leaves("the camera's picture is large")
-            one.drags_to_needle()
-            one.leaves("the tip is dragged to where the needle is seen")
-            one.holds("x", 0.5)
-            one.leaves("the jaw is open")
-            for _ in range(12):
-                depth = one.sight.depth(one.needle) - one.sight.depth(tip(served, ARM)[:3, 3])
-                if depth < 0.004:
-                    break
-                one.holds("e", min(depth / 0.04, 0.5))
-            one.leaves("the tip is at the needle's depth")
-            one.drags_to_needle()
-            one.holds("z", 0.8)
-            one.leaves("the jaw is closed")
+            album.keep("the camera's picture is large")
+            one.presses("lig-pick")
+            one.waits_for("lig-bring")
+            album.keep("Pick up the needle")
+            one.presses("lig-bring")
+            one.waits_for("lig-drive")
+            time.sleep(2.0)
+            album.keep("Bring it to the tissue")
+            one.pulls("lig-drive", 0.0, 0.55)
+            one.waits_until(lambda: one.punctures == 1, "the needle is in")
+            time.sleep(3.0)
+            album.keep("the slider is half way")
+            one.pulls("lig-drive", 0.55, 1.0)
+            one.waits_until(lambda: "through the tissue" in one.words, "the needle is through")
+            time.sleep(3.0)
+            album.keep(f"the slider is at its end, {one.punctures} punctures")
+            return 0 if one.punctures == 2 else 1
     finally:
         served.end()
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

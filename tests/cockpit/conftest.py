@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ FLAGS = (
 )  # fmt: skip
 
 
-def until(condition: Callable[[], Any], what: str, seconds: float = TIMEOUT) -> Any:
+def until(condition: Callable[[], Any], what: str | Callable[[], str], seconds: float = TIMEOUT) -> Any:
     """Wait for ``condition``, as long as a busy browser takes; returns what it returned."""
     return waiting.until(condition, what, seconds, every=0.05)
 
@@ -47,9 +47,11 @@ def until(condition: Callable[[], Any], what: str, seconds: float = TIMEOUT) -> 
 class Served:
     """A simulation with a page, and its state as the physics process writes it."""
 
-    def __init__(self, *arguments: str, scene: Path = SMALL, folder: Path | None = None) -> None:
+    def __init__(
+        self, *arguments: str, scene: Path = SMALL, folder: Path | None = None, prefix: Sequence[str] = ()
+    ) -> None:
         self.lines: list[str] = []
-        command = [str(Path(sys.executable).parent / "ligature"), "cockpit", str(scene), "--at", "127.0.0.1:0"]
+        command = [*prefix, str(Path(sys.executable).parent / "ligature"), "cockpit", str(scene), "--at", "127.0.0.1:0"]
         self.process = subprocess.Popen(
             [*command, "-p", "250", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env=dict(os.environ, COLUMNS="200"), cwd=folder, preexec_fn=end_with_parent,
@@ -126,8 +128,8 @@ class Person:
         self.driver.set_script_timeout(TIMEOUT)
         self.driver.set_page_load_timeout(TIMEOUT)
 
-    def opens(self, url: str) -> None:
-        self.driver.get(f"{url}/?fixedDpr={COARSE}")
+    def opens(self, url: str, pixels: float = COARSE) -> None:
+        self.driver.get(f"{url}/?fixedDpr={pixels}")
         self.sees("Ligature")
         self.driver.execute_script(
             "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
@@ -228,6 +230,52 @@ class Person:
     def goes(self) -> None:
         with suppress(Exception):  # a browser that was killed cannot be asked to end
             self.driver.quit()
+
+
+class Newcomer:
+    """Somebody who presses what the page offers, and knows nothing else."""
+
+    def __init__(self, served: Served, person: Person) -> None:
+        self.served, self.person = served, person
+
+    @property
+    def words(self) -> str:
+        """What the page says about the throw."""
+        return str(self.person.driver.execute_script("return document.getElementById('lig-told')?.textContent ?? ''"))
+
+    @property
+    def punctures(self) -> int:
+        """How many the tissue has."""
+        return int(self.served.state["puncture_count"][0])
+
+    def waits_until(self, condition: Callable[[], Any], what: str) -> None:
+        until(condition, lambda: f"{what} (the page says: {self.words})")
+
+    def offered(self, identity: str) -> bool:
+        """Whether a control is to be seen and can be used."""
+        found = self.person.driver.find_elements("id", identity)
+        return any(one.is_displayed() and one.is_enabled() for one in found)
+
+    def waits_for(self, identity: str) -> None:
+        self.waits_until(lambda: self.offered(identity), f"{identity} is offered")
+
+    def presses(self, identity: str) -> None:
+        self.waits_for(identity)
+        self.person.driver.find_element("id", identity).click()
+
+    def sees_the_picture(self) -> None:
+        size = "return document.getElementById('lig-image')?.naturalHeight > 100"
+        until(lambda: self.person.driver.execute_script(size), "the camera's picture is shown")
+
+    def pulls(self, identity: str, begin: float, end: float) -> None:
+        """Pull the thumb of a slider from one share of its length to another with the mouse."""
+        slider = self.person.driver.find_element("id", identity)
+        wide = slider.size["width"] - 16  # the thumb's middle does not reach the ends
+        chain = self.person._chain().move_to_element_with_offset(slider, round((begin - 0.5) * wide), 0)
+        chain.click_and_hold()
+        for _ in range(10):
+            chain.move_by_offset(round((end - begin) * wide / 10), 0).pause(0.1)
+        chain.move_by_offset(4, 0).release().perform()
 
 
 def projected(served: Served, person: Person, points: np.ndarray) -> np.ndarray:

@@ -17,8 +17,10 @@ from hypothesis import strategies as st
 from ligature.cockpit.curves import Curves, span_of
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
+from PIL import Image
 from viser import ViserServer
 
+from tests.cockpit.conftest import Person, Served, until
 from tests.tasks.test_attempt import driven_through
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -97,3 +99,25 @@ def test_the_table_has_a_row_for_each_sample(scene: Scene, server: ViserServer) 
     assert (numbers[:, names.index("real-time factor: physics")] == 0.5).all()
     for word in ("thread tension", "tip force", "depth in tissue", "task score"):
         assert any(name.startswith(word) for name in names)
+
+
+def test_save_as_picture_downloads_all_charts(served: Served, person: Person, tmp_path: Path) -> None:
+    person.opens(served.url)
+    charts = "return document.querySelectorAll('.uplot canvas').length"
+    until(lambda: person.driver.execute_script(charts) >= 2, "charts are drawn")
+    params = {"behavior": "allow", "downloadPath": str(tmp_path)}
+    person.driver.execute_cdp_cmd("Browser.setDownloadBehavior", params)
+    person.driver.execute_script("document.querySelector('[data-ligature=png]').click()")
+    file = tmp_path / "ligature-curves.png"
+    until(file.is_file, "a picture is saved")
+    picture = np.asarray(Image.open(file).convert("RGB"), dtype=int)
+    high = person.driver.execute_script(
+        "return [...document.querySelectorAll('.uplot canvas')].reduce((sum, c) => sum + c.height, 0)"
+    )
+    assert picture.shape[0] >= high, "all charts, one below the other"
+    ground = picture[0, -1]
+    marked = np.abs(picture - ground).max(axis=2) > 60
+    bands = np.array_split(marked, int(person.driver.execute_script(charts)))
+    assert all(band.mean() > 0.001 for band in bands), "each has lines and labels"
+    blue = (picture[..., 2] > 200) & (picture[..., 0] < 120)
+    assert blue.any(), "curves are drawn in their colours"

@@ -22,7 +22,7 @@ from ligature.cockpit.arm_facts import ArmFacts
 from ligature.cockpit.gate import Gate
 from ligature.cockpit.hands import Hands, Sightline
 from ligature.cockpit.intake import rejections
-from ligature.cockpit.orders import FARTHEST, MODES, MOST_HEIGHT, ORDERS, PHASES, Drag, Order, read_order
+from ligature.cockpit.orders import FARTHEST, HELP, MODES, MOST_HEIGHT, ORDERS, PHASES, Drag, Order, read_order
 from ligature.cockpit.page import SLOW, behind, serve
 from ligature.cockpit.pursuit import LINEAR, ArmPursuits, TwistPursuit
 from ligature.cockpit.rhythm import LEAST, MOST, RISE, Rhythm
@@ -40,7 +40,7 @@ from tests.cockpit.conftest import until
 ROOT = Path(__file__).resolve().parents[2]
 MESSAGES = 100_000 if os.environ.get("LIGATURE_EXAMPLES") == "new" else 3_000
 ODD = (
-    None, True, False, 0, 1, -1, 0.5, 2, 1e308, math.inf, -math.inf, math.nan, 10**400, "", "fine", "start", "x" * 10_000, [], [0] * 7,
+    None, True, False, 0, 1, -1, 0.5, 2, 1e308, math.inf, -math.inf, math.nan, 10**400, "", "fine", "start", "pick", "x" * 10_000, [], [0] * 7,
     [1] * 7, [2] * 7, [0] * 8, [math.nan] * 7, ["start", 0, 0], ["start", 0, 1e9], ["no", 0, 0], [[], 0, 0], [True, 480, False],
     [True, -1, True], [1, 480, True], [True, 1e9, True], {}, {"do": 1}, [[[[]]]],
 )  # fmt: skip
@@ -59,11 +59,15 @@ def sound(order: Order) -> bool:
     if word == "drag":
         return value.phase in PHASES and max(abs(value.right), abs(value.up)) <= FARTHEST
     if word == "view":
-        return type(value.large) is bool and type(value.stereo) is bool and 1 <= value.height <= MOST_HEIGHT
+        return type(value.large) is bool and type(value.stereo) is bool and 0 <= value.height <= MOST_HEIGHT
     if word == "speed":
         return value in MODES
     if word == "dark":
         return type(value) is bool
+    if word == "assist":
+        return value in HELP
+    if word == "drive":
+        return type(value) is float and 0.0 <= value <= 1.0
     return word == "hello" and type(value) is str and len(value) <= 100
 
 

@@ -6,10 +6,14 @@ import re
 from pathlib import Path
 
 import pytest
+from ligature.cockpit.orders import ORDERS
+
+from tests.fuzz.readers import READERS
 
 ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "SECURITY.md").read_text("utf-8")
 ROWS = [
-    line for line in (ROOT / "SECURITY.md").read_text("utf-8").partition("## What is promised")[2].splitlines()
+    line for line in TEXT.partition("## What is promised")[2].partition("## Fuzzed")[0].splitlines()
     if line.startswith("| ") and not line.startswith(("| promise", "|---"))
 ]  # fmt: skip
 
@@ -24,4 +28,13 @@ def test_a_promise_has_its_test(row: str) -> None:
 
 
 def test_there_is_a_promise_for_every_reader_and_for_the_page() -> None:
-    assert len(ROWS) >= 15
+    assert len(ROWS) >= 24
+
+
+def test_every_reader_and_every_order_of_the_page_is_in_the_tables_of_what_was_fuzzed() -> None:
+    fuzzed = TEXT.partition("## Fuzzed")[2].partition("## Limits")[0]
+    for word in ORDERS:
+        assert f"| {word} |" in fuzzed, word
+    rows = fuzzed.lower()
+    for reader in READERS:
+        assert reader.kind.lower().removeprefix("packed ").removeprefix("sealed ").split()[0] in rows, reader.kind

@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 from ligature.process import end_with_parent
 
+from tests.network import HERE, THERE
 from tests.waiting import until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,6 +32,13 @@ PROCESSES = (
     )), "rosmaster",
 )  # fmt: skip
 """What the processes of a run are called in a list of processes."""
+
+
+FAR = os.environ.get("LIGATURE_TEST_FAR", "")
+"""A process in the network namespace in which master and simulator are to run (`tests.ros.test_bad_network`)."""
+
+_PREFIX = ["nsenter", "-t", FAR, "-n"] if FAR else []
+MASTER = THERE if FAR else "127.0.0.1"
 
 
 def free_port() -> int:
@@ -101,7 +109,7 @@ class Program:
 def ros_env() -> Iterator[dict[str, str]]:
     """Environment of a ROS master that lives for the whole test session; also set for this process."""
     port = free_port()
-    env = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
+    env = dict(os.environ, ROS_MASTER_URI=f"http://{MASTER}:{port}", ROS_IP=HERE if FAR else "127.0.0.1")
     env["PYTHONPATH"] = os.pathsep.join([str(ROOT / "build" / "python"), env.get("PYTHONPATH", "")])
     os.environ["ROS_MASTER_URI"], os.environ["ROS_IP"] = env["ROS_MASTER_URI"], env["ROS_IP"]
     master = start_master(port, env)
@@ -115,11 +123,12 @@ def start_master(port: int, env: dict[str, str]) -> subprocess.Popen[bytes]:
     from ligature.cli.master import master_answers
 
     master = subprocess.Popen(
-        ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(port)], env=env,
+        [*_PREFIX, "/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(port)],
+        env=dict(env, ROS_IP=MASTER),
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=end_with_parent,
     )  # fmt: skip
     try:
-        until(lambda: master_answers(f"http://127.0.0.1:{port}"), "the ROS master answers", every=0.05)
+        until(lambda: master_answers(f"http://{MASTER}:{port}"), "the ROS master answers", every=0.05)
     except AssertionError:
         master.kill()
         master.wait()
@@ -142,7 +151,10 @@ def start(ros_env: dict[str, str]) -> Iterator[Callable[..., Program]]:
     programs: list[Program] = []
 
     def run(*command: object, env: dict[str, str] | None = None) -> Program:
-        programs.append(Program([str(word) for word in command], env or ros_env))
+        words, there = [str(word) for word in command], env or ros_env
+        if FAR and "run" in words[:2]:
+            words, there = [*_PREFIX, *words], dict(there, ROS_IP=THERE)
+        programs.append(Program(words, there))
         return programs[-1]
 
     yield run

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 from collections.abc import Callable
 from typing import Any
@@ -9,6 +11,7 @@ from typing import Any
 import pytest
 
 from tests.ros.conftest import BIN, ROOT, SMALL, Program, free_port
+from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 SUTURING = ROOT / "scenes" / "suturing" / "launch.yaml"
@@ -44,6 +47,25 @@ def test_an_insertion_that_was_not_made_is_reported_with_measures(
     restart.publish(Empty())
     measures.wait(lambda m: passed(m) < 1.0)
     assert any("not done:" in line for line in program.lines)
+    assert program.end() == 0
+
+
+def test_a_killed_judge_is_back_and_physics_never_pauses(
+    start: Callable[..., Program], listen: Callable[..., Any]
+) -> None:
+    from diagnostic_msgs.msg import DiagnosticStatus
+
+    program = start(BIN / "ligature", "run", SUTURING, "-p", "200", "--no-cameras", "--task", "insertion")
+    program.wait_for("judging 'insertion'")
+    measures = listen("/ligature/tasks/insertion/measures", DiagnosticStatus)
+    measures.wait()
+    physics = program.children()["physics"]
+    os.kill(program.children()["tasks_process"], signal.SIGKILL)
+    program.wait_for("the tasks process ended with status -9; restarting it")
+    until(lambda: program.output.count("judging 'insertion'") == 2, "it judges again", 60.0)
+    before = len(measures.messages)
+    until(lambda: len(measures.messages) > before, "measures come again", 30.0)
+    assert program.children()["physics"] == physics
     assert program.end() == 0
 
 

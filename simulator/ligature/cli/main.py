@@ -64,6 +64,9 @@ Cameras = Annotated[
 
 Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies the scene gets.")]  # noqa: UP045
 
+FIRST_THROW = Path("needle_insertion")
+"""Scene of the cockpit for who names none."""
+
 CockpitAddress = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
@@ -190,7 +193,7 @@ def _served_at(text: str | None) -> str:
 
 @app.command()
 def cockpit(
-    launch: Launch,
+    launch: Launch = FIRST_THROW,
     models: Models = None,
     root: Roots = None,
     at: CockpitAddress = None,
@@ -198,7 +201,10 @@ def cockpit(
     speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
     devices: Devices = None,
 ) -> None:
-    """Run a scene with a live web page and without ROS; see `run --cockpit` for both."""
+    """Run a scene with a live web page and without ROS; see `run --cockpit` for both.
+
+    Without LAUNCH it is the scene of a first throw: one arm, a needle, and tissue.
+    """
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
         cockpit=_served_at(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
@@ -448,6 +454,14 @@ def replay(
         Optional[Path],  # noqa: UP045
         typer.Option(help="For a record: HDF5 file to write pictures and motion to."),
     ] = None,
+    page: Annotated[
+        bool, typer.Option("--page", help="For a record: show it on a web page, with a slider through its time.")
+    ] = False,
+    compare: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="For a page: another record of the scene, shown beside the first."),
+    ] = None,
+    at: CockpitAddress = None,
     rate: Rate = None,
     size: Size = None,
     camera: Cameras = None,
@@ -464,6 +478,12 @@ def replay(
     text: Annotated[str, typer.Option(help="For a dataset: the task as an instruction in words.")] = "",
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
+    if page or compare is not None:
+        address = _served_at(at)
+        from ligature.cli.replay_page import show
+
+        files = [file] if compare is None else [file, compare]
+        raise typer.Exit(show(files, scene, address, Console(highlight=False, soft_wrap=True)))
     from ligature.cli.replay import replay as run_replay
     from ligature.cli.sampling import Sampled
 

@@ -20,7 +20,7 @@ class CameraControls:
         with folder:
             self._choice = client.gui.add_dropdown("Camera", (*names, NO_PICTURES), initial_value=chosen)
             self._tube = client.gui.add_checkbox(
-                "Endoscope", tube, hint="Its tube in the 3D view, where it may be in the way"
+                "Endoscope", tube, hint="Its tube in the 3D view, where it stands in the way at first"
             )
         self._act = act
         self._choice.on_update(self._on_choice)

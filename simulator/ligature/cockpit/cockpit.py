@@ -20,6 +20,7 @@ from ligature.bus.events import RUN
 from ligature.cockpit.address import Address
 from ligature.cockpit.arm_facts import ArmFacts
 from ligature.cockpit.arm_panel import ArmControls, ArmStatus
+from ligature.cockpit.assist import Assist
 from ligature.cockpit.audience import Audience
 from ligature.cockpit.camera_panel import NO_PICTURES, CameraControls
 from ligature.cockpit.curves import Curves
@@ -98,6 +99,8 @@ class Cockpit:
         self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
         self._hands = Hands(facts, self._pursuits)
         self._starter = Starter(facts, self._outbox.push)
+        self._assist = Assist(scene, facts, self._pursuits)
+        self._resets = 0
         self._views: dict[int, View] = {}
         self._begins = (-1, 0.0)
         self._curves = Curves(scene, task)
@@ -141,7 +144,8 @@ class Cockpit:
             panels[1].dock_below(panels[0])
             panels[0].set_height(CAMERA_HEIGHT)
         self._stage = Stage(server, scene)
-        self._tube = True
+        self._tube = False  # the first view is from behind it
+        self._stage.show_endoscope(self._tube)
 
     @property
     def url(self) -> str:
@@ -222,6 +226,7 @@ class Cockpit:
         self._controls, self._run_controls, self._camera_controls, self._teleop_controls = [], None, None, None
 
         self._starter.end()
+        self._assist.stop()
         self._hands.rest()
 
     # --- the page's own script -------------------------------------------------------------------
@@ -254,6 +259,8 @@ class Cockpit:
 
     def _obey_hands(self, word: str, value: Any, client: ClientHandle) -> None:
         state, hands = self._state[0], self._hands
+        if word in ("next", "drag") or (word == "move" and any(value)):
+            self._assist.stop()  # the hand takes over
         if word == "move":
             self._forget_note(hands.selected)
             hands.move(value, time.monotonic())
@@ -265,6 +272,12 @@ class Cockpit:
             hands.next()
         elif word == "speed":
             hands.mode = value
+        elif word == "assist":
+            self._forget_note(hands.selected)
+            hands.rest()
+            self._assist.begin(value, hands.selected, state)
+        elif word == "drive":
+            self._assist.drive(value, hands.selected, state)
         elif word == "drag":
             sight = self._camera_sight
             arm = None if sight is None else hands.drag(state, value, sight)
@@ -277,6 +290,7 @@ class Cockpit:
         for arm, pursuits in enumerate(self._pursuits):
             if pursuits.stop():
                 self._outbox.push(Hold(arm))
+        self._assist.stop()
 
     def _forget_note(self, arm: int) -> None:
         if 0 <= arm < len(self._arms):
@@ -307,6 +321,9 @@ class Cockpit:
         hands = self._hands
         chosen = self._arms[hands.selected].facts.name if hands.selected >= 0 else ""
         wish = self._wish()
+        sight = self._camera_sight
+        aim = None if sight is None or chosen == "" else self._aim(sight)
+        help_ = self._assist.facts(hands.selected, self._state[0])
         for client in self._audience.clients:
             self._wire.inform(
                 client,
@@ -319,8 +336,20 @@ class Cockpit:
                     "speed": hands.mode,
                     "eyes": 0 if wish is None else len(wish.sight.eyes),
                     "pair": wish is not None and len(self._sights[self._sight].eyes) > 1,
+                    "assist": help_,
+                    "aim": aim,
                 },
             )
+
+    def _aim(self, sight: Sightline) -> list[float] | None:
+        """Where the selected arm has to go next: from and to in the picture, then millimetres apart and in depth."""
+        ends = self._assist.aim(self._hands.selected, self._state[0])
+        if ends is None:
+            return None
+        away, deeper = float(np.linalg.norm(ends[1] - ends[0])), sight.depth(ends[1]) - sight.depth(ends[0])
+        places = np.concatenate([sight.place(end) for end in ends])
+        shown = [*places.round(4).tolist(), round(1e3 * away, 1), round(1e3 * deeper, 1)]
+        return shown if np.isfinite(places).all() else None
 
     # --- what the operator does ----------------------------------------------------------------
 
@@ -357,6 +386,7 @@ class Cockpit:
             self._controls[arm].show_gizmo(value)
             return
         self._arms[arm].note = ""
+        self._assist.stop()
         if word == "command":
             pursuits.stop()
             if value == "Hold":
@@ -378,9 +408,14 @@ class Cockpit:
         client = self._audience.clients.get(
             -1 if self._audience.desk.operator is None else self._audience.desk.operator
         )
+        state = self._state[0]
         if client is not None:
             if self._starter.advance(self._state[0]) and self._camera_sight is not None:
                 self._hands.bring(self._state[0], work_place(self._scene, self._state), self._camera_sight)
+            if int(state["resets"]) != self._resets:
+                self._resets = int(state["resets"])
+                self._assist.forget()
+            self._assist.advance(state)
             if self._hands.busy:
                 self._hands.advance(self._state[0], self._sightline(client), now, dt)
         driven = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
@@ -404,6 +439,7 @@ class Cockpit:
                 if why and status.note != f"hold: {why}":
                     status.note = f"hold: {why}"
                     self._warn(f"{status.facts.name} holds: {why}")
+        self._assist.stop()
         self._hands.rest()
 
     @property
@@ -425,6 +461,8 @@ class Cockpit:
     def _show_stage(self, now: float) -> float:
         if self._audience.clients:
             self._stage.update(self._state)
+            operated = self._audience.desk.operator is not None
+            self._stage.show_aim(self._assist.aim(self._hands.selected, self._state[0]) if operated else None)
             for arm, controls in enumerate(self._controls):
                 if not self._pursuits[arm].active:
                     controls.place_gizmo(self._state[0])
@@ -452,15 +490,17 @@ class Cockpit:
                 self._run_controls.show_recording(self._recording)
             self._inform()
             self._show_ros()
-        self._pictures.want(self._wish() if self._audience.clients else None)
+        self._pictures.want(self._wish())
         return WORDS_PERIOD
 
     def _wish(self) -> Wish | None:
         """The picture that the browsers want: as large as the largest of them."""
         sight = self._sights.get(self._sight)
         self._views = {client: view for client, view in self._views.items() if client in self._audience.clients}
-        large = [view for view in self._views.values() if view.large]
-        if sight is None:
+        views = [self._views.get(client, SMALL_VIEW) for client in self._audience.clients]
+        seen = [view for view in views if view.height > 0]
+        large = [view for view in seen if view.large]
+        if sight is None or not seen:
             return None
         if large and not any(view.stereo for view in large):
             sight = sight.mono

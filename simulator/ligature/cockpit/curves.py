@@ -60,7 +60,7 @@ class Curves:
     def __init__(self, scene: Scene, task: str = "") -> None:
         self._attempt = _attempt(scene, task)
         pace: tuple[str, list[str], Values] = (FACTOR, ["physics"], lambda _: [self._factor])
-        self._charts = [chart for chart in (*_charts(scene), *_score(self._attempt), pace) if chart[1]]
+        self._charts = [chart for chart in (*charts_of(scene), *_score(self._attempt), pace) if chart[1]]
         self._times: deque[float] = deque(maxlen=int(SPAN * SAMPLES))
         self._rows: deque[list[float]] = deque(maxlen=int(SPAN * SAMPLES))
         self._handles: list[Any] = []
@@ -80,7 +80,7 @@ class Curves:
             self._spans.append(span)
             self._handles.append(
                 gui.add_uplot(
-                    (empty, *(empty for _ in names)), series, title=title, height=150, scales=_scales(span),
+                    (empty, *(empty for _ in names)), series, title=title, height=150, scales=scales_of(span),
                     padding=PADDING, legend=uplot.Legend(show=len(names) > 1, live=False),
                 )
             )  # fmt: skip
@@ -108,7 +108,7 @@ class Curves:
         for number, (handle, (title, names, _)) in enumerate(zip(self._handles, self._charts, strict=True)):
             span = RANGES.get(title) or span_of(rows[:, column : column + len(names)], LEAST[title])
             if span != self._spans[number]:
-                self._spans[number], handle.scales = span, _scales(span)
+                self._spans[number], handle.scales = span, scales_of(span)
             handle.data = (times, *(rows[:, column + i] for i in range(len(names))))
             column += len(names)
 
@@ -155,7 +155,8 @@ def _round_up(value: float, least: float) -> float:
     return float(next(power * step for step in (1.0, 2.0, 5.0, 10.0) if power * step >= value * (1.0 - 1e-9)))
 
 
-def _scales(span: tuple[float, float]) -> dict[str, uplot.Scale]:
+def scales_of(span: tuple[float, float]) -> dict[str, uplot.Scale]:
+    """Axes of a chart whose values lie in ``span``."""
     return {"x": uplot.Scale(time=False), "y": uplot.Scale(range=span)}
 
 
@@ -180,7 +181,7 @@ def _series(names: list[str]) -> list[uplot.Series]:
     ]
 
 
-def _charts(scene: Scene) -> list[tuple[str, list[str], Values]]:
+def charts_of(scene: Scene) -> list[tuple[str, list[str], Values]]:
     """Title, names of the curves and their values."""
     threads = [(rod.name.rpartition("/")[2], list(rod.bodies)) for rod in scene.rods]
     arms = [(i, arm.name) for i, arm in enumerate(scene.arms) if arm.kind is ArmKind.PSM]
@@ -201,5 +202,5 @@ def _charts(scene: Scene) -> list[tuple[str, list[str], Values]]:
     return [
         (TENSION, [name or f"thread {i}" for i, (name, _) in enumerate(threads, 1)], tension),
         (FORCE, [name for _, name in arms], forces),
-        (DEPTH, ["needle", "thread"] if scene.holes else [], depths),
+        (DEPTH, ["needle", "thread"] if scene.holes or scene.tissues else [], depths),
     ]

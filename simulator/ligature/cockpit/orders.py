@@ -7,7 +7,6 @@ height.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -16,6 +15,9 @@ MOST_CHARACTERS = 500
 
 MODES = {"fine": 0.1, "normal": 0.4, "fast": 1.0}
 """Speeds of the hand, as shares of the maximum velocity of goals."""
+
+HELP = ("align", "pick", "bring")
+"""What the page can do with a needle at the press of a button."""
 
 PHASES = ("start", "move", "end")
 """Of a drag in the picture."""
@@ -43,7 +45,10 @@ class Drag(NamedTuple):
 
 
 class View(NamedTuple):
-    """What a browser shows: whether the picture is large, its pixels from top to bottom, and whether of both eyes."""
+    """What a browser shows: whether the picture is large, its pixels from top to bottom, and whether of both eyes.
+
+    A browser that nobody sees wants a picture of no pixels.
+    """
 
     large: bool
     height: int
@@ -82,7 +87,7 @@ def _flag(value: Any) -> bool:
 
 
 def _number(value: Any, bound: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > bound:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= bound:
         raise ValueError
     return float(value)
 
@@ -100,6 +105,19 @@ def _mode(value: Any) -> str:
     return value
 
 
+def _help(value: Any) -> str:
+    if not isinstance(value, str) or value not in HELP:
+        raise ValueError
+    return value
+
+
+def _share(value: Any) -> float:
+    share = _number(value, 1.0)
+    if share < 0.0:
+        raise ValueError
+    return share
+
+
 def _drag(value: Any) -> Drag:
     if not isinstance(value, list) or len(value) != 3 or value[0] not in PHASES:
         raise ValueError
@@ -110,7 +128,7 @@ def _view(value: Any) -> View:
     if not isinstance(value, list) or len(value) != 3:
         raise ValueError
     height = int(_number(value[1], MOST_HEIGHT))
-    if height < 1:
+    if height < 0:
         raise ValueError
     return View(_flag(value[0]), height, _flag(value[2]))
 
@@ -131,6 +149,8 @@ ORDERS: dict[str, Callable[[Any], Any]] = {
     "move": _motion,
     "speed": _mode,
     "drag": _drag,
+    "assist": _help,
+    "drive": _share,
     "view": _view,
     "dark": _flag,
     "csv": _nothing,

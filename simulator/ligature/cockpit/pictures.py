@@ -1,6 +1,7 @@
 """Pictures of the scene's cameras for the page, drawn by a process of their own: drawing must not hold up an arm.
 
-It draws the newest state as seldom as a person puts up with, and takes no more than a part of one core.
+Small pictures come as seldom as a person puts up with. One that somebody works by comes often, and is drawn with
+fewer pixels where the machine is too slow for all of them: a smooth picture is worth more than a sharp one.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import multiprocessing
 import os
 import signal
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -30,13 +31,19 @@ HEIGHT = 240
 PERIOD, LARGE_PERIOD = 0.2, 0.05
 """Seconds between pictures at least: small ones, and one that somebody works by."""
 
-REST, LARGE_REST = 3.0, 0.25
+REST, LARGE_REST = 3.0, 0.1
 """Seconds of rest for each second of drawing."""
+
+RATE = 15.0
+"""Large pictures a second below which they get fewer pixels."""
+
+LEAST_SHARE, STEP, SLOW_STEP = 0.5, 0.85, 1.03
+"""Smallest share of the pixels from top to bottom, and by what the share falls and rises from picture to picture."""
 
 QUALITY = 82
 """Of JPEG."""
 
-NICE = 10
+NICE = 5
 """How much lower the scheduling priority of drawing is than that of physics and the rest of the cockpit."""
 
 Eye = tuple[int, str]
@@ -119,6 +126,32 @@ class Pictures:
         self._process.join(1.0)
 
 
+class Sharpness:
+    """The share of the pixels that pictures are drawn with, from how long they took; seconds of wall time."""
+
+    def __init__(self) -> None:
+        self.share = 1.0
+        self._usual = 0.0
+
+    def note(self, spent: float) -> None:
+        """A large picture took so long."""
+        self._usual = spent if self._usual == 0.0 else 0.7 * self._usual + 0.3 * spent
+        takes = (1.0 + LARGE_REST) * self._usual
+        if takes > 1.0 / RATE:
+            self._set(max(STEP * self.share, LEAST_SHARE))
+        elif takes < 0.7 / RATE:
+            self._set(min(SLOW_STEP * self.share, 1.0))
+
+    def _set(self, share: float) -> None:
+        # what a picture takes goes about with its pixels
+        self._usual *= (share / self.share) ** 2
+        self.share = share
+
+    def height(self, wish: Wish) -> int:
+        """Pixels from top to bottom, in steps of sixteen: each size has buffers of its own."""
+        return max(16 * round(self.share * wish.height / 16), HEIGHT) if wish.large else wish.height
+
+
 def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
     """The process: draws what was asked for last."""
     end_with_parent()
@@ -127,6 +160,7 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
     lower_priority(NICE)
     wish: Wish | None = None
     easel: _Easel | None = None
+    sharpness = Sharpness()
     while True:
         while pipe.poll(None if wish is None else 0):
             wish = pipe.recv()
@@ -142,10 +176,12 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
         begin = time.monotonic()
         if easel.ended:
             return
-        picture = easel.picture(wish)
+        picture = easel.picture(replace(wish, height=sharpness.height(wish)))
         if picture is not None:
             pipe.send(jpeg(picture))
         spent = time.monotonic() - begin
+        if picture is not None and wish.large:
+            sharpness.note(spent)
         period, rest = (LARGE_PERIOD, LARGE_REST) if wish.large else (PERIOD, REST)
         time.sleep(max(period - spent, rest * spent))
 

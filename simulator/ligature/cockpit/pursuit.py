@@ -5,6 +5,7 @@ A slider or a gizmo may leap; the goal that is sent to the arm does not. Metres,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,9 @@ LINEAR, ANGULAR = 0.1, 1.5
 
 SMOOTH = 0.06
 """Seconds in which the velocity of a goal follows a key or a stick."""
+
+ARC = 0.8
+"""Maximum velocity in rad/s at which a needle is turned along its arc."""
 
 JAW = 2.0
 """Maximum velocity of goals of a jaw or gripper in rad/s."""
@@ -115,12 +119,37 @@ class TwistPursuit:
         return not self.twist.any() and float(np.abs(self._now).max()) < 1e-5
 
 
+@dataclass(eq=False)
+class ArcPursuit:
+    """Tip poses ``pose(angle)`` (4, 4) along an arc, from the angle ``at`` towards ``target``."""
+
+    pose: Callable[[float], Array]
+    at: float
+    target: float
+    verb: str = "servo_cp"
+
+    @property
+    def goal(self) -> Array:
+        """The pose now."""
+        return self.pose(self.at)
+
+    def advance(self, dt: float) -> tuple[float, ...]:
+        """The goal ``dt`` seconds later, as a pose (7,)."""
+        self.at += float(np.clip(self.target - self.at, -ARC * dt, ARC * dt))
+        return tuple(matrix_pose7(self.goal).tolist())
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the target is reached."""
+        return self.at == self.target
+
+
 class ArmPursuits:
     """What one arm pursues: joints, a tip pose or a twist, and beside it the jaw."""
 
     def __init__(self, arm: int) -> None:
         self._arm = arm
-        self._motion: JointPursuit | PosePursuit | TwistPursuit | None = None
+        self._motion: JointPursuit | PosePursuit | TwistPursuit | ArcPursuit | None = None
         self._jaw: JointPursuit | None = None
 
     @property
@@ -141,12 +170,23 @@ class ArmPursuits:
         goal = np.array(start) if isinstance(self._motion, JointPursuit | None) else self._motion.goal
         self._motion = PosePursuit(goal, np.array(target))
 
+    def along(self, pose: Callable[[float], Array], start: float, target: float) -> None:
+        """Go along the poses (4, 4) of an arc from the angle ``start`` to ``target``."""
+        self._motion = ArcPursuit(pose, start, target)
+
+    def steer(self, target: float) -> bool:
+        """Go to another angle of the arc; False where no arc is pursued."""
+        if not isinstance(self._motion, ArcPursuit):
+            return False
+        self._motion.target = target
+        return True
+
     def twist(self, start: Array, twist: Array) -> None:
         """Move with ``twist`` (6,), from ``start`` (4, 4) unless the tip moves already; zeros let it come to rest."""
         if isinstance(self._motion, TwistPursuit):
             self._motion.twist = np.array(twist)
         elif np.any(twist):
-            goal = self._motion.goal if isinstance(self._motion, PosePursuit) else np.array(start)
+            goal = self._motion.goal if isinstance(self._motion, PosePursuit | ArcPursuit) else np.array(start)
             self._motion = TwistPursuit(goal, np.array(twist))
 
     @property

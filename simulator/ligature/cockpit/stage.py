@@ -25,6 +25,9 @@ STILL, UNTURNED = 2e-5, 2e-4
 TUBE_POINTS, TUBE_SIDES = 2, 6
 """Of the drawn thread: a tenth of what pictures have, since it is sent anew whenever it moves."""
 
+AIM_COLOUR, AIM_THICKNESS = (255, 212, 59), 0.0004
+"""Of the line from a tip to where it has to go, in metres."""
+
 VIEW_ANGLE = 0.8
 """Vertical field of view of a page in radians."""
 
@@ -62,6 +65,9 @@ class Stage:
         begin = new_state(scene)
         self._lights = LightStage(server, scene, distance_of_work(scene, begin, work_place(scene, begin)))
         self._rod_poses = [np.full((len(rod.bodies), 7), np.inf) for rod in scene.rods]
+        self._aim = server.scene.add_line_segments(
+            "/aim", np.zeros((1, 2, 3), np.float32), AIM_COLOUR, thickness=AIM_THICKNESS, visible=False
+        )
         self.sent = 0
 
     def update(self, state: NDArray[np.void]) -> None:
@@ -71,6 +77,13 @@ class Stage:
             self._move(poses[self._owners])
             self._bend(poses)
             self.sent += self._tissues.update(state) + self._lights.update(state)
+
+    def show_aim(self, ends: tuple[Array, Array] | None) -> None:
+        """Show a line between two places, (3,) each, or none."""
+        if (ends is not None) != self._aim.visible:
+            self._aim.visible = ends is not None
+        if ends is not None and np.abs(self._aim.points[0] - ends).max() > STILL:
+            self._aim.points = np.array([ends], np.float32)
 
     def show_endoscope(self, shown: bool) -> None:
         """Show the endoscope's tube, or hide it: it may stand before what is worked on."""
@@ -110,10 +123,16 @@ def endoscope(scene: Scene) -> set[int]:
 
 
 def work_place(scene: Scene, state: NDArray[np.void]) -> Array:
-    """Where the work is (3,): the middle of threads, else of what can move."""
-    loose = [*scene.rod_bodies] or [body.index for body in scene.bodies if not body.static]
+    """Where the work is (3,): the middle of threads, else of needles, else of what can move."""
+    loose = _worked_on(scene)
     places = state["body_pose"][0, loose, :3] if loose else np.zeros((1, 3))
     return 0.5 * (np.min(places, axis=0) + np.max(places, axis=0))  # type: ignore[no-any-return]
+
+
+def _worked_on(scene: Scene) -> list[int]:
+    """Bodies of threads, else needles, else all that can move."""
+    needles = [needle.body for needle in scene.needles]
+    return [*scene.rod_bodies] or needles or [body.index for body in scene.bodies if not body.static]
 
 
 def first_view(scene: Scene, state: NDArray[np.void]) -> tuple[Array, Array, Array]:
@@ -121,8 +140,11 @@ def first_view(scene: Scene, state: NDArray[np.void]) -> tuple[Array, Array, Arr
 
     As the scene's first camera looks, but from so far that threads and the tips of arms that are at home are seen.
     """
-    loose = [*scene.rod_bodies] or [body.index for body in scene.bodies if not body.static]
+    loose = _worked_on(scene)
     places = [*state["body_pose"][0, loose, :3]]
+    if scene.tissues:
+        nodes = state["tissue_node"][0]
+        places += [nodes.min(axis=0), nodes.max(axis=0)]
     for arm in scene.arms:
         if arm.kind is ArmKind.PSM:
             places.append((base_pose(scene, arm) @ kinematics_of(scene, arm).forward(HOME))[:3, 3])

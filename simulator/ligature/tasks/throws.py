@@ -146,28 +146,59 @@ def best_grasp(
     It must also reach the needle where it is ``now`` (4, 4), from 15 mm behind, and on the way keep clear of the
     tissue, whose upper side is level through the point ``surface`` (3,).
     """
+    found = rated_grasp(arc, depths, kinematics, T_world_base, way, now, surface, upright)
+    return None if found is None else found[0]
+
+
+def rated_grasp(
+    arc: NeedleArc,
+    depths: Sequence[float],
+    kinematics: Psm,
+    T_world_base: Array,
+    way: Sequence[Array],
+    now: Array,
+    surface: Array,
+    upright: bool = False,
+    least: float = LEAST_CLEARANCE,
+) -> tuple[NeedleGrasp, float] | None:
+    """What `best_grasp` finds, and how good it is: the larger the farther from the limits of the joints.
+
+    ``least`` are the metres that the tool keeps from the tissue.
+    """
     T_base = inverse(T_world_base)
-    best, best_margin = None, 0.0
-    span = kinematics.upper - kinematics.lower
+    best: tuple[NeedleGrasp, float] | None = None
     for grasp in grasps(depths, upright):
         T_arc_tool = grasp.tool_in_arc(arc)
-        path = kinematics.inverse(np.array([T_base @ T @ T_arc_tool for T in way]))
-        if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max(initial=0.0) > JUMP:
-            continue
-        height = clearance(kinematics, path.q, T_world_base, UP) - float(surface[2])
-        if height < LEAST_CLEARANCE:
+        q = reach(kinematics, T_world_base, [T @ T_arc_tool for T in way], surface, least)
+        if q is None:
             continue
         here = now @ T_arc_tool
         behind = frame(np.eye(3), -0.015 * here[:3, 2]) @ here
         start = kinematics.inverse(np.array([T_base @ here, T_base @ behind]))
         if not start.ok.all():
             continue
-        q = np.vstack([path.q, start.q])
-        inside = np.minimum(q - kinematics.lower, kinematics.upper - q) / span
-        margin = float(inside.min()) - 0.05 * abs(grasp.tilt) - 0.05 * abs(grasp.pivot)
-        if best is None or margin > best_margin:
-            best, best_margin = grasp, margin
+        left = margin(kinematics, np.vstack([q, start.q])) - 0.05 * abs(grasp.tilt) - 0.05 * abs(grasp.pivot)
+        if best is None or left > best[1]:
+            best = grasp, left
     return best
+
+
+def reach(
+    kinematics: Psm, T_world_base: Array, way: Sequence[Array], surface: Array, least: float = LEAST_CLEARANCE
+) -> Array | None:
+    """Joint values (k, 6) along ``way`` (k, 4, 4) of the tool, without a swing and clear of the tissue; else None."""
+    T_base = inverse(T_world_base)
+    path = kinematics.inverse(np.array([T_base @ T for T in way]))
+    if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max(initial=0.0) > JUMP:
+        return None
+    height = clearance(kinematics, path.q, T_world_base, UP) - float(surface[2])
+    return None if height < least else np.asarray(path.q)
+
+
+def margin(kinematics: Psm, q: Array) -> float:
+    """How far joint values (k, 6) stay from their limits, as a share of the joints' travel: the least of all."""
+    inside = np.minimum(q - kinematics.lower, kinematics.upper - q) / (kinematics.upper - kinematics.lower)
+    return float(inside.min())
 
 
 def clearance(kinematics: Psm, q: Array, T_world_base: Array, up: Array) -> float:

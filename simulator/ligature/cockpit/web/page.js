@@ -20,6 +20,7 @@
     ["N", "next arm"],
     ["Space", "hold: every arm stays where it is"],
     ["V", "camera's picture or 3D view as the large one"],
+    ["A throw", "the box at the top left picks the needle up, brings it to the tissue and drives it; your hand takes over at any time"],
     ["?", "this help"],
     ["Mouse or finger", "drag a tip in the camera's picture; sliders and the gizmo at the right"],
     ["Game pad", "left stick moves, right stick turns, triggers out and in, shoulders roll, A and B the jaw, X next arm"],
@@ -110,7 +111,7 @@
     moves();
   }, true);
   addEventListener("blur", rest);
-  document.addEventListener("visibilitychange", rest);
+  document.addEventListener("visibilitychange", () => { rest(); sendView(); });
 
   const readPad = () => {
     const found = [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected);
@@ -142,7 +143,7 @@
   };
   const sendView = () => {
     const high = Math.min(Math.round((main.clientHeight || 240) * devicePixelRatio), 480);
-    order("view", [large, large ? Math.max(high, 120) : 240, stereo]);
+    order("view", [large, document.hidden ? 0 : large ? Math.max(high, 120) : 240, stereo]);
   };
   const swap = () => {
     if (!facts.eyes) return;
@@ -216,6 +217,60 @@
   const hintBox = make("aside", { id: "lig-hints", "aria-label": "Hint", hidden: true },
     hint, button("Got it", () => { finish("all"); }, { id: "lig-hints-off", title: "No more hints" }));
 
+  // --- help with a throw: what to do next, one press each, and the slider of the drive ---------------------------------
+  const TOLD = {
+    pick: "1 of 3: the needle. Pick it up, or turn the jaw to it and do it by hand.",
+    bring: "2 of 3: the needle is in the jaws. Bring it to the tissue.",
+    drive: "3 of 3: drive the needle. Pull the slider to the right: its tip goes in along the needle's own arc.",
+    hand: "The needle is in the tissue. Go on by hand.",
+  };
+  const BUSY = { pick: "The arm goes to the needle …", bring: "The arm brings the needle to the tissue …" };
+  const asks = (word) => () => { order("assist", word); done("assist"); };
+  const told = make("p", { id: "lig-told", role: "status" });
+  const picks = button("Pick up the needle", asks("pick"), { id: "lig-pick", class: "lig-first" });
+  const aligns = button("Turn the jaw to it", asks("align"), { id: "lig-align" });
+  const brings = button("Bring it to the tissue", asks("bring"), { id: "lig-bring", class: "lig-first" });
+  const drives = make("input", { type: "range", id: "lig-drive", min: "0", max: "1", step: "0.01", value: "0" });
+  let driving = -Infinity, pulled = false;
+  drives.addEventListener("input", () => { driving = performance.now(); order("drive", Number(drives.value)); });
+  drives.addEventListener("pointerdown", () => { pulled = true; });
+  for (const name of ["pointerup", "pointercancel", "blur"]) drives.addEventListener(name, () => { pulled = false; driving = performance.now(); });
+  const drive = make("label", { for: "lig-drive" }, "Drive the needle", drives);
+  const assistBox = make("section", { id: "lig-assist", "aria-label": "A throw", hidden: true }, told, picks, aligns, brings, drive);
+  const assist = () => {
+    const { stage = "", busy = false, note = "", driven = 0, inside = false, through = false } = facts.assist ?? {};
+    assistBox.hidden = !facts.operates || !stage;
+    if (stage !== "drive") driving = -Infinity;
+    else if (!pulled && (driving === -Infinity || (!busy && performance.now() - driving > 2000))) drives.value = String(Math.min(Math.max(driven, 0), 1));
+    const now = through ? "The needle is through the tissue." : inside ? "The tip is in the tissue: go on." : TOLD[stage] ?? "";
+    set(told, (busy && BUSY[stage]) || note || now);
+    for (const [element, at] of [[picks, "pick"], [aligns, "pick"], [brings, "bring"], [drive, "drive"]]) element.hidden = stage !== at;
+    for (const element of [picks, aligns, brings]) element.disabled = busy;
+    aims();
+  };
+  const vector = (name, attributes = {}) => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    return element;
+  };
+  const aimLine = vector("line"), aimEnd = vector("circle", { r: 9 }), aimText = vector("text");
+  const aimBox = vector("svg", { id: "lig-aim", "aria-hidden": "true" });
+  aimBox.append(aimLine, aimEnd, aimText);
+  const aims = () => { // from the tip to where it has to go, over the large picture of one eye
+    const known = facts.operates && facts.aim && facts.eyes === 1 && image.naturalHeight;
+    aimBox.style.visibility = known ? "visible" : "hidden";
+    if (!large || !known) return;
+    const wide = main.clientWidth, high = main.clientHeight, [x1, y1, x2, y2, away, deeper] = facts.aim;
+    const tall = Math.min(high, (wide * image.naturalHeight) / image.naturalWidth);
+    const at = (x, y) => [wide / 2 + x * tall, high / 2 - y * tall];
+    const [a, b] = at(x1, y1), [c, d] = at(x2, y2);
+    for (const [key, value] of Object.entries({ x1: a, y1: b, x2: c, y2: d })) aimLine.setAttribute(key, value);
+    aimEnd.setAttribute("cx", c); aimEnd.setAttribute("cy", d);
+    aimText.setAttribute("x", c + 14); aimText.setAttribute("y", d - 10);
+    const depth = Math.abs(deeper) < 1 ? "" : deeper > 0 ? `, ${deeper.toFixed(0)} mm deeper` : `, ${(-deeper).toFixed(0)} mm nearer`;
+    set(aimText, `${away.toFixed(0)} mm${depth}`);
+  };
+
   const keyFor = (label, name, axis, way) => {
     const one = button(label, () => {}, { "aria-label": name });
     const down = (event) => { touched.set(one, [axis, way]); one.setPointerCapture?.(event.pointerId); event.preventDefault(); moves(); };
@@ -239,7 +294,7 @@
     make("h2", {}, "Words"), make("table", {}, make("tbody", {}, ...rows(WORDS))), closer);
   const help = () => { rest(); if (dialog.open) dialog.close(); else { dialog.showModal(); done("help"); } };
 
-  const root = make("div", { id: "lig" }, main, welcome, hintBox, padBox, bar);
+  const root = make("div", { id: "lig" }, main, aimBox, welcome, assistBox, hintBox, padBox, bar);
   let watching = false, host = null;
 
   // --- hints: one at a time, gone for good when done --------------------------------------------------------------------
@@ -261,6 +316,7 @@
   const inform = (news) => { facts = news; if (!facts.operates) { held.clear(); touched.clear(); sent = ""; } update(); };
   const set = (element, text) => { if (element.textContent !== text) element.textContent = text; };
   const update = () => {
+    root.hidden = !pass; // a page of recorded runs has nothing to operate
     const light = document.documentElement.dataset.mantineColorScheme === "light";
     set(themeButton, light ? "Dark" : "Light");
     welcome.hidden = watching || facts.operates || !facts.free;
@@ -275,6 +331,7 @@
     swapper.hidden = !facts.eyes;
     eyesButton.hidden = !large || !facts.pair;
     padBox.classList.toggle("off", !facts.operates || !facts.ready);
+    assist();
   };
 
   // --- where it stands: over the 3D view, whatever panels viser has beside it ----------------------------------------------

@@ -1,0 +1,115 @@
+"""An operator without a browser: speaks what the page's own script speaks, for tests of networks and frozen processes."""
+
+from __future__ import annotations
+
+import json
+import re
+import threading
+import time
+from contextlib import suppress
+from http.client import HTTPConnection
+from typing import Any
+from urllib.parse import urlencode, urlsplit
+
+import msgspec.msgpack
+import viser
+import zstandard
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from tests.cockpit.conftest import until
+
+MOTION = 7
+ZSTD = b"\x28\xb5\x2f\xfd"
+"""What packed messages begin with."""
+
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.0, 0.0, 1.0), "fov": 0.8,
+    "image_height": 800, "image_width": 1200, "near": 0.01, "far": 10.0, "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}  # fmt: skip
+"""What a browser says first; viser takes it for one from then on."""
+
+
+def _plain(message: str | bytes) -> bytes:
+    """What viser has packed."""
+    data = message if isinstance(message, bytes) else b""
+    at = data.find(ZSTD)
+    return data if at < 0 else zstandard.ZstdDecompressor().decompressobj().decompress(data[at:])
+
+
+def _cookie(url: str, token: str) -> str:
+    """What the page gives to who shows the token."""
+    where = urlsplit(url)
+    connection = HTTPConnection(str(where.hostname), where.port, timeout=60)
+    connection.request("GET", f"/?{urlencode({'token': token})}")
+    given = connection.getresponse().getheader("Set-Cookie")
+    connection.close()
+    assert given is not None, "the token is taken"
+    return given.partition(";")[0]
+
+
+class Wired:
+    """Connections of one page; `facts` and ``picture`` are the newest that came, ``pictures`` how many."""
+
+    def __init__(self, url: str, token: str = "") -> None:
+        address = url.replace("http", "ws").rstrip("/")
+        headers = {"Cookie": _cookie(url, token)} if token else {}
+        protocol = Subprotocol(f"viser-v{viser.__version__}")
+        self._page = connect(
+            f"{address}/", subprotocols=[protocol], max_size=None, additional_headers=headers, open_timeout=60
+        )
+        self._pass, self.facts, self.pictures, self.picture = "", dict[str, Any](), 0, b""
+        self._held: list[float] = [0.0] * MOTION
+        self._over = False
+        self._page.send(msgspec.msgpack.encode(CAMERA))
+        threading.Thread(target=self._read_page, daemon=True).start()
+        until(lambda: self._pass, "the page has a pass", 30.0)
+        self._wire = connect(f"{address}/wire", max_size=None, additional_headers=headers, open_timeout=60)
+        self.orders("hello", self._pass)
+        threading.Thread(target=self._read_wire, daemon=True).start()
+        threading.Thread(target=self._hold, daemon=True).start()
+
+    def _read_page(self) -> None:
+        with suppress(ConnectionClosed):
+            for message in self._page:
+                found = re.search(rb'data-pass="([\w-]+)"', b"" if self._pass else _plain(message))
+                if found:
+                    self._pass = found[1].decode()
+
+    def _read_wire(self) -> None:
+        with suppress(ConnectionClosed):
+            for message in self._wire:
+                if isinstance(message, str):
+                    self.facts = json.loads(message)
+                else:
+                    self.pictures, self.picture = self.pictures + 1, message
+                    self.orders("seen")
+
+    def _hold(self) -> None:
+        """What a page does while keys are held."""
+        with suppress(ConnectionClosed):
+            while not self._over:
+                if any(self._held):
+                    self.orders("move", self._held)
+                time.sleep(0.04)
+
+    def orders(self, word: str, value: Any = None) -> None:
+        self._wire.send(json.dumps({"do": word, "value": value}))
+
+    def starts(self, seconds: float = 60.0) -> None:
+        """Press *Start* and wait until the arm is ready."""
+        self.orders("start")
+        until(lambda: self.facts.get("operates") and self.facts.get("ready"), "the arm is ready", seconds)
+
+    def holds(self, axis: int, way: float) -> None:
+        """Hold a key; 0 lets it go."""
+        self._held = [way if i == axis else 0.0 for i in range(MOTION)]
+        self.orders("move", self._held)
+
+    def goes(self) -> None:
+        self._over = True
+        self._page.close()
+        with suppress(Exception):
+            self._wire.close()
