@@ -28,7 +28,7 @@ FIRST_REPORT, REPORT_EVERY = 1.0, 4.0
 """Seconds of compilation before the first line about it, and between lines."""
 
 _PACKAGE = Path(__file__).parent
-_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic)\b", re.MULTILINE)
+_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|callback|intrinsic)\b", re.MULTILINE)
 _CONSTANTS = (
     "kernels.py", "model/state.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
     "tissue/contact_arrays.py",
@@ -77,15 +77,44 @@ def inlined(function: Function) -> Function:
     return compile_with(function, error_model="numpy", _nrt=False, forceinline=True)
 
 
+def callback(signature: str) -> Callable[[Callable[..., None]], Callable[[], int]]:
+    """Like `kernel`, for a function that C code calls: the decorated one takes nothing and returns its address.
+
+    It is compiled, or loaded, when the address is asked for.
+    """
+
+    def lazy(function: Callable[..., None]) -> Callable[[], int]:
+        @cache
+        def made() -> Any:
+            def make(cache: bool) -> Any:
+                return numba.cfunc(signature, cache=cache, error_model="numpy", _nrt=False)(function)
+
+            return _kept(make)
+
+        return lambda: int(made().address)
+
+    return lazy
+
+
 def compile_with(function: Function, **options: Any) -> Function:
     """Like `compiled`, with options of `numba.njit`."""
+
+    def make(cache: bool) -> Function:
+        dispatcher: Function = numba.njit(cache=cache, **options)(function)
+        return dispatcher
+
+    return _kept(make)
+
+
+def _kept(make: Callable[[bool], Function]) -> Function:
+    """What ``make`` compiles, with its machine code on disk where it can be kept there."""
     folder = kernel_folder()
     if folder is None:
-        return numba.njit(**options)(function)
+        return make(False)
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:
-        dispatcher = numba.njit(cache=True, **options)(function)
+        dispatcher = make(True)
     finally:
         numba.config.CACHE_DIR = before
     _survive_failed_writes(dispatcher)
