@@ -57,6 +57,7 @@ CACHES: dict[str, str] = {
     **dict.fromkeys(
         (
             "Holes._scratch",
+            "Holes._motion",
             "Holes._reaction",
             "Holes._twist",
             "Holes._pull",

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature import Simulation
 from ligature.model.scene import Scene
-from ligature.physics import bullet, memory
+from ligature.physics import bullet, objects
 from ligature.physics.broad_phase import MOST, SIMPLE, BroadPhase
 
 from tests.conftest import ROOT
@@ -30,7 +30,7 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 def alone(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
     """No broad phase is found in memory."""
     with monkeypatch.context() as patch:
-        patch.setattr(memory, "part", lambda handle, kind: 0)
+        patch.setattr(objects, "part", lambda handle, kind: 0)
         yield patch
 
 
@@ -40,7 +40,7 @@ def test_bullet_alone_moves_a_scene_with_the_same_bits(scene: Scene, alone: pyte
         if found:
             alone.undo()
         simulation = Simulation(scene)
-        assert simulation._world.engine.broad_phase.spared == found
+        assert simulation._world.engine.broad_phase.active == found
         Driver(scene, 5).run(simulation, 0, 150)
         taken = simulation.snapshot()
         Driver(scene, 6).run(simulation, 150, 250)
@@ -74,8 +74,8 @@ filters = st.tuples(st.just("filter"), st.integers(0, BALLS - 1), st.integers(0,
 @given(st.lists(st.lists(st.one_of(moves, filters), max_size=4), max_size=8))
 def test_balls_touch_as_in_a_client_that_is_left_alone(ticks: list[list[tuple[str, int, int]]]) -> None:
     (one, handle), (other, _) = world(), world()
-    spared = BroadPhase(handle)
-    assert spared.spared
+    broad_phase = BroadPhase(handle)
+    assert broad_phase.active
     for acts in ticks:
         for act, ball, *rest in acts:
             for client in (one, other):
@@ -85,7 +85,7 @@ def test_balls_touch_as_in_a_client_that_is_left_alone(ticks: list[list[tuple[st
                 else:
                     pybullet.setCollisionFilterPair(ball, rest[0], -1, -1, rest[1], physicsClientId=client)
             if act == "filter":
-                spared.forget()
+                broad_phase.forget()
         for client in (one, other):
             pybullet.stepSimulation(physicsClientId=client)
         assert touching(one) == touching(other)
@@ -98,14 +98,14 @@ def test_balls_touch_as_in_a_client_that_is_left_alone(ticks: list[list[tuple[st
 
 def test_it_looks_only_where_boxes_begin_or_cease_to_overlap() -> None:
     client, handle = world()
-    spared = BroadPhase(handle)
-    seen, together = spared._boxes.seen, spared._boxes.meet
+    broad_phase = BroadPhase(handle)
+    seen, together = broad_phase._boxes.seen, broad_phase._boxes.meet
     pybullet.stepSimulation(physicsClientId=client)
     assert seen.tolist() == [BALLS - 1, 0, 0] and not together.any()
     pybullet.resetBasePositionAndOrientation(1, [0.9, 0.0, 0.0], [0, 0, 0, 1], physicsClientId=client)
     pybullet.stepSimulation(physicsClientId=client)
     assert seen.tolist() == [BALLS - 1, 1, 0] and together.sum() == 1
-    spared._boxes.own[0] = 0  # a call of it would end this process
+    broad_phase._boxes.own[0] = 0  # a call of it would end this process
     for _ in range(10):
         pybullet.stepSimulation(physicsClientId=client)
     assert touching(client) == {(0, 1)}
@@ -114,11 +114,11 @@ def test_it_looks_only_where_boxes_begin_or_cease_to_overlap() -> None:
 
 def test_a_world_beyond_its_arrays_is_bullets_own() -> None:
     client, handle = world(MOST + 1)
-    assert not BroadPhase(handle).spared
+    assert not BroadPhase(handle).active
     pybullet.disconnect(client)
     client, handle = world(MOST)
-    spared = BroadPhase(handle)
-    assert spared.spared
+    broad_phase = BroadPhase(handle)
+    assert broad_phase.active
     shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.5, physicsClientId=client)
     pybullet.createMultiBody(1.0, shape, basePosition=[0.5, 0.0, 0.0], physicsClientId=client)
     pybullet.stepSimulation(physicsClientId=client)
@@ -128,8 +128,8 @@ def test_a_world_beyond_its_arrays_is_bullets_own() -> None:
 
 def test_trees_of_boxes_are_left_alone() -> None:
     client, handle = bullet.connect()
-    assert memory.part(handle, SIMPLE) == 0
-    assert not BroadPhase(handle).spared and not BroadPhase(0).spared
+    assert objects.part(handle, SIMPLE) == 0
+    assert not BroadPhase(handle).active and not BroadPhase(0).active
     pybullet.disconnect(client)
 
 
@@ -140,18 +140,18 @@ def test_a_layout_that_differs_is_left_alone(monkeypatch: pytest.MonkeyPatch) ->
             patch.setattr(f"ligature.physics.broad_phase.{name}", other)
             if name == "LOW":
                 patch.setattr("ligature.physics.broad_phase.HIGH", 24)
-            assert not BroadPhase(handle).spared, name
-    assert BroadPhase(handle).spared
+            assert not BroadPhase(handle).active, name
+    assert BroadPhase(handle).active
     pybullet.disconnect(client)
 
 
 @given(st.integers(-(1 << 70), 1 << 70))
 def test_no_address_names_a_class_by_chance(address: int) -> None:
-    assert memory.class_of(address) == ""
+    assert objects.class_of(address) == ""
 
 
 def test_an_object_without_a_name_has_no_class() -> None:
     words = np.zeros(8, dtype=np.int64)
     words[0], words[1], words[3] = words.ctypes.data + 16, words.ctypes.data + 24, words.ctypes.data
-    assert memory.class_of(words.ctypes.data) == ""
-    assert len(memory.words(0, 4)) == 0 and memory.word(-8) is None
+    assert objects.class_of(words.ctypes.data) == ""
+    assert len(objects.words(0, 4)) == 0 and objects.word(-8) is None

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import callback, inlined
-from ligature.physics import memory
+from ligature.physics import objects
 from ligature.physics.bullet import call_method, real_at, whole_at, word_at
 from ligature.tables import opener, table_at, table_of
 
@@ -122,19 +122,19 @@ class BroadPhase:
 
     Attributes
     ----------
-    spared
+    active
         Whether compiled code stands before Bullet's.
     """
 
     def __init__(self, handle: int) -> None:
         self._boxes = boxes()
-        address = memory.part(handle, SIMPLE) if handle else 0
-        self.spared = bool(address) and _is_as_known(address)
-        if self.spared:
+        address = objects.part(handle, SIMPLE) if handle else 0
+        self.active = bool(address) and _is_as_known(address)
+        if self.active:
             self._stand_before(address)
 
     def _stand_before(self, address: int) -> None:
-        table = memory.words(memory.words(address, 1)[0] - 8 * BEFORE, BEFORE + ENTRIES)
+        table = objects.words(objects.words(address, 1)[0] - 8 * BEFORE, BEFORE + ENTRIES)
         self._boxes.own[0] = table[BEFORE + CALCULATE]
         self._table = np.concatenate([table, table_of(self._boxes)])
         self._table[BEFORE + CALCULATE] = find_pairs()
@@ -147,11 +147,11 @@ class BroadPhase:
 
 def _is_as_known(address: int) -> bool:
     """Whether the object at an address is laid out as above, by what Bullet has written into it."""
-    found = memory.words(address, 8)
+    found = objects.words(address, 8)
     pairs, last, handles = int(found[PAIRS // 8]), int(found[LAST // 8]) & 0xFFFFFFFF, int(found[HANDLES // 8])
-    if memory.class_of(pairs) != HASHED or not 0 < last < MOST:
+    if objects.class_of(pairs) != HASHED or not 0 < last < MOST:
         return False
-    rows = memory.words(handles, (last + 1) * STRIDE // 8)
+    rows = objects.words(handles, (last + 1) * STRIDE // 8)
     if len(rows) < (last + 1) * STRIDE // 8:
         return False
     rows = rows.reshape(last + 1, STRIDE // 8)

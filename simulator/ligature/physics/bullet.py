@@ -26,7 +26,7 @@ from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from ligature.physics.memory import word
+from ligature.physics.objects import word
 
 Integers = NDArray[np.int64]
 
