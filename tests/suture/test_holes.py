@@ -43,6 +43,9 @@ class Tissued:
     def motion(self, body):
         return self.bench.motion(body)
 
+    def read_motions(self, bodies, out):
+        self.bench.read_motions(bodies, out)
+
     def apply_impulse(self, body, impulse, moment):
         self.bench.apply_impulse(body, impulse, moment)
 

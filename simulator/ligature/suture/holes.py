@@ -24,7 +24,7 @@ from ligature.suture.bodies import HeldBodies
 from ligature.suture.passage_forces import react, solve_needle
 from ligature.suture.rod import Rod
 from ligature.suture.rods import Rods
-from ligature.suture.tracking import follow_needle, follow_rod, look_for_needle, look_for_rod
+from ligature.suture.tracking import follow_needle, follow_rod, look_for_needles, look_for_rod, next_search
 from ligature.tables import table_of
 
 Array = NDArray[np.float64]
@@ -104,6 +104,8 @@ class Holes:
         self._scratch = (np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6))
         self._reaction = np.zeros(6)
         n = len(self._needles)
+        self._watched = np.array([*self._needles, *(hole.body for hole in scene.holes)], dtype=np.int64)
+        self._motion = np.zeros((len(self._watched), 13))
         self._twist, self._pull = np.zeros((n, 6)), np.zeros((n, 6))
         self._mass, self._inertia = np.zeros(n), np.zeros((n, 3))
         self._gaps = np.zeros((n + len(self._rods), len(scene.holes)))
@@ -146,28 +148,17 @@ class Holes:
 
     def _search(self) -> None:
         """Find paths that have entered holes, and the number of ticks in which no other can."""
-        for path, body in enumerate(self._needles):
-            self._paths.pose[path] = self._bodies.motion(body)[0]
         self._turn = (self._turn + 1) % len(self._scene.holes)
         self._near[self._turn] = True
-        self._read_holes(np.flatnonzero(self._near).tolist())
-        for path in range(len(self._needles)):
-            look_for_needle(self._passage_table, self._path_table, self._site_table, path, self._gaps[path])
+        self._bodies.read_motions(self._watched, self._motion)
+        tables, n = (self._passage_table, self._path_table, self._site_table), len(self._needles)
+        look_for_needles(*tables, n, self._motion, self._near, self._gaps)
         for owner, rod in enumerate(self._rods):
-            path = len(self._needles) + owner
             look_for_rod(
-                self._passage_table,
-                self._site_table,
-                self._rod_tables[owner],
-                rod.first,
-                self._before[owner],
-                path,
-                owner,
-                self._gaps[path],
-            )
-        nearest = self._gaps.min(axis=0)
-        self._near[:] = nearest < NEAR
-        self._countdown = int(min(max(float(nearest.min()), 0.0) / (MAX_APPROACH * self._dt), MAX_WAIT))
+                self._passage_table, self._site_table, self._rod_tables[owner], rod.first, self._before[owner],
+                n + owner, owner, self._gaps[n + owner],
+            )  # fmt: skip
+        self._countdown = next_search(self._gaps, self._near, NEAR, MAX_APPROACH * self._dt, MAX_WAIT)
 
     def _read_holes(self, holes: list[int]) -> None:
         sites = self._sites

@@ -19,6 +19,7 @@ from ligature.tables import opener
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 open_nodes = opener(layout.nodes(1))
@@ -449,11 +450,32 @@ def _hole_centre(p: arrays.Passages, sites: arrays.Sites, h: int) -> tuple[float
 
 
 @kernel
-def look_for_needle(
-    passage_table: Integers, path_table: Integers, site_table: Integers, path: int, gaps: Array
-) -> None:
-    """Find the holes that a needle has entered; ``gaps`` (H,) receives lower bounds of its distances to all."""
+def look_for_needles(
+    passage_table: Integers, path_table: Integers, site_table: Integers, count: int, motion: Array, near: Flags,
+    gaps: Array,
+) -> None:  # fmt: skip
+    """Find the holes that the first ``count`` paths, needles, have entered.
+
+    ``motion`` (count + H, 13) are pose and twist of needles, then of the bodies of the holes, of which only those that
+    are ``near`` (H,) are taken; ``gaps`` (L, H) receives lower bounds of distances.
+    """
     p, paths, sites = open_passages(passage_table), open_paths(path_table), open_sites(site_table)
+    for path in range(count):
+        for a in range(7):
+            paths.pose[path, a] = motion[path, a]
+    for h in range(near.shape[0]):
+        if near[h]:
+            for a in range(7):
+                sites.pose[h, a] = motion[count + h, a]
+            for a in range(6):
+                sites.twist[h, a] = motion[count + h, 7 + a]
+    for path in range(count):
+        _look_for_needle(p, paths, sites, path, gaps[path])
+
+
+@inlined
+def _look_for_needle(p: arrays.Passages, paths: arrays.Paths, sites: arrays.Sites, path: int, gaps: Array) -> None:
+    """Find the holes that a needle has entered; ``gaps`` (H,) receives lower bounds of its distances to all."""
     pose, m = paths.pose[path], paths.centre[path]
     _body_rotation(pose, p.A)
     cx, cy, cz = rotate(p.A, m[0], m[1], m[2])
@@ -486,3 +508,19 @@ def look_for_rod(
         gaps[h] = nearest - reach
         if gaps[h] <= 0.0:
             _enter_rod(p, sites, nodes, first, before, path, owner, h)
+
+
+@kernel
+def next_search(gaps: Array, near: Flags, margin: float, step: float, most: int) -> int:
+    """Ticks in which no path that comes nearer by ``step`` a tick enters a hole, at most ``most``.
+
+    ``gaps`` (L, H) are lower bounds of distances; ``near`` (H,) receives the holes that a path is within ``margin`` of.
+    """
+    nearest = np.inf
+    for h in range(near.shape[0]):
+        gap = np.inf
+        for path in range(gaps.shape[0]):
+            gap = min(gap, gaps[path, h])
+        near[h] = gap < margin
+        nearest = min(nearest, gap)
+    return int(min(max(nearest, 0.0) / step, float(most)))
