@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -143,9 +146,22 @@ def test_energy_never_grows_after_a_fall(tmp_path):
         most = min(most, now)
 
 
-def test_a_gripper_squeezes_lifts_and_puts_it_down_and_it_recovers(tmp_path):
+@pytest.mark.parametrize(
+    ("jaw", "still"),
+    [
+        (0.05, 0.05e-3),
+        (0.03, 3e-3),  # sharp edges in cells of 10 mm: the tissue trembles around them for up to a second
+    ],
+)
+def test_a_gripper_squeezes_lifts_and_puts_it_down_and_it_recovers(tmp_path, jaw, still):
     fingers = [
-        body(name, "shape: BOX, geometry: {x: 0.03, y: 0.006, z: 0.03}", (0.0, side * 0.0235, 0.02), 0.1, 1.0)
+        body(
+            name,
+            f"shape: BOX, geometry: {{x: {jaw}, y: 0.006, z: {jaw}}}",
+            (0.0, side * 0.0235, 0.003 + jaw / 2),
+            0.1,
+            1.0,
+        )
         for name, side in (("Left", 1), ("Right", -1))
     ]
     simulation = Simulation(load(tmp_path, block(young=1e4, density=400.0, at=(0.0, 0.0, 0.0201)), TABLE, *fingers))
@@ -167,15 +183,39 @@ def test_a_gripper_squeezes_lifts_and_puts_it_down_and_it_recovers(tmp_path):
     held = nodes(simulation)
     assert held[:, 2].min() > 0.010  # lifted by 15 mm
     move(0.0, 0.0, 500)
-    np.testing.assert_allclose(nodes(simulation), held, atol=0.2e-3)
+    np.testing.assert_allclose(nodes(simulation), held, atol=still)
     move(0.0, -0.05, 300)
     move(-0.02, 0.0, 200)
     move(0.0, 0.0, 800)
-    piece = simulation.tissues.pieces[0]
-    shape = piece.block.positions
-    fit, _ = Rotation.align_vectors(shape - shape.mean(axis=0), rest - rest.mean(axis=0))
-    np.testing.assert_allclose(fit.apply(rest - rest.mean(axis=0)), shape - shape.mean(axis=0), atol=0.05e-3)
+    after = nodes(simulation)
+    assert np.ptp(after[middle, 1]) == pytest.approx(np.ptp(rest[middle, 1]), abs=0.1e-3)
+    # The table's friction holds its base as the jaws put it down.
+    fit, _ = Rotation.align_vectors(after - after.mean(axis=0), rest - rest.mean(axis=0))
+    np.testing.assert_allclose(fit.apply(rest - rest.mean(axis=0)), after - after.mean(axis=0), atol=0.8e-3)
     assert simulation.state["tissue_wrench"][0, 0, 2] == pytest.approx(0.0256 * GRAVITY, rel=0.01)
+
+
+@few
+@given(size=SIZES, young=st.floats(4.0, 5.5).map(lambda e: 10.0**e), squeeze=st.floats(0.02, 0.1))
+def test_squeezed_without_weight_it_springs_back_to_its_shape(tmp_path, size, young, squeeze):
+    jaws = [
+        body(
+            name, "shape: BOX, geometry: {x: 0.2, y: 0.01, z: 0.2}", (0.0, side * (size[1] / 2 + 0.0055), 0.1), 0.1, 1.0
+        )
+        for name, side in (("Left", 1), ("Right", -1))
+    ]
+    simulation = Simulation(load(tmp_path, block(size, young).replace("  mass:", FLOATING), *jaws))
+    left, right = simulation.bodies["BODY Left"], simulation.bodies["BODY Right"]
+    way = 0.0005 + squeeze * size[1] / 2
+    for sign, ticks in ((1, 200), (-1, 200)):
+        left.command_twist([0.0, -sign * way / 0.2, 0.0, 0.0, 0.0, 0.0])
+        right.command_twist([0.0, sign * way / 0.2, 0.0, 0.0, 0.0, 0.0])
+        simulation.step(ticks)
+        if sign > 0:
+            assert np.ptp(nodes(simulation)[:, 1]) == pytest.approx((1.0 - squeeze) * size[1], abs=0.2e-3)
+    simulation.step(500)
+    piece = simulation.tissues.pieces[0]
+    np.testing.assert_allclose(piece.block.positions, piece.tissue.form.grid.nodes, atol=0.02e-3)
 
 
 def test_a_ball_rests_on_it(tmp_path):
@@ -209,7 +249,17 @@ def test_runs_repeat_to_the_bit_and_go_on_from_snapshots(tmp_path):
     fresh = Simulation(scene)
     for each in (simulation, fresh):
         each.step(200)
-    assert simulation.state_hash() == fresh.state_hash()
+    assert simulation.state_hash(clock=False) == fresh.state_hash(clock=False)
+
+
+def test_two_processes_have_the_same_bits(tmp_path):
+    load(tmp_path, block(young=2e4, at=(0.0, 0.0, 0.03), rpy=(0.4, 0.3, 0.2)), TABLE)
+    code = (
+        "import sys, ligature; s = ligature.Simulation(ligature.load(sys.argv[1])); s.step(250); print(s.state_hash())"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / "m.yaml")]
+    hashes = {subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)}
+    assert len(hashes) == 1 and len(hashes.pop()) > 10
 
 
 def test_a_needle_goes_through_it(kit):
