@@ -284,7 +284,7 @@ def test_two_bodies_of_one_shape_are_drawn_each_where_it_is(tmp_path: Path):
     assert np.median((before.depth - after.depth)[second]) > 2e-3
 
 
-def test_a_soft_body_that_fell_is_drawn_where_it_lies(tmp_path):
+def test_a_soft_body_that_fell_is_drawn_where_its_nodes_are(tmp_path):
     trimesh.creation.icosphere(3, 0.02).export(tmp_path / "lump.obj")
     head = HEAD.replace("bodies: [Pad, Floor]", "bodies: [Floor]\nsoft bodies: [Lump]")
     head = head.replace("shape: BOX, geometry: {x: 0.4, y: 0.4, z: 0.02}", "shape: BOX, geometry: {x: 0.4, y: 0.4, z: 0.02}, collision shape: BOX, collision geometry: {x: 0.4, y: 0.4, z: 0.02}")  # fmt: skip
