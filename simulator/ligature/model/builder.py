@@ -177,7 +177,7 @@ class SceneBuilder:
                 self.no_rod.add(len(self.bodies))
                 self.bodies.append(part.make(index=len(self.bodies), identity=identity))
                 self._scales.append(1.0)
-                self._groups.append(())
+                self.groups.append(())
 
     def _note_unusable(self, document: Document, model: Model) -> None:
         """Remember the listed bodies that an error took away, so that what names them is no further error."""
