@@ -19,7 +19,7 @@ ROLES = [
     ("ACTUATOR", "Actuator", "Constraint that holds bodies on command", "SNAP_ON", 8),
     ("CAMERA", "Camera", "Camera that the simulator draws and publishes", "CAMERA_DATA", 9),
     ("LIGHT", "Light", "Spot light", "LIGHT_SPOT", 10),
-    ("SOFT_BODY", "Soft Body", "Deformable body; checked, not simulated", "MOD_SOFT", 11),
+    ("SOFT_BODY", "Soft Body", "Deformable body, simulated as tissue; docs/tissue.md", "MOD_SOFT", 11),
     ("VEHICLE", "Vehicle", "Wheels on a chassis; checked, not simulated", "AUTO", 12),
     ("VOLUME", "Volume", "Image stack; checked, not simulated", "VOLUME_DATA", 13),
     ("SUTURE", "Suture", "Thread by physical data, leaving along +Z", "CURVE_DATA", 14),

@@ -19,6 +19,7 @@ from typing import Any
 import ligature
 import numpy as np
 import pytest
+import trimesh
 import yaml
 from ligature.adf import Severity
 from ligature.adf.schema import NOT_SIMULATED, SCHEMA, Key, Status, Type
@@ -48,13 +49,14 @@ SUBJECTS: dict[str, dict[str, Any]] = {
     "camera": {"name": "subject", "location": {"x": 1, "y": 0, "z": 0}, "look at": AT},
     "light": {"name": "subject", "location": {"x": 1, "y": 0, "z": 1}, "direction": {"x": 0, "y": 0, "z": -1}},
     "suture": {"name": "subject", "length": 0.1, "diameter": 0.0004, "elements": 12},
+    "soft body": {"name": "subject", "mass": 0.2, "mesh": "lump.obj", "config": {"kLST": 0.01, "kMT": 0.01}},
     "input device": {"hardware name": "MTMR", "simulated multibody": "proxy.yaml", "root link": "BODY handle"},
 }  # fmt: skip
 """One object of each kind, as small as it may be."""
 
 LISTS = {
     "body": "bodies", "joint": "joints", "ghost object": "ghost objects", "sensor": "sensors",
-    "actuator": "actuators", "camera": "cameras", "light": "lights", "suture": "sutures",
+    "actuator": "actuators", "camera": "cameras", "light": "lights", "suture": "sutures", "soft body": "soft bodies",
 }  # fmt: skip
 
 ROUND = {"shape": "CYLINDER", "geometry": {"radius": 0.1, "height": 0.2}}
@@ -123,7 +125,16 @@ CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
     ("ghost object", "low resolution path"): {"collision shape": None},
     ("body", "color components.ambient.level"): {"color components": {"diffuse": {"r": 0.5, "g": 0.5, "b": 0.5}, "transparency": 1}},
     ("body", "controller output type"): {"controller": {half: {"P": 10, "D": 1} for half in ("linear", "angular")}},
-    **{(kind, "use material"): {"color rgba": {"r": 1, "g": 0, "b": 0, "a": 1}} for kind in ("body", "ghost object")},
+    **{
+        (kind, "use material"): {"color rgba": {"r": 1, "g": 0, "b": 0, "a": 1}}
+        for kind in ("body", "ghost object", "soft body")
+    },
+    ("soft body", "color components.ambient.level"): {"color components": {"diffuse": {"r": 0.5, "g": 0.5, "b": 0.5}, "transparency": 1}},
+    **{("soft body", f"config.{key}"): {"config": {"kLST": 0.01, "kMT": 0.0}} for key in ("kLST", "piterations", "kMT")},
+    **{
+        ("soft body", f"config.{key}"): {"config": {"kLST": 0.01, other: 0.0}}
+        for key, other in (("kVC", "kPR"), ("kPR", "kVC"))
+    },
     ("joint", "parent"): {"child": "BODY far"}, ("joint", "child offset"): {},
     ("camera", "camera intrinsics.f"): {"camera intrinsics": {"cx": 320, "cy": 240}},
     ("camera", "publish depth noise.std dev"): {"publish depth": True, "publish depth noise": {"mean": 0.0, "bias": 0.0}},
@@ -198,6 +209,9 @@ PAIRS: dict[tuple[str, str], list[Any]] = {
     ("input device", "simulated multibody"): ["proxy.yaml", "proxy2.yaml"],
     ("input device", "root link"): ["BODY handle", "BODY knob"],
     ("suture", "elements"): [10, 12], ("body", "collision groups"): [[0], [1]],
+    ("soft body", "mesh"): ["lump.obj", "block.obj"], ("soft body", "collision mesh"): ["lump.obj", "block.obj"],
+    ("soft body", "config.kVC"): [0.0, 0.5], ("soft body", "config.kPR"): [0.0, 0.5],
+    ("soft body", "config.kDP"): [0.0, 0.001], ("soft body", "config.fixed nodes"): [[0], [0, 1]],
 }  # fmt: skip
 """Two values of keys whose type does not suggest any."""
 
@@ -205,7 +219,6 @@ CHECKED_ELSEWHERE = {
     ("*", "adf version"): "only one value is right",
     ("actuator", "type"): "there is only one",
     ("launch", "color config"): "never opened, as the table says",
-    ("model", "soft bodies"): "of kinds that are not simulated",
     ("model", "vehicles"): "of kinds that are not simulated",
     ("model", "volumes"): "of kinds that are not simulated",
 }
@@ -436,6 +449,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for place in (folder, folder / "more"):
         place.mkdir(exist_ok=True)
         (place / "part.obj").write_text(OBJ)
+        trimesh.creation.icosphere(2, 0.05 if place == folder else 0.04).export(place / "lump.obj")
+        trimesh.creation.box((0.1, 0.08, 0.06)).export(place / "block.obj")
         (place / "part.mtl").write_text(MTL)
         (place / "plate.stl").write_text(ASCII_STL)
         (place / "red.png").touch()

@@ -282,3 +282,32 @@ def test_two_bodies_of_one_shape_are_drawn_each_where_it_is(tmp_path: Path):
     second = (before.ids == 2) & (after.ids == 2)
     assert (before.depth == after.depth)[first].all()
     assert np.median((before.depth - after.depth)[second]) > 2e-3
+
+
+def test_a_soft_body_that_fell_is_drawn_where_its_nodes_are(tmp_path):
+    trimesh.creation.icosphere(3, 0.02).export(tmp_path / "lump.obj")
+    head = HEAD.replace("bodies: [Pad, Floor]", "bodies: [Floor]\nsoft bodies: [Lump]")
+    head = head.replace("shape: BOX, geometry: {x: 0.4, y: 0.4, z: 0.02}", "shape: BOX, geometry: {x: 0.4, y: 0.4, z: 0.02}, collision shape: BOX, collision geometry: {x: 0.4, y: 0.4, z: 0.02}")  # fmt: skip
+    lump = "Lump: {name: lump, mesh: lump.obj, mass: 0.03, config: {kMT: 0.003}}\n"
+    (tmp_path / "m.yaml").write_text(head + lump)
+    scene = ligature.load(tmp_path / "m.yaml")
+    try:
+        renderer = Renderer(scene)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    simulation = Simulation(scene)
+    simulation.step(800)
+    state = simulation.state.copy()
+    (surface,) = tissue_surfaces(scene, VisualLoader().of_scene(scene))
+    moved = surface.triangles(state["tissue_node"][0])
+    lowest = moved.positions[:, 2].min()
+    assert -0.0525 < lowest < -0.0475  # on the floor, within half a cell of the grid that carries it
+    view = view_of(scene.cameras[0], state["camera_world"][0, 0], FEW)
+    frame = renderer.render(state, view, ("depth", "ids"))
+    number = next(n for n, name in scene.drawn_names.items() if name.endswith("Lump"))
+    seen = frame.ids == number
+    solid = trimesh.Trimesh(moved.positions, moved.faces, process=False)
+    camera = np.array([0.0, -0.1, 0.12])
+    assert seen.sum() > 200
+    forward = -camera / np.linalg.norm(camera)
+    assert frame.depth[seen].min() == pytest.approx(((solid.vertices - camera) @ forward).min(), abs=1e-3)

@@ -72,7 +72,7 @@ def _at_start(scene: Scene) -> list[Diagnostic]:
 
 def _has_bodies(document: Document) -> bool:
     """Whether a model file can stand alone; others hang on bodies of earlier files."""
-    return bool(document.elements("bodies") or document.elements("sutures"))
+    return any(document.elements(name) for name in ("bodies", "soft bodies", "sutures"))
 
 
 def _distinct(found: Sequence[Diagnostic]) -> list[Diagnostic]:

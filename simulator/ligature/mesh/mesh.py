@@ -68,11 +68,15 @@ class MeshPart:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A mesh file: its parts in the order of its materials, and what was odd but did not prevent reading."""
+    """A mesh file: its parts in the order of its materials, and what was odd but did not prevent reading.
+
+    ``points`` (n, 3) are the vertices as the file numbers them, None where that is the order of the parts.
+    """
 
     path: Path
     parts: tuple[MeshPart, ...]
     diagnostics: tuple[Diagnostic, ...] = ()
+    points: Array | None = None
 
     @property
     def vertices(self) -> Array:

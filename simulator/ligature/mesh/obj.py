@@ -211,7 +211,7 @@ class _Reader:
         ]
         if not self.faces:
             parts[0] = replace(parts[0], vertices=points)
-        return Mesh(self.path, tuple(parts), self.findings.all())
+        return Mesh(self.path, tuple(parts), self.findings.all(), points)
 
     def _finite(self, rows: list[list[float]], columns: int, what: str) -> Array | None:
         """Rows as an array (n, columns), or None when there are none or some are not finite."""

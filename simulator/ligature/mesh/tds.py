@@ -54,6 +54,7 @@ class _Reader:
     def __init__(self, data: bytes, path: Path, resolver: Resolver) -> None:
         self.data, self.path, self.resolver = data, path, resolver
         self.findings = Findings()
+        self.points: list[Array] = [np.zeros((0, 3))]
 
     def read(self) -> Mesh:
         editors = [
@@ -74,7 +75,7 @@ class _Reader:
                 raise self._wrong(f"the file holds more than {MAX_PARTS} pairs of object and material", start)
         if not parts:
             raise failure(self.path, "the file holds no triangle mesh")
-        return Mesh(self.path, tuple(parts), self.findings.all())
+        return Mesh(self.path, tuple(parts), self.findings.all(), np.vstack(self.points))
 
     def _wrong(self, message: str, at: int) -> Exception:
         return failure(self.path, f"{message} (byte {at})", hint="the file is damaged or was cut short")
@@ -128,6 +129,7 @@ class _Reader:
                 groups = [
                     self._group(c, d) for sub, c, d in self._chunks(a + 2 + 8 * len(faces), b) if sub == _FACE_MATERIAL
                 ]
+        self.points.append(vertices)
         if len(faces) and faces.max() >= len(vertices):
             message = f"a face of '{name}' names vertex {faces.max()}, but there are {len(vertices)}"
             raise self._wrong(message, start)

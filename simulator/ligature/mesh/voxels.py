@@ -48,6 +48,10 @@ class Embedding:
         return np.einsum("vk,vka->va", self.weights, x[self.nodes])
 
 
+NOWHERE = Embedding(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 8)))
+"""No points."""
+
+
 def voxelise(
     vertices: Array,
     triangles: NDArray[np.integer],

@@ -108,6 +108,7 @@ class SceneBuilder:
         local = self._add_bodies(parts, model)
         if not top.flag("ligature rod"):
             self.no_rod.update(local)
+        self._add_soft_bodies(parts, model)
         self._add_sutures(document, parts.gravity, model, local)
         self._add_ghosts(parts, model)
         self._add_sensors(parts, model, local)
@@ -166,6 +167,17 @@ class SceneBuilder:
                 self.no_rod.add(body.index)
             local.append(body.index)
         return local
+
+    def _add_soft_bodies(self, parts: ModelParts, model: Model) -> None:
+        """Bodies of tissue without topics, which no joint, group or other object names."""
+        for part in parts.soft_bodies:
+            self.diagnostics += part.findings
+            if part.make is not None:
+                identity = self._names["body"].identity(part.element, model.namespace, model.index, passive=True)
+                self.no_rod.add(len(self.bodies))
+                self.bodies.append(part.make(index=len(self.bodies), identity=identity))
+                self._scales.append(1.0)
+                self.groups.append(())
 
     def _note_unusable(self, document: Document, model: Model) -> None:
         """Remember the listed bodies that an error took away, so that what names them is no further error."""

@@ -19,6 +19,7 @@ from ligature.model.mounted import camera_of, ghost_of, light_of, sensor_rays
 from ligature.model.parts import body_of, sensor_of
 from ligature.model.scene import Body, Camera, Ghost, Light, Sensor
 from ligature.model.shapes import ShaderFiles
+from ligature.model.soft_bodies import soft_body_of
 
 Kind = TypeVar("Kind")
 
@@ -56,6 +57,7 @@ class ModelParts:
 
     gravity: Array
     bodies: tuple[Part[Body], ...]
+    soft_bodies: tuple[Part[Body], ...]
     ghosts: tuple[Part[Ghost], ...]
     sensors: tuple[Part[Sensor], ...]
     mounts: Mounts
@@ -63,7 +65,7 @@ class ModelParts:
 
 def converted(document: Document, resolver: Resolver, shaders: ShaderFiles | None, gravity: Array) -> ModelParts:
     """The parts of a model file; its own shaders and gravity (3,) come before those of the world."""
-    top, folder = document.top, document.path.parent
+    top, folder, world = document.top, document.path.parent, gravity
     shaders = shader_files(top, "shaders", folder) or shaders
     if top.has("gravity"):
         gravity = np.array(top.vector("gravity"))
@@ -74,6 +76,7 @@ def converted(document: Document, resolver: Resolver, shaders: ShaderFiles | Non
     return ModelParts(
         gravity,
         each("bodies", lambda element, context: body_of(element, context, gravity, shaders)),
+        each("soft bodies", lambda element, context: soft_body_of(element, context, world, shaders)),
         each("ghost objects", ghost_of),
         each("sensors", lambda element, _: sensor_of(element, sensor_rays(element, folder, resolver))),
         mounts(document),

@@ -175,8 +175,13 @@ def _compound(element: Element, key: str) -> tuple[Collider, ...]:
     return tuple(parts)
 
 
+def collision_mesh(element: Element, name: str, context: FileContext) -> Path:
+    """The file of a collision mesh; raises `GeometryError` when it is missing."""
+    return _mesh_path(element, name, "collision mesh", context, context.low, _body_low(element))
+
+
 def _mesh_colliders(element: Element, name: str, context: FileContext) -> tuple[Collider, ...]:
-    path = _mesh_path(element, name, "collision mesh", context, context.low, _body_low(element))
+    path = collision_mesh(element, name, context)
     kind = _MESH_KINDS[element.text("collision mesh type")]
     try:
         mesh = load_mesh(path, context.resolver)

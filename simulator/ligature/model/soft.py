@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.mesh.grid import Grid
-from ligature.mesh.voxels import Embedding, embed
+from ligature.mesh.voxels import NOWHERE, Embedding, embed
 from ligature.model.material import TissueMaterial
 
 Array = NDArray[np.float64]
@@ -38,6 +38,8 @@ class TissueForm:
         Whether the file gives the density, or a material that has one.
     slits
         Boxes (2, 3) from corner to corner at rest in B, m, that cut the body; one that is flat along an axis is a slit.
+    pins
+        Material points that stay where they are in the world, of tissue without fixed nodes.
     """
 
     grid: Grid
@@ -46,6 +48,7 @@ class TissueForm:
     support: str = ""
     own_density: bool = False
     slits: tuple[Array, ...] = ()
+    pins: Embedding = NOWHERE
 
     @property
     def cell_masses(self) -> Array:
@@ -62,6 +65,10 @@ class TissueForm:
         """The form with densities that make up ``mass`` kilograms; itself where the file gives them, or it is held."""
         if self.own_density or self.fixed.any() or not mass > 0.0:
             return self
+        return self.scaled(mass)
+
+    def scaled(self, mass: float) -> TissueForm:
+        """The form with densities that make up ``mass`` kilograms."""
         scale = mass / float(self.cell_masses.sum())
         return replace(self, materials=tuple(replace(m, density=scale * m.density) for m in self.materials))
 

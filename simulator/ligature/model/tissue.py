@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from ligature.model.shapes import Collider, Visual
 
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
-DEFAULT_CELLS = 600
-"""Cells of a body whose cell size the file does not state, about."""
+DEFAULT_CELLS, DEFAULT_FREE_CELLS = 600, 150
+"""Cells of a body whose cell size the file does not state, about; of one that nothing holds."""
 
 MOST_NODES = 6000
 """Most nodes of a body: with more, a step takes longer than the four ticks that it stands for."""
@@ -44,11 +44,17 @@ def tissue_of(
     """
     if not element.has("ligature tissue"):
         return None
-    base = _material(element, "ligature tissue.", None)
-    vertices, faces = _surface(element, context, visual, colliders)
+    base = material_of(element, "ligature tissue.", None)
+    form = form_of(element, *_surface(element, context, visual, colliders), base)
+    return replace(form, support=element.text("ligature tissue.carried by"))
+
+
+def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: TissueMaterial) -> TissueForm:
+    """The tissue that fills a surface, vertices (n, 3) in B and faces (m, 3); raises `GeometryError`."""
     cell = element.value("ligature tissue.cell size")
     if cell is None:
-        cell = float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / DEFAULT_CELLS)) or 1e-3
+        usual = DEFAULT_CELLS if element.texts("ligature tissue.fixed") else DEFAULT_FREE_CELLS
+        cell = float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / usual)) or 1e-3
     if not cell > 0.0:
         raise _error(element, "ligature tissue.cell size", f"has cells of {cell:g} m", "give metres above 0")
     cells = np.prod(np.ceil(np.ptp(vertices, axis=0) / cell) + 1.0)
@@ -71,7 +77,7 @@ def tissue_of(
                      f"at most {MOST_NODES} are simulated; use larger cells than {cell:g} m")  # fmt: skip
     fixed = _fixed(element, grid)
     stated = element.has("ligature tissue.density") or element.has("ligature tissue.material")
-    return TissueForm(grid, materials, fixed, element.text("ligature tissue.carried by"), stated, tuple(slits))
+    return TissueForm(grid, materials, fixed, own_density=stated, slits=tuple(slits))
 
 
 def inertial_of(form: TissueForm, mass: float, T_body_inertial: Array | None) -> tuple[Array, Array]:
@@ -92,12 +98,14 @@ def tissue_findings(bodies: Iterable[Body]) -> list[Diagnostic]:
         if body.tissue is not None:
             grid = body.tissue.grid
             edges = " x ".join(f"{1e3 * edge:.2g}" for edge in np.median(grid.sizes, axis=0))
+            young = " and ".join(dict.fromkeys(f"{m.youngs:.3g}" for m in body.tissue.materials))
             message = f"'{body.identity.identifier}' is soft tissue: {len(grid.nodes)} nodes, cells of {edges} mm"
+            message += f", Young's modulus {young} Pa"
             findings.append(Diagnostic(Severity.INFO, message, body.identity.mark, "docs/tissue.md", "tissue"))
     return findings
 
 
-def _material(element: Element, prefix: str, below: TissueMaterial | None) -> TissueMaterial:
+def material_of(element: Element, prefix: str, below: TissueMaterial | None) -> TissueMaterial:
     """The material of a block or layer: that of its name, else of the block, with the numbers that it states."""
     name = element.text(f"{prefix}material")
     start = MATERIALS[name] if name else below
@@ -121,7 +129,7 @@ def _layers(element: Element, base: TissueMaterial, top: float) -> tuple[tuple[T
         return (base,), []
     materials, heights = [], []
     for number, item in enumerate(layers):
-        materials.append(_material(item, "", base))
+        materials.append(material_of(item, "", base))
         thickness = item.value("thickness")
         if number == len(layers) - 1:
             break
@@ -174,5 +182,5 @@ def _surface(
 
 
 def _error(element: Element, key: str, message: str, hint: str) -> GeometryError:
-    text = f"body '{element.key}' {message}"
+    text = f"{element.kind} '{element.key}' {message}"
     return GeometryError(Diagnostic(Severity.ERROR, text, element.mark_of(key), hint, "tissue"))

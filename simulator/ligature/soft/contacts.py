@@ -19,7 +19,7 @@ from ligature.suture.rotations import matrix_of, rotate, rotate_back
 from ligature.tables import opener, table_of
 from ligature.tissue import contact_arrays as arrays
 from ligature.tissue.block import TissueBlock
-from ligature.tissue.contact import touch
+from ligature.tissue.contact import SOFT, touch
 from ligature.tissue.contact_arrays import Contacts, open_contacts
 from ligature.tissue.contact_search import REACH
 from ligature.tissue.layout import open_tissue
@@ -30,6 +30,9 @@ Flags = NDArray[np.bool_]
 
 MAX_APPROACH = 1.0
 """Speed in m/s of bodies between two looks at them."""
+
+CAPACITY_FREE = 120
+"""Most points of contact of a body of tissue that nothing holds, which stands on all nodes of a side."""
 
 MAX_WAIT = 64
 """Most ticks between two looks."""
@@ -47,7 +50,7 @@ class Around(NamedTuple):
     inside: Flags  # (B,) a needle that is in the tissue
     read: Integers  # (B,) rows that are looked at in this tick
     wanted: Integers  # (B,) the bodies of these rows, and the block's own after them
-    motion: Array  # (B, 13) their poses (7,) and twists (6,)
+    motion: Array  # (B + 1, 13) their poses (7,) and twists (6,), and in the last row those of the world
     pushed: Integers  # (B,) rows that the tissue pushes
     turn: Array  # (2, 3, 3) scratch
 
@@ -55,9 +58,11 @@ class Around(NamedTuple):
 def _around(bodies: list[int]) -> Around:
     B, z = len(bodies), np.zeros
     i = lambda: np.zeros(B, np.int64)  # noqa: E731
+    motion = z((B + 1, 13))
+    motion[B, 6] = 1.0
     return Around(
         np.array(bodies, dtype=np.int64), z(B), np.ones((B, 3)), z(B), i(), np.zeros(B, np.bool_),
-        np.zeros(B, np.bool_), i(), i(), z((B, 13)), i(), z((2, 3, 3)),
+        np.zeros(B, np.bool_), i(), i(), motion, i(), z((2, 3, 3)),
     )  # fmt: skip
 
 
@@ -85,16 +90,21 @@ class BodyContacts:
         self._piercers = [(self.listed.index(p.body.index) + 1, p) for p in piercers if p.body.index in self.listed]
         self._around = _around([own, *self.listed])
         self._static = [True, *(scene.bodies[b].static for b in self.listed)]
+        room = CAPACITY_FREE if block.elastic.floats else arrays.CAPACITY
         self._contacts = Contacts(
-            arrays.touching(), arrays.partners(len(self.listed) + 1), self._gather(scene), arrays.scratch(),
-            np.zeros(1, np.int64),
+            arrays.touching(room), arrays.partners(len(self.listed) + 2), self._gather(scene),
+            arrays.scratch(capacity=room), np.zeros(1, np.int64),
         )  # fmt: skip
         self._touching = self._contacts.touching
-        self._contacts.partners.friction[1:] = [
+        self._contacts.partners.friction[1:-1] = [
             scene.bodies[own].friction * scene.bodies[b].friction for b in self.listed
         ]
         self._tables = (block.interface.table, table_of(self._contacts), table_of(self._around))
         own_body = scene.bodies[own]
+        assert own_body.tissue is not None
+        self._pins = own_body.tissue.pins
+        self._pinned = len(self._pins.nodes) > 0
+        self._pin()
         self._own_free = not own_body.static and any(
             [link.body for link in tree.links] == [own] for tree in scene.articulations
         )
@@ -123,16 +133,24 @@ class BodyContacts:
             self._around.radius[body] = max(self._around.radius[body], reach)
         return parts
 
+    def _pin(self) -> None:
+        """Hold the points of pins where they are at the start."""
+        t, T = self._touching, self._scene.bodies[self._own].T_world_body
+        for row, (nodes, weights) in enumerate(zip(self._pins.nodes, self._pins.weights, strict=True)):
+            t.used[row], t.part[row], t.body[row], t.soft[row] = 1, -1, len(self.listed) + 1, SOFT
+            t.point[row] = self._block.interface.add(nodes, weights)
+            t.anchor[row] = T[:3, :3] @ (weights @ self._block.elastic.grid.nodes[nodes]) + T[:3, 3]
+
     # --- the tick -----------------------------------------------------------------------------
 
     def step(self, frame: Frame) -> None:
         """Find points of contact and push tissue and bodies."""
         tissue, contacts, around = self._tables
         count = choose(contacts, around)
-        if not count:
+        if not count and not self._pinned:
             return
         self._read(count)
-        pushed = meet(tissue, contacts, around, frame.table, count, self._dt)
+        pushed = meet(tissue, contacts, around, frame.table, count, self._pinned, self._dt)
         if pushed:
             self._push(self._around.pushed[:pushed].tolist())
 
@@ -177,6 +195,7 @@ class BodyContacts:
         for array in self._touching:
             array[:] = 0
         self._around.due[:] = 0
+        self._pin()
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""
@@ -197,7 +216,7 @@ def choose(contact_table: Integers, around_table: Integers) -> int:
     for b in range(around.kept.shape[0]):
         around.kept[b] = False
     for r in range(touching.used.shape[0]):
-        if touching.used[r]:
+        if touching.used[r] and touching.part[r] >= 0:
             around.kept[touching.body[r]] = True
     count = 0
     for b in range(1, around.due.shape[0]):
@@ -212,8 +231,9 @@ def choose(contact_table: Integers, around_table: Integers) -> int:
 
 @kernel
 def meet(
-    tissue: Integers, contact_table: Integers, around_table: Integers, frame_table: Integers, count: int, dt: float
-) -> int:
+    tissue: Integers, contact_table: Integers, around_table: Integers, frame_table: Integers, count: int, pinned: bool,
+    dt: float,
+) -> int:  # fmt: skip
     """A tick of the bodies that were read: how many the tissue pushes, by `Partners.push` in world axes."""
     t, contacts, around, f = (
         open_tissue(tissue), open_contacts(contact_table), open_around(around_table), open_frame(frame_table),
@@ -224,7 +244,7 @@ def meet(
     half = math.sqrt(hx * hx + hy * hy + hz * hz)
     for c in range(parts.live.shape[0]):
         parts.live[c] = False
-    near = False
+    near = pinned
     for k in range(count):
         b, m = around.read[k], around.motion[k]
         x, y, z = into(f, m[0], m[1], m[2])
@@ -244,10 +264,13 @@ def meet(
         _place(contacts, around, f, 0, around.motion[count])
     else:
         partners.light[0] = 0.0
+    if pinned:
+        world = around.motion[around.motion.shape[0] - 1]
+        _place(contacts, around, f, partners.R.shape[0] - 1, world)
     if not touch(field, t.points, contacts, dt):
         return 0
     pushed = 0
-    for b in range(partners.push.shape[0]):
+    for b in range(around.kept.shape[0]):
         p, any_ = partners.push[b], False
         p[0], p[1], p[2] = rotate(f.R, p[0], p[1], p[2])
         p[3], p[4], p[5] = rotate(f.R, p[3], p[4], p[5])
@@ -279,8 +302,8 @@ def _place(contacts: Contacts, around: Around, f: FrameArrays, b: int, motion: A
     x, y, z = velocity_at(f, c[0], c[1], c[2])
     v[0], v[1], v[2] = v[0] - x, v[1] - y, v[2] - z
     v[3], v[4], v[5] = v[3] - f.w[0], v[4] - f.w[1], v[5] - f.w[2]
-    partners.light[b] = around.light[b]
-    if around.light[b] > 0.0:
+    partners.light[b] = around.light[b] if b < around.light.shape[0] else 0.0
+    if partners.light[b] > 0.0:
         m = around.moments[b]
         for i in range(3):
             for j in range(3):

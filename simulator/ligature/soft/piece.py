@@ -13,6 +13,7 @@ from ligature.model.scene import Scene
 from ligature.model.soft import TissueBody
 from ligature.model.state import MAX_INSERTIONS, MAX_PUNCTURES, StateRecord
 from ligature.soft.contacts import BodyContacts
+from ligature.soft.floating import Floating
 from ligature.soft.frame import Frame, open_frame
 from ligature.soft.needle import ScenePiercer
 from ligature.soft.thread import SceneThread
@@ -24,6 +25,10 @@ from ligature.tissue.layout import open_tissue
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+
+TICKS, FREE_TICKS = 4, 1
+"""Ticks of a tissue step; in four of them tissue that nothing holds would sink into what it hits before it yields."""
 
 
 class Piece:
@@ -44,7 +49,8 @@ class Piece:
     def __init__(self, scene: Scene, tissue: TissueBody, bodies: SutureBodies, rods: list[Rod], dt: float) -> None:
         form, self.tissue, self._bodies, self._dt = tissue.form, tissue, bodies, dt
         self._body = scene.bodies[tissue.body]
-        self.block = TissueBlock(form.grid, form.materials, form.fixed, dt=dt)
+        ticks = TICKS if form.fixed.any() else FREE_TICKS
+        self.block = TissueBlock(form.grid, form.materials, form.fixed, dt=dt, ticks=ticks)
         self.frame = Frame(self._body)
         carrier = {a.body: rod for rod in rods for a in rod.description.attachments}
         self.piercers = [
@@ -54,6 +60,7 @@ class Piece:
         self._alone = [p for p in self.piercers if p.rod is None]
         self.threads = [SceneThread(p.rod, p, self.block, self.frame) for p in self._carried if p.rod is not None]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
+        self._floating = Floating(self._body, self.block) if self.block.elastic.floats else None
         self.wrench, self.peak = np.zeros(6), np.zeros(1)
         self._index, self._motion = np.array([tissue.body]), np.zeros((1, 13))
         self._read()
@@ -84,7 +91,11 @@ class Piece:
             piercer.couple(self._bodies, self.frame)
         self._react()
         frame, block = self.frame, self.block
-        if block.interface.tick + 1 == block.interface.ticks:
+        moves = block.interface.tick + 1 == block.interface.ticks
+        if self._floating is not None:
+            self._floating.step(frame, moves, self._bodies)
+            return
+        if moves:
             frame.end_step(block.elastic.h)
             block.elastic.gravity[:] = (self._body.gravity - frame.acceleration) @ frame.R
         block.step()
@@ -160,6 +171,8 @@ class Piece:
     def reset(self) -> None:
         """As at the start."""
         self.block.elastic.gravity[:] = 0.0
+        if self._floating is not None:
+            self._floating.reset()
         self.block.reset()
         self.contacts.reset()
         for piercer in self.piercers:
@@ -174,6 +187,7 @@ class Piece:
             "block": self.block.snapshot(), "frame": self.frame.snapshot(), "contacts": self.contacts.snapshot(),
             "piercers": [piercer.snapshot() for piercer in self.piercers],
             "gravity": self.block.elastic.gravity.copy(), "wrench": self.wrench.copy(), "peak": self.peak.copy(),
+            "floating": {} if self._floating is None else self._floating.snapshot(),
         }  # fmt: skip
 
     def restore(self, snapshot: dict[str, Any]) -> None:
@@ -185,6 +199,8 @@ class Piece:
             piercer.restore(kept)
         self.block.elastic.gravity[:] = snapshot["gravity"]
         self.wrench[:], self.peak[:] = snapshot["wrench"], snapshot["peak"]
+        if self._floating is not None:
+            self._floating.restore(snapshot["floating"])
         self._read()
 
 
@@ -221,6 +237,8 @@ def see_puncture(tissue: Integers, frame: Integers, i: int, out: Array) -> None:
         nearest = math.inf
         for q in range(t.field.faces.shape[0]):
             corner, away = t.field.faces[q], 0.0
+            if corner[0] == corner[1]:
+                continue
             for m in range(3):
                 middle = x[corner[0], m] + x[corner[1], m] + x[corner[2], m] + x[corner[3], m]
                 away += (0.25 * middle - (px if m == 0 else (py if m == 1 else pz))) ** 2

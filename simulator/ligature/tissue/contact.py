@@ -8,7 +8,8 @@ Each convex part of a body has at most one point of contact with each face of th
 
 with u the gap along the normal and the stretch across it at the end of the tick (Coulomb friction by bristles of
 compliance c). A face that is held has points of contact for bodies that come from inside, so that what presses the
-tissue flat does not turn its cells inside out. Axes are those of the block.
+tissue flat does not turn its cells inside out. A pin holds a point at a place of the world by all three components of
+its force. Axes are those of the block.
 """
 
 from __future__ import annotations
@@ -49,6 +50,9 @@ RECOVERY = 4e-5
 
 SWEEPS = 12
 """Sweeps of projected Gauss–Seidel in a tick, from the forces of the last one."""
+
+SWEEPS_FREE, SETTLED = 60, 1e-6
+"""The same at most for tissue that recoils, and the change over the largest force at which they end."""
 
 SOFT = 1e-5
 """Compliance of a bristle, m/N."""
@@ -133,7 +137,7 @@ def match_contacts(field: Field, points: Points, contacts: Contacts, count: int,
     """Keep, begin, move and end points of contact after the ``count`` that were found."""
     t, work, partners = contacts.touching, contacts.solve, contacts.partners
     for r in range(t.used.shape[0]):
-        work.known[r] = t.used[r] != 0
+        work.known[r] = t.used[r] != 0 and t.part[r] >= 0
     _sort(work, count)
     for n in range(count):
         f = work.order[n]
@@ -244,13 +248,21 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
                 f = touching.force[work.rows[c]]
                 D = work.D[a, c]
                 work.u[a, k] += D[k, 0] * f[0] + D[k, 1] * f[1] + D[k, 2] * f[2]
-    for _ in range(SWEEPS):
+    for _ in range(SWEEPS if partners.light[0] == 0.0 else SWEEPS_FREE):
+        change, most = 0.0, 0.0
         for a in range(n):
-            _relax(touching, work, n, a)
+            change = max(change, _relax(touching, work, n, a))
+            f = touching.force[work.rows[a]]
+            most = max(most, f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+        if partners.light[0] > 0.0 and change <= SETTLED * SETTLED * most:
+            break
     for a in range(n):
         r = work.rows[a]
         f, normal, u = touching.force[r], touching.normal[r], work.u[a]
         i = touching.point[r]
+        if touching.part[r] < 0:
+            points.force[i, 0], points.force[i, 1], points.force[i, 2] = f[0], f[1], f[2]
+            continue
         along_f = f[0] * normal[0] + f[1] * normal[1] + f[2] * normal[2]
         along_u = u[0] * normal[0] + u[1] * normal[1] + u[2] * normal[2]
         # What the bristle does not hold moves its anchor on.
@@ -264,10 +276,20 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
 
 
 @inlined
-def _relax(touching: Touching, work: Solve, n: int, a: int) -> None:
-    """One point: its normal force, then friction within the cone."""
+def _relax(touching: Touching, work: Solve, n: int, a: int) -> float:
+    """One point: its normal force, then friction within the cone; returns the square of what its force changes by."""
     r = work.rows[a]
     f, normal, D, u, soft = touching.force[r], touching.normal[r], work.D[a, a], work.u[a], touching.soft[work.rows[a]]
+    if touching.part[r] < 0:
+        total = 0.0
+        for k in range(3):
+            change = -(u[k] + soft * f[k]) / (D[k, k] + soft)
+            f[k] += change
+            for c in range(n):
+                E, v = work.D[c, a], work.u[c]
+                v[0], v[1], v[2] = v[0] + E[0, k] * change, v[1] + E[1, k] * change, v[2] + E[2, k] * change
+            total += change * change
+        return total
     stiff, trace, gap, before = 0.0, 0.0, 0.0, 0.0
     for k in range(3):
         trace += D[k, k]
@@ -289,13 +311,14 @@ def _relax(touching: Touching, work: Solve, n: int, a: int) -> None:
     cy = pressed * normal[1] + scale * ty - f[1]
     cz = pressed * normal[2] + scale * tz - f[2]
     if cx == 0.0 and cy == 0.0 and cz == 0.0:
-        return
+        return 0.0
     f[0], f[1], f[2] = f[0] + cx, f[1] + cy, f[2] + cz
     for c in range(n):
         E, v = work.D[c, a], work.u[c]
         v[0] += E[0, 0] * cx + E[0, 1] * cy + E[0, 2] * cz
         v[1] += E[1, 0] * cx + E[1, 1] * cy + E[1, 2] * cz
         v[2] += E[2, 0] * cx + E[2, 1] * cy + E[2, 2] * cz
+    return cx * cx + cy * cy + cz * cz
 
 
 @kernel

@@ -22,20 +22,20 @@ class Touching(NamedTuple):
     """K points of contact of a block."""
 
     used: Integers  # (K,)
-    part: Integers  # (K,)
+    part: Integers  # (K,) or -1 for a pin
     face: Integers  # (K,)
     point: Integers  # (K,) of the interface
     body: Integers  # (K,) row of `Partners`
-    normal: Array  # (K, 3) from the body into the tissue
+    normal: Array  # (K, 3) from the body into the tissue; zero for a pin
     distance: Array  # (K,) between point and part when the tick begins
-    anchor: Array  # (K, 3) of friction, in the inertial frame of the body
+    anchor: Array  # (K, 3) of friction, in the inertial frame of the body; where a pin holds
     force: Array  # (K, 3) on the tissue
     friction: Array  # (K,) Coulomb coefficient
     soft: Array  # (K,) compliance along the normal, m/N
 
 
 class Partners(NamedTuple):
-    """B bodies; row 0 is the block's own rigid body."""
+    """B bodies; row 0 is the block's own rigid body, the last row the world that pins belong to."""
 
     R: Array  # (B, 3, 3) of the inertial frame
     centre: Array  # (B, 3)

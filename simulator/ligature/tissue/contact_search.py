@@ -1,6 +1,8 @@
 """Where rigid bodies are nearest to the surface of tissue: each face's deepest point for each convex part; metres.
 
-The best of a few points of a face, from which a search with ever smaller steps goes on. Faces that are held stop bodies
+The best of a few points of a face, from which a search with ever smaller steps goes on. Tissue that nothing holds is
+met at its nodes too, and its faces only where they are deeper than their corners: so it stands on a level face with all
+its nodes, which stay where they are in the material. Faces that are held stop bodies
 that come from inside a little before they reach them: what presses tissue flat does not turn its cells inside out.
 """
 
@@ -34,6 +36,12 @@ LEVEL = 1e-7
 
 REACH = 1.5e-3
 """Distance in metres at which a point of contact is let go."""
+
+BULGE = 2e-5
+"""Metres by which a face must be deeper than its corners where these are met by themselves."""
+
+KEEP = 1.0
+"""What stands for the distance, in metres, of a face that is not: it keeps its point of contact, if it has one."""
 
 
 @inlined
@@ -87,6 +95,8 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
     nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
     edge = math.sqrt(size)
+    if i == j:
+        return _search_node(field, parts, work, c, q, count)
     if core > 0.0:
         _at(x, faces, q, 0.5, 0.5, p)
         _distance_to(parts, c, p, a, b, normal)
@@ -120,11 +130,50 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
     facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
     if best > REACH or (facing > FACING * size if core == 0.0 else facing < -FACING * size):
         return count
+    if field.around.shape[0] > 0:
+        for s in range(4):
+            _at(x, faces, q, float(s & 1), float(s >> 1), p)
+            if _distance_to(parts, c, p, a, b, normal) < best + BULGE:
+                if parts.still[c]:
+                    return count
+                best = KEEP
+                break
+    return _note(work, c, q, best, u, v, best_normal, count)
+
+
+@inlined
+def _note(work: Solve, c: int, q: int, depth: float, u: float, v: float, normal: Array, count: int) -> int:
+    """Add a place to what was found."""
     work.found[count, 0], work.found[count, 1] = c, q
-    work.values[count, 0], work.values[count, 4], work.values[count, 5] = best, u, v
+    work.values[count, 0], work.values[count, 4], work.values[count, 5] = depth, u, v
     for m in range(3):
-        work.values[count, 1 + m] = best_normal[m]
+        work.values[count, 1 + m] = normal[m]
     return count + 1
+
+
+@inlined
+def _search_node(field: Field, parts: Parts, work: Solve, c: int, q: int, count: int) -> int:
+    """Add a node that is met like a face, if part ``c`` is near and before the faces around it."""
+    x, faces, vectors = field.x, field.faces, work.vectors
+    p, a, b, normal = vectors[0], vectors[1], vectors[2], vectors[3]
+    node = faces[q, 0]
+    for m in range(3):
+        p[m] = x[node, m]
+    depth = _distance_to(parts, c, p, a, b, normal)
+    if depth > REACH:
+        return count
+    nx, ny, nz = 0.0, 0.0, 0.0
+    beside = field.around[q - faces.shape[0] + field.around.shape[0]]
+    for s in range(beside.shape[0]):
+        if beside[s] >= 0:
+            i, j, k, h = faces[beside[s], 0], faces[beside[s], 1], faces[beside[s], 2], faces[beside[s], 3]
+            for m in range(3):
+                a[m], b[m] = x[k, m] - x[i, m], x[h, m] - x[j, m]
+            nx, ny, nz = nx + a[1] * b[2] - a[2] * b[1], ny + a[2] * b[0] - a[0] * b[2], nz + a[0] * b[1] - a[1] * b[0]
+    facing = nx * normal[0] + ny * normal[1] + nz * normal[2]
+    if facing > FACING * math.sqrt(nx * nx + ny * ny + nz * nz):
+        return count
+    return _note(work, c, q, depth, 0.0, 0.0, normal, count)
 
 
 @kernel
@@ -183,7 +232,7 @@ def measure_contacts(
     """Distance and normal of every point of contact as the tick begins."""
     a, b = vectors[0], vectors[1]
     for r in range(touching.used.shape[0]):
-        if touching.used[r]:
+        if touching.used[r] and touching.part[r] >= 0:
             c, at = touching.part[r], points.at[touching.point[r]]
             if not parts.live[c]:
                 place_part(parts, partners, c)

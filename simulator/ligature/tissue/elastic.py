@@ -27,6 +27,7 @@ from ligature.tables import opener, table_of
 from ligature.tissue import elements
 from ligature.tissue.corotation import LANES, add_elastic_forces
 from ligature.tissue.factorisation import Factor, shares, solve_in_place, solve_part
+from ligature.tissue.floating import add_inertial_forces, frame_modes, without_frame
 from ligature.tissue.layout import Elimination
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ open_bulk = opener(_bulk_example())
 
 
 class ElasticGrid:
-    """Tissue that is held at some of its nodes.
+    """Tissue that is held at some of its nodes, or at none: then it deforms in a frame that goes along with it.
 
     Parameters
     ----------
@@ -111,6 +112,10 @@ class ElasticGrid:
         The solve of this step, and how many of its parts are done.
     free
         Indices of the nodes that move, (f,); `row` (n,) is the inverse, -1 for fixed nodes.
+    modes
+        What a step leaves to the frame, see `ligature.tissue.floating`: (6, n, 3); (0, n, 3) for tissue that is held.
+    spin
+        Angular velocity (3,) of the frame in rad/s, by which tissue that nothing holds feels how it turns.
     """
 
     def __init__(
@@ -133,6 +138,8 @@ class ElasticGrid:
         self.mass = np.zeros(n)
         np.add.at(self.mass, grid.cells, (self._cell_mass / 8.0)[:, None])
         self._factor = Factor(self._matrix(), grid.site[self.free])
+        self.modes = frame_modes(self._factor.solve, self.mass, grid.nodes) if self.floats else np.zeros((0, n, 3))
+        self.spin = np.zeros(3)
         self._responses: Array | None = None
         self.x, self.v = grid.nodes.copy(), np.zeros((n, 3))
         self.force, self.load = np.zeros((n, 3)), np.zeros(3 * len(self.free))
@@ -178,6 +185,11 @@ class ElasticGrid:
         A.sort_indices()
         return A
 
+    @property
+    def floats(self) -> bool:
+        """Whether nothing holds it."""
+        return len(self.free) == len(self.row)
+
     # --- the step -----------------------------------------------------------------------------
 
     def begin(self, external: Array | None = None) -> None:
@@ -186,6 +198,8 @@ class ElasticGrid:
         ``external`` (n, 3) are forces beside gravity; what contacts add is found by superposition of `response`.
         """
         self.force[:] = 0.0 if external is None else external
+        if self.spin.any():
+            add_inertial_forces(self.mass, self.x, self.v, self.spin, self.h, self.force)
         begin(self._bulk_table, self.h)
 
     def solve(self, share: float) -> None:
@@ -196,6 +210,8 @@ class ElasticGrid:
         """Displacements of all nodes in the step that is solved, (n, 3) m."""
         d = np.zeros_like(self.x)
         d[self.free] = self.load.reshape(-1, 3)
+        if self.floats:
+            without_frame(self.modes, d, self.force)
         return d
 
     def predict(self, external: Array | None = None) -> Array:
@@ -249,6 +265,8 @@ class ElasticGrid:
                 if node >= 0:
                     load[node, axis] += weight
             out[axis, self.free] = self._factor.solve(load.reshape(-1)).reshape(-1, 3)
+            if self.floats:
+                without_frame(self.modes, out[axis], load)
         return out
 
     @property
@@ -266,6 +284,8 @@ class ElasticGrid:
             f = len(self.free) if len(self.free) <= TABLE_NODES else 0
             self._responses = np.zeros((f, 3, *self.x.shape))
             tabulate(self._bulk_table, self._responses)
+            if f and self.floats:
+                self._responses -= np.einsum("kfa,knb->fanb", self.modes, self.modes)
         return self._responses
 
     # --- state --------------------------------------------------------------------------------

@@ -166,16 +166,32 @@ def _field(elastic: ElasticGrid, ticks: int) -> Field:
     for row, m in zip(material, elastic.materials, strict=True):
         row[FRICTION], row[STRENGTH], row[SHEAR] = m.friction, m.strength, m.shear
         row[PUNCTURE], row[CUTTING], row[EXIT] = m.puncture_force, m.cutting_force, m.exit_force
+    nodes, around = _sites(grid.faces) if elastic.floats else (np.zeros(0, np.int64), np.zeros((0, 8), np.int64))
+    faces = np.vstack([grid.faces, np.repeat(nodes[:, None], 4, axis=1)])
+    face_cell = np.concatenate([grid.face_cell, grid.face_cell[around[:, 0]]])
     cells, layers, faces, face_cell = (
-        np.ascontiguousarray(a, dtype=np.int64) for a in (grid.cells, grid.layer, grid.faces, grid.face_cell)
+        np.ascontiguousarray(a, dtype=np.int64) for a in (grid.cells, grid.layer, faces, face_cell)
     )
+    core = np.concatenate([_core(elastic), np.zeros(len(nodes))])
     return Field(
-        elastic.x, elastic.force, cells, layers, faces, face_cell, _core(elastic), np.zeros((len(faces), 2, 3)),
+        elastic.x, elastic.force, cells, layers, faces, face_cell, around, core, np.zeros((len(faces), 2, 3)),
         np.zeros((-(-len(faces) // GROUP), 2, 3)), np.zeros((2, 3)), elastic.free, elastic.row, elastic.responses,
         elastic.factor, np.zeros(3 * len(elastic.free)),
-        np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 3, n, 3)), material, np.array([0, ticks]),
+        np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 3, n, 3)), elastic.modes, material, np.array([0, ticks]),
         np.zeros(1, np.int64),
     )  # fmt: skip
+
+
+def _sites(faces: Integers) -> tuple[Integers, Integers]:
+    """Nodes of the surface (k,), and the faces around each, (k, 8), -1 for none."""
+    corners = faces.reshape(-1)
+    order = np.argsort(corners, kind="stable")
+    nodes, first, count = np.unique(corners[order], return_index=True, return_counts=True)
+    rank = np.arange(len(corners)) - np.repeat(first, count)
+    around = np.full((len(nodes), 8), -1)
+    kept = rank < 8
+    around[np.repeat(np.arange(len(nodes)), count)[kept], rank[kept]] = order[kept] // 4
+    return nodes, around
 
 
 def _core(elastic: ElasticGrid) -> Array:
@@ -219,6 +235,13 @@ def respond(field: Field, points: Points, i: int) -> None:
             for k in range(field.free.shape[0]):
                 for b in range(3):
                     R[a, field.free[k], b] = field.load[3 * k + b]
+            for mode in range(field.modes.shape[0]):
+                Z, share = field.modes[mode], 0.0
+                for c in range(8):
+                    share += points.weights[i, c] * Z[points.nodes[i, c], a]
+                for k in range(n):
+                    for b in range(3):
+                        R[a, k, b] -= share * Z[k, b]
         return
     for c in range(8):
         node, weight = field.row[points.nodes[i, c]], points.weights[i, c]

@@ -49,8 +49,9 @@ class Field(NamedTuple):
     force: Array  # (n, 3) that moves the nodes in this step, besides those on the points, N
     cells: Integers  # (m, 8)
     layer: Integers  # (m,)
-    faces: Integers  # (q, 4)
+    faces: Integers  # (q, 4) the faces, and after them nodes that are met like faces, each four times
     face_cell: Integers  # (q,)
+    around: Integers  # (k, 8) the faces around each of these k nodes, -1 for none; k = 0 for tissue that is held
     core: Array  # (q,) distance of a held face, m, within which nothing presses the tissue; 0 for faces that move
     face_box: Array  # (q, 2, 3) around the faces at the start of the step, and what is so near
     group_box: Array  # (ceil(q / GROUP), 2, 3) around faces that follow each other
@@ -62,6 +63,7 @@ class Field(NamedTuple):
     load: Array  # (3 f,) scratch
     change: Array  # (N, 3) scratch: forces on the points over their means in the last step
     response: Array  # (N, 3, n, 3) displacements of all nodes for 1 N along x, y, z on a point
+    modes: Array  # (6, n, 3) what a step leaves to the frame of tissue that nothing holds; or (0, n, 3)
     material: Array  # (layers, 6)
     clock: Integers  # (2,) ticks of this step that are over, and in all
     found: Integers  # (1,) how often the boxes were found
@@ -131,8 +133,8 @@ def _example() -> Tissue:
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     factor = Elimination(i(1, 5), i(1), z(1), z(1), z(1))
     field = Field(
-        z((1, 3)), z((1, 3)), i(1, 8), i(1), i(1, 4), i(1), z(1), z((1, 2, 3)), z((1, 2, 3)), z((2, 3)), i(1), i(1),
-        z((1, 3, 1, 3)), factor, z(3), z((1, 3)), z((1, 3, 1, 3)), z((1, 6)), i(2), i(1),
+        z((1, 3)), z((1, 3)), i(1, 8), i(1), i(1, 4), i(1), i(1, 8), z(1), z((1, 2, 3)), z((1, 2, 3)), z((2, 3)), i(1),
+        i(1), z((1, 3, 1, 3)), factor, z(3), z((1, 3)), z((1, 3, 1, 3)), z((6, 1, 3)), z((1, 6)), i(2), i(1),
     )  # fmt: skip
     return Tissue(field, points(1), paths(1, 1))
 

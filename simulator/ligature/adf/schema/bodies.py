@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ligature.adf.schema.blocks import (
     COLLISION,
     COLOUR,
@@ -84,8 +86,8 @@ def _material(block: str) -> tuple[Key, ...]:
 SOFT_TISSUE = (
     Key("ligature tissue", MAP, doc="the body is soft tissue, docs/tissue.md", status=Status.OURS),
     *_material("ligature tissue"),
-    Key("ligature tissue.cell size", N, unit="m", doc="edge of its cells; some 600 cells when absent",
-        least=1e-5, status=Status.OURS, fault=Fault.OBJECT),
+    Key("ligature tissue.cell size", N, unit="m", least=1e-5, status=Status.OURS, fault=Fault.OBJECT,
+        doc="edge of its cells; when absent some 600 cells, 150 where nothing holds it"),
     Key("ligature tissue.fixed", Type.TEXTS, ("-z",), doc="faces that its rigid body holds, of -x +x -y +y -z +z",
         status=Status.OURS),
     Key("ligature tissue.carried by", T, "", doc="body that it is fixed to", status=Status.OURS),
@@ -247,35 +249,49 @@ GHOST = (
     *TISSUE,
 )
 
-_STATUS = Status.NOT_SIMULATED
-_SOFT_NUMBERS = {
-    "kLST": "linear stiffness", "kAST": "angular stiffness", "kVST": "volume stiffness",
-    "kVCF": "velocity correction", "kDP": "damping", "kDG": "drag", "kLF": "lift", "kPR": "pressure",
-    "kVC": "volume conservation", "kDF": "dynamic friction", "kMT": "pose matching",
-    "kCHR": "rigid contact hardness", "kKHR": "kinetic contact hardness", "kSHR": "soft contact hardness",
-    "kAHR": "anchor hardness", "kSRHR_CL": "hardness of cluster against rigid",
+_BULLET = {
+    "kAST": "angular stiffness", "kVST": "volume stiffness", "kVCF": "velocity correction", "kDG": "drag",
+    "kLF": "lift", "kCHR": "rigid contact hardness", "kKHR": "kinetic contact hardness",
+    "kSHR": "soft contact hardness", "kAHR": "anchor hardness", "kSRHR_CL": "hardness of cluster against rigid",
     "kSKHR_CL": "hardness of cluster against kinetic", "kSSHR_CL": "hardness of cluster against soft",
     "kSR_SPLT_CL": "impulse split of cluster against rigid", "kSK_SPLT_CL": "impulse split of cluster against kinetic",
     "kSS_SPLT_CL": "impulse split of cluster against soft", "maxvolume": "largest volume ratio",
     "timescale": "time scale",
 }  # fmt: skip
-_SOFT_INTEGERS = {
-    "viterations": "velocity iterations", "piterations": "position iterations", "diterations": "drift iterations",
-    "citerations": "cluster iterations", "flags": "collision flags",
-    "bending constraint": "distance of the bending links", "clusters": "number of clusters",
+_BULLET_INTEGERS = {
+    "viterations": "velocity iterations", "diterations": "drift iterations", "citerations": "cluster iterations",
+    "flags": "collision flags", "bending constraint": "distance of the bending links",
+    "clusters": "number of clusters",
 }  # fmt: skip
+_OWN_TISSUE = tuple(
+    replace(key, default=()) if key.path == "ligature tissue.fixed" else key
+    for key in SOFT_TISSUE
+    if key.path != "ligature tissue.carried by"
+)
+"""What a soft body may state of its tissue; nothing holds it unless the file does."""
+
 SOFT_BODY = (
-    *IDENTITY,
-    *PARENT,
-    *LOOKS,
-    *COLLISION,
-    Key("location", POSE, POSE_ZERO, "m, rad", "initial pose", status=_STATUS),
-    Key("mass", N, 1.0, "kg", "total mass, spread evenly over the nodes", status=_STATUS, least=0.0),
-    Key("randomize constraints", F, doc="any value randomises", status=_STATUS),
-    Key("config", MAP, doc="Bullet's soft-body parameters, §20", status=_STATUS),
-    *(Key(f"config.{k}", N, doc=doc, status=_STATUS) for k, doc in _SOFT_NUMBERS.items()),
-    *(Key(f"config.{k}", I, doc=doc, status=_STATUS) for k, doc in _SOFT_INTEGERS.items()),
-    Key("config.fixed nodes", Type.INTEGERS, (), doc="nodes of infinite mass", status=_STATUS),
+    *unused(IDENTITY, "passive", "publish frequency", "publish frequency.low", "publish frequency.high"),
+    *unused(PARENT),
+    *unused(
+        LOOKS, *(key.path for key in LOOKS if key.path.startswith(("shape", "geometry", "compound shape"))),
+        "mesh remove duplicates",
+    ),
+    *unused(COLLISION, *(key.path for key in COLLISION if key.path not in ("collision mesh", "scale"))),
+    Key("location", POSE, POSE_ZERO, "m, rad", "initial pose"),
+    Key("mass", N, 1.0, "kg", "total mass, above 0", least=0.0, most=HEAVIEST),
+    *unused((Key("randomize constraints", F, doc="any value randomises their order"),)),
+    Key("config", MAP, doc="Bullet's soft-body parameters, §20; how they count: docs/tissue.md"),
+    Key("config.kLST", N, 1.0, doc="linear stiffness, 0 to 1; gives Young's modulus"),
+    Key("config.piterations", I, 1, doc="position iterations, which multiply it"),
+    Key("config.kMT", N, 0.0, doc="pose matching, 0 to 1; adds to Young's modulus"),
+    Key("config.kVC", N, 0.0, doc="volume conservation: above 0 Poisson's ratio is 0.45, not 0.3"),
+    Key("config.kPR", N, 0.0, doc="pressure: above 0 Poisson's ratio is 0.45; it does not inflate"),
+    Key("config.kDP", N, 0.0, doc="share of the velocity that each millisecond takes"),
+    Key("config.kDF", N, 0.2, doc="friction coefficient", least=0.0),
+    *unused(Key(f"config.{k}", N, doc=doc) for k, doc in _BULLET.items()),
+    *unused(Key(f"config.{k}", I, doc=doc) for k, doc in _BULLET_INTEGERS.items()),
+    Key("config.fixed nodes", Type.INTEGERS, (), doc="vertices of the mesh file, from 0, that stay where they are"),
     *ignored(("config.cutting", "config.margin"), "no effect"),
     *ignored(
         (
@@ -284,7 +300,9 @@ SOFT_BODY = (
         ),
         "no effect on a soft body",
     ),
+    *_OWN_TISSUE,
 )  # fmt: skip
+_STATUS = Status.NOT_SIMULATED
 _POWER = ("engine", "brake")
 _SUSPENSION = {"stiffness": "N/m", "damping": "N·s/m", "compression": "N·s/m", "rest length": "m"}
 VEHICLE = (
