@@ -171,6 +171,40 @@ CACHES: dict[str, str] = {
         ),
         "Bullet's own numbers",
     ),  # fmt: skip
+    "Closures._table": "addresses of arrays",
+    "Closures._share": "set by every tick before it is used",
+    "Closures._torn": "set by every tick before it is used",
+    **dict.fromkeys(
+        (
+            f"Loops.{name}"
+            for name in (
+                "gap",
+                "moved",
+                "end",
+                "error",
+                "inertia",
+                "axis",
+                "first",
+                "linear",
+                "M",
+                "J",
+                "row_of",
+                "rank",
+                "B",
+                "scale",
+                "A",
+                "multiplier",
+                "step",
+                "shift",
+                "place",
+                "bound",
+                "speed",
+                "wanted",
+                "wanted_at",
+            )  # fmt: skip
+        ),
+        "written by every tick before it is read",
+    ),
     "Trees.ticks": "ticks since a restore; before the first nobody has an effort",
     "ContactWrenches._owned": "saves asking again",
     # what sensors make of the state

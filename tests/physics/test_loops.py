@@ -12,19 +12,22 @@ from ligature.adf import Severity
 from ligature.model.assembly import joint_coordinates
 from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import inverse, pose7_matrix
+from ligature.model.scene import Scene
+from ligature.physics import bullet
 from ligature.physics.divergence import joined
+from ligature.physics.world import World
 from numpy.typing import NDArray
 
 from tests.physics.linkages import CLOSING, KINDS, linkage
 
-GAP, WORST = 1e-4, 3e-3
-"""What a loop may open by in nine ticks of ten, in metres, and while it passes a flat configuration at speed."""
-
-RATIO, GAP_BEYOND = 300.0, 5e-4
-"""Ratio of masses from which on Bullet's solver holds a loop less well, and what it may open by then."""
+GAP = 1e-4
+"""What a loop may open by, in metres, whatever its masses and wherever it passes."""
 
 GAIN = 0.01
-"""Share of the largest kinetic energy by which that of a linkage without springs may grow beyond what falling gives."""
+"""Share of the largest kinetic energy by which that of a linkage may grow beyond what falling and springs give."""
+
+FAST = 100.0
+"""Speed in m/s that no linkage reaches; one of 500, with a link of grams that whips about, comes to 61."""
 
 
 def gaps(sim: Simulation) -> NDArray[np.float64]:
@@ -40,7 +43,7 @@ def gaps(sim: Simulation) -> NDArray[np.float64]:
 
 
 def energy(sim: Simulation) -> NDArray[np.float64]:
-    """Kinetic energy (J), and potential energy of gravity, of all bodies."""
+    """Kinetic energy (J) of all bodies, and potential energy of gravity and springs."""
     found = np.zeros(2)
     for body in sim.scene.bodies:
         if not body.static:
@@ -49,16 +52,21 @@ def energy(sim: Simulation) -> NDArray[np.float64]:
             turning = T[:3, :3].T @ twist[3:]
             found[0] += 0.5 * (body.mass * twist[:3] @ twist[:3] + np.sum(body.inertia * turning**2))
             found[1] -= body.mass * body.gravity @ T[:3, 3]
+    world = sim._world
+    for k, control in enumerate(world.joints.controls):
+        stretch = world.engine.motions.joints(k)[0] - control.axes.rest
+        found[1] += 0.5 * np.sum(control.axes.stiffness * control.axes.sprung * stretch**2)
     return found
 
 
-def run(sim: Simulation, ticks: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The widest gap (m) of each of ``ticks``, and the `energy` (ticks, 2) after it."""
-    widest, energies = np.zeros(ticks), np.zeros((ticks, 2))
+def run(sim: Simulation, ticks: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """The widest gap (m) of each of ``ticks``, the `energy` (ticks, 2) after it, and the largest speed (m/s)."""
+    widest, energies, speed = np.zeros(ticks), np.zeros((ticks, 2)), 0.0
     for k in range(ticks):
         sim.step()
         widest[k], energies[k] = gaps(sim).max(), energy(sim)
-    return widest, energies
+        speed = max(speed, float(np.linalg.norm(sim.state["body_twist"][0, :, :3], axis=1).max()))
+    return widest, energies, speed
 
 
 def check(text: str, folder: Path, ticks: int) -> None:
@@ -72,14 +80,12 @@ def check(text: str, folder: Path, ticks: int) -> None:
         moved = np.linalg.norm(sim.state["body_pose"][0, body.index, :3] - body.T_world_body[:3, 3])
         assert moved < 0.02, body.identity.key
     start = energy(sim).sum()
-    widest, energies = run(sim, ticks)
+    widest, energies, speed = run(sim, ticks)
     sim.close()
     assert not sim.problems
-    masses = [body.mass for body in scene.bodies if not body.static]
-    assert np.quantile(widest, 0.9) < (GAP if max(masses) < RATIO * min(masses) else GAP_BEYOND)
-    assert widest.max() < WORST
-    if "spring" not in text:
-        assert (energies.sum(axis=1) - start).max() <= GAIN * energies[:, 0].max()
+    assert widest.max() <= GAP
+    assert speed < FAST
+    assert (energies.sum(axis=1) - start).max() <= GAIN * energies[:, 0].max()
 
 
 CASES = [(kind, closing) for kind in KINDS for closing in (CLOSING if kind != "spatial" else ("p2p",))]
@@ -93,8 +99,8 @@ def test_any_rounded_linkage_assembles_and_holds(kind: str, closing: str, tmp_pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "closing"), CASES)
-def test_most_rounded_linkages_hold_as_they_fall_for_a_second(kind: str, closing: str, tmp_path: Path) -> None:
-    """The others open while they pass a stretched configuration, where grams hold kilograms: 37 of 500 here."""
+def test_every_rounded_linkage_holds_as_it_falls_for_a_second(kind: str, closing: str, tmp_path: Path) -> None:
+    """Through stretched and flat configurations, where grams hold kilograms: 500 of them, of masses of 1 to 10 000."""
     failed = {}
     for seed in range(20):
         rng = np.random.default_rng([KINDS.index(kind), CLOSING.index(closing), seed])
@@ -102,7 +108,96 @@ def test_most_rounded_linkages_hold_as_they_fall_for_a_second(kind: str, closing
             check(linkage(rng, kind, closing), tmp_path, 1000)
         except AssertionError as error:
             failed[seed] = str(error).split("\n")[0]
-    assert len(failed) <= 8, failed
+    assert not failed
+
+
+def scene_of(text: str, folder: Path) -> Scene:
+    (folder / "model.yaml").write_text("namespace: /ambf/env/\n" + text, encoding="utf-8")
+    return ligature.load(folder / "model.yaml")
+
+
+def kinetic(world: World) -> float:
+    """Kinetic energy (J) of all links, also of those parts of bodies that closing joints carry."""
+    motions = world.engine.motions
+    motions.everything()
+    trees, found = motions.trees, 0.0
+    for pose, twist, mass, inertia in zip(trees.pose, trees.twist, trees.mass, trees.inertia, strict=True):
+        found += 0.5 * (mass * twist[:3] @ twist[:3] + inertia @ (pose7_matrix(pose)[:3, :3].T @ twist[3:]) ** 2)
+    return float(found)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_closing_loops_takes_kinetic_energy_and_adds_none(kind: str, tmp_path: Path) -> None:
+    """A linkage with joints put elsewhere, at any speeds, closes; it moves on as its loops allow, with less energy."""
+    rng = np.random.default_rng(KINDS.index(kind))
+    scene = scene_of(linkage(rng, kind, "p2p" if kind == "spatial" else "revolute"), tmp_path)
+    sim = Simulation(scene)
+    world, start = sim._world, sim.snapshot()
+    looped = {closure.joint for closure in scene.closures}
+    single = [j.index for j in scene.joints if len(scene.start.coordinates[j.index]) == 1 and j.index not in looped]
+    for _ in range(20):
+        sim.restore(start)
+        for joint in single:
+            at = scene.start.coordinates[joint][0] + rng.normal(0.0, 1e-3)
+            world.set_joint_position(joint, at, rng.normal(0.0, 3.0))
+        world.write_state(sim.state)
+        before = kinetic(world)
+        assert gaps(sim).max() > 1e-5
+        assert not world._closures.project()
+        world.write_state(sim.state)
+        assert gaps(sim).max() < 1e-8
+        assert kinetic(world) <= (1.0 + 1e-9) * before
+        dt = 1e-5  # along the speeds that are left the loops stay closed
+        for k, tree in enumerate(world.engine.trees):
+            q, v, _ = world.engine.motions.joints(k).copy()
+            world.joints.controls[k].put(range(len(tree.axes)), q + dt * v)
+        world.write_state(sim.state)
+        assert gaps(sim).max() < 1e-7
+    sim.close()
+
+
+def test_linkages_fall_as_in_mujoco_until_they_stretch(tmp_path: Path) -> None:
+    """A four-bar whose crank of 9 kg is held by 7 and 9 g, beside MuJoCo in ticks of 10 µs; it stretches at 0.26 s."""
+    oracle = pytest.importorskip("tests.physics.oracle", reason="MuJoCo is not installed")
+    scene = scene_of(linkage(np.random.default_rng([0, 0, 9]), "four-bar"), tmp_path)
+    sim = Simulation(scene)
+    crank = max(scene.bodies, key=lambda body: body.mass)
+    expected = oracle.motion(scene, sim.state["body_pose"][0].copy(), 250)
+    for k in range(250):
+        sim.step()
+        T = pose7_matrix(sim.state["body_pose"][0, crank.index]) @ crank.T_body_inertial
+        assert np.linalg.norm(T[:3, 3] - expected[k, crank.index]) < 2e-3
+    assert np.ptp(expected[:, crank.index], axis=0).max() > 0.1
+    sim.close()
+
+
+def test_a_loop_that_opens_is_reported_once_with_its_gap(tmp_path: Path) -> None:
+    scene = scene_of(linkage(np.random.default_rng(3), "four-bar", gravity=0.0), tmp_path)
+    sim = Simulation(scene)
+    looped = {closure.joint for closure in scene.closures}
+    joint = next(j.index for j in scene.joints if j.index not in looped)
+    sim._world.set_joint_position(joint, scene.start.coordinates[joint][0] + 1.5)
+    sim.step(5)
+    found = [d.message for d in sim.problems if d.code == "loop"]
+    (name,) = (scene.joints[index].identity.key for index in looped)
+    assert len(found) == 1 and f"the loop of joint '{name}' is open by " in found[0]
+    sim.step(3000)
+    assert gaps(sim).max() < GAP
+    sim.close()
+
+
+def test_without_a_handle_loops_close_to_the_same_bits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(linkage(np.random.default_rng(4), "double parallelogram"), tmp_path)
+    hashes = []
+    for found in (True, False):
+        if not found:
+            monkeypatch.setattr(bullet._Clients, "begin", 0)
+        sim = Simulation(scene)
+        assert bool(sim._world.engine.motions.handle) == found
+        sim.step(200)
+        hashes.append(sim.state_hash())
+        sim.close()
+    assert hashes[0] == hashes[1]
 
 
 def test_a_loop_repeats_after_reset_and_restore(tmp_path: Path) -> None:

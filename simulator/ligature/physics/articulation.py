@@ -145,6 +145,9 @@ class Tree:
     """Position of every degree of freedom as the scene starts."""
     ends: dict[int, int]
     """Link at the end of each closing joint that starts from this tree."""
+    masses: list[float]
+    inertias: list[Array]
+    """Mass and principal moments (3,) of the base and of each link."""
     damping: tuple[float, float] = (0.0, 0.0)
     """Linear and angular damping by Bullet, in 1/s."""
 
@@ -223,6 +226,8 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         plan.frames(),
         start,
         ends,
+        [root.mass, *plan.masses],
+        [inertia_of(root), *plan.inertias],
     )
     _set_dynamics(client, tree, plan, bodies)
     tree.put_joints(client)

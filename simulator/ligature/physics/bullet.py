@@ -50,6 +50,10 @@ _FUNCTIONS = {
     "b3JointControlSetMaximumForce": _int(_address, _int, _real),
     "b3JointControlSetDesiredForceTorque": _int(_address, _int, _real),
     "b3CreatePoseCommandInit": _address(_address, _int),
+    "b3CreatePoseCommandSetBasePosition": _int(_address, _real, _real, _real),
+    "b3CreatePoseCommandSetBaseOrientation": _int(_address, _real, _real, _real, _real),
+    "b3CreatePoseCommandSetJointPositions": _int(_address, _int, _address),
+    "b3CreatePoseCommandSetJointVelocities": _int(_address, _address, _int, _address),
     "b3CreatePoseCommandSetBaseLinearVelocity": _int(_address, _address),
     "b3CreatePoseCommandSetBaseAngularVelocity": _int(_address, _address),
     "b3ApplyExternalForceCommandInit": _address(_address),
@@ -81,6 +85,10 @@ set_gain = _external("b3JointControlSetKd")
 set_strength = _external("b3JointControlSetMaximumForce")
 set_effort = _external("b3JointControlSetDesiredForceTorque")
 init_motion = _external("b3CreatePoseCommandInit")
+set_position = _external("b3CreatePoseCommandSetBasePosition")
+set_orientation = _external("b3CreatePoseCommandSetBaseOrientation")
+set_joint_positions = _external("b3CreatePoseCommandSetJointPositions")
+set_joint_velocities = _external("b3CreatePoseCommandSetJointVelocities")
 set_linear_velocity = _external("b3CreatePoseCommandSetBaseLinearVelocity")
 set_angular_velocity = _external("b3CreatePoseCommandSetBaseAngularVelocity")
 init_forces = _external("b3ApplyExternalForceCommandInit")

@@ -10,30 +10,30 @@ hold differently, in spite of corrected frames (`ligature.model.assembly`), the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from ligature.model.frames import inverse, matrix_quaternion, pose7_matrix
+from ligature.adf import Diagnostic, Severity
+from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, pose7_matrix
 from ligature.model.mechanism import Chain, chain_of
-from ligature.model.scene import Closure, Scene
-from ligature.physics.articulation import Tree, is_point, needs_link
-from ligature.physics.bodies import Placement
-from ligature.physics.motions import Motions
+from ligature.model.scene import Closure
+from ligature.physics.articulation import is_point, needs_link
+from ligature.physics.engine import CLOSING, Engine
+from ligature.physics.linkage import End, lay_out, moving_with
+from ligature.physics.projection import MOVED, close_loops, measure_loops
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
 
 MAX_FORCE = 1e5
 """Force in newtons that a closure may use; enough for any arm, finite so that a jam does not explode."""
 
-
-CLOSING = 0.8
-"""Part of a loop's gap that is closed within a tick; Bullet's 0.2 lets a swinging linkage open by 0.5 mm."""
-
 PACE = 1.0
-"""Speed in m/s at which gaps are closed at most: a loop that came apart must not throw its bodies."""
+"""Speed in m/s at which wide gaps are closed: bodies do not get it, but what is in their way is pushed by it."""
+
+PUSH = 0.01
+"""Speed in m/s at which Bullet closes gaps at most; bodies keep what it gives them, the lighter ones a multiple."""
 
 TORN = 0.005
 """Gap in metres from which on a loop comes apart: what it holds is damped then."""
@@ -41,56 +41,126 @@ TORN = 0.005
 TORN_DAMPING = (8.0, 1.0)
 """Linear and angular damping in 1/s of the trees of such a loop; at 50 m/s Bullet makes it 0.4 in a tick of 1 ms."""
 
+OPEN = 1e-4
+"""Gap in metres from which on an open loop is reported."""
+
+UNBOUNDED = 1e6
+"""Speed in rad/s or m/s of a coordinate that Bullet allows: it would stop one link at 100, and tear its loop open."""
+
+STUCK = 1e-3
+"""Distance (rad, m) of a joint from its limit at which the limit is what holds a loop open."""
+
 
 class Closures:
-    """The constraints of a scene's loops, made where the scene starts, for ticks of ``dt``."""
+    """What closes the loops of a scene: constraints, made where it starts, and a projection after each tick."""
 
-    def __init__(
-        self, client: int, scene: Scene, trees: Sequence[Tree], place_of: Mapping[int, Placement], motions: Motions,
-        dt: float,
-    ) -> None:  # fmt: skip
-        self._client, self._scene, self._trees = client, scene, trees
-        self._place_of, self._motions = place_of, motions
-        self.ids: list[int] = []
-        self._dt, self._share = dt, CLOSING
-        ends: list[tuple[int, Array, int, Array]] = []
-        self._ends = ends
-        motions.forget_all()
-        held = [closure for closure in scene.closures if needs_link(scene, closure) or not closure.free]
-        for closure in held:
-            if needs_link(scene, closure):
-                self._hold_end(closure)
-            else:
-                self._hold_point(closure)
-        self._rows = np.array([[one, other] for one, _, other, _ in ends], dtype=np.int64).reshape(-1, 2).T
-        self._points = np.array([[one, other] for _, one, _, other in ends]).reshape(-1, 2, 3).transpose(1, 0, 2)
-        self._joined = [(self._place_of[c.inner].tree, self._place_of[c.outer].tree) for c in held]
-        self._looped = sorted({tree for pair in self._joined for tree in pair})
+    def __init__(self, engine: Engine) -> None:
+        self._engine, self._client, self._scene = engine, engine.client, engine.scene
+        self._share = CLOSING
         self._torn: set[int] = set()
+        self._reported: set[int] = set()
+        self._ends: list[End] = []
+        engine.motions.forget_all()
+        for closure in engine.scene.closures:
+            if needs_link(engine.scene, closure):
+                self._hold_end(closure)
+            elif not closure.free:
+                self._hold_point(closure)
+        self._ends.sort(key=lambda end: end.mechanism)
+        self._arrays = lay_out(engine, self._ends)
+        self._table = table_of(self._arrays)
+        looped = sorted({tree for end in self._ends for tree in end.mechanism})
+        for tree in looped:
+            uid = engine.trees[tree].uid
+            pybullet.changeDynamics(uid, -1, maxJointVelocity=UNBOUNDED, physicsClientId=self._client)
 
     def pace(self) -> None:
         """Have the coming tick close gaps by no more than `PACE` allows, and damp loops that come apart.
 
         What it sets follows from where the bodies are, so that snapshots need not keep it.
         """
-        if not self._looped:
+        if not self._ends:
             return
-        for tree in self._looped:
-            self._motions.links(tree)
-        one, other = (
-            _placed(self._motions.pose[rows], points) for rows, points in zip(self._rows, self._points, strict=True)
-        )
-        gaps = np.sqrt(((one - other) ** 2).sum(axis=1))
-        widest = float(gaps.max())
-        self._close(CLOSING if CLOSING * widest <= PACE * self._dt else PACE * self._dt / widest)
-        torn = {tree for k in np.flatnonzero(gaps > TORN) for tree in self._joined[k]} if widest > TORN else set()
+        motions = self._engine.motions
+        motions.read_all()
+        widest = float(measure_loops(motions.table, self._table))
+        within = PUSH * self._engine.dt
+        self._close(CLOSING if CLOSING * widest <= within else within / widest)
+        open_ = np.flatnonzero(self._arrays.gap > TORN) if widest > TORN else ()
+        torn = {tree for k in open_ for tree in self._ends[k].trees}
         if torn != self._torn:
             self._damp(torn)
 
+    def project(self) -> list[Diagnostic]:
+        """After a tick, put mechanisms where their loops are closed; returns what is found open for the first time."""
+        if not self._ends:
+            return []
+        motions = self._engine.motions
+        motions.prepare()
+        left = float(close_loops(motions.handle, motions.table, self._table, PACE * self._engine.dt, self._engine.dt))
+        if not motions.handle:
+            self._hand_on()
+        if left <= OPEN:
+            return []
+        fresh = [k for k in np.flatnonzero(self._arrays.gap > OPEN).tolist() if k not in self._reported]
+        self._reported |= set(fresh)
+        return [self._finding(k) for k in fresh]
+
     def begin(self) -> None:
-        """Close gaps as fast, and damp as little, as a new client does."""
+        """Close gaps as fast, and damp as little, as a new client does; what is open is reported again."""
         self._damp(set())
         self._close(CLOSING)
+        self._reported.clear()
+
+    def snapshot(self) -> set[int]:
+        """The loops that were reported as open."""
+        return set(self._reported)
+
+    def restore(self, snapshot: set[int]) -> None:
+        """Continue from `snapshot`."""
+        self._reported = set(snapshot)
+
+    def _finding(self, k: int) -> Diagnostic:
+        """That a loop is open, by how much, and why."""
+        joints, end = self._scene.joints, self._ends[k]
+        name = joints[end.joint].identity
+        message = f"the loop of joint '{name.key}' is open by {1e3 * self._arrays.gap[k]:.3g} mm"
+        names = [f"'{joints[joint].identity.key}'" for joint in self._at_limits(end)]
+        if names:
+            message += f": {' and '.join(names)} {'is' if len(names) == 1 else 'are'} at the end of the range"
+            hint = "widen the limits, or command less"
+        else:
+            message += ": what pulls it is stronger than its bodies can bear, or its joints hold it differently"
+            hint = "command it slower and with less force, or look at its pivots and axes"
+        return Diagnostic(Severity.WARNING, message, name.mark, hint, "loop")
+
+    def _at_limits(self, end: End) -> list[int]:
+        """Joints of a mechanism that are at a limit."""
+        found: dict[int, None] = {}
+        for tree in end.mechanism:
+            positions = self._engine.motions.joints(tree)[0]
+            for (_, joint, axis, _), q in zip(self._engine.trees[tree].axes, positions, strict=True):
+                low, high = axis.low, axis.high
+                if low is not None and high is not None and low < high and not low + STUCK < q < high - STUCK:
+                    found[joint] = None
+        return list(found)
+
+    def _hand_on(self) -> None:
+        """Hand Bullet where mechanisms are, by PyBullet's functions."""
+        arrays, engine = self._arrays, self._engine
+        motions, client = engine.motions, self._client
+        for m in np.flatnonzero(arrays.moved).tolist():
+            for k in arrays.tree[arrays.tree_begin[m] : arrays.tree_begin[m + 1]].tolist():
+                tree = engine.trees[k]
+                if arrays.moved[m] == MOVED:
+                    pose, twist = (a[motions.row(k, -1)].tolist() for a in (motions.pose, motions.twist))
+                    if not tree.static:
+                        pybullet.resetBasePositionAndOrientation(tree.uid, pose[:3], pose[3:], physicsClientId=client)
+                        pybullet.resetBaseVelocity(tree.uid, twist[:3], twist[3:], physicsClientId=client)
+                    axes = motions.slices[k]
+                    for (link, *_), q, v in zip(tree.axes, motions.position[axes], motions.velocity[axes], strict=True):
+                        pybullet.resetJointState(tree.uid, link, float(q), float(v), physicsClientId=client)
+                motions.forget(k)
 
     def _close(self, share: float) -> None:
         if share != self._share:
@@ -100,7 +170,7 @@ class Closures:
     def _damp(self, torn: set[int]) -> None:
         """Damp the trees ``torn`` and no others more than their files state."""
         for index in sorted(torn ^ self._torn):
-            tree = self._trees[index]
+            tree = self._engine.trees[index]
             linear, angular = np.maximum(TORN_DAMPING, tree.damping) if index in torn else tree.damping
             pybullet.changeDynamics(
                 tree.uid, -1, linearDamping=float(linear), angularDamping=float(angular), physicsClientId=self._client
@@ -109,29 +179,34 @@ class Closures:
 
     def _hold_end(self, closure: Closure) -> None:
         """Join the end of a closing joint to its outer body."""
-        inner, outer = self._place_of[closure.inner], self._place_of[closure.outer]
-        tree = self._trees[inner.tree]
+        engine = self._engine
+        inner, outer = engine.place_of[closure.inner], engine.place_of[closure.outer]
+        tree = engine.trees[inner.tree]
         link = tree.ends[closure.joint]
-        self._motions.links(inner.tree)
-        T_world_link = pose7_matrix(self._motions.pose[self._motions.row(inner.tree, link)])
+        row = engine.motions.row(inner.tree, link)
+        engine.motions.links(inner.tree)
+        T_world_link = pose7_matrix(engine.motions.pose[row])
         point = is_point(self._scene, closure)
         # at the joint: a force there does not turn the light end about its axis, so that the solver's rows agree
         T_link_end = np.eye(4) if point else self._chain(closure).T_outer
         T_outer_end = inverse(self._frame(closure.outer)) @ T_world_link @ T_link_end
         kind = pybullet.JOINT_POINT2POINT if point else pybullet.JOINT_FIXED
         self._create(kind, (tree.uid, link), (outer.uid, outer.link), T_link_end, T_outer_end)
-        self._watch(self._motions.row(inner.tree, link), T_link_end, outer, T_outer_end)
+        self._watch(closure, row, T_link_end, T_outer_end, point)
 
     def _hold_point(self, closure: Closure) -> None:
-        inner, outer = self._place_of[closure.inner], self._place_of[closure.outer]
+        inner, outer = self._engine.place_of[closure.inner], self._engine.place_of[closure.outer]
         T_inner = self._chain(closure).T_inner
         T_outer_end = inverse(self._frame(closure.outer)) @ self._frame(closure.inner) @ T_inner
         self._create(pybullet.JOINT_POINT2POINT, (inner.uid, inner.link), (outer.uid, outer.link), T_inner, T_outer_end)
-        self._watch(self._motions.row(inner.tree, inner.link), T_inner, outer, T_outer_end)
+        self._watch(closure, self._engine.motions.row(inner.tree, inner.link), T_inner, T_outer_end, True)
 
-    def _watch(self, row: int, T_inner_end: Array, outer: Placement, T_outer_end: Array) -> None:
-        ends = T_inner_end[:3, 3], self._motions.row(outer.tree, outer.link), T_outer_end[:3, 3]
-        self._ends.append((row, *ends))
+    def _watch(self, closure: Closure, row: int, T_inner_end: Array, T_outer_end: Array, point: bool) -> None:
+        inner, outer = (self._engine.place_of[body] for body in (closure.inner, closure.outer))
+        rows = row, self._engine.motions.row(outer.tree, outer.link)
+        frames = matrix_pose7(T_inner_end), matrix_pose7(T_outer_end)
+        trees = inner.tree, outer.tree
+        self._ends.append(End(closure.joint, trees, moving_with(self._engine, trees), rows, frames, point))
 
     def _chain(self, closure: Closure) -> Chain:
         joint = self._scene.joints[closure.joint]
@@ -140,7 +215,7 @@ class Closures:
     def _frame(self, body: int) -> Array:
         """Inertial frame (4, 4) of a body in the world."""
         pose, twist = np.empty(7), np.empty(6)
-        self._place_of[body].read_inertial(pose, twist)
+        self._engine.place_of[body].read_inertial(pose, twist)
         return pose7_matrix(pose)
 
     def _create(self, kind: int, one: tuple[int, int], other: tuple[int, int], T_one: Array, T_other: Array) -> None:
@@ -150,12 +225,3 @@ class Closures:
             physicsClientId=self._client,
         )  # fmt: skip
         pybullet.changeConstraint(constraint, maxForce=MAX_FORCE, physicsClientId=self._client)
-        self.ids.append(int(constraint))
-
-
-def _placed(poses: Array, points: Array) -> Array:
-    """Points (k, 3) of frames at ``poses`` (k, 7) in the world."""
-    axis = poses[:, 3:6]
-    turned = np.cross(axis, points)
-    turned = 2.0 * (poses[:, 6:7] * turned + np.cross(axis, turned))
-    return np.asarray(poses[:, :3] + points + turned)

@@ -20,7 +20,6 @@ from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
 from ligature.physics.broad_phase import BroadPhase
 from ligature.physics.bullet import connect
-from ligature.physics.closures import CLOSING
 from ligature.physics.motions import Motions
 from ligature.physics.trees import Places
 from ligature.tables import table_of
@@ -32,6 +31,9 @@ SOLVER_ITERATIONS = 50
 
 LOOP_ITERATIONS = 200
 """The same where loops close: with 50, links of grams beside ones of kilograms part by 2 mm, with 200 by 0.1 mm."""
+
+CLOSING = 0.8
+"""Part of a loop's gap that Bullet closes within a tick; its 0.2 lets a swinging linkage open by 0.5 mm."""
 
 MOVES, STANDS = (1, -1), (2, -3)
 """Bullet's collision group and mask of what moves, and of what stands and meets only what moves: its own defaults."""

@@ -111,6 +111,8 @@ class Masses:
         pybullet.changeDynamics(
             place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self._engine.client
         )
+        arrays = self._engine.motions.trees
+        arrays.mass[place.row], arrays.inertia[place.row] = mass, inertia
         extra = mass - place.body.mass
         if extra > 0.0:
             fall = place.body.gravity if commanded else np.zeros(3)

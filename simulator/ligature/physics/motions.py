@@ -60,8 +60,9 @@ class Motions:
         self._uids = [tree.uid for tree in trees]
 
     def _lay_out(self, tree_index: int, tree: Tree) -> None:
-        """Fill the rows of one tree's links."""
-        begin = self._begin[tree_index]
+        """Fill the rows of one tree."""
+        begin, end = self._begin[tree_index], self._begin[tree_index + 1]
+        self.trees.mass[begin:end], self.trees.inertia[begin:end] = tree.masses, tree.inertias
         first = self.slices[tree_index].start
         joint_of = {link: first + i for i, (link, *_) in enumerate(tree.axes)}
         for link, frame in enumerate(tree.frames):

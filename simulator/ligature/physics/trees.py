@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-_TURNS, _SLIDES = int(pybullet.JOINT_REVOLUTE), int(pybullet.JOINT_PRISMATIC)
+TURNS, SLIDES = int(pybullet.JOINT_REVOLUTE), int(pybullet.JOINT_PRISMATIC)
 
 BASE_Q, BASE_U = 7, 6
 """Numbers of the base before those of the first axis, among Bullet's coordinates and velocities."""
@@ -60,6 +60,8 @@ class Trees(NamedTuple):
     sent_effort: Array  # (a,)
     rows: Integers  # (r, 3) parent row, type and axis of the joint
     fixed: Array  # (r, 17) axis of the joint, link frame in its parent's at zero, inertial frame in the link frame
+    mass: Array  # (r,)
+    inertia: Array  # (r, 3) principal moments
     pose: Array  # (r, 7)
     twist: Array  # (r, 6)
     frame: Array  # (r, 7) pose and velocity of the link frames' origins
@@ -83,9 +85,10 @@ def trees(count: int, rows: int, axes: int) -> Trees:
         uid=z(count, whole), begin=z(count + 1, whole), first=z(count + 1, whole), going=z(count, no),
         turning=z(count, no), measured=z(count, no), read=z(count, no), linked=z(count, no), ticks=z(1, whole),
         link=z(axes, whole), limp=np.ones(axes, no), sent=z(axes, no), sent_effort=z(axes),
-        rows=np.full((rows, 3), -1), fixed=z((rows, 17)), pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)),
-        speed=z((rows, 6)), joints=z((3, axes)), reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)),
-        push=z(axes), answer=answer, wanted=wanted, wanted_at=np.array([wanted.ctypes.data]),
+        rows=np.full((rows, 3), -1), fixed=z((rows, 17)), mass=z(rows), inertia=z((rows, 3)),
+        pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)), speed=z((rows, 6)), joints=z((3, axes)),
+        reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)), push=z(axes), answer=answer,
+        wanted=wanted, wanted_at=np.array([wanted.ctypes.data]),
     )  # fmt: skip
 
 
@@ -303,16 +306,16 @@ def follow(trees: Trees, k: int) -> None:
         p, kind, joint = trees.rows[r, 0], trees.rows[r, 1], trees.rows[r, 2]
         f, v, fixed = frame[r], speed[r], trees.fixed[r]
         compose(frame[p], fixed[3:10], f)
-        ax, ay, az = _turned(f, fixed[0], fixed[1], fixed[2])
+        ax, ay, az = turned(f, fixed[0], fixed[1], fixed[2])
         q, qd = 0.0, 0.0
         if joint >= 0:
             q, qd = trees.joints[0, joint], trees.joints[1, joint]
-        if kind == _SLIDES:
+        if kind == SLIDES:
             f[0], f[1], f[2] = f[0] + q * ax, f[1] + q * ay, f[2] + q * az
         _carried(speed[p], f[0] - frame[p, 0], f[1] - frame[p, 1], f[2] - frame[p, 2], v)
-        if kind == _SLIDES:
+        if kind == SLIDES:
             v[0], v[1], v[2] = v[0] + qd * ax, v[1] + qd * ay, v[2] + qd * az
-        elif kind == _TURNS:
+        elif kind == TURNS:
             v[3], v[4], v[5] = v[3] + qd * ax, v[4] + qd * ay, v[5] + qd * az
             s, c = math.sin(0.5 * q), math.cos(0.5 * q)
             x, y, z, w = f[3], f[4], f[5], f[6]
@@ -327,7 +330,7 @@ def follow(trees: Trees, k: int) -> None:
 
 
 @inlined
-def _turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float, float]:
+def turned(pose: Array, px: float, py: float, pz: float) -> tuple[float, float, float]:
     """The vector p, given in the frame ``pose``, in world axes."""
     x, y, z, w = pose[3], pose[4], pose[5], pose[6]
     cx, cy, cz = y * pz - z * py + w * px, z * px - x * pz + w * py, x * py - y * px + w * pz
@@ -359,8 +362,8 @@ def load_joints(trees: Trees, k: int) -> None:
         p, kind, joint = rows[r, 0], rows[r, 1], rows[r, 2]
         if joint >= 0:
             f, at = frame[r], load[r]
-            ax, ay, az = _turned(f, fixed[r, 0], fixed[r, 1], fixed[r, 2])
-            if kind == _SLIDES:
+            ax, ay, az = turned(f, fixed[r, 0], fixed[r, 1], fixed[r, 2])
+            if kind == SLIDES:
                 effort[joint] += ax * at[0] + ay * at[1] + az * at[2]
             else:
                 mx = at[3] - (f[1] * at[2] - f[2] * at[1])

@@ -130,7 +130,7 @@ class World(Subsystem):
         self._broken = False
         self._lifts = gravity_lifts(engine, self.joints.controls)
         self._damping = Damping(engine)
-        self._closures = Closures(engine.client, self.scene, engine.trees, engine.place_of, engine.motions, self.dt)
+        self._closures = Closures(engine)
         self._readout = Readout(engine.client, self.scene, engine.trees, engine.motions, engine.place_of)
         self._parting = Parting(engine.client, self.dt)
 
@@ -224,6 +224,8 @@ class World(Subsystem):
         # here, for a grasp that ended in this tick took the added mass back: its lift would throw a needle at 5 m/s
         self.masses.lift()
         sound = self.engine.motions.step(MAX_SPEED)
+        if sound:
+            self.problems += self._closures.project()
         self._parting.step()
         self.collisions.step(tick)
         if not sound:
@@ -370,6 +372,7 @@ class World(Subsystem):
             "collisions": self.collisions,
             "welds": self.welds,
             "parting": self._parting,
+            "closures": self._closures,
         }
 
     def close(self) -> None:
