@@ -150,7 +150,7 @@ def test_closing_loops_takes_kinetic_energy_and_adds_none(kind: str, tmp_path: P
         dt = 1e-5  # along the speeds that are left the loops stay closed
         for k, tree in enumerate(world.engine.trees):
             q, v, _ = world.engine.motions.joints(k).copy()
-            world.joints.controls[k].put(range(len(tree.axes)), q + dt * v)
+            world.joints.controls[k].set_state(range(len(tree.axes)), q + dt * v)
         world.write_state(sim.state)
         assert gaps(sim).max() < 1e-7
     sim.close()
