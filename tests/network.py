@@ -26,6 +26,8 @@ from pathlib import Path
 import pytest
 from ligature.process import end_with_parent
 
+from tests.waiting import until
+
 TUNSETIFF, TUN_WITHOUT_HEADER = 0x400454CA, 0x1001
 NEW_NETWORK = 0x40000000
 HERE, THERE = "10.231.77.1", "10.231.77.2"
@@ -58,7 +60,8 @@ def bad_network(delay: float, loss: float, seed: int = 1) -> Iterator[Far]:
         pytest.skip("no network can be made here: /dev/net/tun cannot be opened")
     there = subprocess.Popen(["unshare", "-n", "sleep", "infinity"], preexec_fn=end_with_parent, stderr=subprocess.PIPE)
     command = [sys.executable, "-m", "tests.network", str(there.pid), str(delay), str(loss), str(seed)]
-    time.sleep(0.3)
+    own = os.readlink("/proc/self/ns/net")
+    until(lambda: there.poll() is not None or os.readlink(f"/proc/{there.pid}/ns/net") != own, "a namespace")
     link = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT, preexec_fn=end_with_parent
     )

@@ -72,7 +72,16 @@ class Page:
         self.simulation.step(300)
 
 
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_needle_that_one_arm_cannot_grasp_there_is_reported(seed: int) -> None:
+    page = Page("needle_insertion", "PSM2")
+    page.scatters(seed)
+    page.presses("pick")
+    assert page.facts["stage"] == "pick" and not page.facts["busy"]
+    assert "PSM2 cannot reach the needle" in page.facts["note"]
+
+
+@pytest.mark.parametrize("seed", [0, 4])
 def test_three_presses_take_a_needle_through_tissue(seed: int) -> None:
     page = Page("needle_insertion", "PSM2")
     if seed:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -80,8 +79,7 @@ def test_hands_work_while_the_drawing_of_pictures_is_frozen(running: Served, ope
     _, pictures = page_processes(running)
     until(lambda: operator.pictures > 3, "pictures come")
     with stopped(pictures):
-        time.sleep(1.0)
-        before, begin = operator.pictures, tip(running, ARM)
+        before, begin = int(steady(lambda: operator.pictures, 1.0, what="pictures on the way")), tip(running, ARM)
         operator.holds(UP, -1.0)
         until(lambda: np.linalg.norm((tip(running, ARM) - begin)[:3, 3]) > 0.003, "the tip moves")
         operator.holds(UP, 0.0)
@@ -92,8 +90,7 @@ def test_hands_work_while_the_drawing_of_pictures_is_frozen(running: Served, ope
 def test_nothing_is_drawn_for_a_browser_that_nobody_sees(running: Served, operator: Wired) -> None:
     until(lambda: operator.pictures > 0, "pictures come")
     operator.orders("view", [False, 0, False])
-    time.sleep(1.0)
-    before = operator.pictures
+    before = int(steady(lambda: operator.pictures, 1.0, what="pictures on the way"))
     stays(lambda: operator.pictures == before, "no pictures", 1.5)
     operator.orders("view", [False, 240, False])
     until(lambda: operator.pictures > before + 2, "pictures come again")
