@@ -10,7 +10,7 @@ import sys
 
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.cli.process import Run, run_process
-from ligature.process import report
+from ligature.process import report, run_in_real_time
 from ligature.ros.node import Node
 from ligature.ros.registrations import NameTaken
 
@@ -33,7 +33,8 @@ def _serve(run: Run) -> None:
     except NameTaken as error:
         run.fail(error)
     run.await_state()
-    report("ready", node.summary)
+    real_time = run_in_real_time()
+    report("ready", f"{node.summary}{'; readings in real time' if real_time else ''}")
     node.run(run.stop, lambda: report("first-state"))
 
 

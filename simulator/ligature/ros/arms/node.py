@@ -36,10 +36,14 @@ from ligature.ros.publisher import Publisher
 PERIOD = 0.005
 """Seconds between two publications of a reading: 200 Hz, so that clients never find one older than 20 ms."""
 
+BACKLOG = 0.01
+"""Seconds of delay that are made up for: readings that were due before show the same state as the next one."""
+
 TF_PERIODS = 4
 FOLLOW_PERIODS = 20
-HEARTBEAT = 0.7
-"""Seconds between two publications of an operating state that does not change."""
+HEARTBEAT = 0.3
+"""Seconds between two publications of an operating state, switch or scale that does not change: clients take none that
+is older than a second, and one that is queued waits for the processor of a busy machine."""
 
 STALE = 0.1
 """Seconds after which a state counts as that of a resting simulation, and is reported with the time of now."""
@@ -154,6 +158,8 @@ class ArmsNode:
         ended finds readings that are no older than its end: the bus holds a state before it reports the state's events.
         """
         self._due = max(self._due + PERIOD, now + PERIOD / 5)
+        if self._due < now - BACKLOG:
+            self._due = now + PERIOD
         self._count += 1
         for part in self._yielded():
             self._fall_silent(part)
