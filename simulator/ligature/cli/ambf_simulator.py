@@ -41,6 +41,7 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--arm", action="append", default=[], type=_arm, help="NAME=KIND:BODY:TOOL (not an AMBF flag)")
     flags.add_argument("--only", default="", help="names of the arms that are there (not an AMBF flag)")
     flags.add_argument("--no-masters", action="store_true", help="no master arms (not an AMBF flag)")
+    flags.add_argument("--base-frames", default="", help="ECM: poses of arms relative to it (not an AMBF flag)")
     flags.add_argument("--src-crtk", action="store_true", help="arms under /CRTK too (not an AMBF flag)")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument(
@@ -91,6 +92,7 @@ def options_of(arguments: list[str]) -> RunOptions:
         min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
         window=bool(given.g), notes=_notes(given), devices=devices, only=only, masters=not given.no_masters,
+        base_frames=given.base_frames,
     )  # fmt: skip
 
 

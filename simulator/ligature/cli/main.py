@@ -128,6 +128,9 @@ def run(
     masters: Annotated[
         bool, typer.Option("--masters/--no-masters", help="With master arms, or without: a real console has its own.")
     ] = True,
+    base_frames: Annotated[
+        str, typer.Option(help="Arm in the frame of whose tip the others give their poses: ECM, as a dVRK with a cart.")
+    ] = "",
     src_crtk: Annotated[
         bool, typer.Option("--src-crtk", help="Publish arms under /CRTK too, as the challenge's node does.")
     ] = False,
@@ -174,6 +177,7 @@ def run(
         task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
         devices=indices(devices) or (), soft=tuple(soft or ()), only=names_of_arms, masters=masters,
+        base_frames=base_frames,
     )  # fmt: skip
     supervise(options)
 

@@ -29,7 +29,9 @@ def _serve(run: Run) -> None:
         if run.stop.wait(MASTER_NAP):
             sys.exit(0)
     try:
-        node = Node(run.scene, run.block, options.min_hz, options.max_hz, options.names, options.src_crtk)
+        node = Node(
+            run.scene, run.block, options.min_hz, options.max_hz, options.names, options.src_crtk, options.base_frames
+        )
     except NameTaken as error:
         run.fail(error)
     run.await_state()

@@ -45,8 +45,9 @@ class Node:
     """The simulator on ROS; raises `ligature.ros.registrations.NameTaken` when another one is there already."""
 
     def __init__(
-        self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool
-    ) -> None:
+        self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool,
+        reference: str = "",
+    ) -> None:  # fmt: skip
         self._scene = scene
         self._state = new_state(scene)
         self._block = block
@@ -64,7 +65,7 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
-        self._arms = ArmsNode(scene, self._block, self._outbox, challenge)
+        self._arms = ArmsNode(scene, self._block, self._outbox, challenge, reference)
         arms = ", ".join(outlet.description.name for outlet in self._arms.outlets) or "none"
         self.summary = f"{2 * len(outlets) + len(tissues)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block, lambda: tissue.statuses(scene, self._state[0]))
