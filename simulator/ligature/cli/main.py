@@ -526,7 +526,14 @@ def score(
 
 @app.command()
 def teleop(
-    config: Annotated[Path, typer.Argument(help="Teleoperation file, or a launch file with input devices.")],
+    config: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Argument(help="Teleoperation file, or a launch file with input devices; none with --device."),
+    ] = None,
+    device: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(help="Device that needs no file, such as touch, or touch=/arm1/ for its topics; repeatable."),
+    ] = None,
     record: Annotated[Optional[Path], typer.Option(help="File to record all device input to.")] = None,  # noqa: UP045
     replay: Annotated[Optional[Path], typer.Option(help="Recorded file to play back instead of the devices.")] = None,  # noqa: UP045
     calibrate: Annotated[Optional[str], typer.Option(help="Device to calibrate.")] = None,  # noqa: UP045
@@ -539,7 +546,7 @@ def teleop(
     from ligature.cli.teleop import teleop as run_teleop
 
     console = Console(highlight=False, soft_wrap=True)
-    raise typer.Exit(run_teleop(config, record, replay, calibrate, check, indices(devices), console))
+    raise typer.Exit(run_teleop(config, device or (), record, replay, calibrate, check, indices(devices), console))
 
 
 DatasetFile = Annotated[Path, typer.Argument(help="HDF5 dataset of demo, replay or DatasetWriter.")]

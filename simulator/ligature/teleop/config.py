@@ -27,7 +27,7 @@ from ligature.teleop.pairing import Settings
 
 Array = NDArray[np.float64]
 
-TOPICS = {"hydra": "/hydra_calib", "joy": "/joy", "spacenav": "/spacenav/joy", "keyboard": ""}
+TOPICS = {"hydra": "/hydra_calib", "joy": "/joy", "spacenav": "/spacenav/joy", "keyboard": "", "mouse": ""}
 """Topics of devices whose name does not show it."""
 
 NOBODY = "none"

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 HARDWARE = (
     ("mtm", "mtm"), ("omni", "touch"), ("phantom", "touch"), ("touch", "touch"), ("geomagic", "touch"),
     ("falcon", "touch"), ("hydra", "hydra"), ("spacenav", "spacenav"), ("spacemouse", "spacenav"), ("joy", "joy"),
-    ("pad", "joy"), ("keyboard", "keyboard"),
+    ("pad", "joy"), ("keyboard", "keyboard"), ("mouse", "mouse"),
 )  # fmt: skip
 """Parts of hardware names, in lower case, and the kinds of devices that they mean."""
 

@@ -43,6 +43,10 @@ class Device:
     def feel(self, force: Array) -> None:
         """Press the hand with a force (3,) in the device's axes, in N."""
 
+    def make_ready(self) -> str:
+        """Ask for what the device needs before a hand can drive with it; what it waits for, empty when nothing."""
+        return ""
+
     def begin(self) -> None:
         """The hand begins to drive."""
 
