@@ -57,11 +57,11 @@ def drive(chunks: Sequence[bytes], **options: float) -> list[Reading]:
         while select.select([end], [], [], 0.02)[0]:  # a terminal hands on what is typed when it comes to it
             device.poll(0.01 * k)
     device.close()
-    told = b""
-    while not told.endswith(mouse.REPORT_OFF):
-        assert select.select([user], [], [], 5.0)[0], "the terminal is told to report the mouse no more"
-        told += os.read(user, 1000)
-    assert told.startswith(mouse.REPORT_ON)
+    shown = b""
+    while not shown.endswith(mouse.REPORT_OFF):
+        assert select.select([user], [], [], 5.0)[0], "the terminal reports the mouse no more"
+        shown += os.read(user, 1000)
+    assert shown.startswith(mouse.REPORT_ON)
     os.close(user)
     os.close(end)
     return readings

@@ -30,7 +30,8 @@ class RunOptions:
     the start, ``devices`` are indices of the input devices whose proxies are there, ``soft`` bodies
     that are soft tissue, ``only`` the names of the arms that are there (empty: all), ``masters`` whether
     master arms are, ``base_frames`` the arm in the frame of whose tip the others give their poses (empty: each in its
-    base).
+    base). ``haptic_rate`` in Hz (0: that of the device) and ``haptic_forces`` (None: as teleoperation has them) are
+    left to teleoperation as parameters.
     """
 
     scene: str
@@ -58,6 +59,8 @@ class RunOptions:
     only: tuple[str, ...] = ()
     masters: bool = True
     base_frames: str = ""
+    haptic_rate: float = 0.0
+    haptic_forces: bool | None = None
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""

@@ -9,8 +9,9 @@ from __future__ import annotations
 import gc
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,10 @@ from ligature.ros.schedule import Key, Outlet, Schedule
 from ligature.ros.start import start_node
 
 DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
+HAPTICS = "ligature/haptics"
+"""Parameter from which teleoperation reads its haptic ``rate`` in Hz and whether it sends ``forces``."""
+COUNTING = 1.0
+"""Seconds over which pictures are counted."""
 HOUSEKEEPING = 0.02
 """Seconds between looks at watchdogs and the physics process."""
 
@@ -46,7 +51,7 @@ class Node:
 
     def __init__(
         self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool,
-        reference: str = "",
+        reference: str = "", haptics: Mapping[str, Any] = MappingProxyType({}), devices: int = 0,
     ) -> None:  # fmt: skip
         self._scene = scene
         self._state = new_state(scene)
@@ -57,7 +62,10 @@ class Node:
         start_node(name)
         self._outbox = Outbox(self._ring)
         self._reception = Reception(scene, self._outbox, self._wake)
-        self._world = conversion.WorldTemplate()
+        self._world = conversion.WorldTemplate(devices)
+        self._frames = 0, time.monotonic()
+        if haptics:
+            rospy.set_param(f"{scene.world.root}{HAPTICS}", dict(haptics))
         self._publishers: list[Publisher] = []
         outlets = self._advertise(min_hz, max_hz, policy)
         tissues = self._advertise_tissues(outlets)
@@ -161,6 +169,14 @@ class Node:
         figures["published"] += np.uint64(sent)
         figures["publish_late"] += np.uint64(missed)
 
+    def _count_pictures(self, now: float) -> None:
+        """Pictures per second, for the world's state."""
+        before, since = self._frames
+        if now - since >= COUNTING:
+            drawn = int(self._block.figures["frames"][0])
+            self._world.pictures_hz = (drawn - before) / (now - since)
+            self._frames = drawn, now
+
     def _keep_house(self, now: float) -> bool:
         """Signs of life, watchdogs, diagnostics; False when the physics process is gone."""
         self._ring.beat()
@@ -171,6 +187,7 @@ class Node:
         self._diagnostics.faults = self._arms.faults
         self._diagnostics.rivals = self._arms.rivals
         self._world.loop_hz = float(figures["loop_hz"][0])
+        self._count_pictures(now)
         self._diagnostics.publish(now)
         return self._block.active
 

@@ -81,14 +81,14 @@ class Adapter(Device):
         self._absolute.publish(True)
         self._weightless.publish(True)
         self._unlock.publish()
-        self.feel(np.zeros(3))
+        self.feel(np.zeros(6))
 
-    def feel(self, force: Array) -> None:
-        """Press the hand, in axes of the console."""
+    def feel(self, wrench: Array) -> None:
+        """Press and turn the hand, in axes of the console."""
         message = WrenchStamped()
         message.header.stamp = rospy.Time.now()
-        f = message.wrench.force
-        f.x, f.y, f.z = force.tolist()
+        f, t = message.wrench.force, message.wrench.torque
+        f.x, f.y, f.z, t.x, t.y, t.z = wrench.tolist()
         self._force.publish(message)
 
     def turn_to(self, R: Array) -> bool:
