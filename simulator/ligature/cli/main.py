@@ -116,7 +116,7 @@ def run(
     models: Models = None,
     root: Roots = None,
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
+    speed: Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)] = 1.0,
     namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
     min_hz: Annotated[int | None, typer.Option("--min-hz", help="Publishing rate without commands.", min=1)] = None,  # noqa: UP045
     max_hz: Annotated[int | None, typer.Option("--max-hz", help="Publishing rate with commands.", min=1)] = None,  # noqa: UP045
@@ -202,7 +202,7 @@ def cockpit(
     root: Roots = None,
     at: CockpitAddress = None,
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
+    speed: Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)] = 1.0,
     devices: Devices = None,
 ) -> None:
     """Run a scene with a live web page and without ROS; see `run --cockpit` for both.

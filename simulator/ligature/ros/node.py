@@ -30,6 +30,7 @@ from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
 from ligature.ros.intake import oversized
 from ligature.ros.master import NO_ANSWER, MasterWatch, node_name
+from ligature.ros.pace import PaceServices
 from ligature.ros.parameters import Parameters
 from ligature.ros.publisher import Publisher
 from ligature.ros.reception import Reception
@@ -73,6 +74,7 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
+        PaceServices(f"{scene.world.root}ligature", scene, self._block, self._outbox.push)
         self._arms = ArmsNode(scene, self._block, self._outbox, challenge, reference)
         arms = ", ".join(outlet.description.name for outlet in self._arms.outlets) or "none"
         self.summary = f"{2 * len(outlets) + len(tissues)} topics of objects; arms: {arms}"
