@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[2]
 PERIOD = 0.005
 TIMEOUT = 0.02
+SETTLING = 0.5
+"""Seconds before intervals count."""
 READINGS = (
     ("measured_cp", "geometry_msgs/PoseStamped"), ("setpoint_cp", "geometry_msgs/PoseStamped"),
     ("measured_js", "sensor_msgs/JointState"), ("setpoint_js", "sensor_msgs/JointState"),
@@ -130,10 +132,13 @@ def _intervals(master: str, seconds: float, pictures: bool) -> tuple[dict[str, A
     for number in by_number:
         poll.register(number, select.EPOLLIN)
     run_in_real_time()
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        for number, _ in poll.poll(0.1):
-            by_number[number].read()
+    for length in (SETTLING, seconds):
+        for reader in every:
+            reader.times.clear()  # what came while others were connected arrives at once
+        end = time.monotonic() + length
+        while time.monotonic() < end:
+            for number, _ in poll.poll(0.1):
+                by_number[number].read()
     for reader in every:
         reader.link.close()
     silent = [topic for topic, pair in readers.items() if not all(reader.times for reader in pair)]

@@ -43,6 +43,8 @@ HAPTICS = "ligature/haptics"
 """Parameter from which teleoperation reads its haptic ``rate`` in Hz and whether it sends ``forces``."""
 COUNTING = 1.0
 """Seconds over which pictures are counted."""
+REST = 0.0002
+"""Seconds of sleep after each publication: of a thread in real time that never sleeps nobody gets the processor."""
 HOUSEKEEPING = 0.02
 """Seconds between looks at watchdogs and the physics process."""
 
@@ -102,6 +104,7 @@ class Node:
                 self._woken.wait(nap)
             elif self._block.read(self._state):
                 self._publish(now)
+                time.sleep(REST)
                 if not published:
                     published = True
                     gc.freeze()  # what a start has made stays: each look at it would hold up all topics for 50 ms
