@@ -107,10 +107,30 @@ def test_a_block_that_is_just_being_made_is_not_mistaken_for_another() -> None:
     empty.unlink()
 
 
-def test_a_reader_gives_up_on_a_writer_that_died_while_writing(block: Block) -> None:
+def test_a_writer_that_stops_in_the_middle_of_a_state_holds_up_no_reader(block: Block) -> None:
+    """As one does that the machine takes the processor from, or that dies there."""
+    block.write(np.ones(1, DTYPE))
+    reader, into = Block.attach(NAME, DTYPE), np.zeros(1, DTYPE)
+    half = np.full(1, 2, DTYPE).view("u1")
+    block._states[(int(block.figures["sequence"][0]) + 1) % 2][: len(half) // 2] = half[: len(half) // 2]
+    assert reader.read(into) and into.tobytes() == np.ones(1, DTYPE).tobytes()
+    assert reader.retried == 0
+    reader.close()
+
+
+def test_a_reader_gives_up_on_a_writer_that_is_always_faster(block: Block, monkeypatch: pytest.MonkeyPatch) -> None:
     block.write(np.ones(1, DTYPE))
     reader = Block.attach(NAME, DTYPE)
-    block.figures["sequence"] += 1
+    monkeypatch.setattr(time, "sleep", lambda _: None)
+
+    class Fast:
+        """A place in which each copy meets a state that was finished meanwhile."""
+
+        def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+            block.write(np.ones(1, DTYPE))
+            return np.zeros(DTYPE.itemsize, "u1")
+
+    reader._states = [Fast(), Fast()]  # type: ignore[list-item]
     assert not reader.read(np.zeros(1, DTYPE))
     assert reader.retried == RETRIES
     reader.close()

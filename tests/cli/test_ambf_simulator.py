@@ -32,6 +32,17 @@ def test_every_flag_has_its_long_name_too() -> None:
 def test_input_devices_are_taken_with_their_proxies() -> None:
     assert options("-l 2 -i 0,3").devices == (0, 3)
     assert options("-l 2").devices == ()
+    assert (
+        options("-n 3").devices == (0, 1, 2) and options("-n 3 -i 1").devices == (1,) and options("-n 0").devices == ()
+    )
+
+
+def test_haptic_flags_are_left_to_teleoperation() -> None:
+    run = options("-d 500 -e 0")
+    assert (run.haptic_rate, run.haptic_forces) == (500.0, False)
+    assert (
+        options("-e 1").haptic_forces is True and options("").haptic_forces is None and options("").haptic_rate == 0.0
+    )
 
 
 def test_blanks_in_the_list_of_indices_are_allowed() -> None:
@@ -53,9 +64,9 @@ def test_a_prefix_and_a_speed_are_taken() -> None:
 
 
 def test_flags_without_effect_are_accepted_and_reported() -> None:
-    run = options("-t 0 -g 1 -n 2 --plugins 'a.so, b.so'")
+    run = options("-t 0 -g 1 -f 1 --plugins 'a.so, b.so'")
     assert run.notes == (
-        "-n (number of input devices) has no effect here",
+        "-f (fixed haptic step) has no effect here",
         "--plugins (simulator plug-ins) has no effect here",
         "-t 0: the step is fixed here anyway; simulated time falls behind on a machine that is too slow",
     )

@@ -169,3 +169,60 @@ def test_a_body_follows_the_mouse_against_its_weight_and_is_let_go(tmp_path: Pat
     assert sent[-1] == Release("body", simulation.bodies["Ball"].body.index) and not viewer.holds
     simulation.step(300)
     assert simulation.bodies["Ball"].pose[2] < wanted[1] - 0.2
+
+
+@pytest.mark.parametrize("view", ["camera", "free"])
+def test_an_arm_goes_where_the_mouse_goes(view: str) -> None:
+    """Whichever way the view looks: the tip's pixel moves as the mouse did, the wheel takes it away, a turn turns it."""
+    simulation, sent = Simulation(ligature.load(SMALL)), []
+    try:
+        viewer = Viewer(simulation.scene, lambda message: (sent.append(message), simulation.apply(message)))
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    viewer.picture(simulation.state, SIZE, Figures())
+    viewer.move_arm(10, 0)
+    assert viewer.arm == "" and sent == [], "no arm is chosen"
+    viewer.key("A")
+    assert viewer.arm == "PSM1"
+    psm = simulation.arms["PSM1"]
+    for _ in range(400):
+        simulation.step(10)
+        if psm.is_homed and not psm.is_busy:
+            break
+    if view == "free":
+        viewer.orbit(150, 40)
+
+    def seen() -> np.ndarray:
+        """The tip by the eye: right, down, away."""
+        viewer.picture(simulation.state, SIZE, Figures())
+        return ((viewer._view.view @ np.append(viewer._arm._tip(simulation.state)[:3, 3], 1.0)) * [1, -1, -1, 1])[:3]
+
+    def steps(act: Callable[[], None], count: int) -> None:
+        for _ in range(count):
+            act()
+            simulation.step(20)
+            viewer.picture(simulation.state, SIZE, Figures())
+        simulation.step(200)
+
+    start = seen()
+    steps(lambda: viewer.move_arm(0.5, 0.25), 20)
+    moved, reach = seen() - start, start[2] if start[2] > 0 else np.linalg.norm(start)
+    f = viewer._view.intrinsics[0, 0]
+    assert moved == pytest.approx([10.0 * reach / f, 5.0 * reach / f, 0.0], rel=0.1, abs=3e-4)
+    before = seen()
+    steps(lambda: viewer.advance_arm(1.0), 2)
+    assert seen() - before == pytest.approx([0.0, 0.0, 0.004], abs=3e-4)
+    before, q = seen(), psm.setpoint_cp()[3:]
+    steps(lambda: viewer.turn_arm(4.0, 0.0), 5)
+    assert seen() == pytest.approx(before, abs=3e-4)
+    assert 2.0 * np.arccos(min(abs(float(q @ psm.setpoint_cp()[3:])), 1.0)) == pytest.approx(0.1, abs=0.02)
+    viewer.key("G")
+    simulation.step(1500)
+    closed = psm.jaw.setpoint_js().position[0]
+    viewer.picture(simulation.state, SIZE, Figures())
+    viewer.key("G")
+    simulation.step(1500)
+    assert psm.jaw.setpoint_js().position[0] - closed > 0.5
+    viewer.key("A")
+    viewer.key("A")
+    assert viewer.arm == ""

@@ -17,6 +17,7 @@ from ligature.bus.pacing import Throttle
 from ligature.render import RenderUnavailable
 from ligature.render.viewer import Figures, Viewer
 from ligature.render.window import SIZE, Window
+from ligature.robots.commands import StateCommand
 
 from tests.render.screen import Hands, Screen, xvfb
 
@@ -92,6 +93,16 @@ def test_the_window_shows_the_picture_and_passes_mouse_and_keys_on(
         wait(lambda: viewer.camera is None, turn)
         hands.button(1, False)
         assert (turn() != before).any()
+        hands.key("A")
+        wait(lambda: viewer.arm == "PSM1", turn)
+        count = len(sent)
+        assert isinstance(sent[-1], StateCommand), "the arm is asked for power and homing"
+        hands.key("Shift", True)
+        hands.button(1, True)
+        hands.move(400, 340)
+        wait(lambda: len(sent) > count, turn)
+        hands.button(1, False)
+        hands.key("Shift", False)
         assert not window.closed
     finally:
         window.close()

@@ -184,6 +184,44 @@ def test_known_points_project_onto_their_pixels_through_tf_and_camera_info(
         assert baseline == pytest.approx({"L": 0.0, "R": 0.06}[side])
 
 
+def test_facts_project_known_points_onto_their_pixels_and_follow_the_camera(
+    simulator: Program, node: Any, listen: Callable[..., Any], publish: Callable[..., Any]
+) -> None:
+    """A point of the world goes through `T_camera_world` and K to the pixel where the picture has it; so says no tf."""
+    from ambf_msgs.msg import CameraCmd
+    from sensor_msgs.msg import CameraInfo
+
+    name = f"{NS}/cameraL/facts"
+    until(lambda: node.has_param(f"{name}/K"), "the facts are written", 20.0)
+    found = node.get_param(name)
+    info = listen(f"{NS}/cameraL/CameraInfo", CameraInfo).wait()
+    assert found["K"] == pytest.approx(info.K) and (found["width"], found["height"]) == (info.width, info.height)
+    assert found["frame"] == info.header.frame_id and found["pixel_radius"] == pytest.approx(0.5 / info.K[0])
+    K, T = np.reshape(found["K"], (3, 3)), np.reshape(found["T_camera_world"], (4, 4))
+    for x, y, z in BEADS.values():
+        seen = (T @ [x, y, z, 1.0])[:3]
+        # the camera is at y = -0.03 and looks along -x, with z up
+        assert seen == pytest.approx([y + 0.03, -z, -x], abs=1e-6)
+        u, v, _ = K @ seen / seen[2]
+        assert 0.0 < u < info.width and 0.0 < v < info.height
+    place = publish(f"{NS}/cameraL/Command", CameraCmd)
+    command = CameraCmd(enable_position_controller=True)
+    command.pose.position.y, command.pose.orientation.w = 0.1, 1.0
+
+    def moved() -> bool:
+        place.publish(command)
+        return abs(np.reshape(node.get_param(name)["T_camera_world"], (4, 4))[0, 3] + 0.1) < 1e-6
+
+    until(moved, "the facts follow", 20.0, 0.05)
+    command.pose.position.y = -0.03
+    until(
+        lambda: place.publish(command) or abs(node.get_param(name)["T_camera_world"][3] - 0.03) < 1e-6,
+        "back",
+        20.0,
+        0.05,
+    )
+
+
 def test_the_eyes_of_a_stereo_camera_are_a_pair(simulator: Program, listen: Callable[..., Any]) -> None:
     from sensor_msgs.msg import CameraInfo, Image
     from tf2_msgs.msg import TFMessage

@@ -12,6 +12,7 @@ import typer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.cli.main import app
+from ligature.teleop.ready import names
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[2]
@@ -80,7 +81,7 @@ def packages(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("file", sorted(FILES))
 def test_every_option_of_the_command_is_an_argument(file: str) -> None:
     text = (ROOT / "launch" / f"{file}.launch").read_text()
-    declared = set(re.findall(r'<arg name="(\w+)"[^>]* doc="[^"]+"', text)) - {"options"}
+    declared = set(re.findall(r'<arg name="(\w+)"[^>]* doc="[^"]+"', text)) - {"options", "terminal"}
     command, _ = FILES[file]
     options = {RENAMED.get(p.name, p.name) for p in COMMANDS[command].params if not getattr(p, "hidden", False)}
     assert declared == options
@@ -103,6 +104,29 @@ def test_what_is_given_arrives(file: str) -> None:
             assert value == chosen.get(name, plain[name]) or (not value and not plain[name] and name not in chosen)
 
     arrives()
+
+
+@pytest.mark.parametrize("device", names())
+def test_every_ready_device_has_a_launch_file_with_its_driver(device: str) -> None:
+    from roslaunch.config import ROSLaunchConfig
+    from roslaunch.xmlloader import XmlLoader
+
+    def nodes(*argv: str) -> dict[str, Any]:
+        config = ROSLaunchConfig()
+        path = ROOT / "launch" / f"teleop_{device}.launch"
+        XmlLoader().load(str(path), config, argv=list(argv), verbose=False)
+        return {node.type: node for node in config.nodes}
+
+    found = nodes()
+    assert shlex.split(found["ligature_command"].args) == ["teleop", "--device", device]
+    if device in ("keyboard", "mouse"):
+        assert found["ligature_command"].launch_prefix == "xterm -e" and len(found) == 1
+    elif device == "mtm":
+        assert len(found) == 1
+    else:
+        assert len(found) == 2 and len(nodes("driver:=false")) == 1
+        other = nodes("topic:=/other/")["ligature_command"].args
+        assert shlex.split(other) == ["teleop", "--device", f"{device}=/other/"]
 
 
 @pytest.mark.parametrize("file", ["suturing_small", "suturing_task", "cockpit"])

@@ -146,7 +146,7 @@ def test_a_pen_presses_back_with_its_driver_s_messages(
     monkeypatch.setitem(sys.modules, "omni_msgs.msg", package)
     felt = listen("/pressed/force_feedback", made)
     device, _ = adapter("touch", "/pressed/")
-    until(lambda: device.feel(np.array([0.1, 0.2, 0.3])) or felt.messages)
+    until(lambda: device.feel(np.array([0.1, 0.2, 0.3, 0, 0, 0])) or felt.messages)
     force = felt.messages[-1].force
     assert (force.x, force.y, force.z) == pytest.approx((0.1, 0.2, 0.3))
     device.close()

@@ -17,8 +17,8 @@ class Motors(Device):
         super().__init__(lambda reading: None)
         self.forces: list[np.ndarray] = []
 
-    def feel(self, force: np.ndarray) -> None:
-        self.forces.append(force)
+    def feel(self, wrench: np.ndarray) -> None:
+        self.forces.append(wrench)
 
 
 def test_a_push_to_the_right_of_the_picture_is_felt_to_the_right_by_the_device() -> None:
@@ -26,21 +26,31 @@ def test_a_push_to_the_right_of_the_picture_is_felt_to_the_right_by_the_device()
     haptics = Haptics(FeedbackSettings(gain=0.5, damping=0.0), motors, Calibration(axes_of_words("left", "up", "away")))
     for k in range(3):
         hand = Hand(0.01 * k, frame(np.eye(3), (0, 0, 0)))
-        haptics.press(hand, np.array([2.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.1]))
-    assert motors.forces[-1] == pytest.approx([-1.0, 0.0, 0.1])
+        haptics.press(hand, np.array([2.0, 0, 0, 9, 0, 0]), np.array([0.0, 0, 0.1, 0, 0, 0]))
+    assert motors.forces[-1] == pytest.approx([-1.0, 0.0, 0.1, 0.0, 0.0, 0.0])
     haptics.rest()
-    assert motors.forces[-1] == pytest.approx(np.zeros(3))
+    assert motors.forces[-1] == pytest.approx(np.zeros(6))
     count = len(motors.forces)
     haptics.rest()
     assert len(motors.forces) == count
 
 
-def test_forces_go_out_five_hundred_times_a_second_at_most() -> None:
+def test_torques_are_felt_with_their_gain_about_the_device_s_axes_and_within_their_limit() -> None:
+    motors = Motors()
+    settings = FeedbackSettings(torque_gain=0.5, torque_limit=0.2, torque_damping=0.0)
+    haptics = Haptics(settings, motors, Calibration(axes_of_words("left", "up", "away")))
+    for k, torque in enumerate((0.0, 0.1, 0.9)):
+        haptics.press(Hand(0.01 * k, np.eye(4)), np.array([0.0, 0, 0, torque, 0, 0]), np.zeros(6))
+    assert motors.forces[1][3:] == pytest.approx([-0.05, 0.0, 0.0])
+    assert motors.forces[2][3:] == pytest.approx([-0.2, 0.0, 0.0])
+
+
+def test_forces_go_out_a_thousand_times_a_second_at_most() -> None:
     motors = Motors()
     haptics = Haptics(FeedbackSettings(), motors, Calibration())
     for k in range(1000):
-        haptics.press(Hand(1e-4 * k, np.eye(4)), np.zeros(3), np.zeros(3))
-    assert 40 <= len(motors.forces) <= 50
+        haptics.press(Hand(1e-4 * k, np.eye(4)), np.zeros(6), np.zeros(6))
+    assert 90 <= len(motors.forces) <= 110
 
 
 def test_contacts_below_the_deadband_are_not_felt() -> None:

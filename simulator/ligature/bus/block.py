@@ -1,9 +1,10 @@
-"""The shared memory block: newest state under a sequence lock, figures, command rings, events.
+"""The shared memory block: newest state in one of two places, figures, command rings, events.
 
-The writer never waits. A reader copies the state and tries again when the writer was at it
-meanwhile. That rests on stores and loads being seen in program order, as on x86-64. Files live in
-``/dev/shm`` and carry the supervisor's process id, so that the leftovers of a killed run are found
-and removed by the next one. Times are seconds on the monotonic clock.
+Nobody waits for anybody. The writer fills the older of two places and then counts one state more; a reader copies the
+newest one and tries again when another was finished meanwhile, so a writer that the machine stops in the middle of a
+state holds up no reader, whatever their priorities. That rests on stores and loads being seen in program order, as on
+x86-64. Files live in ``/dev/shm`` and carry the supervisor's process id, so that the leftovers of a killed run are
+found and removed by the next one. Times are seconds on the monotonic clock.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ time at which it was noted last on the monotonic clock, 0 for none.
 
 _STATE_AT = 4096
 RETRIES = 1000
-"""Attempts of one reading; the writer is at it for a microsecond of every update."""
+"""Attempts of one reading; one fails when a state is finished while another is copied, which takes microseconds."""
 
 PHYSICS_TIMEOUT = 5.0
 """Seconds without a sign of life of the physics process after which the other processes of its run end."""
@@ -85,7 +86,8 @@ class Block:
         self.path = path
         self._owner = owner
         self._dtype = dtype
-        ring_at = _STATE_AT + -(-dtype.itemsize // 64) * 64
+        state_bytes = -(-dtype.itemsize // 64) * 64
+        ring_at = _STATE_AT + 2 * state_bytes
         log_at = ring_at + RING_BYTES * len(PRODUCERS)
         size = log_at + LOG_BYTES
         descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if owner else 0), 0o600)
@@ -101,7 +103,9 @@ class Block:
         finally:
             os.close(descriptor)
         self.figures: NDArray[np.void] = np.ndarray(1, FIGURES, self._map, 0)
-        self._state: NDArray[np.uint8] = np.ndarray(dtype.itemsize, "u1", self._map, _STATE_AT)
+        self._states: list[NDArray[np.uint8]] = [
+            np.ndarray(dtype.itemsize, "u1", self._map, _STATE_AT + place * state_bytes) for place in range(2)
+        ]
         self.retried = 0
         self.rings = {
             name: Ring(memoryview(self._map)[ring_at + i * RING_BYTES : ring_at + (i + 1) * RING_BYTES])
@@ -148,26 +152,25 @@ class Block:
     @property
     def filled(self) -> bool:
         """Whether the first state has been written."""
-        return int(self.figures["sequence"][0]) >= 2
+        return int(self.figures["sequence"][0]) > 0
 
     def write(self, state: StateRecord) -> None:
         """Publish ``state`` (1,) as the newest."""
-        self.figures["sequence"] += 1
-        self._state[:] = state.view("u1")
-        self.figures["sequence"] += 1
+        following = int(self.figures["sequence"][0]) + 1
+        self._states[following % 2][:] = state.view("u1")
+        self.figures["sequence"] = following
 
     def read(self, into: StateRecord) -> bool:
-        """Copy the newest state into ``into`` (1,); False when the writer was at it `RETRIES` times in a row.
+        """Copy the newest state into ``into`` (1,); False when one was finished meanwhile `RETRIES` times in a row.
 
-        ``retried`` counts the attempts that met the writer.
+        ``retried`` counts the attempts in which one was.
         """
         sequence, target = self.figures["sequence"], into.view("u1")
         for _ in range(RETRIES):
-            before = int(sequence[0])
-            if before % 2 == 0:
-                target[:] = self._state
-                if int(sequence[0]) == before:
-                    return True
+            newest = int(sequence[0])
+            target[:] = self._states[newest % 2]
+            if int(sequence[0]) == newest:
+                return True
             self.retried += 1
             time.sleep(0)
         return False
@@ -200,7 +203,7 @@ class Block:
         for ring in self.rings.values():
             ring.release()
         self.events.release()
-        del self.figures, self._state
+        del self.figures, self._states
         self._map.close()
         if self._owner:
             self.path.unlink(missing_ok=True)

@@ -12,10 +12,7 @@ MAX_UPDATE_RATE = 1000.0
 """Updates per second of one tick each: no update can be shorter."""
 
 _WITHOUT_EFFECT = {
-    ("-d", "--htx_frequency"): "haptic rate",
     ("-f", "--fixed_htx_timestep"): "fixed haptic step",
-    ("-e", "--enableforces"): "force feedback of devices",
-    ("-n", "--ndevs"): "number of input devices",
     ("--plugins",): "simulator plug-ins",
 }
 
@@ -41,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--arm", action="append", default=[], type=_arm, help="NAME=KIND:BODY:TOOL (not an AMBF flag)")
     flags.add_argument("--only", default="", help="names of the arms that are there (not an AMBF flag)")
     flags.add_argument("--no-masters", action="store_true", help="no master arms (not an AMBF flag)")
+    flags.add_argument("--base-frames", default="", help="ECM: poses of arms relative to it (not an AMBF flag)")
     flags.add_argument("--src-crtk", action="store_true", help="arms under /CRTK too (not an AMBF flag)")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
     flags.add_argument(
@@ -48,6 +46,12 @@ def parser() -> argparse.ArgumentParser:
         help="publish pictures of all cameras, or of none; by default as the scene sets it (not an AMBF flag)",
     )  # fmt: skip
     flags.add_argument("--root", action="append", default=[], help="further folder of scene files (not an AMBF flag)")
+    flags.add_argument(
+        "-d", "--htx_frequency", dest="d", type=float, default=0.0,
+        help="most forces per second that `ligature teleop` sends to a device",
+    )  # fmt: skip
+    flags.add_argument("-e", "--enableforces", dest="e", type=_switch, help="0: `ligature teleop` sends no forces")
+    flags.add_argument("-n", "--ndevs", dest="n", type=int, help="the first N input devices, where there is no -i")
     for words, what in _WITHOUT_EFFECT.items():
         flags.add_argument(*words, dest=words[0].lstrip("-"), help=f"{what}; accepted, without effect")
     return flags
@@ -75,6 +79,12 @@ def options_of(arguments: list[str]) -> RunOptions:
         devices = model_indices(given.i)
     except ValueError as error:
         flags.error(f"-i {error}")
+    if given.n is not None and given.n < 0:
+        flags.error(f"-n {given.n}: there cannot be fewer than no devices")
+    if given.n is not None and not given.i:
+        devices = tuple(range(given.n))
+    if not 0.0 <= given.d < float("inf"):
+        flags.error("-d must be a rate in Hz")
     try:
         only = arm_names(given.only)
     except ValueError as error:
@@ -91,6 +101,7 @@ def options_of(arguments: list[str]) -> RunOptions:
         min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
         window=bool(given.g), notes=_notes(given), devices=devices, only=only, masters=not given.no_masters,
+        base_frames=given.base_frames, haptic_rate=given.d, haptic_forces=given.e,
     )  # fmt: skip
 
 

@@ -116,7 +116,7 @@ def run(
     models: Models = None,
     root: Roots = None,
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
+    speed: Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)] = 1.0,
     namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
     min_hz: Annotated[int | None, typer.Option("--min-hz", help="Publishing rate without commands.", min=1)] = None,  # noqa: UP045
     max_hz: Annotated[int | None, typer.Option("--max-hz", help="Publishing rate with commands.", min=1)] = None,  # noqa: UP045
@@ -128,6 +128,9 @@ def run(
     masters: Annotated[
         bool, typer.Option("--masters/--no-masters", help="With master arms, or without: a real console has its own.")
     ] = True,
+    base_frames: Annotated[
+        str, typer.Option(help="Arm in the frame of whose tip the others give their poses: ECM, as a dVRK with a cart.")
+    ] = "",
     src_crtk: Annotated[
         bool, typer.Option("--src-crtk", help="Publish arms under /CRTK too, as the challenge's node does.")
     ] = False,
@@ -174,6 +177,7 @@ def run(
         task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
         devices=indices(devices) or (), soft=tuple(soft or ()), only=names_of_arms, masters=masters,
+        base_frames=base_frames,
     )  # fmt: skip
     supervise(options)
 
@@ -198,7 +202,7 @@ def cockpit(
     root: Roots = None,
     at: CockpitAddress = None,
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", help="Simulated time over wall time.", min=0.001)] = 1.0,
+    speed: Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)] = 1.0,
     devices: Devices = None,
 ) -> None:
     """Run a scene with a live web page and without ROS; see `run --cockpit` for both.
@@ -522,7 +526,14 @@ def score(
 
 @app.command()
 def teleop(
-    config: Annotated[Path, typer.Argument(help="Teleoperation file, or a launch file with input devices.")],
+    config: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Argument(help="Teleoperation file, or a launch file with input devices; none with --device."),
+    ] = None,
+    device: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(help="Device that needs no file, such as touch, or touch=/arm1/ for its topics; repeatable."),
+    ] = None,
     record: Annotated[Optional[Path], typer.Option(help="File to record all device input to.")] = None,  # noqa: UP045
     replay: Annotated[Optional[Path], typer.Option(help="Recorded file to play back instead of the devices.")] = None,  # noqa: UP045
     calibrate: Annotated[Optional[str], typer.Option(help="Device to calibrate.")] = None,  # noqa: UP045
@@ -535,7 +546,7 @@ def teleop(
     from ligature.cli.teleop import teleop as run_teleop
 
     console = Console(highlight=False, soft_wrap=True)
-    raise typer.Exit(run_teleop(config, record, replay, calibrate, check, indices(devices), console))
+    raise typer.Exit(run_teleop(config, device or (), record, replay, calibrate, check, indices(devices), console))
 
 
 DatasetFile = Annotated[Path, typer.Argument(help="HDF5 dataset of demo, replay or DatasetWriter.")]

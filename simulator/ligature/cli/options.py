@@ -29,7 +29,9 @@ class RunOptions:
     the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines for the user at
     the start, ``devices`` are indices of the input devices whose proxies are there, ``soft`` bodies
     that are soft tissue, ``only`` the names of the arms that are there (empty: all), ``masters`` whether
-    master arms are.
+    master arms are, ``base_frames`` the arm in the frame of whose tip the others give their poses (empty: each in its
+    base). ``haptic_rate`` in Hz (0: that of the device) and ``haptic_forces`` (None: as teleoperation has them) are
+    left to teleoperation as parameters.
     """
 
     scene: str
@@ -56,6 +58,9 @@ class RunOptions:
     soft: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
     masters: bool = True
+    base_frames: str = ""
+    haptic_rate: float = 0.0
+    haptic_forces: bool | None = None
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
@@ -71,6 +76,10 @@ class RunOptions:
         missing = [name for name in self.only if name not in known]
         if missing:
             text = f"--only: the scene has no arm '{missing[0]}'; it has {', '.join(known) or 'none'}"
+            raise ligature.SceneError(Diagnostic(Severity.ERROR, text))
+        bodied = [arm.name for arm in scene.arms if arm.kind.value != "mtm"]
+        if self.base_frames and (self.base_frames not in bodied or self.only and self.base_frames not in self.only):
+            text = f"--base-frames: '{self.base_frames}' is no arm of this run with a tip in the scene; write ECM"
             raise ligature.SceneError(Diagnostic(Severity.ERROR, text))
         return tuple(
             arm

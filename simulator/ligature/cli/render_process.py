@@ -13,14 +13,15 @@ import numpy as np
 from ligature.bus import Block
 from ligature.cli.options import RunOptions
 from ligature.cli.process import Run, run_process
-from ligature.model.optics import stereo_partners
+from ligature.model.optics import Calibration, stereo_partners
 from ligature.model.scene import Camera, Scene
 from ligature.model.state import new_state
 from ligature.process import report
 from ligature.render import CameraView, ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
-from ligature.render.calibration import calibrations
+from ligature.render.calibration import Eye, calibrations
 from ligature.render.sensor import IDEAL
 from ligature.render.shutter import Shutter
+from ligature.ros.camera_facts import CameraFacts, facts
 from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
 from ligature.ros.master import MasterWatch
 from ligature.ros.parameters import Follower
@@ -84,9 +85,22 @@ class Studio:
         self.cameras = options.shown_cameras(scene)
         self._node = CameraNode(scene, self.cameras, bool(options.cameras))
         self._follower = Follower(scene)
-        MasterWatch(self._follower.poll).start()
+        self._facts, self._seen = CameraFacts(), new_state(scene)
+        MasterWatch(self._look_at_parameters).start()
         self._rejected: set[str] = set()
         self._exposures = [_Exposure(topics) for topics in self._node.topics]
+
+    def _look_at_parameters(self) -> None:
+        """Read what users have set, and write what follows from it; on the thread that watches the master."""
+        self._follower.poll()
+        if self._block.filled and self._block.read(self._seen):
+            poses = self._seen["camera_world"][0]
+            found = self._calibrations(poses)
+            shown = {topics.camera.index: topics for topics in self._node.topics if not topics.eye}
+            self._facts.write({
+                topics.camera.identity.topic: facts(found[index, ""], poses[index], topics.optical_frame)
+                for index, topics in shown.items()
+            })  # fmt: skip
 
     def turn(self, now: float) -> None:
         """Wait for the next deadline, or draw what is due."""
@@ -115,12 +129,16 @@ class Studio:
         self._count(len(wanted), missed, time.monotonic() - now)
 
     def _publish_infos(self, calls: list[tuple[_Exposure, Wishes]], poses: np.ndarray, stamp: float) -> None:
-        cameras = [self._camera(camera.index) for camera in self._scene.cameras]
-        lenses = {camera.index: self._follower.sensors[camera.index]["distortion"] for camera in cameras}
-        found = calibrations(cameras, poses, self._partners, lenses)
+        found = self._calibrations(poses)
         for exposure, wishes in calls:
             if wishes.info:
                 exposure.topics.publish_info(found[exposure.key], stamp)
+
+    def _calibrations(self, poses: np.ndarray) -> dict[Eye, Calibration]:
+        """Calibrations of all cameras as their parameters have them now, at ``poses`` (n, 7)."""
+        cameras = [self._camera(camera.index) for camera in self._scene.cameras]
+        lenses = {camera.index: self._follower.sensors[camera.index]["distortion"] for camera in cameras}
+        return calibrations(cameras, poses, self._partners, lenses)
 
     def _draw(self, exposure: _Exposure, wishes: Wishes, stamp: float) -> None:
         index, eye = exposure.key

@@ -9,8 +9,9 @@ import os
 import sys
 
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.cli.options import RunOptions
 from ligature.cli.process import Run, run_process
-from ligature.process import report
+from ligature.process import report, run_in_real_time
 from ligature.ros.node import Node
 from ligature.ros.registrations import NameTaken
 
@@ -29,12 +30,22 @@ def _serve(run: Run) -> None:
         if run.stop.wait(MASTER_NAP):
             sys.exit(0)
     try:
-        node = Node(run.scene, run.block, options.min_hz, options.max_hz, options.names, options.src_crtk)
+        node = Node(
+            run.scene, run.block, options.min_hz, options.max_hz, options.names, options.src_crtk, options.base_frames,
+            _haptics(options), len(options.devices),
+        )  # fmt: skip
     except NameTaken as error:
         run.fail(error)
     run.await_state()
-    report("ready", node.summary)
+    real_time = run_in_real_time()
+    report("ready", f"{node.summary}{'; readings in real time' if real_time else ''}")
     node.run(run.stop, lambda: report("first-state"))
+
+
+def _haptics(options: RunOptions) -> dict[str, object]:
+    """What teleoperation is to know of forces."""
+    found: dict[str, object] = {"rate": options.haptic_rate} if options.haptic_rate else {}
+    return found if options.haptic_forces is None else {**found, "forces": options.haptic_forces}
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -15,19 +16,20 @@ from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.paths import regular_file
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
+from ligature.teleop.ready import of_devices
 
 END_TIMEOUT = 10.0
 """Seconds that the end may take: a recording is written, and arms are left in order."""
 
 
 def teleop(
-    file: Path, record: Path | None, replay: Path | None, calibrate: str | None, check: bool,
-    devices: tuple[int, ...] | None, console: Console,
+    file: Path | None, ready: Sequence[str], record: Path | None, replay: Path | None, calibrate: str | None,
+    check: bool, devices: tuple[int, ...] | None, console: Console,
 ) -> int:  # fmt: skip
     """Drive until Ctrl-C; returns the exit status."""
     try:
-        wanted = _configuration(file, devices)
-    except (AdfError, OSError) as error:
+        wanted = _configuration(file, ready, devices)
+    except (AdfError, OSError, ValueError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
     for note in wanted.notes:
@@ -45,8 +47,12 @@ def teleop(
     return _on_ros(wanted, record, replay, calibrate, console)
 
 
-def _configuration(file: Path, devices: tuple[int, ...] | None) -> TeleopConfig:
-    """That of a teleoperation file, or what the input devices of a launch file state."""
+def _configuration(file: Path | None, ready: Sequence[str], devices: tuple[int, ...] | None) -> TeleopConfig:
+    """That of a teleoperation file, what the input devices of a launch file state, or devices that need no file."""
+    if (file is None) is not bool(ready):
+        raise ValueError("write either a file or --device, such as 'ligature teleop --device keyboard'")
+    if file is None:
+        return of_devices(ready)
     text = regular_file(file).read_text("utf-8")
     if "multibody configs" in text:
         from ligature.teleop.launch import of_launch_file

@@ -22,6 +22,7 @@ from ligature.model.optics import stereo_partners
 from ligature.model.scene import Scene
 from ligature.model.shapes import Collider, Colour, TriMesh, Visual
 from ligature.render import overlay
+from ligature.render.arm_drive import ArmDrive
 from ligature.render.camera import CameraView, perspective, view_matrix, view_of
 from ligature.render.renderer import Renderer
 from ligature.render.viewpoint import Viewpoint
@@ -59,6 +60,7 @@ TOGGLES = {
 
 HELP = (
     "drag: turn   right drag: move   wheel: nearer   Ctrl+drag: pull a body",
+    "A: drive the next arm, then none   G: its jaw   Shift+drag: move   Shift+right drag: turn   Shift+wheel: away",
     "Space: pause   .: one update   Ctrl+R: reset bodies   Ctrl+V: reset cameras   V: next camera",
     "   ".join(f"{key}: {meaning}" for key, (_, meaning) in TOGGLES.items()),
 )
@@ -100,6 +102,7 @@ class Viewer:
         self._viewpoint, self._angle = Viewpoint(_middle(scene), 1.0), FREE_ANGLE
         self._mouse: Mapping[str, float] = {}
         self._hold: _Hold | None = None
+        self._arm = ArmDrive(scene, send)
         self._view: CameraView | None = None
         self._state: NDArray[np.void] | None = None
 
@@ -141,6 +144,7 @@ class Viewer:
     def _words(self, state: NDArray[np.void], figures: Figures) -> list[str]:
         view = "free view" if self.camera is None else self.scene.cameras[self.camera].identity.name
         pace = "paused" if self.paused else f"real-time factor {figures.real_time_factor:.2f}"
+        view += f"   {self._arm.name}" if self._arm.name else ""
         words = [f"{view}   {figures.frame_rate:.0f} frames/s   {pace}   {float(state['sim_time'][0]):.2f} s"]
         if "tension" in self.shown:
             words.append(f"largest thread tension {overlay.tension(self.scene, state)[1]:.3g} N")
@@ -295,6 +299,28 @@ class Viewer:
         depth = float(frame.depth[y, x])
         return int(frame.ids[y, x]), _point(view, x, y, depth), depth
 
+    # --- an arm -----------------------------------------------------------------------------
+
+    @property
+    def arm(self) -> str:
+        """Name of the arm that the mouse drives; empty for none."""
+        return self._arm.name
+
+    def move_arm(self, right: float, down: float) -> None:
+        """Move the arm's tip by a mouse movement in pixels."""
+        if self._state is not None and self._view is not None:
+            self._arm.move(self._state, self._view, right, down)
+
+    def turn_arm(self, right: float, down: float) -> None:
+        """Turn the arm's tip by a mouse movement in pixels."""
+        if self._state is not None and self._view is not None:
+            self._arm.turn(self._state, self._view, right, down)
+
+    def advance_arm(self, notches: float) -> None:
+        """Move the arm's tip away by notches of the wheel."""
+        if self._state is not None and self._view is not None:
+            self._arm.advance(self._state, self._view, notches)
+
     # --- keys -------------------------------------------------------------------------------
 
     def key(self, key: str, control: bool = False) -> None:
@@ -313,6 +339,12 @@ class Viewer:
             self._send(Throttle(True, self._clock, 1))
         elif key == "V":
             self.next_camera()
+        elif key == "A":
+            self._arm.next()
+            if self._state is not None:
+                self._arm.make_ready(self._state)
+        elif key == "G" and self._state is not None:
+            self._arm.toggle_jaw(self._state)
         elif key in TOGGLES:
             self.shown ^= {TOGGLES[key][0]}
             if key == "N":

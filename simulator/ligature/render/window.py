@@ -29,7 +29,7 @@ in vec2 vAt;
 out vec4 fColour;
 void main() { fColour = texture(uPicture, vec2(vAt.x, 1.0 - vAt.y)); }
 """
-_KEYS = {glfw.KEY_SPACE: " ", glfw.KEY_PERIOD: "."} | {getattr(glfw, f"KEY_{c}"): c for c in "CFHJNRSTV"}
+_KEYS = {glfw.KEY_SPACE: " ", glfw.KEY_PERIOD: "."} | {getattr(glfw, f"KEY_{c}"): c for c in "ACFGHJNRSTV"}
 
 
 class Window:
@@ -76,7 +76,7 @@ class Window:
         glfw.set_key_callback(self._window, self._on_key)
         glfw.set_mouse_button_callback(self._window, self._on_button)
         glfw.set_cursor_pos_callback(self._window, self._on_move)
-        glfw.set_scroll_callback(self._window, lambda _window, _x, y: viewer.zoom(y))
+        glfw.set_scroll_callback(self._window, self._on_wheel)
 
     def show(self, rgb: NDArray[np.uint8]) -> None:
         """Show a picture (h, w, 3) and take what mouse and keys have done meanwhile."""
@@ -110,13 +110,28 @@ class Window:
     def _on_move(self, _window: Any, x: float, y: float) -> None:
         right, down = x - self._last[0], y - self._last[1]
         self._last = (x, y)
-        if self._pressed(glfw.MOUSE_BUTTON_LEFT):
+        if self._drives_arm() and self._pressed(glfw.MOUSE_BUTTON_LEFT):
+            self._viewer.move_arm(right, down)
+        elif self._drives_arm() and self._pressed(glfw.MOUSE_BUTTON_RIGHT):
+            self._viewer.turn_arm(right, down)
+        elif self._pressed(glfw.MOUSE_BUTTON_LEFT):
             if self._viewer.holds:
                 self._viewer.drag(*self._pixel())
             else:
                 self._viewer.orbit(right, down)
         elif self._pressed(glfw.MOUSE_BUTTON_RIGHT) or self._pressed(glfw.MOUSE_BUTTON_MIDDLE):
             self._viewer.pan(right, down)
+
+    def _on_wheel(self, _window: Any, _x: float, y: float) -> None:
+        if self._drives_arm():
+            self._viewer.advance_arm(y)
+        else:
+            self._viewer.zoom(y)
+
+    def _drives_arm(self) -> bool:
+        """Whether the mouse is the arm's: one is chosen, and Shift is down."""
+        shift = (glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT)
+        return bool(self._viewer.arm) and any(glfw.get_key(self._window, key) == glfw.PRESS for key in shift)
 
     def _pressed(self, button: int) -> bool:
         return bool(glfw.get_mouse_button(self._window, button) == glfw.PRESS)

@@ -240,20 +240,21 @@ class ContactTemplate(Template):
 
 
 class WorldTemplate:
-    """``WorldState``; loop rates come with the figures of the bus."""
+    """``WorldState`` of a run with a number of input ``devices``; rates come with the figures of the bus."""
 
     kind = "world"
     index = 0
 
-    def __init__(self) -> None:
-        self.message = WorldState()
-        self.loop_hz = 0.0
+    def __init__(self, devices: int = 0) -> None:
+        self.message = WorldState(n_devices=min(devices, 255))
+        self.loop_hz = self.pictures_hz = 0.0
 
     def fill(self, state: Record, stamp: rospy.Time) -> WorldState:
         """The message of ``state``."""
         message = self.message
         message.header.stamp = stamp
         message.dynamic_loop_freq = max(round(self.loop_hz), 0)
+        message.graphics_loop_freq = max(round(self.pictures_hz), 0)
         message.sim_step = int(state["update"]) % 2**32
         message.wall_time = state["wall_time"]
         message.sim_time = state["sim_time"]

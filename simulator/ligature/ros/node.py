@@ -6,10 +6,12 @@ third. None of them ever waits for another process.
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,7 @@ from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
 from ligature.ros.intake import oversized
 from ligature.ros.master import NO_ANSWER, MasterWatch, node_name
+from ligature.ros.pace import PaceServices
 from ligature.ros.parameters import Parameters
 from ligature.ros.publisher import Publisher
 from ligature.ros.reception import Reception
@@ -36,6 +39,12 @@ from ligature.ros.schedule import Key, Outlet, Schedule
 from ligature.ros.start import start_node
 
 DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
+HAPTICS = "ligature/haptics"
+"""Parameter from which teleoperation reads its haptic ``rate`` in Hz and whether it sends ``forces``."""
+COUNTING = 1.0
+"""Seconds over which pictures are counted."""
+REST = 0.0002
+"""Seconds of sleep after each publication: of a thread in real time that never sleeps nobody gets the processor."""
 HOUSEKEEPING = 0.02
 """Seconds between looks at watchdogs and the physics process."""
 
@@ -44,8 +53,9 @@ class Node:
     """The simulator on ROS; raises `ligature.ros.registrations.NameTaken` when another one is there already."""
 
     def __init__(
-        self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool
-    ) -> None:
+        self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool,
+        reference: str = "", haptics: Mapping[str, Any] = MappingProxyType({}), devices: int = 0,
+    ) -> None:  # fmt: skip
         self._scene = scene
         self._state = new_state(scene)
         self._block = block
@@ -55,7 +65,10 @@ class Node:
         start_node(name)
         self._outbox = Outbox(self._ring)
         self._reception = Reception(scene, self._outbox, self._wake)
-        self._world = conversion.WorldTemplate()
+        self._world = conversion.WorldTemplate(devices)
+        self._frames = 0, time.monotonic()
+        if haptics:
+            rospy.set_param(f"{scene.world.root}{HAPTICS}", dict(haptics))
         self._publishers: list[Publisher] = []
         outlets = self._advertise(min_hz, max_hz, policy)
         tissues = self._advertise_tissues(outlets)
@@ -63,7 +76,8 @@ class Node:
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
-        self._arms = ArmsNode(scene, self._block, self._outbox, challenge)
+        PaceServices(f"{scene.world.root}ligature", scene, self._block, self._outbox.push)
+        self._arms = ArmsNode(scene, self._block, self._outbox, challenge, reference)
         arms = ", ".join(outlet.description.name for outlet in self._arms.outlets) or "none"
         self.summary = f"{2 * len(outlets) + len(tissues)} topics of objects; arms: {arms}"
         self._diagnostics = Diagnostics(self._block, lambda: tissue.statuses(scene, self._state[0]))
@@ -90,8 +104,10 @@ class Node:
                 self._woken.wait(nap)
             elif self._block.read(self._state):
                 self._publish(now)
+                time.sleep(REST)
                 if not published:
                     published = True
+                    gc.freeze()  # what a start has made stays: each look at it would hold up all topics for 50 ms
                     on_first()
                 if not ready and self._state["update"][0] > 0:  # the first state is there before physics has started
                     ready = True
@@ -158,6 +174,14 @@ class Node:
         figures["published"] += np.uint64(sent)
         figures["publish_late"] += np.uint64(missed)
 
+    def _count_pictures(self, now: float) -> None:
+        """Pictures per second, for the world's state."""
+        before, since = self._frames
+        if now - since >= COUNTING:
+            drawn = int(self._block.figures["frames"][0])
+            self._world.pictures_hz = (drawn - before) / (now - since)
+            self._frames = drawn, now
+
     def _keep_house(self, now: float) -> bool:
         """Signs of life, watchdogs, diagnostics; False when the physics process is gone."""
         self._ring.beat()
@@ -168,6 +192,7 @@ class Node:
         self._diagnostics.faults = self._arms.faults
         self._diagnostics.rivals = self._arms.rivals
         self._world.loop_hz = float(figures["loop_hz"][0])
+        self._count_pictures(now)
         self._diagnostics.publish(now)
         return self._block.active
 

@@ -58,7 +58,7 @@ class PairTopics(Topics):
                 "align_mtm": Bool, "rotation_locked": Joy, "translation_locked": Joy,
             },
         )  # fmt: skip
-        self.haptic = np.zeros(3)
+        self.haptic = np.zeros(6)
         self._offset = rospy.Publisher(f"{root}/alignment_offset", QuaternionStamped, queue_size=1)
         self._leader = rospy.Publisher(f"{root}/MTM/measured_cp", PoseStamped, queue_size=1)
         self._follower = rospy.Publisher(f"{root}/PSM/setpoint_cp", PoseStamped, queue_size=1)
@@ -77,9 +77,9 @@ class PairTopics(Topics):
         listen(root, "following/mtm/body/servo_cf", WrenchStamped, self._pressed)
 
     def _pressed(self, message: Any) -> None:
-        f = message.wrench.force
-        values = np.array([f.x, f.y, f.z])
-        self.haptic = values if np.isfinite(values).all() else np.zeros(3)
+        f, t = message.wrench.force, message.wrench.torque
+        values = np.array([f.x, f.y, f.z, t.x, t.y, t.z])
+        self.haptic = values if np.isfinite(values).all() else np.zeros(6)
 
     def read(self, offset: Array, T_view_hand: Array | None, T_camera_tip: Array | None) -> None:
         """Publish the readings: rotation (3, 3) of the tip in the hand, both poses (4, 4), the hand's velocity."""

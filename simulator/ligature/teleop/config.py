@@ -27,7 +27,7 @@ from ligature.teleop.pairing import Settings
 
 Array = NDArray[np.float64]
 
-TOPICS = {"hydra": "/hydra_calib", "joy": "/joy", "spacenav": "/spacenav/joy", "keyboard": ""}
+TOPICS = {"hydra": "/hydra_calib", "joy": "/joy", "spacenav": "/spacenav/joy", "keyboard": "", "mouse": ""}
 """Topics of devices whose name does not show it."""
 
 NOBODY = "none"
@@ -56,11 +56,13 @@ GRIP = (0.0, 1.0)
 class ProxySpec:
     """A proxy's root link on ROS.
 
-    ``limits`` (2, n) are those of the joints that the grip drives, in the order of its commands.
+    ``limits`` (2, n) are those of the joints that the grip drives, in the order of its commands. ``stiffness`` is that
+    of the springs between proxy and hand which the hand feels, in N/m and N·m/rad.
     """
 
     topic: str
     limits: Array
+    stiffness: tuple[float, float] = (0.0, 0.0)
 
 
 FORMER_KEYS = {"patience": "timeout", "fastest": "max velocity", "quickest": "max angular velocity"}

@@ -3,8 +3,8 @@
 Delay makes reflected forces give energy back that the hand never spent, and the device shakes. A passivity observer
 counts the energy that flowed to the hand: a force that stays until the next one does exactly ``F · Δx``. What pushes
 the hand along is cut down to the energy that the hand has spent before, and where that was not enough, the hand is
-braked (after Hannaford and Ryu, *Time-domain passivity control of haptic interfaces*, IEEE T-RA 18, 2002). Newtons,
-metres, seconds.
+braked (after Hannaford and Ryu, *Time-domain passivity control of haptic interfaces*, IEEE T-RA 18, 2002). Torques are
+treated as forces are, with turns in place of ways; each has an account of its own. Newtons, metres, seconds.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ STILL = 1e-6
 class FeedbackSettings:
     """``gain`` of forces, ``limit`` in N, ``damping`` of the hand in N·s/m, ``most_damping`` that may brake it.
 
-    Contacts weaker than ``deadband`` N are not felt.
+    Contacts weaker than ``deadband`` N are not felt. ``torque_gain`` is that of torques (0: none are exerted),
+    ``torque_limit`` in N·m, ``torque_damping`` in N·m·s/rad, ``most_torque_damping`` that may brake a turn.
     """
 
     gain: float = 1.0
@@ -35,6 +36,14 @@ class FeedbackSettings:
     damping: float = 0.5
     most_damping: float = 30.0
     deadband: float = 0.0
+    torque_gain: float = 0.0
+    torque_limit: float = 0.1
+    torque_damping: float = 0.0005
+    most_torque_damping: float = 0.03
+
+    def of_torques(self) -> FeedbackSettings:
+        """The same for torques and turns."""
+        return FeedbackSettings(self.torque_gain, self.torque_limit, self.torque_damping, self.most_torque_damping)
 
 
 class Feedback:

@@ -32,7 +32,7 @@ class Arm:
         self.name, self._frames, self._rival = name, frames, rival
         self._setpoint: tuple[float, str, Array] | None = None
         self._jaw = 0.0
-        self._force = np.zeros(3)
+        self._wrench = np.zeros(6)
         self._state: Any = None
         self._asked = ""
         self._command = rospy.Publisher(f"{root}/state_command", StringStamped, queue_size=5)
@@ -65,8 +65,8 @@ class Arm:
             self._jaw = message.position[0]
 
     def _on_force(self, message: Any) -> None:
-        f = message.wrench.force
-        self._force = np.array([f.x, f.y, f.z])
+        f, t = message.wrench.force, message.wrench.torque
+        self._wrench = np.array([f.x, f.y, f.z, t.x, t.y, t.z])
 
     def _on_command(self, raw: Any) -> None:
         sender = raw._connection_header["callerid"]
@@ -101,10 +101,10 @@ class Arm:
     def keep(self) -> None:
         """Nothing: an arm holds its last set-point."""
 
-    def force_in(self, camera: str) -> Array:
-        """Force (3,) of the world on the tip in the camera's axes; zeros while it is unknown."""
+    def wrench_in(self, camera: str) -> Array:
+        """Force and torque (6,) of the world on the tip in the camera's axes; zeros while they are unknown."""
         T = self._frames.between(camera, self.name)
-        return np.zeros(3) if T is None else np.asarray(T[:3, :3] @ self._force)
+        return np.zeros(6) if T is None else np.asarray((self._wrench.reshape(2, 3) @ T[:3, :3].T).reshape(6))
 
     # --- commands to it
 

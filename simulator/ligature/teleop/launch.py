@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 HARDWARE = (
     ("mtm", "mtm"), ("omni", "touch"), ("phantom", "touch"), ("touch", "touch"), ("geomagic", "touch"),
     ("falcon", "touch"), ("hydra", "hydra"), ("spacenav", "spacenav"), ("spacemouse", "spacenav"), ("joy", "joy"),
-    ("pad", "joy"), ("keyboard", "keyboard"),
+    ("pad", "joy"), ("keyboard", "keyboard"), ("mouse", "mouse"),
 )  # fmt: skip
 """Parts of hardware names, in lower case, and the kinds of devices that they mean."""
 
@@ -44,7 +44,7 @@ PADDLES = ("left", "right")
 """Of a Razer Hydra, as its input devices claim them one after the other."""
 
 HAPTIC_GAIN = 10.0
-"""Linear gain in N/m that means forces as they are; others scale them."""
+"""Gain in N/m that means forces as they are, and in N·m/rad torques; others scale them."""
 
 
 def of_launch_file(path: Path, indices: tuple[int, ...] | None = None) -> TeleopConfig:
@@ -79,7 +79,8 @@ def of_devices(scene: Scene, devices: Sequence[InputDevice], path: Path) -> Tele
         if first is None and device.proxy >= 0:
             name = f"Proxy{len(proxies)}"
             pairs[spec.name], proxies[name] = (name,), _proxy(scene, device)
-            specs[number] = device, replace(spec, settings=replace(spec.settings, jaw=GRIP))
+            force = spec.force and replace(spec.force, gain=1.0, torque_gain=1.0)  # the proxy's springs have the gains
+            specs[number] = device, replace(spec, settings=replace(spec.settings, jaw=GRIP), force=force)
             continue
         if first is None or first in taken:
             why = f"{first} is driven already" if first else "no arm is left" if arms else "the scene has no arm"
@@ -104,7 +105,9 @@ def _proxy(scene: Scene, device: InputDevice) -> ProxySpec:
     limits = np.array([[joint.low or 0.0, joint.high or 0.0] for joint in joints]).reshape(-1, 2).T
     if str(device.settings.get("enable joint control", True)).lower() in ("false", "0"):
         limits = limits[:, :0]
-    return ProxySpec(root.identity.topic, limits)
+    gains = device.settings.get("haptic gain") or {}
+    stiffness = float(gains.get("linear", 0.0)), float(gains.get("angular", 0.0))
+    return ProxySpec(root.identity.topic, limits, stiffness)
 
 
 def _specs(
@@ -144,8 +147,6 @@ def _without_effect(device: InputDevice) -> list[str]:
     if settings.get("simulated multibody"):
         notes.append("it drives the arm itself and not its proxy")
     unused = [key for key in ("controller gain", "location", "max force", "max jerk") if key in settings]
-    if "angular" in (settings.get("haptic gain") or {}) and float(settings["haptic gain"]["angular"]) != 0.0:
-        unused.append("haptic gain: angular")
     if unused:
         notes.append(f"{', '.join(unused)}: no effect on an arm")
     if str(settings.get("enable joint control", True)).lower() in ("false", "0"):
@@ -220,8 +221,9 @@ def _force(settings: Mapping[str, Any]) -> FeedbackSettings | None:
     haptic = settings.get("haptic gain")
     if not haptic:
         return None
-    gain = float(haptic.get("linear", HAPTIC_GAIN)) / HAPTIC_GAIN
-    return FeedbackSettings(gain=gain, deadband=max(float(settings.get("deadband", 0.0)), 0.0))
+    gain, torque_gain = (max(float(haptic.get(key, 0.0)), 0.0) / HAPTIC_GAIN for key in ("linear", "angular"))
+    deadband = max(float(settings.get("deadband", 0.0)), 0.0)
+    return FeedbackSettings(gain=gain, deadband=deadband, torque_gain=torque_gain)
 
 
 def _problem(path: Path, message: str, hint: str) -> AdfError:

@@ -30,7 +30,7 @@ from ligature.teleop.devices.device import Device, Reading
 from ligature.teleop.follower import Arm
 from ligature.teleop.frames import Frames
 from ligature.teleop.handset import Handset
-from ligature.teleop.haptics import Haptics
+from ligature.teleop.haptics import Haptics, period_of
 from ligature.teleop.messages import pose_numbers
 from ligature.teleop.pair import MOST_SCALE, Pair
 from ligature.teleop.pairing import HOLDING, Status, Tip
@@ -57,6 +57,15 @@ NOT_RECORDED = ("reading", "rival")
 def begin_node() -> None:
     """Make this process a ROS node; several teleoperations may run side by side."""
     rospy.init_node("ligature_teleop", anonymous=True, disable_signals=True)
+
+
+def _asked_of_haptics(prefix: str) -> dict[str, Any]:
+    """What the simulator was started with, ``-d`` and ``-e`` of `ambf_simulator`; empty where that is nothing."""
+    try:
+        found = rospy.get_param(f"{prefix}ligature/haptics", {})
+    except OSError:
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 class Teleop:
@@ -89,10 +98,11 @@ class Teleop:
         self._devices = {} if replay else {name: self._open(spec) for name, spec in specs.items()}
         for name, spec in specs.items():
             self.seat.change(name, **vars(spec.settings))
+        asked = _asked_of_haptics(config.prefix)
         self._haptics = {
-            name: Haptics(spec.force, self._devices[name], spec.calibration)
+            name: Haptics(spec.force, self._devices[name], spec.calibration, period_of(asked.get("rate")))
             for name, spec in specs.items()
-            if spec.force is not None and name in self._devices
+            if spec.force is not None and name in self._devices and asked.get("forces") is not False
         }
         names = dict.fromkeys(arm for followers in config.pairs.values() for arm in followers)
         self.arms = {name: self._arm(name) for name in names}
@@ -265,7 +275,7 @@ class Teleop:
                 haptics.rest()
                 continue
             pair = self.pairs[name, leader.selected]
-            haptics.press(leader.hand, pair.arm.force_in(VIEW), pair.topics.haptic)
+            haptics.press(leader.hand, pair.arm.wrench_in(VIEW), pair.topics.haptic)
 
     def _camera_ready(self) -> bool:
         """Whether the camera can be driven; it is asked for power and homing."""

@@ -114,6 +114,9 @@ class Pair:
             return ""
         if now - self._turn_asked > TURN_AGAIN:
             self._turn_asked = now
+            waits_for = self._device.make_ready() if self._device is not None else ""
+            if waits_for:
+                return waits_for
             goal = self._handset.calibration.orientation_on_device(R)
             self._turns = self._device is not None and self._device.turn_to(goal)
         return f"{self.leader.name} aligns with {self.arm.name}" if self._turns else ""

@@ -13,6 +13,7 @@ from ambf_msgs.msg import RigidBodyCmd, RigidBodyState
 from numpy.typing import NDArray
 
 from ligature.model.frames import matrix_pose7
+from ligature.robots.poses import rotation_vector
 from ligature.teleop.calibration import pose_of
 from ligature.teleop.config import GRIP, ProxySpec
 from ligature.teleop.follower import FRESH
@@ -65,9 +66,19 @@ class Proxy:
         goal, T_camera_world = self.setpoint(), self._frames.between(camera, "world")
         return None if goal is None or T_camera_world is None else Tip(T_camera_world @ goal[1], self._grip)
 
-    def force_in(self, camera: str) -> Array:
-        """Zeros (3,): a proxy measures no force."""
-        return np.zeros(3)
+    def wrench_in(self, camera: str) -> Array:
+        """What keeps the proxy from where the hand wants it (6,), in the camera's axes.
+
+        A spring of the haptic gains between both, as AMBF's: a proxy that lies against something stays behind.
+        """
+        T_camera_world = self._frames.between(camera, "world")
+        if self._goal is None or T_camera_world is None:
+            return np.zeros(6)
+        linear, angular = self._spec.stiffness
+        R = T_camera_world[:3, :3]
+        away = self._measured[:3, 3] - self._goal[:3, 3]
+        turned = rotation_vector(self._measured[:3, :3] @ self._goal[:3, :3].T)
+        return np.concatenate([linear * R @ away, angular * R @ turned])
 
     def make_ready(self) -> None:
         """Nothing: it is driven as it is."""

@@ -16,9 +16,10 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Bool, Empty, Float64, Float64MultiArray, String
 
-from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
+from ligature.model.frames import inverse, matrix_pose7
 from ligature.model.scene import ArmKind, WorldSettings
 from ligature.robots.commands import ArmCommand, StateCommand
+from ligature.ros.arms.bases import CART, bases, tip
 from ligature.ros.arms.latched import Latched
 from ligature.ros.arms.outlet import ArmOutlet
 from ligature.ros.arms.readings import set_pose
@@ -168,21 +169,14 @@ class SetupJoints:
 
     def publish(self, state: Any, stamp: Any) -> None:
         """Poses of the bases: of the reference arm in the world, of the others in the tip of the reference arm."""
-        bases = {}
-        for outlet in self._outlets:
-            body = outlet.description.base
-            bases[outlet.description.name] = outlet.T_base if body < 0 else pose7_matrix(state["body_pose"][body])
-        T_world_tip = None
-        for outlet in self._outlets:
-            name = outlet.description.name
-            if name == self._reference:
-                T_world_tip = bases[name] @ pose7_matrix(state["arm"][outlet.index]["local_measured_cp"])
+        stands = bases(self._outlets, state)
+        T_world_tip = tip(self._outlets, state, self._reference)
         for name, arm in self._arms.items():
-            T = bases[name]
+            T = stands[name]
             apart = name != self._reference and T_world_tip is not None
             pose = inverse(T_world_tip) @ T if apart and T_world_tip is not None else T
-            reference = self._frame_prefix + (self._reference if apart else "Cart")
-            arm.publish(pose, reference, T, f"{self._frame_prefix}Cart", stamp)
+            reference = self._frame_prefix + (self._reference if apart else CART)
+            arm.publish(pose, reference, T, f"{self._frame_prefix}{CART}", stamp)
 
 
 class _SetupArm:

@@ -39,6 +39,9 @@ _LOGS: dict[str, Callable[[str], None]] = {
     "status": rospy.logdebug,
 }
 WARNING_PAUSE = 2.0
+"""Seconds between two equal lines of the log, and between two equal warnings of an arm that is not ready: a stream of
+commands to it would make as many."""
+NOT_READY = "not ready"
 
 
 def event_topics(kind: ArmKind) -> list[str]:
@@ -77,6 +80,7 @@ class EventTopics:
         self._publishers = {name: Latched(f"{root}/{name}", type_) for name, type_ in topics.items()}
         self._types = topics
         self._logged: dict[str, float] = {}
+        self._warned: dict[str, float] = {}
         self.error = ""
 
     def publish(self, name: str, value: Any) -> None:
@@ -84,7 +88,7 @@ class EventTopics:
         if name == "operating_state":
             self._state = value
             self.beat()
-        elif name in self._publishers:
+        elif name in self._publishers and not (name == "warning" and self._repeats(value)):
             if name == "error":
                 self.error = value
             type_ = self._types[name]
@@ -108,6 +112,16 @@ class EventTopics:
     def state(self) -> OperatingState:
         """The newest operating state."""
         return operating_state(self._state, self._clock.now())
+
+    def _repeats(self, warning: str) -> bool:
+        """Whether a warning of an arm that is not ready was published a moment ago."""
+        if not warning.endswith(NOT_READY):
+            return False
+        now = rospy.get_time()
+        if now - self._warned.get(warning, 0.0) < WARNING_PAUSE:
+            return True
+        self._warned = {text: at for text, at in self._warned.items() if now - at < WARNING_PAUSE} | {warning: now}
+        return False
 
     def _log(self, name: str, value: Any) -> None:
         """Errors go to the log as well, the same one at most every two seconds."""

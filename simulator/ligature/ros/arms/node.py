@@ -24,6 +24,7 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
 from ligature.robots.commands import ArmCommand
 from ligature.robots.instruments import INSTRUMENTS
+from ligature.ros.arms.bases import CART, BaseFrames
 from ligature.ros.arms.challenge import ChallengeFace
 from ligature.ros.arms.commands import listeners
 from ligature.ros.arms.console import Console, SetupJoints, console_topics, setup_topics
@@ -36,10 +37,14 @@ from ligature.ros.publisher import Publisher
 PERIOD = 0.005
 """Seconds between two publications of a reading: 200 Hz, so that clients never find one older than 20 ms."""
 
+BACKLOG = 0.01
+"""Seconds of delay that are made up for: readings that were due before show the same state as the next one."""
+
 TF_PERIODS = 4
 FOLLOW_PERIODS = 20
-HEARTBEAT = 0.7
-"""Seconds between two publications of an operating state that does not change."""
+HEARTBEAT = 0.3
+"""Seconds between two publications of an operating state, switch or scale that does not change: clients take none that
+is older than a second, and one that is queued waits for the processor of a busy machine."""
 
 STALE = 0.1
 """Seconds after which a state counts as that of a resting simulation, and is reported with the time of now."""
@@ -53,12 +58,13 @@ CONSOLE, SETUP = "console", "SUJ/"
 class ArmsNode:
     """The arms of a scene on ROS.
 
-    Topics and frames begin with the prefix of the scene; with ``challenge`` topics are there a second time, under
-    the names of the suturing challenge's own node. What another node publishes already, or begins to publish, is left
-    to it for the rest of the run: two who report one arm are worse than none.
+    With a ``reference``, the name of an arm, poses of the others are in the frame of its tip. Topics and frames begin
+    with the prefix of the scene; with ``challenge`` topics are there a second time, under the names of the suturing
+    challenge's own node. What another node publishes already, or begins to publish, is left to it for the rest of the
+    run: two who report one arm are worse than none.
     """
 
-    def __init__(self, scene: Scene, block: Block, outbox: Outbox, challenge: bool) -> None:
+    def __init__(self, scene: Scene, block: Block, outbox: Outbox, challenge: bool, reference: str = "") -> None:
         self._block, self._outbox = block, outbox
         prefix = scene.world.root
         self._frame_prefix = scene.world.frame_prefix
@@ -84,6 +90,7 @@ class ArmsNode:
             self._console = Console(prefix, outlets, self.push, CONSOLE in taken)
             self._setup_joints = SetupJoints(scene.world, outlets, [name.removeprefix(SETUP) for name in taken])
         self._challenge = ChallengeFace(scene, outlets, self.push) if challenge else None
+        self._bases = BaseFrames(reference, outlets, self._frame_prefix, self.push) if reference else None
 
     @property
     def outlets(self) -> list[ArmOutlet]:
@@ -154,6 +161,8 @@ class ArmsNode:
         ended finds readings that are no older than its end: the bus holds a state before it reports the state's events.
         """
         self._due = max(self._due + PERIOD, now + PERIOD / 5)
+        if self._due < now - BACKLOG:
+            self._due = now + PERIOD
         self._count += 1
         for part in self._yielded():
             self._fall_silent(part)
@@ -183,6 +192,8 @@ class ArmsNode:
         if self._challenge is not None:
             self._challenge.publish(now, state, stamp)
         if self._count % TF_PERIODS == 0:
+            if self._bases is not None:
+                self._bases.follow(state)
             self._publish_tf(state, stamp)
         return sent
 
@@ -195,6 +206,9 @@ class ArmsNode:
         if not heard:
             return
         frames = []
+        if self._bases is not None:
+            world = matrix_pose7(np.eye(4))
+            frames.append(_transform(f"{self._frame_prefix}world", f"{self._frame_prefix}{CART}", world, stamp))
         for outlet in self.outlets:
             body = outlet.description.base
             record, name = state["arm"][outlet.index], f"{self._frame_prefix}{outlet.description.name}"

@@ -19,6 +19,7 @@ KINDS = MappingProxyType(
         "joy": "game controller, sensor_msgs/Joy",
         "spacenav": "3D mouse, sensor_msgs/Joy of spacenav_node",
         "keyboard": "keys of the terminal",
+        "mouse": "mouse and keys of the terminal",
     }
 )
 """What there is, by the word of the configuration file."""

@@ -40,8 +40,12 @@ class Device:
     def poll(self, now: float) -> None:
         """Called steadily, for devices that do not speak by themselves."""
 
-    def feel(self, force: Array) -> None:
-        """Press the hand with a force (3,) in the device's axes, in N."""
+    def feel(self, wrench: Array) -> None:
+        """Press the hand with a force in N and a torque in N·m (6,) in the device's axes, as far as it has motors."""
+
+    def make_ready(self) -> str:
+        """Ask for what the device needs before a hand can drive with it; what it waits for, empty when nothing."""
+        return ""
 
     def begin(self) -> None:
         """The hand begins to drive."""

@@ -47,11 +47,14 @@ class Adapter(Device):
     def poll(self, now: float) -> None:
         """Take the keys pressed since, and give where the hand is by now."""
         while select.select([self._input], [], [], 0.0)[0]:
-            for key in os.read(self._input, 64).decode("ascii", "ignore"):
-                self._press(key)
-                if key in CLICKS:
-                    self.take(Reading(now, matrix_pose7(self._T), None, {**self._buttons, CLICKS[key]: True}))
+            self._read(os.read(self._input, 64), now)
         self.take(Reading(now, matrix_pose7(self._T), None, dict(self._buttons)))
+
+    def _read(self, data: bytes, now: float) -> None:
+        for key in data.decode("ascii", "ignore"):
+            self._press(key)
+            if key in CLICKS:
+                self.take(Reading(now, matrix_pose7(self._T), None, {**self._buttons, CLICKS[key]: True}))
 
     def _press(self, key: str) -> None:
         T = self._T

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import rospy
+from crtk_msgs.msg import OperatingState, StringStamped
 from geometry_msgs.msg import PoseStamped, Quaternion, WrenchStamped
 from numpy.typing import NDArray
 from std_msgs.msg import Bool, Empty
@@ -43,6 +44,10 @@ class Adapter(Device):
             *(Listener(topic + name, self._gripped) for name in GRIPPERS),
         ]
         self._force = rospy.Publisher(f"{topic}body/servo_cf", WrenchStamped, queue_size=1, tcp_nodelay=True)
+        self._state: OperatingState | None = None
+        self._states = rospy.Subscriber(f"{topic}operating_state", OperatingState, self._reported, queue_size=10)
+        self._command = rospy.Publisher(f"{topic}state_command", StringStamped, queue_size=10)
+        self._name = topic.strip("/")
         self._absolute = rospy.Publisher(f"{topic}body/set_cf_orientation_absolute", Bool, latch=True, queue_size=1)
         self._weightless = rospy.Publisher(f"{topic}use_gravity_compensation", Bool, latch=True, queue_size=1)
         self._move = rospy.Publisher(f"{topic}move_cp", PoseStamped, queue_size=1)
@@ -57,19 +62,33 @@ class Adapter(Device):
         if len(message.position) == 1:
             self._grip = message.position[0]
 
+    def _reported(self, message: OperatingState) -> None:
+        self._state = message
+
+    def make_ready(self) -> str:
+        """Power and home the arm, as the dVRK's teleoperation does; systems of dVRK 1.x report no such state."""
+        state = self._state
+        if state is None or (state.state == "ENABLED" and state.is_homed and not state.is_busy):
+            return ""
+        if not state.is_busy:
+            command = StringStamped(string="home" if state.state == "ENABLED" else "enable")
+            command.header.stamp = rospy.Time.now()
+            self._command.publish(command)
+        return f"{self._name} is {state.state}{'' if state.is_homed else ' and not homed'}"
+
     def begin(self) -> None:
         """The hand moves the arm from now on: its weight is carried, and it yields."""
         self._absolute.publish(True)
         self._weightless.publish(True)
         self._unlock.publish()
-        self.feel(np.zeros(3))
+        self.feel(np.zeros(6))
 
-    def feel(self, force: Array) -> None:
-        """Press the hand, in axes of the console."""
+    def feel(self, wrench: Array) -> None:
+        """Press and turn the hand, in axes of the console."""
         message = WrenchStamped()
         message.header.stamp = rospy.Time.now()
-        f = message.wrench.force
-        f.x, f.y, f.z = force.tolist()
+        f, t = message.wrench.force, message.wrench.torque
+        f.x, f.y, f.z, t.x, t.y, t.z = wrench.tolist()
         self._force.publish(message)
 
     def turn_to(self, R: Array) -> bool:
@@ -92,3 +111,4 @@ class Adapter(Device):
         """Listen no more."""
         for listener in self._listeners:
             listener.close()
+        self._states.unregister()

@@ -44,12 +44,18 @@ class Adapter(Device):
     def _pressed(self, message: Any, sender: str) -> None:
         self._buttons = {"grey": bool(message.grey_button), "white": bool(message.white_button)}
 
-    def feel(self, force: Array) -> None:
-        """Press the hand, in the driver's axes; without the driver's messages a warning names what is missing."""
+    def feel(self, wrench: Array) -> None:
+        """Press the hand, in the driver's axes; torques where its messages have them (``geometry_msgs/Wrench``).
+
+        Without the driver's messages a warning names what is missing.
+        """
         if self._message is None:
             self._message = self._force_message()
         if self._message:
-            self._message.force.x, self._message.force.y, self._message.force.z = force.tolist()
+            pressed = getattr(self._message, "wrench", self._message)
+            pressed.force.x, pressed.force.y, pressed.force.z = wrench[:3].tolist()
+            if hasattr(pressed, "torque"):
+                pressed.torque.x, pressed.torque.y, pressed.torque.z = wrench[3:].tolist()
             self._force.publish(self._message)
 
     def _force_message(self) -> Any:
