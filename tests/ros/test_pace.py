@@ -46,7 +46,7 @@ def test_a_run_is_paused_stepped_and_goes_on_at_another_speed(
     world, paused = listen("/ambf/env/World/State", WorldState), listen("/ligature/paused", Bool)
     pause, step = service(node, "pause"), service(node, "step")
     world.wait()
-    assert speed(world) == pytest.approx(0.5, abs=0.15)
+    assert speed(world) < 0.65, "half the speed of the world at most; a busy machine may be slower"
     assert not step().success, "a run that goes on is not stepped"
     answer = pause(True)
     assert answer.success and paused.wait(lambda m: m.data)
@@ -62,7 +62,9 @@ def test_a_run_is_paused_stepped_and_goes_on_at_another_speed(
     until(lambda: world.messages[-1].sim_step > at + 40, "it goes on", 10.0)
     faster = publish("/ligature/set_speed", Float64)
     faster.publish(1.0)
-    until(lambda: speed(world) == pytest.approx(1.0, abs=0.25), "at the speed of the world", 20.0)
+    until(lambda: 0.7 < speed(world) < 1.25, "at the speed of the world", 60.0)
+    faster.publish(0.1)
+    until(lambda: speed(world) < 0.15, "slower", 20.0)
     faster.publish(float("nan"))
     faster.publish(-1.0)
-    until(lambda: speed(world) > 0.7, "nonsense changes nothing", 10.0)
+    stays(lambda: speed(world) < 0.15, "nonsense changes nothing", 2.0)
