@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ast
-import ctypes
-import errno
 import os
 import subprocess
 import sys
@@ -12,10 +10,8 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 import pytest
 from ligature import kernels
-from numba.core.caching import FunctionCache
 
 PACKAGE = Path(kernels.__file__).parent
 PROGRAM = """
@@ -28,12 +24,6 @@ print(twice(21), kernels.kernel_folder(), sum(twice.stats.cache_hits.values()))
 """
 
 
-def _name(decorator: ast.expr) -> str:
-    """The name of a decorator, with arguments or without."""
-    named = decorator.func if isinstance(decorator, ast.Call) else decorator
-    return named.id if isinstance(named, ast.Name) else ""
-
-
 def constants_of(source: Path) -> set[Path]:
     """The modules of the package whose constants the kernels of ``source`` read."""
     tree = ast.parse(source.read_text())
@@ -41,7 +31,7 @@ def constants_of(source: Path) -> set[Path]:
         name.id
         for function in ast.walk(tree)
         if isinstance(function, ast.FunctionDef)
-        and any(_name(d) in ("compiled", "kernel", "inlined", "callback") for d in function.decorator_list)
+        and any(isinstance(d, ast.Name) and d.id in ("compiled", "kernel", "inlined") for d in function.decorator_list)
         for name in ast.walk(function)
         if isinstance(name, ast.Name) and name.id.isupper()
     }
@@ -146,27 +136,3 @@ def test_somebody_who_owns_nothing_can_simulate() -> None:
         )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "/root/.cache/ligature cannot be written (Permission denied)" in done.stderr
-
-
-@pytest.mark.parametrize("full", [False, True])
-def test_c_code_calls_a_compiled_function_even_where_its_code_cannot_be_kept(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture, full: bool
-) -> None:
-    def fail(cache: object, signature: object, data: object) -> None:
-        raise OSError(errno.ENOSPC, "no space left")
-
-    monkeypatch.setattr(kernels, "kernel_folder", lambda: tmp_path)
-    kernels._warn_of_writes.cache_clear()
-    if full:
-        monkeypatch.setattr(FunctionCache, "save_overload", fail)
-
-    @kernels.callback("void(CPointer(int64), int64)")
-    def double(to: np.ndarray, value: int) -> None:
-        to[0] = 2 * value
-
-    result = np.zeros(1, dtype=np.int64)
-    call = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(double())
-    call(result.ctypes.data, 21)
-    assert result[0] == 42 and double() == double()
-    assert ("no space left" in caplog.text) == full
-    assert any(tmp_path.rglob("*.nbi")) != full

@@ -108,11 +108,7 @@ def callback(signature: str) -> Callable[[Callable[..., None]], Callable[[], int
             def make(cache: bool) -> Any:
                 return numba.cfunc(signature, cache=cache, error_model="numpy", _nrt=False)(function)
 
-            try:
-                return _kept(make)
-            except OSError as error:  # unlike a kernel's, its code is written while it is compiled
-                _warn_of_writes(str(error))
-                return make(False)
+            return _kept(make)
 
         return lambda: int(made().address)
 
