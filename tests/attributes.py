@@ -19,7 +19,6 @@ CACHES: dict[str, str] = {
     "Rod._arrays": "what of it lasts are attributes of the rod, too",
     "Joints._table": "addresses of arrays",
     "Motions.table": "addresses of arrays",
-    "Engine.broad_phase": "has Bullet look at all boxes after a restore",
     "Readout._table": "addresses of arrays",
     "Readout._state_table": "addresses of arrays",
     "Rod._touch_tables": "addresses of arrays",

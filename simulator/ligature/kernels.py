@@ -34,7 +34,7 @@ KEPT = 30 * 24 * 3600.0
 """Seconds for which the machine code of a version is kept after the last start with it."""
 
 _PACKAGE = Path(__file__).parent
-_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|callback|intrinsic)\b", re.MULTILINE)
+_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic)\b", re.MULTILINE)
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
     "kernels.py", "model/state.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
@@ -96,44 +96,15 @@ def inlined(function: Function) -> Function:
     return compile_with(function, error_model="numpy", _nrt=False, forceinline=True)
 
 
-def callback(signature: str) -> Callable[[Callable[..., None]], Callable[[], int]]:
-    """Like `kernel`, for a function that C code calls: the decorated one takes nothing and returns its address.
-
-    It is compiled, or loaded, when the address is asked for.
-    """
-
-    def lazy(function: Callable[..., None]) -> Callable[[], int]:
-        @cache
-        def made() -> Any:
-            def make(cache: bool) -> Any:
-                return numba.cfunc(signature, cache=cache, error_model="numpy", _nrt=False)(function)
-
-            return _kept(make)
-
-        return lambda: int(made().address)
-
-    return lazy
-
-
 def compile_with(function: Function, **options: Any) -> Function:
     """Like `compiled`, with options of `numba.njit`."""
-
-    def make(cache: bool) -> Function:
-        dispatcher: Function = numba.njit(cache=cache, **options)(function)
-        return dispatcher
-
-    return _kept(make)
-
-
-def _kept(make: Callable[[bool], Function]) -> Function:
-    """What ``make`` compiles, with its machine code on disk where it can be kept there."""
     folder = kernel_folder()
     if folder is None:
-        return make(False)
+        return numba.njit(**options)(function)
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:
-        dispatcher = make(True)
+        dispatcher = numba.njit(cache=True, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
     _survive_failed_writes(dispatcher)

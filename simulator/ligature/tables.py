@@ -54,17 +54,6 @@ def opener(example: NamedTuple) -> Callable[[Any], Any]:
     return opened
 
 
-@intrinsic  # type: ignore[misc]
-def table_at(typing_context: Any, address: Any) -> Any:
-    """The table at an address; only `opener` knows how long it is."""
-    kind = types.Array(types.int64, 1, "C")
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _array_at(context, builder, kind, arguments[0], [ir.Constant(ir.IntType(64), 0)])
-
-    return kind(types.intp), build
-
-
 def _group_at(context: Any, builder: Any, kind: Any, words: Any, at: int) -> tuple[Any, int]:
     """A group of numba type ``kind`` from the words at index ``at``, and the index after it."""
     items = []

@@ -26,8 +26,6 @@ from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from ligature.physics.objects import word
-
 Integers = NDArray[np.int64]
 
 VELOCITY_CONTROL, TORQUE_CONTROL = int(pybullet.VELOCITY_CONTROL), int(pybullet.TORQUE_CONTROL)
@@ -120,29 +118,6 @@ def whole_at(typing_context: Any, address: Any) -> Any:
     return types.int64(types.intp), build
 
 
-@intrinsic  # type: ignore[misc]
-def word_at(typing_context: Any, address: Any) -> Any:
-    """The whole number of 64 bits at an address."""
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.load(builder.inttoptr(arguments[0], ir.PointerType(ir.IntType(64))))
-
-    return types.int64(types.intp), build
-
-
-@intrinsic  # type: ignore[misc]
-def call_method(typing_context: Any, function: Any, object_: Any, argument: Any) -> Any:
-    """Call the function at an address, a method of an object that takes another address."""
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        word = ir.IntType(64)
-        kind = ir.PointerType(ir.FunctionType(ir.VoidType(), [word, word]))
-        builder.call(builder.inttoptr(arguments[0], kind), arguments[1:])
-        return context.get_dummy_value()
-
-    return types.void(types.intp, types.intp, types.intp), build
-
-
 # --- handles ------------------------------------------------------------------------------------
 
 
@@ -198,7 +173,17 @@ def _segments() -> Iterator[Integers]:
 
 def _is_client(address: int) -> bool:
     """Whether an object of the class of clients is at an address, which may be none."""
-    return address % 8 == 0 and address > 0 and word(address) == _class_of_clients()
+    return address % 8 == 0 and address > 0 and _word(address) == _class_of_clients()
+
+
+def _word(address: int) -> int | None:
+    """The word at an address, None where there is no memory."""
+    try:
+        with open("/proc/self/mem", "rb", buffering=0) as own:
+            own.seek(address)
+            return int.from_bytes(own.read(8), "little")
+    except (OSError, ValueError, OverflowError):
+        return None
 
 
 @cache
@@ -207,6 +192,6 @@ def _class_of_clients() -> int | None:
     make, end = _library.b3ConnectPhysicsDirect, _library.b3DisconnectSharedMemory
     make.restype, end.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
     example = make()
-    first = word(example)
+    first = _word(example)
     end(example)
     return first

@@ -18,7 +18,6 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
-from ligature.physics.broad_phase import BroadPhase
 from ligature.physics.bullet import connect
 from ligature.physics.motions import Motions
 from ligature.physics.trees import Places
@@ -80,8 +79,6 @@ class Engine:
         The body at Bullet's multibody and link.
     gravity
         Bullet's gravity (3,).
-    broad_phase
-        Which shapes may touch.
     forgets
         Whether `forget_contacts` leaves nothing of what was before.
     """
@@ -96,6 +93,7 @@ class Engine:
     def _build(self) -> None:
         scene = self.scene
         self.client, handle = connect()
+        self._end = weakref.finalize(self, pybullet.disconnect, self.client)
         if self.forgets:
             pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=self.client)
         iterations = LOOP_ITERATIONS if scene.closures else SOLVER_ITERATIONS
@@ -118,8 +116,6 @@ class Engine:
         self.place_table = table_of(self.places)
         self.body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
         self._colliders = [collider for tree in self.trees for collider in _colliders(tree)]
-        self.broad_phase = BroadPhase(handle)
-        self._end = weakref.finalize(self, _disconnect, self.client, self.broad_phase)
         self.start = self.snapshot()
         self.restore(self.start)  # as every later start: Bullet turns what it makes by a last bit
 
@@ -136,7 +132,6 @@ class Engine:
         """
         for uid, link, group, mask in self._colliders:
             pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)
-        self.broad_phase.forget()
         self.motions.begin()
 
     def restart(self, tree: int) -> None:
@@ -171,11 +166,6 @@ class Engine:
     def close(self) -> None:
         """Give the Bullet client back; an engine that is forgotten does so by itself."""
         self._end()
-
-
-def _disconnect(client: int, broad_phase: BroadPhase) -> None:
-    """End a client, which needs its broad phase until then."""
-    pybullet.disconnect(client)
 
 
 def _colliders(tree: Tree) -> list[tuple[int, int, int, int]]:

@@ -55,7 +55,6 @@ class BulletQueries:
         shape = shapes.create(client, self._engine.cache, colliders, np.eye(4), True, margin)
         uid = pybullet.createMultiBody(0, shape, basePosition=_FAR, physicsClientId=client)
         pybullet.setCollisionFilterGroupMask(uid, -1, 0, 0, physicsClientId=client)
-        self._engine.broad_phase.forget()
         self._probe_shapes.append((colliders, margin))
         self._probes.append(uid)
         return len(self._probes) - 1
