@@ -1,4 +1,4 @@
-"""Packs the extension: its own files, the rooms adf, mesh and authoring with the module cache, and the wheels it needs.
+"""Packs the extension: its own files, the rooms adf, mesh and authoring, cache and paths, and the wheels it needs.
 
 ``python blender_addon/pack.py OUT`` writes the legacy zip (Blender 3.4 to 4.1) and the extension zip
 (4.2 and later); ``--stage FOLDER`` only lays the legacy form out in a folder, for tests. Imports of
@@ -19,7 +19,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 SIMULATOR = HERE.parent / "simulator" / "ligature"
 ROOMS = ("adf", "mesh", "authoring")
-MODULES = ("cache.py",)
+MODULES = ("cache.py", "paths.py")
 LEFT_OUT = {"mesh/distance.py", "mesh/quality.py", "mesh/coacd_process.py"}
 """Compiled by numba or in need of SciPy, neither of which Blender has."""
 

@@ -178,7 +178,7 @@ def test_an_actuator_can_hold_the_thread(sim: Simulation) -> None:
     ("command", "text"),
     [
         (BodyCommand(0, CommandType.POSITION, (float("nan"),) * 7), "must be finite"),
-        (BodyCommand(0, CommandType.POSITION, (0.0,) * 6), "has 7 numbers, not 6"),
+        (BodyCommand(0, CommandType.POSITION, (0.0,) * 6), "must have 7 numbers, not 6"),
         (BodyCommand(0, CommandType.POSITION, (0.0,) * 7), "the quaternion has the length 0"),
         (BodyCommand(0, CommandType.FORCE, (1e30,) + (0.0,) * 5), "must stay within"),
     ],

@@ -130,7 +130,7 @@ CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
         for kind in ("body", "ghost object", "soft body")
     },
     ("soft body", "color components.ambient.level"): {"color components": {"diffuse": {"r": 0.5, "g": 0.5, "b": 0.5}, "transparency": 1}},
-    **{("soft body", f"config.{key}"): {"config": {"kLST": 0.01, "kMT": 0.0}} for key in ("kLST", "piterations", "kMT")},
+    **{("soft body", f"config.{key}"): {"config": {"kLST": 0.5, "kMT": 0.0}} for key in ("kLST", "piterations", "kMT")},
     **{
         ("soft body", f"config.{key}"): {"config": {"kLST": 0.01, other: 0.0}}
         for key, other in (("kVC", "kPR"), ("kPR", "kVC"))

@@ -302,4 +302,4 @@ def test_a_mechanism_too_large_for_its_reaches_is_reported(corpus: Path) -> None
     scene = ligature.load(
         corpus / "multibodies/descriptions/multi-bodies/environments/KnotEnv/env.yaml", roots=[corpus]
     )
-    assert any("more than the 64 of which reaches are computed" in found.message for found in findings(scene))
+    assert any("reaches are computed for at most 64" in found.message for found in findings(scene))
