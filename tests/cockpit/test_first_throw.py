@@ -8,7 +8,7 @@ import pytest
 
 from tests.cockpit.conftest import ROOT, Newcomer, Person, Served
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,8 @@ NEEDLE = "/ambf/env/phantom/Needle"
 FLAGS = "-l 10,11,6,7,8,9 -g 0 -p 200 -t 1 --override_max_comm_freq 100 --override_min_comm_freq 100"
 EXTRA = {
     "/ligature/ready": "std_msgs/Bool",
+    "/ligature/paused": "std_msgs/Bool",
+    "/ligature/set_speed": "std_msgs/Float64",
     "/ambf/env/World/Command/ResetBodies": "std_msgs/Empty",
     "/ambf/env/phantom/BlackGround1/State": "ambf_msgs/RigidBodyState",
     "/ambf/env/phantom/BlackGround1/Command": "ambf_msgs/RigidBodyCmd",
