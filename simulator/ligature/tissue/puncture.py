@@ -237,9 +237,13 @@ class NeedleInTissue:
 
     def _drop_of(self, point: int) -> float:
         """Time in which the force on a dented point falls, s."""
+        dent = self._interface.points.at[point] - self._at_rest(point)
+        return max(states.DROP, float(np.linalg.norm(dent)) / states.RECOIL)
+
+    def _at_rest(self, point: int) -> Array:
+        """Where a point is in the tissue at rest, (3,)."""
         p = self._interface.points
-        rest = p.weights[point] @ self._interface.elastic.grid.nodes[p.nodes[point]]
-        return max(states.DROP, float(np.linalg.norm(p.at[point] - rest)) / states.RECOIL)
+        return np.asarray(p.weights[point] @ self._interface.elastic.grid.nodes[p.nodes[point]])
 
     def _let_go(self) -> None:
         """The tip has left the surface."""
@@ -290,9 +294,9 @@ class NeedleInTissue:
 
     def _away(self, cell: int, point: int) -> float:
         """Distance of the place that `_locate` has found in a cell from a point, in the tissue at rest, m."""
-        grid, p = self._interface.elastic.grid, self._interface.points
-        there = p.weights[point] @ grid.nodes[p.nodes[point]]
-        return float(np.linalg.norm(self._weights8 @ grid.nodes[grid.cells[cell]] - there))
+        grid = self._interface.elastic.grid
+        there = self._weights8 @ grid.nodes[grid.cells[cell]]
+        return float(np.linalg.norm(there - self._at_rest(point)))
 
     def _hold(self, point: int) -> None:
         """Let a node where the tip is hold the needle from now on."""
