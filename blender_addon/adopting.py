@@ -132,7 +132,7 @@ def adopt(scene: bpy.types.Scene) -> Adopted:
     names = [_names(obj.name) for obj in objects]
     spaces = [space for space, _ in names if space]
     namespace = str(whole.get("ambf_namespace", default="")) or (max(set(spaces), key=spaces.count) if spaces else "")
-    file = making.new_file(scene, "adopted", "MODEL", _closed(namespace or "/ambf/env/"))
+    file = making.new_file(scene, "adopted", "MODEL", making.closed(namespace or "/ambf/env/"))
     done = Adopted(file)
     if not namespace:
         done.guessed.append("the namespace is /ambf/env/")
@@ -142,7 +142,7 @@ def adopt(scene: bpy.types.Scene) -> Adopted:
     roles = {obj: _role_of(obj) for obj in objects}
     for obj, (space, name) in zip(objects, names, strict=True):
         if roles[obj] in ("RIGID_BODY", "GHOST_OBJECT", "BLENDER_BODY"):
-            _adopt_shaped(obj, name, _closed(space) if space else "", roles[obj], done)
+            _adopt_shaped(obj, name, making.closed(space) if space else "", roles[obj], done)
     for obj, (_, name) in zip(objects, names, strict=True):
         if roles[obj] == "CONSTRAINT":
             _adopt_joint(obj, name, done)
@@ -170,10 +170,6 @@ def _names(name: str) -> tuple[str, str]:
     """Namespace and name of an object, both in its name in Blender."""
     space, _, last = name.rpartition("/")
     return space, last
-
-
-def _closed(namespace: str) -> str:
-    return "/" + "".join(f"{part}/" for part in namespace.split("/") if part)
 
 
 def _file_keys(file: bpy.types.Collection, whole: Stored) -> None:

@@ -10,10 +10,11 @@ from .ligature.adf import AdfError, Resolver
 from .ligature.adf.diagnostics import Severity
 from .ligature.adf.reader import read_text
 from .ligature.adf.schema import BY_PATH
-from .ligature.authoring.lint import Finding, lint
+from .ligature.authoring.lint import Finding, lint_by_rule
 from .placing import SHAPED, place, rest_pose
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier, store, unset
+from .steps import InSteps, finished, part
 from .write_file import NO_MESH, ExportError, current_text, has_mesh, members
 
 OWN = {"identifier": "its own"}
@@ -22,11 +23,19 @@ OWN = {"identifier": "its own"}
 DELETE, UNHANG = {"object": "deleted"}, {"parent": "none"}
 """The fixes of a joint, and of what hung on a body, whose body was deleted."""
 
+READ = 0.4
+"""Share of a check after the file's text is there."""
+
 ICONS = {"ERROR": "ERROR", "WARNING": "INFO", "INFO": "DOT"}
 
 
 def check_file(collection):
     """Findings of one file as it would be written now, each with its object."""
+    return finished(checking(collection))
+
+
+def checking(collection):
+    """The steps to the findings of one file."""
     copies = list(_copies(collection))
     if copies:
         return copies
@@ -36,13 +45,15 @@ def check_file(collection):
     if broken:
         return [(finding, objects.get(finding.key)) for finding in broken]
     try:
-        text = current_text(collection)
+        text = yield from part(current_text(collection), 0.0, READ)
     except ExportError as error:
         return [(Finding("export", Severity.ERROR, error.obj.adf.key if error.obj else "", str(error)), error.obj)]
     except ValueError as error:
         return [(Finding("export", Severity.ERROR, "", str(error)), None)]
     path = Path(bpy.path.abspath(collection.adf.filepath) or "new.yaml").resolve()
     kind = {"MODEL": "model", "WORLD": "world", "INPUT_DEVICES": "input devices"}[collection.adf.kind]
+    words = f"Checking {collection.name}"
+    yield words, READ
     try:
         document = read_text(text, path, kind)
     except AdfError as error:
@@ -52,7 +63,10 @@ def check_file(collection):
     unsaved = {name for group in groups for name in (group.mesh, group.collision_mesh)}  # the next export writes them
     unsaved |= {f"{obj.name}.OBJ" for obj in objects.values() if has_mesh(obj)}
     inflated = {obj.adf.key for obj in objects.values() if obj.adf.inertia_factor != 1.0}
-    found = lint(document, Resolver.for_file(path), frozenset(unsaved), frozenset(inflated))
+    found = []
+    for listed in lint_by_rule(document, Resolver.for_file(path), frozenset(unsaved), frozenset(inflated)):
+        found += listed
+        yield words, READ + (1.0 - READ) * 0.5
     found = [*found, *(finding for obj in objects.values() for finding in _unwritten(obj))]
     return [(finding, objects.get(finding.key)) for finding in found]
 
@@ -112,7 +126,7 @@ def _unplaced(obj):
         yield Finding("transform", Severity.ERROR, obj.adf.key, str(error), "clear its transform")
 
 
-class ADF_OT_check(bpy.types.Operator):
+class ADF_OT_check(InSteps, bpy.types.Operator):
     """Check all files of the scene; findings are listed below"""
 
     bl_idname = "adf.check"
@@ -126,25 +140,37 @@ class ADF_OT_check(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context):
-        listed = context.scene.adf.findings
-        listed.clear()
-        found = [(finding, None, context.scene.name) for finding in _units(context.scene)]
-        for collection in bpy.data.collections:
-            if collection.adf.kind not in ("NONE", "OTHER"):
-                found += [(finding, obj, collection.name) for finding, obj in check_file(collection)]
-        errors = 0
-        for finding, obj, where in found:
-            item = listed.add()
-            item.severity, item.rule = finding.severity.name, finding.rule
-            item.message = f"{obj.name if obj else finding.key or where}: {finding.message}"
-            item.hint, item.object, item.fixable = finding.hint, obj, bool(finding.fix and obj)
-            errors += finding.severity >= Severity.ERROR
-        self.report({"WARNING"} if errors else {"INFO"}, f"{len(listed)} findings, {errors} errors")
+    def steps(self, context):
+        found = yield from checking_scene(context.scene)
+        errors = list_findings(context.scene, found)
+        self.report({"WARNING"} if errors else {"INFO"}, f"{len(found)} findings, {errors} errors")
         return {"FINISHED"}
 
 
-class ADF_OT_fix(bpy.types.Operator):
+def checking_scene(scene):
+    """The steps to the findings of all files, each with its object and the name of what it is about."""
+    found = [(finding, None, scene.name) for finding in _units(scene)]
+    files = [collection for collection in bpy.data.collections if collection.adf.kind not in ("NONE", "OTHER")]
+    for number, collection in enumerate(files):
+        listed = yield from part(checking(collection), number / len(files), (number + 1) / len(files))
+        found += [(finding, obj, collection.name) for finding, obj in listed]
+    return found
+
+
+def list_findings(scene, found):
+    """List findings in the sidebar; returns how many are errors."""
+    listed, errors = scene.adf.findings, 0
+    listed.clear()
+    for finding, obj, where in found:
+        item = listed.add()
+        item.severity, item.rule = finding.severity.name, finding.rule
+        item.message = f"{obj.name if obj else finding.key or where}: {finding.message}"
+        item.hint, item.object, item.fixable = finding.hint, obj, bool(finding.fix and obj)
+        errors += finding.severity >= Severity.ERROR
+    return errors
+
+
+class ADF_OT_fix(InSteps, bpy.types.Operator):
     """Mend the active finding, or all that can be mended"""
 
     bl_idname = "adf.fix"
@@ -160,21 +186,21 @@ class ADF_OT_fix(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context):
+    def steps(self, context):
         scene = context.scene.adf
         chosen = scene.findings[scene.active_finding] if len(scene.findings) > scene.active_finding else None
         wanted = [(i.rule, i.object) for i in scene.findings if i.fixable and (self.everything or i == chosen)]
-        mended = 0
-        for collection in [c for c in bpy.data.collections if c.adf.kind not in ("NONE", "OTHER")]:
-            for finding, obj in check_file(collection):
-                if finding.fix and (finding.rule, obj) in wanted:
-                    mend(obj, finding.fix)
-                    mended += 1
-            for obj in [o for o in collection.all_objects if o.adf.role == "JOINT" and not o.adf.key]:
-                bpy.data.objects.remove(obj)
-        bpy.ops.adf.check()
-        self.report({"INFO"}, f"{mended} findings mended")
-        return {"FINISHED"} if mended else {"CANCELLED"}
+        found = yield from part(checking_scene(context.scene), 0.0, 0.5)
+        todo = [(obj, finding.fix) for finding, obj, _ in found if finding.fix and (finding.rule, obj) in wanted]
+        self.can_end = False
+        for obj, fix in todo:
+            mend(obj, fix)
+        for obj in [o for o in bpy.data.objects if o.adf.role == "JOINT" and not o.adf.key and making.file_of(o)]:
+            bpy.data.objects.remove(obj)
+        left = yield from part(checking_scene(context.scene), 0.5, 1.0)
+        list_findings(context.scene, left)
+        self.report({"INFO"}, f"{len(todo)} findings mended")
+        return {"FINISHED"} if todo else {"CANCELLED"}
 
 
 def mend(obj, fix):

@@ -21,6 +21,7 @@ from .placing import placed
 from .properties import KIND_OF_ROLE
 from .references import members, new_name
 from .schema_properties import fetch, identifier
+from .steps import Steps, part
 
 FILE_KINDS = {"MODEL": "model", "WORLD": "world", "INPUT_DEVICES": "input devices"}
 
@@ -92,8 +93,13 @@ class Collected:
     own: dict[str, str] = field(default_factory=dict)
 
 
-def collect(collection: bpy.types.Collection, with_meshes: bool = False) -> Collected:
-    """Everything that the file of a collection states; raises ValueError and `ExportError` for what has no place."""
+def collecting(collection: bpy.types.Collection, with_meshes: bool = False) -> Steps[Collected]:
+    """The steps to everything that the file of a collection states.
+
+    They raise ValueError and `ExportError` for what has no place.
+    """
+    words = f"Reading {collection.name}"
+    yield words, 0.0
     stored = collection.adf
     if stored.kind == "OTHER":
         return Collected(
@@ -105,12 +111,18 @@ def collect(collection: bpy.types.Collection, with_meshes: bool = False) -> Coll
     top = fetch(getattr(stored, identifier(kind)), kind)
     values = [fetch(getattr(obj.adf, identifier(own)), own) for obj, own in zip(objects, kinds, strict=True)]
     check_values(objects, values)
-    places = [placed(obj) for obj in objects]
+    places = []
+    for number, obj in enumerate(objects):
+        yield words, 0.5 * number / len(objects)
+        places.append(placed(obj))
     states = [json.loads(obj.adf.imported) if obj.adf.imported else None for obj in objects]
     unchanged = [unchanged_groups(before, place.state()) for before, place in zip(states, places, strict=True)]
     check_ends(collection, objects, places, unchanged)
     notes = [f"'{obj.name}' {note}" for obj in objects for note in notes_of(obj)]
     notes += kept_joints(objects, places, states, unchanged)
+    meshes = []
+    if with_meshes and kind == "model":
+        meshes = yield from part(mesh_sources(objects, words), 0.5, 1.0)
     parts = [
         Part(obj.adf.key, obj.adf.was, obj.adf.like, *rest)
         for obj, *rest in zip(objects, names, values, places, states, unchanged, strict=True)
@@ -125,7 +137,7 @@ def collect(collection: bpy.types.Collection, with_meshes: bool = False) -> Coll
         parts,
         any(has_mesh(obj) for obj in objects),
         json.loads(stored.imported_keys or "[]"),
-        mesh_sources(objects) if with_meshes and kind == "model" else [],
+        meshes,
         notes,
         allowed_folders(),
         own_files(stored),

@@ -10,6 +10,7 @@ from .placing import SHAPED
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier
 from .solids import Solid, solids_of
+from .steps import Steps
 
 
 def has_mesh(obj: bpy.types.Object) -> bool:
@@ -17,17 +18,21 @@ def has_mesh(obj: bpy.types.Object) -> bool:
     return obj.adf.role in SHAPED and obj.type == "MESH"
 
 
-def mesh_sources(objects: list[bpy.types.Object]) -> list[MeshSource]:
-    """The meshes of all objects; the triangles of those alone whose files have to be written."""
+def mesh_sources(objects: list[bpy.types.Object], words: str) -> Steps[list[MeshSource]]:
+    """The steps to the meshes of all objects, the triangles of those alone whose files have to be written."""
     shaped = [obj for obj in objects if obj.adf.role in SHAPED]
     own = {obj.name_full: _own(obj) for obj in shaped}
     solids = {obj.name_full: solids_of(obj) for obj in shaped}
-    prints = {name: mesh_print(parts) for name, parts in solids.items()}
+    prints = {}
+    for name, parts in solids.items():
+        yield words, 0.5 * len(prints) / len(solids)
+        prints[name] = mesh_print(parts)
     groups = {o.name_full: getattr(o.adf, o.adf.role.lower()) for o in bpy.data.objects if o.adf.role in SHAPED}
     names = {name: {g.mesh.lower(), g.collision_mesh.lower()} for name, g in groups.items()}
     written: set[str] = set()
     found = []
     for obj in shaped:
+        yield words, 0.5 + 0.5 * len(found) / len(shaped)
         now = prints[obj.name_full]
         source = MeshSource(
             key=obj.adf.key, name=obj.name, clean_name=bpy.path.clean_name(obj.name), type=obj.type, print=now,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import bpy
 import numpy as np
 
@@ -53,6 +56,18 @@ def cache_folder() -> str:
     if hasattr(bpy.utils, "extension_path_user") and __package__.startswith("bl_ext."):  # from 4.2
         return bpy.utils.extension_path_user(__package__, path="cache", create=True)
     return bpy.utils.user_resource("DATAFILES", path="adf_studio", create=True)
+
+
+def is_online() -> bool:
+    """Whether the user lets extensions use the network; before 4.2 nobody was asked."""
+    return getattr(bpy.app, "online_access", True)
+
+
+def python() -> str:
+    """The Python that Blender comes with, or that it is a module of; Debian's Blender uses the system's."""
+    name = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    own = Path(sys.prefix, "bin", name)
+    return str(own) if bpy.app.binary_path and own.is_file() else sys.executable
 
 
 def custom_properties(owner: bpy.types.ID) -> dict:

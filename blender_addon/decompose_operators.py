@@ -1,15 +1,15 @@
-"""Convex decomposition by CoACD in a process of its own: progress, cancel by Esc, results kept by content."""
+"""Convex decomposition by CoACD in a process of its own: progress, cancel by Esc, results kept by content.
+
+Where Blender's Python lacks CoACD, as Debian's does, *Fetch CoACD* installs its wheel into the extension's own folder.
+"""
 
 import hashlib
 import importlib.util
 import json
-import os
 import re
-import subprocess
 import sys
-import tempfile
-import time
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 import bpy
@@ -22,8 +22,11 @@ from .object_operators import NeedsBody, active_body
 from .placing import children_with
 from .quality import measure
 from .solids import own_solid
+from .waiting import Process, Waits, failure
 
 WORKER = Path(__file__).with_name("decompose_worker.py")
+COACD = "coacd==1.0.14"
+"""What is fetched: the version whose wheels the extension ships for Blender 4.2 and later."""
 
 
 class Job:
@@ -34,28 +37,23 @@ class Job:
         key = hashlib.sha256(vertices.tobytes() + faces.astype(np.int32).tobytes() + words.encode()).hexdigest()[:32]
         self.kept = Path(compat.cache_folder()) / "decomposition" / f"{key}.npz"
         self.process = None
-        self.started = time.monotonic()
         if not self.kept.is_file():
-            self.folder = tempfile.TemporaryDirectory(prefix="adf-coacd-")
-            source, self.target = Path(self.folder.name, "mesh.npz"), Path(self.folder.name, "pieces.npz")
+            self.process = Process("coacd", {"OMP_NUM_THREADS": "2"})
+            source, self.target = self.process.root / "mesh.npz", self.process.root / "pieces.npz"
             np.savez(source, vertices=vertices, faces=faces)
-            self.log = open(Path(self.folder.name, "log"), "wb")  # noqa: SIM115  (closed with the process)
-            self.process = subprocess.Popen(
-                [*_python(), str(source), str(self.target), words, *_packages()],
-                stdout=self.log, stderr=subprocess.STDOUT, env={**os.environ, "OMP_NUM_THREADS": "2"},
-            )  # fmt: skip
+            self.process.start([*_worker(), str(source), str(self.target), words, *packages()])
 
     @property
     def finished(self):
         """Whether the pieces are there, or the process has ended without."""
-        return self.process is None or self.process.poll() is not None
+        return self.process is None or self.process.finished
 
     @property
     def progress(self):
         """Parts that the mesh is cut into so far, and the share of them, 0 to 1, that this round has looked at."""
         if self.process is None:
             return 1, 1.0
-        words = Path(self.log.name).read_text("utf-8", "replace")
+        words = self.process.words
         pool = re.findall(r"waiting pool: (\d+)", words)
         done = re.findall(r"Processing \[([\d.]+)%\]", words.rpartition("waiting pool")[2])
         return int(pool[-1]) if pool else 1, max((float(share) / 100.0 for share in done), default=0.0)
@@ -63,46 +61,85 @@ class Job:
     def pieces(self):
         """Vertices (n, 3) of each piece; raises ValueError with the process's last words."""
         if self.process is not None:
-            self.log.close()
-            if self.process.returncode or not self.target.is_file():
-                words = Path(self.log.name).read_text("utf-8", "replace").strip().splitlines()[-1:]
-                raise ValueError(f"CoACD failed: {' '.join(words) or self.process.returncode}")
+            if self.process.status or not self.target.is_file():
+                raise ValueError(f"CoACD failed: {failure('CoACD', self.process.words, self.process.status)}")
             write_atomically(self.kept, self.target.read_bytes())
         with np.load(self.kept, allow_pickle=False) as arrays:
             return [np.asarray(arrays[name], dtype=float).reshape(-1, 3) for name in sorted(arrays.files)]
 
     def cancel(self):
         """End the process."""
-        if self.process is not None and self.process.poll() is None:
-            self.process.kill()
-            self.process.wait()
         if self.process is not None:
-            self.log.close()
+            self.process.cancel()
 
 
-def _python():
+def _worker():
     """What runs the worker: this Blender without a window, or the Python that holds Blender as a module."""
     if bpy.app.binary_path:
-        return [
-            bpy.app.binary_path,
-            "-b",
-            "--factory-startup",
-            "--python-exit-code",
-            "1",
-            "--python",
-            str(WORKER),
-            "--",
-        ]
+        options = ["-b", "--factory-startup", "--python-exit-code", "1", "--python", str(WORKER), "--"]
+        return [bpy.app.binary_path, *options]
     return [sys.executable, str(WORKER)]
 
 
-def _packages():
-    """Folders in which the worker finds CoACD."""
+def fetched():
+    """The folder that *Fetch CoACD* fills."""
+    return Path(compat.cache_folder()) / "packages"
+
+
+@cache
+def packages():
+    """Folders in which the worker finds CoACD; none when it is nowhere. Looked up once, since panels ask for it."""
     found = importlib.util.find_spec("coacd")
-    return [str(Path(found.origin).parent.parent)] if found else []
+    if found is not None:
+        return (str(Path(found.origin).parent.parent),)
+    return (str(fetched()),) if (fetched() / "coacd").is_dir() else ()
 
 
-class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
+def fetch_command(python="python3"):
+    """The command that fetches CoACD; any Python 3.9 or later with pip will do."""
+    return [python, "-m", "pip", "install", "--no-deps", "--target", str(fetched()), COACD]
+
+
+class ADF_OT_fetch_coacd(Waits, bpy.types.Operator):
+    """Download CoACD, which finds convex pieces, from the Python package index into the extension's own folder"""
+
+    bl_idname = "adf.fetch_coacd"
+    bl_label = "Fetch CoACD"
+
+    @classmethod
+    def poll(cls, context):
+        if packages():
+            cls.poll_message_set("CoACD is there already")
+            return False
+        if not compat.is_online():
+            cls.poll_message_set(f"Go online in Preferences > System > Network, or run {' '.join(fetch_command())}")
+            return False
+        return True
+
+    def begin(self, context):
+        yield f"Fetching {COACD}", 0.0
+        self.job = Process("fetch")
+        try:
+            self.job.start(fetch_command(compat.python()))
+        except OSError as error:
+            self.report({"ERROR"}, f"{error}; run in a terminal: {' '.join(fetch_command())}")
+            return False
+        return True
+
+    def shown(self):
+        return f"Fetching {COACD} into {fetched()}", None
+
+    def take(self, context):
+        packages.cache_clear()
+        if self.job.status or not packages():
+            words = failure("Fetch CoACD", self.job.words, self.job.status)
+            self.report({"ERROR"}, f"{words}. In a terminal the same is: {' '.join(fetch_command())}")
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{COACD} lies in {fetched()}")
+        return {"FINISHED"}
+
+
+class ADF_OT_decompose(NeedsBody, Waits, bpy.types.Operator):
     """Decompose the body's mesh into convex pieces in the background; Esc ends it"""
 
     bl_idname = "adf.decompose"
@@ -119,70 +156,39 @@ class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
     max_hulls: bpy.props.IntProperty(name="Most Pieces", description="0 sets no limit", default=32, min=0, max=256)
     seed: bpy.props.IntProperty(name="Seed", default=0, min=0)
 
-    def execute(self, context):
-        """Without waiting in the background: the process is waited for here."""
-        if not self._start(context):
-            return {"CANCELLED"}
-        while not self._job.finished:
-            time.sleep(0.05)
-        return self._take(context)
+    @classmethod
+    def poll(cls, context):
+        if not packages():
+            cls.poll_message_set("This Blender's Python has no CoACD; use Fetch CoACD first")
+            return False
+        return super().poll(context)
 
-    def invoke(self, context, event):
-        if bpy.app.background:
-            return self.execute(context)
-        if not self._start(context):
-            return {"CANCELLED"}
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(0.1, window=context.window)
-        manager.progress_begin(0, 100)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        if event.type == "ESC":
-            self._job.cancel()
-            self._end(context)
-            self.report({"WARNING"}, "The decomposition was ended")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        seconds = time.monotonic() - self._job.started
-        parts, share = self._job.progress
-        context.window_manager.progress_update(100.0 * share)
-        context.workspace.status_text_set(
-            f"Decomposing '{self._body}': {share:.0%} of {parts} parts, {seconds:.0f} s. Esc ends it"
-        )
-        if not self._job.finished:
-            return {"PASS_THROUGH"}
-        self._end(context)
-        return self._take(context)
-
-    def _start(self, context):
+    def begin(self, context):
         body = active_body(context)
+        yield f"Reading '{body.name}'", 0.0
         if body.type != "MESH":
             self.report({"ERROR"}, f"'{body.name}' has no mesh to decompose")
             return False
         self._body = body.name
-        self._vertices, self._faces = points_of(own_solid(body))
-        if not len(self._faces):
+        vertices, faces = points_of(own_solid(body))
+        if not len(faces):
             self.report({"ERROR"}, f"'{body.name}' has no face")
             return False
         settings = {"threshold": self.threshold, "max_convex_hull": self.max_hulls or -1, "seed": self.seed}
-        self._job = Job(self._vertices, self._faces, settings)
+        self.job = Job(vertices, faces, settings)
         return True
 
-    def _end(self, context):
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
+    def shown(self):
+        parts, share = self.job.progress
+        return f"Decomposing '{self._body}': {share:.0%} of {parts} parts", share
 
-    def _take(self, context):
+    def take(self, context):
         body = bpy.data.objects.get(self._body)
         if body is None:
             self.report({"ERROR"}, f"'{self._body}' is gone")
             return {"CANCELLED"}
         try:
-            pieces = self._job.pieces()
+            pieces = self.job.pieces()
         except (ValueError, OSError) as error:
             self.report({"ERROR"}, f"'{body.name}': {error}")
             return {"CANCELLED"}
@@ -199,7 +205,7 @@ class ADF_OT_decompose(NeedsBody, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (ADF_OT_decompose,)
+CLASSES = (ADF_OT_fetch_coacd, ADF_OT_decompose)
 
 
 def attach() -> None:
@@ -207,4 +213,5 @@ def attach() -> None:
 
 
 def detach() -> None:
-    """Nothing but the classes."""
+    """Forget where CoACD was."""
+    packages.cache_clear()

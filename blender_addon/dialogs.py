@@ -1,7 +1,6 @@
 """Dialogs that ask before an operator reads outside the scene's folder, or replaces files of others."""
 
 import json
-from pathlib import Path
 
 import bpy
 
@@ -9,39 +8,43 @@ from .folders import allow_folders
 from .ligature.adf import AdfError
 from .preview_operators import is_previewing
 from .read_file import outside_folders
+from .steps import InSteps
 
 
-class Asks:
-    """An operator that asks before it reads outside, or replaces files of others, when a user started it."""
+class Asks(InSteps):
+    """An operator that asks before it reads outside, or replaces files of others, when a user started it.
 
-    asking = False
+    The dialog starts it again, ``answered``.
+    """
+
+    answered: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def by_user(self):
         """Whether a user is there to be asked."""
-        return self.asking and not bpy.app.background
+        return self.started() and not self.answered
 
-    def ask_folders(self, operator, paths, **arguments):
-        """Ask for the folders outside the scene's own that hold meshes; None when there is nothing to ask."""
+    def ask_folders(self, operator, paths, roots, **arguments):
+        """The steps that ask for the folders outside the scene's own that hold meshes; return whether they asked."""
         found = []
-        for path in paths:
+        for path in paths if self.by_user() else ():
             try:
-                found += outside_folders(path, (Path(self.root),) if self.root else ())
+                found += yield from outside_folders(path, roots)
             except (AdfError, OSError):
                 continue  # opening it reports that
-        if not found or not self.by_user():
-            return None
-        words = json.dumps(arguments)
-        return bpy.ops.adf.allow_folders(
-            "INVOKE_DEFAULT", operator=operator, arguments=words, folders=json.dumps(found)
-        )
+        if not found:
+            return False
+        words = {"operator": operator, "arguments": json.dumps(arguments), "folders": json.dumps(found)}
+        bpy.ops.adf.allow_folders("INVOKE_DEFAULT", **words)
+        return True
 
     def ask_replace(self, operator, done, **arguments):
-        """Ask before anything surprising is written; None when there is nothing to ask."""
+        """Ask before anything surprising is written; returns whether there was something to ask."""
         if self.replace or not (done.foreign or done.notes) or not self.by_user():
-            return None
+            return False
         lists = {"files": json.dumps([str(file) for file in done.foreign]), "notes": json.dumps(done.notes)}
         words = json.dumps({**arguments, "replace": bool(done.foreign)})
-        return bpy.ops.adf.confirm_export("INVOKE_DEFAULT", operator=operator, arguments=words, **lists)
+        bpy.ops.adf.confirm_export("INVOKE_DEFAULT", operator=operator, arguments=words, **lists)
+        return True
 
     def previewed(self, context):
         """Whether a joint is previewed, which is reported: what would be written are not the poses at rest."""
@@ -63,11 +66,12 @@ class Continues:
     def invoke(self, context, event):
         return context.window_manager.invoke_props_dialog(self, width=self.width)
 
-    def go_on(self, otherwise):
-        """Call the operator, and return what it does; ``otherwise`` without one."""
-        if not self.operator:
-            return {otherwise}
-        return getattr(bpy.ops.adf, self.operator)(**json.loads(self.arguments or "{}"))
+    def go_on(self, **further):
+        """Call the operator, and return what it does: one that goes on by itself makes a step to undo of its own."""
+        context = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+        words = {**json.loads(self.arguments or "{}"), **further}
+        done = getattr(bpy.ops.adf, self.operator)(context, answered=True, **words)
+        return {"CANCELLED"} if done == {"RUNNING_MODAL"} else done
 
 
 class ADF_OT_allow_folders(Continues, bpy.types.Operator):
@@ -86,9 +90,11 @@ class ADF_OT_allow_folders(Continues, bpy.types.Operator):
         self.layout.prop(self, "allow")
 
     def execute(self, context):
-        if self.allow:
-            allow_folders(context.scene, json.loads(self.folders or "[]"))
-        return self.go_on("FINISHED")
+        folders = self.folders if self.allow else "[]"
+        if self.operator:
+            return self.go_on(folders=folders)
+        allow_folders(context.scene, json.loads(folders or "[]"))
+        return {"FINISHED"}
 
 
 class ADF_OT_confirm_export(Continues, bpy.types.Operator):
@@ -111,7 +117,7 @@ class ADF_OT_confirm_export(Continues, bpy.types.Operator):
             _listed(self.layout, notes)
 
     def execute(self, context):
-        return self.go_on("CANCELLED")
+        return self.go_on()
 
 
 def _listed(layout, lines, most=20):

@@ -1,5 +1,6 @@
 """Import and export of model, world and launch files, with entries in the File menu."""
 
+import json
 import re
 from pathlib import Path
 
@@ -8,11 +9,15 @@ from bpy.app.handlers import persistent
 
 from .compat import HAS_FILE_HANDLER
 from .dialogs import Asks
-from .folders import allow_folders, forget_session
-from .launch_file import export_scene, import_launch, prepared_scene
+from .folders import allow_folders, forget_session, remember_written
+from .launch_file import importing_launch, keeping_scene, preparing_scene
 from .ligature.adf import AdfError
-from .read_file import import_file, worded
-from .write_file import ExportError, after_export, export_file, export_variants, prepared, prepared_variants
+from .read_file import Import, importing, worded
+from .steps import all_or_nothing, part
+from .write_file import PREPARED, ExportError, keeping, preparing, preparing_variants, write
+
+ASKED = 0.2
+"""Share of an import after it has looked for meshes outside."""
 
 FURTHER = bpy.props.StringProperty(
     name="Further Folder",
@@ -38,6 +43,7 @@ class ADF_OT_import(Asks, bpy.types.Operator):
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
     filter_glob: bpy.props.StringProperty(default="*.yaml;*.yml;*.ambf", options={"HIDDEN"})
     root: FURTHER
+    folders: bpy.props.StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context, event):
         self.asking = True
@@ -46,33 +52,41 @@ class ADF_OT_import(Asks, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
+    def steps(self, context):
         paths = [Path(self.directory, item.name) for item in self.files if item.name] or [Path(self.filepath)]
         paths = [Path(bpy.path.abspath(str(path))) for path in paths]
         files = [{"name": item.name} for item in self.files]
-        asked = self.ask_folders(
-            "import_file", paths, filepath=self.filepath, directory=self.directory, files=files, root=self.root
-        )
-        if asked is not None:
-            return asked
-        opened = 0
-        roots = _further(context.scene, self.root)
-        for path in paths:
-            try:
-                launch = _is_launch(path)
-                done = (
-                    import_launch(path, context.scene, roots=roots)
-                    if launch
-                    else [import_file(path, context.scene, roots)]
-                )
-            except (AdfError, OSError) as error:
-                self.report({"ERROR"}, worded(error))
-                continue
-            opened += 1
-            for problem in [problem for one in done for problem in one.problems][:20]:
-                self.report({"WARNING"}, problem)
-            self.report({"INFO"}, f"{path.name}: {sum(len(one.collection.all_objects) for one in done)} objects")
+        roots = _further(self)
+        words = {"filepath": self.filepath, "directory": self.directory, "files": files, "root": self.root}
+        asked = yield from part(self.ask_folders("import_file", paths, roots, **words), 0.0, ASKED)
+        if asked:
+            return {"CANCELLED"}
+        opened = []
+        with all_or_nothing():
+            for number, path in enumerate(paths):
+                steps = importing_launch(path, None, roots) if _is_launch(path) else importing(path, roots)
+                shares = (ASKED + (1.0 - ASKED) * n / len(paths) for n in (number, number + 1))
+                try:
+                    done = yield from part(steps, *shares)
+                except (AdfError, OSError) as error:
+                    self.report({"ERROR"}, worded(error))
+                    continue
+                opened.append((path, done))
+        for path, done in opened:
+            if isinstance(done, Import):
+                context.scene.collection.children.link(done.collection)
+            else:
+                done.add_to(context.scene)
+            self._report(path, [done] if isinstance(done, Import) else done.done)
+        if opened and roots:
+            allow_folders(context.scene, [str(root) for root in roots])
         return {"FINISHED"} if opened else {"CANCELLED"}
+
+    def _report(self, path, done):
+        for problem in [problem for one in done for problem in one.problems][:20]:
+            self.report({"WARNING"}, problem)
+        count = sum(len(one.collection.all_objects) for one in done if one.collection is not None)
+        self.report({"INFO"}, f"{path.name}: {count} objects")
 
 
 class ADF_OT_export(Asks, bpy.types.Operator):
@@ -98,13 +112,15 @@ class ADF_OT_export(Asks, bpy.types.Operator):
 
     def invoke(self, context, event):
         self.asking = True
+        if self.answered:
+            return self.execute(context)
         collection = chosen_collection(context, self.collection)
         if collection is not None:
             self.filepath = collection.adf.filepath or f"{collection.name}.yaml"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
+    def steps(self, context):
         collection = chosen_collection(context, self.collection)
         if collection is None:
             self.report({"ERROR"}, "No collection is an ADF file; make the one to be written active")
@@ -113,16 +129,16 @@ class ADF_OT_export(Asks, bpy.types.Operator):
             return {"CANCELLED"}
         path = Path(bpy.path.abspath(self.filepath or collection.adf.filepath))
         try:
-            if self.by_user():
-                words = {"filepath": str(path), "collection": collection.name}
-                asked = self.ask_replace("export_file", prepared(collection, path), **words)
-                if asked is not None:
-                    return asked
-            done = export_file(collection, path, self.replace)
+            done = yield from part(preparing(collection, path), 0.0, PREPARED)
+            if self.ask_replace("export_file", done, filepath=str(path), collection=collection.name):
+                return {"CANCELLED"}
+            self.can_end = False
+            write(done, self.replace)
         except ExportError as error:
             self.report({"ERROR"}, f"{collection.name}: {error}")
             return {"CANCELLED"}
-        after_export(collection, path, done.text)
+        remember_written(collection.adf, done.files)
+        yield from part(keeping(collection, path, done.text), PREPARED, 1.0)
         for problem in (*done.notes, *done.problems):
             self.report({"WARNING"}, problem)
         self.report({"INFO"}, f"{path.name}: {len(done.written)} files written")
@@ -175,23 +191,20 @@ class ADF_OT_export_variants(Asks, bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context, event):
-        self.asking = True
-        return self.execute(context)
-
-    def execute(self, context):
+    def steps(self, context):
         if self.previewed(context):
             return {"CANCELLED"}
+        collection = chosen_collection(context)
         try:
-            if self.by_user():
-                asked = self.ask_replace("export_variants", prepared_variants(chosen_collection(context)))
-                if asked is not None:
-                    return asked
-            written = export_variants(chosen_collection(context), self.replace)
+            done = yield from preparing_variants(collection)
+            if self.ask_replace("export_variants", done):
+                return {"CANCELLED"}
+            write(done, self.replace)
         except ExportError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(written)} variants written")
+        remember_written(collection.adf, done.files)
+        self.report({"INFO"}, f"{len(done.written)} variants written")
         return {"FINISHED"}
 
 
@@ -208,30 +221,37 @@ class ADF_OT_import_launch(Asks, bpy.types.Operator):
         name="Models", description="Indices of the models to open, such as 10,11,6; all when empty"
     )
     root: FURTHER
+    folders: bpy.props.StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context, event):
         self.asking = True
+        if self.answered:
+            return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
+    def steps(self, context):
+        path, roots = Path(bpy.path.abspath(self.filepath)), _further(self)
         try:
             chosen = tuple(int(word) for word in self.indices.replace(",", " ").split()) or None
-            path = Path(bpy.path.abspath(self.filepath))
-            words = {"filepath": str(path), "indices": self.indices, "root": self.root}
-            asked = self.ask_folders("import_launch", [path], **words)
-            if asked is not None:
-                return asked
-            done = import_launch(path, context.scene, chosen, _further(context.scene, self.root))
         except ValueError:
             self.report({"ERROR"}, f"'{self.indices}' are not indices; write them as 10,11,6")
             return {"CANCELLED"}
+        words = {"filepath": str(path), "indices": self.indices, "root": self.root}
+        asked = yield from part(self.ask_folders("import_launch", [path], roots, **words), 0.0, ASKED)
+        if asked:
+            return {"CANCELLED"}
+        try:
+            opened = yield from part(importing_launch(path, chosen, roots), ASKED, 1.0)
         except (AdfError, OSError) as error:
             self.report({"ERROR"}, worded(error))
             return {"CANCELLED"}
-        for problem in [problem for one in done for problem in one.problems][:20]:
+        opened.add_to(context.scene)
+        if roots:
+            allow_folders(context.scene, [str(root) for root in roots])
+        for problem in [problem for one in opened.done for problem in one.problems][:20]:
             self.report({"WARNING"}, problem)
-        self.report({"INFO"}, f"{len(done)} files opened")
+        self.report({"INFO"}, f"{sum(one.collection is not None for one in opened.done)} files opened")
         return {"FINISHED"}
 
 
@@ -255,33 +275,34 @@ class ADF_OT_export_scene(Asks, bpy.types.Operator):
 
     def invoke(self, context, event):
         self.asking = True
+        if self.answered:
+            return self.execute(context)
         self.filepath = context.scene.adf.filepath or "launch.yaml"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
+    def steps(self, context):
         if self.previewed(context):
             return {"CANCELLED"}
+        path = Path(bpy.path.abspath(self.filepath or context.scene.adf.filepath))
         try:
-            path = Path(bpy.path.abspath(self.filepath or context.scene.adf.filepath))
-            if self.by_user():
-                asked = self.ask_replace("export_scene", prepared_scene(context.scene, path)[0], filepath=str(path))
-                if asked is not None:
-                    return asked
-            written = export_scene(context.scene, path, replace=self.replace)
+            whole = yield from part(preparing_scene(context.scene, path), 0.0, PREPARED)
+            if self.ask_replace("export_scene", whole.export, filepath=str(path)):
+                return {"CANCELLED"}
+            self.can_end = False
+            write(whole.export, self.replace)
         except ExportError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(written)} files written")
+        yield from part(keeping_scene(context.scene, path, whole), PREPARED, 1.0)
+        self.report({"INFO"}, f"{len(whole.export.written)} files written")
         return {"FINISHED"}
 
 
-def _further(scene, folder):
-    """The folder that the user allows, remembered with the scene."""
-    if not folder:
-        return ()
-    allow_folders(scene, [bpy.path.abspath(folder)])
-    return (Path(bpy.path.abspath(folder)),)
+def _further(operator):
+    """The folders outside the scene's own that the user allows."""
+    folders = [operator.root] if operator.root else []
+    return tuple(Path(bpy.path.abspath(folder)) for folder in [*folders, *json.loads(operator.folders or "[]")])
 
 
 def _is_launch(path):

@@ -34,10 +34,16 @@ def own_files(*stored: bpy.types.PropertyGroup) -> dict[str, str]:
     return own
 
 
-def remember_written(stored: bpy.types.PropertyGroup, files: Mapping[Path, bytes]) -> None:
-    """Count files, with this content, as those of a collection or scene."""
+def remember_opened(stored: bpy.types.PropertyGroup, files: Mapping[Path, bytes]) -> dict[str, str]:
+    """Count files, with this content, as those of a collection or scene that was opened from them."""
     found = digests(files)
     stored.written = json.dumps({**json.loads(stored.written or "{}"), **found})
+    return found
+
+
+def remember_written(stored: bpy.types.PropertyGroup, files: Mapping[Path, bytes]) -> None:
+    """Count files, with this content, as those of a collection or scene, which undo does not take back."""
+    found = remember_opened(stored, files)
     _session.setdefault(stored.id_data.name_full, {}).update(found)
 
 

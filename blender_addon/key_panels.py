@@ -23,6 +23,7 @@ CATEGORIES = {
     "Surface": ("friction", "restitution"),
     "Collision": ("collision mesh", "collision mesh type", "collision margin", "collision groups", "scale"),
     "Looks": ("mesh", "mesh remove duplicates", "color rgba", "color components", "use material", "visible", "shaders"),
+    "Soft Tissue": ("ligature tissue",),
     "Controller": ("controller", "controller output type"),
     "Publishing": (
         "publish children names",
@@ -245,6 +246,10 @@ class ADF_PT_object(Physics, bpy.types.Panel):
         layout.operator("adf.redraw_shape")
 
 
+ABOVE: dict = {}
+"""What other modules draw above the keys of a sub-panel, by its name: functions that return whether keys follow."""
+
+
 def _sub_panel(category):
     def poll(cls, context):
         obj = context.object
@@ -256,10 +261,12 @@ def _sub_panel(category):
             row = self.layout.row()
             row.operator("adf.set_inertia", icon="PHYSICS")
             self.layout.prop(context.object.adf, "inertia_factor")
+        if category in ABOVE and not ABOVE[category](self.layout, context):
+            return
         draw_keys(self.layout, group_of(context.object), kind, SHOWN[kind][category])
 
     name = "ADF_PT_keys_" + identifier(category)
-    options = set() if category in ("Type and Limits", "Mass") else {"DEFAULT_CLOSED"}
+    options = set() if category in ("Type and Limits", "Mass", "Soft Tissue") else {"DEFAULT_CLOSED"}
     return type(
         name, (Physics, bpy.types.Panel),
         {"bl_label": category, "bl_idname": name, "bl_parent_id": "ADF_PT_object", "bl_options": options,

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import os
 from codecs import BOM_UTF8
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
 
-from .folders import allowed_folders, own_files, remember_written
+from .folders import allowed_folders, own_files, remember_opened, remember_written
 from .in_file import top_values
-from .ligature.adf import AdfError, Resolver, read_any, read_launch, read_world
+from .ligature.adf import AdfError, Document, Resolver, read_any, read_launch, read_world
 from .ligature.adf.nodes import parse
 from .ligature.adf.patch import PatchError
+from .ligature.adf.reader import LaunchDocument, Reference
 from .ligature.adf.update import given_values, new_text, updated
 from .ligature.authoring.save import SaveError, checked_text, foreign
-from .read_file import Import, import_file
+from .read_file import Import, importing
 from .schema_properties import fetch, store, unheld
-from .write_file import Export, ExportError, after_export, prepared, write
+from .steps import Steps, all_or_nothing, finished, part
+from .write_file import PREPARED, Export, ExportError, keeping, preparing, write
 
 WORLD_TEXT = "namespace: /ambf/env/\ngravity: {x: 0.0, y: 0.0, z: -9.8}\nmax iterations: 10\n"
 DEVICES_TEXT = "input devices: []\n"
@@ -32,59 +36,99 @@ def import_launch(
 
     Files that cannot be read are left out; their findings are in an `Import` of their own.
     """
+    opened = finished(importing_launch(path, indices, roots))
+    opened.add_to(scene)
+    return opened.done
+
+
+def importing_launch(
+    path: Path, indices: tuple[int, ...] | None = None, roots: tuple[Path, ...] = ()
+) -> Steps[OpenedLaunch]:
+    """The steps of `import_launch`, without a scene; ended, they leave nothing."""
+    yield f"Opening {path.name}", 0.0
     resolver = Resolver.for_file(path, (*roots, *allowed_folders()))
-    launch = read_launch(path, resolver)
-    stored = scene.adf
-    stored.filepath, stored.source = str(path), launch.text
-    stored.byte_order_mark = path.read_bytes().startswith(BOM_UTF8)
-    remember_written(stored, {path: path.read_bytes()})
-    store(stored.launch, "launch", given_values(launch.top))
-    stored.world_path = launch.world.text if launch.world else ""
-    stored.devices_path = launch.devices.text if launch.devices else ""
-    stored.colours_path = launch.colours.text if launch.colours else ""
-    stored.models.clear()
-    done: list[Import] = []
-    around = (*roots, *resolver.roots)
-    for index, reference in enumerate(launch.models):
-        entry = stored.models.add()
-        entry.path = reference.text
-        if indices is None or index in indices:
-            made = _opened(reference, scene, done, around)
-            entry.collection = made.collection if made else None
-    for name in ("world", "devices", "colours"):
-        reference = getattr(launch, name)
-        made = _opened(reference, scene, done, around, name) if reference is not None else None
-        setattr(stored, name, made.collection if made else None)
-    stored.environment = _environment(stored.world, resolver, scene, done)
-    return done
+    opened = OpenedLaunch(path, path.read_bytes(), read_launch(path, resolver))
+    launch, around = opened.launch, (*roots, *resolver.roots)
+    chosen = [i for i in range(len(launch.models)) if indices is None or i in indices]
+    named = (*chosen, *(name for name in OTHERS if getattr(launch, name) is not None))
+    count = len(named) + 1
+    with all_or_nothing():
+        for number, which in enumerate(named):
+            reference = getattr(launch, which) if isinstance(which, str) else launch.models[which]
+            # a world with nothing but lights and cameras looks like a model by itself
+            reader = read_world if which == "world" else read_any
+            steps = _opening(reference, opened.done, around, reader)
+            opened.files[which] = yield from part(steps, number / count, (number + 1) / count)
+        surroundings = _environment(opened.collection("world"), resolver, opened.done)
+        opened.files["environment"] = yield from part(surroundings, 1.0 - 1.0 / count, 1.0)
+    return opened
 
 
-def _environment(
-    world: bpy.types.Collection | None, resolver: Resolver, scene: bpy.types.Scene, done: list[Import]
-) -> bpy.types.Collection | None:
-    """The model that the world names as its surroundings, brought in."""
+OTHERS = ("world", "devices", "colours")
+"""What a launch file names beside its models."""
+
+
+@dataclass
+class OpenedLaunch:
+    """A launch file with what was opened of it, models by index and others by name; part of no scene yet."""
+
+    path: Path
+    data: bytes
+    launch: LaunchDocument
+    files: dict[int | str, Import | None] = field(default_factory=dict)
+    done: list[Import] = field(default_factory=list)
+
+    def collection(self, which: int | str) -> bpy.types.Collection | None:
+        """The collection of one of the files, if that was opened."""
+        found = self.files.get(which)
+        return None if found is None else found.collection
+
+    def add_to(self, scene: bpy.types.Scene) -> None:
+        """Make the launch file the scene's, and its files part of it."""
+        for made in self.done:
+            if made.collection is not None:
+                scene.collection.children.link(made.collection)
+        stored, launch = scene.adf, self.launch
+        stored.filepath, stored.source = str(self.path), launch.text
+        stored.byte_order_mark = self.data.startswith(BOM_UTF8)
+        remember_opened(stored, {self.path: self.data})
+        store(stored.launch, "launch", given_values(launch.top))
+        stored.models.clear()
+        for index, reference in enumerate(launch.models):
+            entry = stored.models.add()
+            entry.path, entry.collection = reference.text, self.collection(index)
+        for name in OTHERS:
+            reference = getattr(launch, name)
+            setattr(stored, f"{name}_path", reference.text if reference else "")
+            setattr(stored, name, self.collection(name))
+        stored.environment = self.collection("environment")
+
+
+def _environment(world: bpy.types.Collection | None, resolver: Resolver, done: list[Import]) -> Steps[Import | None]:
+    """The steps that bring in the model that the world names as its surroundings."""
     if world is None or not world.adf.world.environment:
         return None
     try:
         path = resolver.resolve(world.adf.world.environment, Path(world.adf.filepath).parent)
-        done.append(import_file(path, scene, resolver.roots))
+        made = yield from importing(path, resolver.roots)
     except (AdfError, OSError) as error:
-        done.append(Import(scene.collection, problems=[str(error)]))
+        done.append(Import(None, problems=[str(error)]))
         return None
-    return done[-1].collection
+    done.append(made)
+    return made
 
 
-def _opened(
-    reference, scene: bpy.types.Scene, done: list[Import], roots: tuple[Path, ...], name: str = ""
-) -> Import | None:
+def _opening(
+    reference: Reference, done: list[Import], roots: tuple[Path, ...], reader: Callable[[Path, Resolver], Document]
+) -> Steps[Import | None]:
+    """The steps that bring one file of a launch file in."""
     if reference.path is None:
-        done.append(Import(scene.collection, problems=[str(reference.diagnostic)]))
+        done.append(Import(None, problems=[str(reference.diagnostic)]))
         return None
     try:
-        # a world with nothing but lights and cameras looks like a model by itself
-        made = import_file(reference.path, scene, roots, reader=read_world if name == "world" else read_any)
+        made = yield from importing(reference.path, roots, reader)
     except AdfError as error:
-        done.append(Import(scene.collection, problems=[str(error)]))
+        done.append(Import(None, problems=[str(error)]))
         return None
     done.append(made)
     return made
@@ -96,33 +140,54 @@ def export_scene(scene: bpy.types.Scene, path: Path, remember: bool = True, repl
     ``remember`` makes the written files the scene's own; a copy for a simulation is not remembered. ``replace`` allows
     to replace files that are not the scene's own.
     """
-    done, prepared_files = prepared_scene(scene, path)
-    write(done, replace)
-    if not remember:
-        return done.written
-    names = _Names(scene, path)
-    for collection, file, content, files in prepared_files:
-        after_export(collection, file, content)
+    return finished(exporting_scene(scene, path, remember, replace))
+
+
+def exporting_scene(
+    scene: bpy.types.Scene, path: Path, remember: bool = True, replace: bool = False
+) -> Steps[list[Path]]:
+    """The steps of `export_scene`."""
+    whole = yield from part(preparing_scene(scene, path), 0.0, PREPARED if remember else 1.0)
+    write(whole.export, replace)
+    if remember:
+        yield from part(keeping_scene(scene, path, whole), PREPARED, 1.0)
+    return whole.export.written
+
+
+@dataclass
+class WholeScene:
+    """A launch file and all that it names: what is written, and each collection with its path, text and files."""
+
+    export: Export
+    names: _Names
+    parts: list[tuple[bpy.types.Collection, Path, str, dict[Path, bytes]]]
+
+
+def keeping_scene(scene: bpy.types.Scene, path: Path, whole: WholeScene) -> Steps[None]:
+    """The steps that make what was written the scene's own."""
+    for number, (collection, file, text, files) in enumerate(whole.parts):
+        yield from part(keeping(collection, file, text), number / len(whole.parts), (number + 1) / len(whole.parts))
         remember_written(collection.adf, files)
-    names.store()
-    scene.adf.filepath, scene.adf.source = str(path), done.text
-    remember_written(scene.adf, done.files)
-    return done.written
+    whole.names.store()
+    scene.adf.filepath, scene.adf.source = str(path), whole.export.text
+    remember_written(scene.adf, whole.export.files)
 
 
-def prepared_scene(scene: bpy.types.Scene, path: Path) -> tuple[Export, list[tuple]]:
-    """The launch file and all that it names, checked and not yet written; raises `ExportError`.
+def preparing_scene(scene: bpy.types.Scene, path: Path) -> Steps[WholeScene]:
+    """The steps that prepare the launch file and all that it names, checked and not yet written.
 
-    Also each collection with its path, text and files.
+    They raise `ExportError`.
     """
     stored, folder = scene.adf, path.parent
     names = _Names(scene, path)
     whole = Export(roots=(folder, *names.roots))
     parts = []
-    for collection, name, top in names.targets():
+    targets = names.targets()
+    for number, (collection, name, top) in enumerate(targets):
         file = folder / name
+        steps = preparing(collection, file, file.parent if names.keeps(collection, file) else folder, top)
         try:
-            done = prepared(collection, file, file.parent if names.keeps(collection, file) else folder, top)
+            done = yield from part(steps, number / len(targets), (number + 1) / len(targets))
         except ExportError as error:
             raise ExportError(f"{collection.name}: {error}", error.obj) from error
         whole.files.update(done.files)
@@ -140,9 +205,9 @@ def prepared_scene(scene: bpy.types.Scene, path: Path) -> tuple[Export, list[tup
     except (SaveError, PatchError) as error:
         raise ExportError(str(error)) from error
     whole.files[path] = BOM_UTF8 + data if stored.byte_order_mark else data
-    own = own_files(stored, *(part[0].adf for part in parts))
+    own = own_files(stored, *(collection.adf for collection, *_ in parts))
     whole.foreign = foreign(whole.files, own)
-    return whole, parts
+    return WholeScene(whole, names, parts)
 
 
 class _Names:

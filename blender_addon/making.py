@@ -33,12 +33,23 @@ PARTS = ("SHAPE", "HULL", "INERTIAL")
 
 def new_file(scene: bpy.types.Scene, name: str, kind: str, namespace: str = "/ambf/env/") -> bpy.types.Collection:
     """An empty model or world as a collection of the scene."""
-    collection = bpy.data.collections.new(name)
+    collection = unplaced_file(name, kind, namespace)
     scene.collection.children.link(collection)
+    return collection
+
+
+def unplaced_file(name: str, kind: str, namespace: str = "/ambf/env/") -> bpy.types.Collection:
+    """An empty model or world as a collection that is part of no scene yet."""
+    collection = bpy.data.collections.new(name)
     collection.adf.kind = kind
     if kind in ("MODEL", "WORLD"):
         getattr(collection.adf, kind.lower()).namespace = namespace
     return collection
+
+
+def closed(namespace: str) -> str:
+    """A namespace between slashes."""
+    return "/" + "".join(f"{part}/" for part in namespace.split("/") if part)
 
 
 def free_key(collection: bpy.types.Collection, role: str, name: str) -> str:
@@ -103,11 +114,17 @@ def take_shapes(original: bpy.types.Object, copy: bpy.types.Object) -> None:
     if any(child.adf.role in PARTS for child in copy.children):
         return
     for part in [child for child in original.children if child.adf.role in PARTS]:
-        own = part.copy()
-        for collection in part.users_collection:
-            collection.objects.link(own)
-        own.parent = copy
-        own.matrix_parent_inverse = part.matrix_parent_inverse.copy()
+        copied_part(part, copy)
+
+
+def copied_part(part: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Object:
+    """A copy of a primitive, hull or frame below another body, placed there as the original below its own."""
+    own = part.copy()
+    for collection in part.users_collection:
+        collection.objects.link(own)
+    own.parent = body
+    own.matrix_parent_inverse = part.matrix_parent_inverse.copy()
+    return own
 
 
 def new_object(
@@ -193,9 +210,14 @@ def add_hull(body: bpy.types.Object, points: np.ndarray, order: int | None = Non
     obj.adf.role = "HULL"
     others = [c.adf.shape.order for c in body.children if c.adf.role == "HULL"]
     obj.adf.shape.order = max(others, default=-1) + 1 if order is None else order
-    obj.display_type, obj.hide_render, obj.color = "WIRE", True, SHAPE_COLOUR["COLLISION"]
+    look_like_collision(obj)
     hang(obj, body, np.eye(4))
     return obj
+
+
+def look_like_collision(obj: bpy.types.Object) -> None:
+    """Show an object as what bodies touch: wires in the colour of collision shapes, and not in pictures."""
+    obj.display_type, obj.hide_render, obj.color = "WIRE", True, SHAPE_COLOUR["COLLISION"]
 
 
 def hull_of(points: np.ndarray) -> tuple[np.ndarray, list[tuple[int, ...]]]:

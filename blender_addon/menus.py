@@ -32,10 +32,17 @@ class ADF_MT_object(bpy.types.Menu):
         layout.operator_menu_enum("adf.make", "role", text="Make")
         layout.operator_menu_enum("adf.connect", "type", text="Connect")
         layout.operator("adf.duplicate")
+        layout.operator("adf.mirror")
         layout.operator("adf.clear_role")
         layout.operator_menu_enum("adf.fit_shape", "kind", text="Fit Primitive")
+        layout.operator("adf.low_resolution")
         layout.operator("adf.decompose")
         layout.operator_menu_enum("adf.set_inertia", "source", text="Set Inertia From")
+        layout.separator()
+        layout.operator_menu_enum("adf.copy_keys", "panel", text="Copy Keys to Selected")
+        layout.operator("adf.copy_shapes")
+        layout.operator("adf.edit_selected")
+        layout.operator("adf.set_gains")
 
 
 class ADF_MT_pie(bpy.types.Menu):

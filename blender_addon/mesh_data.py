@@ -273,6 +273,13 @@ class _Evaluated:
             bpy.data.meshes.remove(self.edited)
 
 
+def baked(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """A new data-block of an object's mesh with its modifiers applied."""
+    evaluated = _Evaluated(obj)
+    with evaluated as mesh:
+        return mesh.copy() if evaluated.user is None else bpy.data.meshes.new_from_object(evaluated.user)
+
+
 def surfaces_of(solid: Solid, textures: Textures | None = None, corners: bool = True) -> list[Surface]:
     """The triangles of a solid by material, in its owner's frame; ``corners`` adds normals and texture coordinates."""
     obj, place = solid.obj, solid.scale if solid.T_owner is None else solid.T_owner @ solid.scale

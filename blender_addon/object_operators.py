@@ -15,6 +15,7 @@ from .mesh_data import points_of
 from .placing import SHAPED, children_with, relative_pose, rest_pose, shape_of, shapes_of
 from .properties import ROLES
 from .solids import own_solid
+from .steps import InSteps, all_or_nothing
 from .write_file import NO_MESH
 
 JOINT_KINDS = [
@@ -61,8 +62,7 @@ class ADF_OT_new_file(bpy.types.Operator):
     namespace: bpy.props.StringProperty(name="Namespace", default="/ambf/env/")
 
     def execute(self, context):
-        namespace = "/" + "".join(f"{part}/" for part in self.namespace.split("/") if part)
-        collection = making.new_file(context.scene, self.name, self.kind, namespace)
+        collection = making.new_file(context.scene, self.name, self.kind, making.closed(self.namespace))
         if self.kind == "WORLD":
             context.scene.adf.world = collection
         else:
@@ -153,7 +153,7 @@ class ADF_OT_add(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ADF_OT_duplicate(bpy.types.Operator):
+class ADF_OT_duplicate(InSteps, bpy.types.Operator):
     """Copy the selected objects of files with their shapes; each copy gets an identifier and a name of its own"""
 
     bl_idname = "adf.duplicate"
@@ -167,15 +167,14 @@ class ADF_OT_duplicate(bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context, event):
-        done = self.execute(context)
-        bpy.ops.transform.translate("INVOKE_DEFAULT")
-        return done
-
-    def execute(self, context):
+    def steps(self, context):
         originals = [obj for obj in context.selected_objects if making.is_file_object(obj)]
         active = context.view_layer.objects.active
-        copies = {obj: making.copied(obj) for obj in originals}
+        copies = {}
+        with all_or_nothing():
+            for obj in originals:
+                yield f"Copying '{obj.name}'", len(copies) / len(originals)
+                copies[obj] = making.copied(obj)
         for obj, copy in copies.items():
             for end in ("parent_object", "child_object"):
                 body = getattr(obj.adf, end)
@@ -187,6 +186,8 @@ class ADF_OT_duplicate(bpy.types.Operator):
             copy.select_set(True)
         if active in copies:
             context.view_layer.objects.active = copies[active]
+        if self.started():
+            bpy.ops.transform.translate("INVOKE_DEFAULT")
         return {"FINISHED"}
 
 
@@ -235,7 +236,7 @@ class ADF_OT_connect(bpy.types.Operator):
         return frame(R, origin)
 
 
-class ADF_OT_inertia(bpy.types.Operator):
+class ADF_OT_inertia(InSteps, bpy.types.Operator):
     """Set mass, principal moments and centre of mass of the selected bodies from their geometry"""
 
     bl_idname = "adf.set_inertia"
@@ -269,14 +270,18 @@ class ADF_OT_inertia(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context):
-        done = 0
-        for body in [obj for obj in context.selected_objects if obj.adf.role == "BODY"]:
+    def steps(self, context):
+        bodies = [obj for obj in context.selected_objects if obj.adf.role == "BODY"]
+        found, failed = {}, []
+        for number, body in enumerate(bodies):
+            yield f"Weighing '{body.name}'", number / len(bodies)
             try:
-                solid = solid_of(body, self.source, self.density)
+                found[body] = solid_of(body, self.source, self.density)
             except ValueError as error:
-                self.report({"ERROR"}, f"'{body.name}': {error}")
-                continue
+                failed.append(f"'{body.name}': {error}")
+        for words in failed:
+            self.report({"WARNING"} if found else {"ERROR"}, words)
+        for body, solid in found.items():
             if self.given == "MASS":
                 solid = solid.with_mass(body.adf.body.mass or 1.0)
             keys = mass_keys(solid, self.factor)
@@ -285,8 +290,7 @@ class ADF_OT_inertia(bpy.types.Operator):
                 setattr(body.adf.body, f"inertia_i{axis}", keys[f"inertia.i{axis}"])
             body.adf.inertia_factor = self.factor
             making.inertial_of(body, pose_matrix(*keys["inertial offset"]))
-            done += 1
-        return {"FINISHED"} if done else {"CANCELLED"}
+        return {"FINISHED"} if found else {"CANCELLED"}
 
 
 def solid_of(body, source, density=1.0):

@@ -13,6 +13,7 @@ import numpy as np
 from . import compat
 from .ligature.adf.frames import Array, axis_rotation
 from .placing import is_prismatic, rest_pose
+from .tissue_grid import grid_lines, tissue_keys
 
 COLOURS = {
     "axis": (0.2, 0.6, 1.0, 1.0),
@@ -21,6 +22,10 @@ COLOURS = {
     "inertia": (0.95, 0.3, 0.9, 1.0),
     "ray": (1.0, 0.9, 0.2, 1.0),
     "thread": (0.45, 0.35, 1.0, 1.0),
+    "tissue": (0.95, 0.6, 0.55, 0.45),
+    "held": (0.15, 0.75, 0.35, 0.9),
+    "layer": (0.95, 0.85, 0.2, 0.6),
+    "slit": (0.9, 0.05, 0.1, 1.0),
 }
 SIZE = 0.03
 """Length in metres of what has no size of its own."""
@@ -44,6 +49,11 @@ def lines_of(scene: bpy.types.Scene) -> dict[str, list[Array]]:
         maker = {"JOINT": _joint, "SENSOR": _sensor, "INERTIAL": _inertia, "SUTURE": _suture}[obj.adf.role]
         for colour, line in maker(obj):
             lines[colour].append(line @ T[:3, :3].T + T[:3, 3])
+    for obj in scene.objects if scene.adf.show_tissue else ():
+        if tissue_keys(obj) and not obj.hide_get():
+            T = rest_pose(obj)
+            for colour, edges in grid_lines(obj).items():
+                lines[colour] += list(edges @ T[:3, :3].T + T[:3, 3])
     return lines
 
 

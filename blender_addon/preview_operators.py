@@ -37,23 +37,44 @@ def behind(joint):
     return found
 
 
-def move_joint(scene, joint, motion):
-    """Show a joint with its frame moved by ``motion`` (4, 4) in itself; from rest."""
+def show(scene, positions):
+    """Show joints away from rest: by name of each, the metres along and radians about its axes, TX to RZ."""
     bring_back(scene)
-    bodies = behind(joint)
-    T = rest_pose(joint)
-    moved = T @ motion @ np.linalg.inv(T)
+    joints = [bpy.data.objects.get(name) for name in positions]
+    moved = {}
+    for joint in _from_the_root([joint for joint in joints if joint is not None and joint in joints_of([joint])]):
+        motion = np.eye(4)
+        for axis in sorted(positions[joint.name], reverse=True):  # along its axes, then about them
+            motion = motion @ motion_along(axis, positions[joint.name][axis])
+        T = moved.get(joint.adf.parent_object, np.eye(4)) @ rest_pose(joint)
+        step = T @ motion @ np.linalg.inv(T)
+        for body in behind(joint):
+            moved[body] = step @ moved.get(body, np.eye(4))
     rest, targets = {}, []
-    for body in bodies:
+    for body, T in moved.items():
         rest[body.name] = {name: list(getattr(body, name)) for name in _TRANSFORM} | {
             "rotation_mode": body.rotation_mode
         }
-        parent = np.eye(4) if body.parent is None else rest_pose(body.parent) @ np.array(body.matrix_parent_inverse)
-        targets.append((body, np.linalg.inv(parent) @ moved @ rest_pose(body), np.array(body.scale)))
+        parent = np.eye(4)
+        if body.parent is not None:
+            parent = moved.get(body.parent, parent) @ rest_pose(body.parent) @ np.array(body.matrix_parent_inverse)
+        targets.append((body, np.linalg.inv(parent) @ T @ rest_pose(body), np.array(body.scale)))
     for body, target, scale in targets:
         place(body, target)
         body.scale = scale
-    scene["adf_rest"] = json.dumps(rest)
+    if rest:
+        scene["adf_rest"], scene["adf_shown"] = json.dumps(rest), json.dumps(positions)
+
+
+def _from_the_root(joints):
+    """Joints in such an order that none moves the frame of one before it."""
+    below = {joint: behind(joint) for joint in joints}
+    return sorted(joints, key=lambda joint: sum(joint.adf.parent_object in bodies for bodies in below.values()))
+
+
+def shown(scene):
+    """What `show` shows now."""
+    return json.loads(scene.get("adf_shown", "{}")) if is_previewing(scene) else {}
 
 
 def bring_back(scene):
@@ -63,8 +84,9 @@ def bring_back(scene):
         if body is not None:
             for attribute, value in values.items():
                 setattr(body, attribute, value)
-    if "adf_rest" in scene:
-        del scene["adf_rest"]
+    for name in ("adf_rest", "adf_shown"):
+        if name in scene:
+            del scene[name]
 
 
 def is_previewing(scene):
@@ -94,6 +116,9 @@ class ADF_OT_move_joint(bpy.types.Operator):
         max=1.0,
         subtype="FACTOR",
     )
+    others: bpy.props.BoolProperty(
+        name="Keep Others", description="Other joints stay where they are previewed, else they go to rest", default=True
+    )
 
     @classmethod
     def poll(cls, context):
@@ -111,7 +136,9 @@ class ADF_OT_move_joint(bpy.types.Operator):
             self.report({"ERROR"}, f"'{joint.name}' is locked there; it moves {', '.join(ranges) or 'nowhere'}")
             return {"CANCELLED"}
         low, high = ranges[name]
-        move_joint(context.scene, joint, motion_along(name, low + self.part * (high - low)))
+        positions = shown(context.scene) if self.others else {}
+        own = {**positions.get(joint.name, {}), name: low + self.part * (high - low)}
+        show(context.scene, {**positions, joint.name: own})
         return {"FINISHED"}
 
 

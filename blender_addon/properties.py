@@ -127,6 +127,12 @@ class ADF_PG_variant(bpy.types.PropertyGroup):
     rotation: bpy.props.FloatVectorProperty(name="Turned By", size=3, subtype="EULER")
 
 
+class ADF_PG_pose(bpy.types.PropertyGroup):
+    """Where the joints of a model stand, under a name; kept in the blend file, the format has no place for it."""
+
+    positions: bpy.props.StringProperty(options={"HIDDEN"})
+
+
 class ADF_PG_launch_entry(bpy.types.PropertyGroup):
     """One model of the launch file, by its index."""
 
@@ -171,6 +177,11 @@ class ADF_PG_scene(bpy.types.PropertyGroup):
     show_overlay: bpy.props.BoolProperty(
         name="Overlay", description="Draw joints, limits, inertia, rays over the scene", default=True
     )
+    show_tissue: bpy.props.BoolProperty(
+        name="Tissue Grid",
+        description="Draw the cells of soft tissue, the faces that are held, and slits",
+        default=True,
+    )
     show_quality: bpy.props.BoolProperty(
         name="Collision Quality",
         description="Draw volume error, Hausdorff distance and deviation over the meshes that were measured",
@@ -182,12 +193,13 @@ for _kind in OBJECT_KINDS:
     ADF_PG_object.__annotations__[identifier(_kind)] = bpy.props.PointerProperty(type=group_class(_kind))
 for _kind in ("model", "world", "input devices"):
     ADF_PG_file.__annotations__[identifier(_kind)] = bpy.props.PointerProperty(type=group_class(_kind))
+ADF_PG_file.__annotations__["poses"] = bpy.props.CollectionProperty(type=ADF_PG_pose)
 ADF_PG_file.__annotations__["variants"] = bpy.props.CollectionProperty(type=ADF_PG_variant)
 ADF_PG_scene.__annotations__["launch"] = bpy.props.PointerProperty(type=group_class("launch"))
 
 CLASSES = (
-    ADF_PG_shape, ADF_PG_quality, ADF_PG_object, ADF_PG_variant, ADF_PG_file, ADF_PG_launch_entry, ADF_PG_finding,
-    ADF_PG_scene,
+    ADF_PG_shape, ADF_PG_quality, ADF_PG_object, ADF_PG_variant, ADF_PG_pose, ADF_PG_file, ADF_PG_launch_entry,
+    ADF_PG_finding, ADF_PG_scene,
 )  # fmt: skip
 
 

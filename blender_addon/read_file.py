@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .folders import allowed_folders, remember_written
+from .folders import allowed_folders, remember_opened
 from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any, read_launch
 from .ligature.adf.reader import read_text
 from .ligature.adf.references import find_by_text
@@ -31,51 +31,74 @@ from .properties import ROLE_OF_KIND
 from .references import qualified
 from .schema_properties import fetch, identifier, state_text, store
 from .solids import solids_of
+from .steps import Steps, all_or_nothing, finished, part
 
 EMPTY_LOOK = {"joint": "SINGLE_ARROW", "sensor": "CONE", "actuator": "SPHERE", "suture": "SINGLE_ARROW"}
+READ, MADE = 0.25, 0.75
+"""Shares of an import after the file is read, and of the rest when its objects are made."""
+
 SHAPE_COLOUR = {"COLLISION": (0.95, 0.75, 0.1, 0.35), "VISUAL": (0.7, 0.7, 0.7, 1.0)}
 
 
 @dataclass
 class Import:
-    """What came of a file: its collection, and what could not be brought in."""
+    """What came of a file: its collection, None without one, and what could not be brought in."""
 
-    collection: bpy.types.Collection
+    collection: bpy.types.Collection | None
     document: Document | None = None
     problems: list[str] = field(default_factory=list)
 
 
-def import_file(
-    path: Path,
-    scene: bpy.types.Scene,
-    roots: tuple[Path, ...] = (),
-    reader: Callable[[Path, Resolver], Document] = read_any,
-) -> Import:
-    """Bring one world, model, input-devices or colours file in; raises `AdfError` when it cannot be read at all.
+def import_file(path: Path, scene: bpy.types.Scene, roots: tuple[Path, ...] = ()) -> Import:
+    """Bring one world, model, input-devices or colours file in; raises `AdfError` when it cannot be read at all."""
+    done = finished(importing(path, roots))
+    scene.collection.children.link(done.collection)
+    return done
+
+
+def importing(
+    path: Path, roots: tuple[Path, ...] = (), reader: Callable[[Path, Resolver], Document] = read_any
+) -> Steps[Import]:
+    """The steps that bring a file in, whose collection is part of no scene yet; ended, they leave nothing.
 
     ``reader`` is for a file whose kind is known; otherwise its keys show the kind.
     """
+    words = f"Opening {path.name}"
+    yield words, 0.0
     resolver = Resolver.for_file(path, (*roots, *allowed_folders()))
     document = reader(path, resolver)
+    yield words, READ
+    with all_or_nothing():
+        done = _begun(path, document)
+        if done.collection.adf.kind != "OTHER":
+            yield from part(_Importer(document, resolver, done).run(words), READ, 1.0)
+    return done
+
+
+def _begun(path: Path, document: Document) -> Import:
+    """The collection of a file with what the file itself states, and without its objects."""
     collection = bpy.data.collections.new(path.stem)
-    scene.collection.children.link(collection)
     stored = collection.adf
     stored.filepath = str(path)
     stored.source = document.text
     data = path.read_bytes()
     stored.byte_order_mark = data.startswith(BOM_UTF8)
-    remember_written(stored, {path: data})
+    remember_opened(stored, {path: data})
     stored.kind = {"model": "MODEL", "world": "WORLD", "input devices": "INPUT_DEVICES"}.get(document.kind, "OTHER")
     done = Import(collection, document, [str(d) for d in document.diagnostics if d.severity >= Severity.ERROR])
     if stored.kind == "OTHER":
         return done
     store(getattr(stored, identifier(document.kind)), document.kind, given_values(document.top))
-    _Importer(document, resolver, done).run()
     return done
 
 
 def add_parts(collection: bpy.types.Collection, parts: Parts) -> list[bpy.types.Object]:
     """Make generated objects in the collection of a file; they are written with its next export."""
+    return finished(adding(collection, parts))
+
+
+def adding(collection: bpy.types.Collection, parts: Parts) -> Steps[list[bpy.types.Object]]:
+    """The steps that make generated objects in the collection of a file."""
     kind = {"MODEL": "model", "WORLD": "world"}[collection.adf.kind]
     folder = Path(collection.adf.filepath or "new.yaml").resolve().parent
     group = getattr(collection.adf, identifier(kind))
@@ -83,23 +106,28 @@ def add_parts(collection: bpy.types.Collection, parts: Parts) -> list[bpy.types.
     document = read_text(new_text(kind, top, _with_free_keys(collection, parts.items)), folder / "generated.yaml", kind)
     importer = _Importer(document, Resolver([folder]), Import(collection, document))
     importer.given_meshes = dict(parts.meshes)
-    made = importer.make()
+    made = yield from importer.make(f"Making {collection.name}")
     for obj in made:
         obj.adf.was = ""
     return made
 
 
-def outside_folders(path: Path, roots: tuple[Path, ...] = ()) -> list[str]:
-    """Folders in which meshes of a scene file, or of the models of a launch file, lie and may not be read.
+def outside_folders(path: Path, roots: tuple[Path, ...] = ()) -> Steps[list[str]]:
+    """The steps that find the folders in which meshes of a file, or of a launch file's models, lie and may not be read.
 
     Raises `AdfError` when the file cannot be read.
     """
+    words = f"Looking for the meshes of {path.name}"
+    yield words, 0.0
     resolver = Resolver.for_file(path, (*roots, *allowed_folders()))
     document = read_any(path, resolver)
     if document.kind == "launch":
         launch = read_launch(path, resolver)
         models = [reference.path for reference in launch.models if reference.path is not None]
-        found = [folder for model in models for folder in _outside_of(model, (*roots, *resolver.roots))]
+        found: list[str] = []
+        for number, model in enumerate(models):
+            yield words, number / len(models)
+            found += _outside_of(model, (*roots, *resolver.roots))
         return list(dict.fromkeys(found))
     return _outside(document, resolver)
 
@@ -174,25 +202,28 @@ class _Importer:
         self.shapes: dict[tuple, bpy.types.Mesh] = {}
         self.shape_collection: bpy.types.Collection | None = None
 
-    def run(self) -> None:
+    def run(self, words: str) -> Steps[None]:
         """Make everything, and remember how it stood."""
-        made = self.make()
-        for obj in made:
+        made = yield from part(self.make(words), 0.0, MADE)
+        for number, obj in enumerate(made):
+            yield words, MADE + (1.0 - MADE) * number / len(made)
             obj.adf.called = obj.name
             obj.adf.imported = state_text(placed(obj).state())
             if obj.adf.role in SHAPED:
                 obj.adf.mesh_print = mesh_print(solids_of(obj))
         self.collection.adf.imported_keys = json.dumps([obj.adf.key for obj in made])
 
-    def make(self) -> list[bpy.types.Object]:
+    def make(self, words: str) -> Steps[list[bpy.types.Object]]:
         """Make the objects, bodies first, since others hang on them."""
         elements = {e.key: e for listed in self.document.lists.values() for e in listed}
         bodies_first = sorted(elements.values(), key=lambda e: (e.kind != "body", e.kind == "joint"))
-        for element in bodies_first:
+        for number, element in enumerate(bodies_first):
+            yield words, number / len(bodies_first)
             self.values[element.key] = given_values(element)
             if element.kind != "joint":
                 self._make(element)
         for element in bodies_first:
+            yield words, 1.0
             if element.kind == "joint":
                 self._make_joint(element)
             elif element.kind != "body":

@@ -3,7 +3,9 @@
 import bpy
 
 from . import making
+from .decompose_operators import packages
 from .file_operators import chosen_collection
+from .pose_operators import model_of
 from .preview_operators import is_previewing
 from .properties import KIND_OF_ROLE, ROLES
 
@@ -72,6 +74,9 @@ class ADF_PT_file(Sidebar, bpy.types.Panel):
         row.operator("adf.import_launch", text="Import Launch")
         row.operator("adf.export_scene", text="Export Scene")
         layout.operator_menu_enum("adf.new_file", "kind", text="New File", icon="ADD")
+        row = layout.row(align=True)
+        row.operator("adf.import_robot", text="Import URDF")
+        row.operator("adf.export_robot", text="Export URDF")
         layout.operator("adf.adopt", icon="IMPORT")
         collection = making.file_of(context.object) or chosen_collection(context)
         if collection is None:
@@ -135,12 +140,28 @@ class ADF_PT_create(Sidebar, bpy.types.Panel):
         layout.operator_menu_enum("adf.add", "role", text="Add Object", icon="ADD")
         layout.operator_menu_enum("adf.connect", "type", text="Connect by Joint", icon="CONSTRAINT")
         layout.operator("adf.duplicate", icon="DUPLICATE")
+        layout.operator("adf.mirror", icon="MOD_MIRROR")
         column = layout.column(align=True)
         column.operator("adf.add_needle", icon="CURVE_NCIRCLE")
         column.operator("adf.add_suture", icon="CURVE_DATA")
         column.operator("adf.add_hole", icon="MESH_TORUS")
         column.operator("adf.add_grasp", icon="SNAP_ON")
         column.operator("adf.add_endoscope", icon="CAMERA_STEREO")
+        column.operator_menu_enum("adf.add_sensor", "which", text="Add Sensor", icon="OUTLINER_OB_FORCE_FIELD")
+
+
+class ADF_PT_batch(Sidebar, bpy.types.Panel):
+    """Editing a selection."""
+
+    bl_label = "Selection"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator_menu_enum("adf.copy_keys", "panel", text="Copy Keys to Selected", icon="COPYDOWN")
+        column.operator("adf.copy_shapes", icon="MOD_PHYSICS")
+        column.operator("adf.edit_selected", icon="DRIVER_TRANSFORM")
+        column.operator_menu_enum("adf.set_gains", "output", text="Set Controller Gains", icon="FORCE_HARMONIC")
 
 
 class ADF_PT_collision(Sidebar, bpy.types.Panel):
@@ -154,7 +175,18 @@ class ADF_PT_collision(Sidebar, bpy.types.Panel):
         layout.operator_menu_enum("adf.fit_shape", "kind", text="Fit Primitive", icon="MOD_SHRINKWRAP")
         layout.operator_menu_enum("adf.add_hull", "around", text="Add Convex Hull", icon="MESH_ICOSPHERE")
         layout.operator("adf.add_ring", icon="MESH_CIRCLE")
-        layout.operator("adf.decompose", icon="MOD_EXPLODE")
+        layout.operator("adf.low_resolution", icon="MOD_DECIM")
+        if packages():
+            layout.operator("adf.decompose", icon="MOD_EXPLODE")
+        else:
+            column = layout.column(align=True)
+            for words in (
+                "Convex pieces need CoACD, which",
+                "this Blender lacks: about 5 MB from",
+                "the package index pypi.org.",
+            ):
+                column.label(text=words)
+            column.operator("adf.fetch_coacd", icon="IMPORT")
         row = layout.row(align=True)
         row.operator("adf.measure_collision", icon="DRIVER_DISTANCE")
         row.prop(context.scene.adf, "show_quality", text="", icon="OVERLAY")
@@ -195,6 +227,12 @@ class ADF_PT_preview(Sidebar, bpy.types.Panel):
         row = layout.row()
         row.alert = is_previewing(context.scene)
         row.operator("adf.rest_pose", icon="LOOP_BACK")
+        layout.operator("adf.store_pose", icon="BOOKMARKS")
+        file = model_of(context)
+        for pose in file.adf.poses if file is not None else ():
+            row = layout.row(align=True)
+            row.operator("adf.show_pose", text=pose.name, icon="ARMATURE_DATA").name = pose.name
+            row.operator("adf.remove_pose", text="", icon="REMOVE").name = pose.name
         layout.operator("adf.simulate", icon="PLAY")
         layout.operator("adf.clear_motion", icon="X")
 
@@ -205,6 +243,7 @@ CLASSES = (
     ADF_PT_file,
     ADF_PT_launch,
     ADF_PT_create,
+    ADF_PT_batch,
     ADF_PT_collision,
     ADF_PT_check,
     ADF_PT_preview,

@@ -14,7 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .collecting import FILE_KINDS, collect, folder_of
+from .collecting import FILE_KINDS, collecting, folder_of
 from .collecting_meshes import has_mesh
 from .export_checks import ExportError
 from .file_text import text_of
@@ -39,6 +39,10 @@ from .references import members
 from .saving import Export, ForeignFiles, write
 from .schema_properties import identifier, state_text, store
 from .solids import solids_of
+from .steps import Steps, finished, part
+
+COLLECTED, PREPARED = 0.6, 0.65
+"""Shares of what is prepared once the scene is read, and of an export once all is prepared."""
 
 
 def export_file(collection: bpy.types.Collection, path: Path, replace: bool = False, remember: bool = True) -> Export:
@@ -46,7 +50,14 @@ def export_file(collection: bpy.types.Collection, path: Path, replace: bool = Fa
 
     ``replace`` allows to replace files that are not this export's own; ``remember`` makes what is written its own.
     """
-    done = prepared(collection, path)
+    return finished(exporting(collection, path, replace, remember))
+
+
+def exporting(
+    collection: bpy.types.Collection, path: Path, replace: bool = False, remember: bool = True
+) -> Steps[Export]:
+    """The steps of `export_file`."""
+    done = yield from preparing(collection, path)
     write(done, replace)
     if remember:
         remember_written(collection.adf, done.files)
@@ -54,17 +65,28 @@ def export_file(collection: bpy.types.Collection, path: Path, replace: bool = Fa
 
 
 def prepared(collection: bpy.types.Collection, path: Path, root: Path | None = None, top: dict | None = None) -> Export:
-    """A collection's file at ``path`` and its meshes, checked and not yet written; raises `ExportError`.
+    """A collection's file at ``path`` and its meshes, checked and not yet written; raises `ExportError`."""
+    return finished(preparing(collection, path, root, top))
+
+
+def preparing(
+    collection: bpy.types.Collection, path: Path, root: Path | None = None, top: dict | None = None
+) -> Steps[Export]:
+    """The steps of `prepared`.
 
     Nothing lies outside ``root``, the folder of the file by default. ``top`` are keys of the file that differ from the
     scene's for this export.
     """
     root, top = root or path.parent, top or {}
     try:
-        found = collect(collection, with_meshes=True)
+        found = yield from part(collecting(collection, with_meshes=True), 0.0, COLLECTED)
+        words = f"Preparing {path.name}"
+        yield words, COLLECTED
         before = Path(found.path) if found.path and found.source else None
         old = OldMeshes(found.meshes, found.top, path, before, Resolver.for_file(before or path, found.folders))
+        yield words, 0.5 * (COLLECTED + 1.0)
         meshes = MeshFiles(found.meshes, old, path, root)
+        yield words, 0.75 + 0.25 * COLLECTED
         text = text_of(found, meshes.keys, {**meshes.top, **top})
         data = text.encode("utf-8") if text == found.source else checked_text(text, path)
     except (ValueError, AdfError, SaveError, PatchError, MeshWriteError) as error:
@@ -74,15 +96,18 @@ def prepared(collection: bpy.types.Collection, path: Path, root: Path | None = N
     return Export(files, (root,), text, found.notes, problems, foreign(files, found.own))
 
 
-def current_text(collection: bpy.types.Collection) -> str:
-    """The text of the file as it would be written now, but for new meshes; raises ValueError for what has no place."""
-    return text_of(collect(collection))
+def current_text(collection: bpy.types.Collection) -> Steps[str]:
+    """The steps to the text of the file as it would be written now, but for new meshes.
+
+    They raise ValueError for what has no place.
+    """
+    found = yield from collecting(collection)
+    return text_of(found)
 
 
-def variant_text(collection: bpy.types.Collection, variant: bpy.types.PropertyGroup) -> str:
-    """The text of the same model under another namespace, moved as a whole; raises ValueError."""
+def variant_text(text: str, collection: bpy.types.Collection, variant: bpy.types.PropertyGroup) -> str:
+    """The text of a model under another namespace, moved as a whole; ``text`` is its own."""
     motion = pose_matrix(variant.location, variant.rotation)
-    text = current_text(collection)
     root = parse(text, Path("variant.yaml"))
     top = {**top_values("model", root), "namespace": variant.namespace}
     items = []
@@ -97,27 +122,25 @@ def variant_text(collection: bpy.types.Collection, variant: bpy.types.PropertyGr
     return updated(text, "model", top, items)
 
 
-def prepared_variants(collection: bpy.types.Collection) -> Export:
-    """The variants beside the model, whose meshes they share, not yet written; raises `ExportError`."""
-    folder = folder_of(collection)
+def preparing_variants(collection: bpy.types.Collection) -> Steps[Export]:
+    """The steps to the variants beside the model, whose meshes they share; they raise `ExportError`."""
+    folder, variants = folder_of(collection), collection.adf.variants
+    files = {}
     try:
-        texts = {folder / Path(v.filepath).name: variant_text(collection, v) for v in collection.adf.variants}
-        files = {path: checked_text(text, path) for path, text in texts.items()}
+        text = yield from part(current_text(collection), 0.0, COLLECTED)
+        for number, variant in enumerate(variants):
+            yield f"Preparing {variant.filepath}", COLLECTED + (1.0 - COLLECTED) * number / len(variants)
+            path = folder / Path(variant.filepath).name
+            files[path] = checked_text(variant_text(text, collection, variant), path)
     except (ValueError, AdfError, SaveError, PatchError) as error:
         raise ExportError(str(error)) from error
     return Export(files, (folder,), foreign=foreign(files, own_files(collection.adf)))
 
 
-def export_variants(collection: bpy.types.Collection, replace: bool = False) -> list[Path]:
-    """Write the variants beside the model; raises `ExportError`."""
-    done = prepared_variants(collection)
-    write(done, replace)
-    remember_written(collection.adf, done.files)
-    return done.written
-
-
-def after_export(collection: bpy.types.Collection, path: Path, text: str) -> None:
-    """Keep the written text as the file's own, so that the next export changes it."""
+def keeping(collection: bpy.types.Collection, path: Path, text: str) -> Steps[None]:
+    """The steps that keep the written text as the file's own, so that the next export changes it."""
+    words = f"Wrote {path.name}"
+    yield words, 0.0
     stored = collection.adf
     stored.filepath, stored.source = str(path), text
     objects = members(collection)
@@ -125,11 +148,13 @@ def after_export(collection: bpy.types.Collection, path: Path, text: str) -> Non
         return
     root, kind = parse(text, path), FILE_KINDS[stored.kind]
     store(getattr(stored, identifier(kind)), kind, top_values(kind, root))  # folders and file names that were chosen
-    for obj in objects:
+    for number, obj in enumerate(objects):
+        yield words, 0.5 * number / len(objects)
         own, node = KIND_OF_ROLE[obj.adf.role], root.get(obj.adf.key)
         store(getattr(obj.adf, identifier(own)), own, given_values(Element(own, obj.adf.key, node)))
     stored.imported_keys = json.dumps([obj.adf.key for obj in objects])
-    for obj in objects:
+    for number, obj in enumerate(objects):
+        yield words, 0.5 + 0.5 * number / len(objects)
         obj.adf.was, obj.adf.like, obj.adf.called = obj.adf.key, "", obj.name
         obj.adf.hung = obj.adf.hung or owner_of(obj) is not None
         for use in ("COLLISION", "VISUAL"):
@@ -141,6 +166,6 @@ def after_export(collection: bpy.types.Collection, path: Path, text: str) -> Non
 
 
 __all__ = [
-    "NO_MESH", "Export", "ExportError", "ForeignFiles", "after_export", "current_text", "export_file", "has_mesh",
-    "members", "prepared", "prepared_variants", "write",
+    "NO_MESH", "Export", "ExportError", "ForeignFiles", "current_text", "export_file", "exporting", "has_mesh",
+    "keeping", "members", "prepared", "preparing", "preparing_variants", "write",
 ]  # fmt: skip

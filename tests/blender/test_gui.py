@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,8 +17,8 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-UNTOUCHING = {"copy_findings"}
-"""Operators that write the clipboard and leave the scene alone."""
+UNTOUCHING = {"copy_findings", "fetch_coacd"}
+"""Operators that write the clipboard or a folder of the extension, and leave the scene alone."""
 
 LIMIT = 800
 """Seconds for the session: half a minute on an idle machine, whose processor draws the windows."""
@@ -128,6 +129,9 @@ def test_panels_draw_operators_are_undone_and_nothing_is_left(session: Callable[
     background, ended = found["background"], found["ended"]
     assert (background["begun"], background["most"]) == (["RUNNING_MODAL"], 1) and background["pieces"] >= 2
     assert ended == {"before": 1, "after": 0, "pieces": background["pieces"], "left": background["pieces"]}
+    sliced = found["import"]
+    assert sliced["begun"] == ["RUNNING_MODAL"] and sliced["as before"] and sliced["undone"]
+    assert sliced["ended"] < sliced["done"]
     assert len(found["dragged"]) == 3
     for label, report in found["dragged"].items():
         assert abs(report["after"] - report["before"]) > 1e-3, label
@@ -137,6 +141,6 @@ def test_panels_draw_operators_are_undone_and_nothing_is_left(session: Callable[
 def test_the_tutorial_drives_to_a_scene_that_moves(session: Callable[[str], tuple[dict, str]], tmp_path: Path) -> None:
     found, output = session("tutorial.py")
     assert len(found["pictures"]) == 5
-    assert "bodies over" in output  # Simulate Here played the motion back
+    assert re.search(r"\d+ bodies and 1 thread over \d+ frames", output), output  # Simulate Here played the motion back
     scene = tmp_path / "scenes" / "blender_suturing"
     assert (scene / "pad.yaml").read_bytes() == (ROOT / "scenes" / "blender_suturing" / "pad.yaml").read_bytes()

@@ -74,8 +74,12 @@ def draw_every_role():
 
 
 @step
+def select_a_joint():
+    select(find("JOINT", "link1"))  # its panels unfold until the next step
+
+
+@step
 def pictures():
-    select(find("JOINT", "link1"))
     picture("blender_joint")
     select(find("BODY", "link1"))
     bpy.ops.adf.check()
@@ -159,6 +163,38 @@ def files():
         bpy.ops.adf.export_scene(filepath=str(OUT / "files" / "launch.yaml"))
 
 
+def is_tissue():
+    select(find("BODY", "base"))
+    bpy.context.scene.cursor.location = find("BODY", "base").matrix_world.translation
+    bpy.ops.adf.make_tissue(material="liver")
+
+
+def has_pose():
+    is_moved()
+    bpy.ops.adf.store_pose(name="work")
+    bpy.ops.adf.rest_pose()
+
+
+def robot():
+    """A robot to open."""
+    box = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+    (OUT / "robot.urdf").write_text(f'<robot name="robot"><link name="only">{box}</link></robot>')
+
+
+def without_coacd():
+    """CoACD is found nowhere at first, and after a command that ends well it is there."""
+    from adf_studio import compat, decompose_operators
+
+    real = decompose_operators.importlib.util.find_spec
+
+    def missing(name):
+        decompose_operators.importlib.util.find_spec = real
+
+    decompose_operators.importlib.util.find_spec = missing
+    compat.python = lambda: "/bin/true"
+    decompose_operators.packages.cache_clear()
+
+
 FILE_ROLES = ("BODY", "JOINT", "GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SOFT_BODY", "VEHICLE", "VOLUME",
               "SUTURE", "INPUT_DEVICE")  # fmt: skip
 ENDS = on("BODY", "phantom", "base")
@@ -215,7 +251,25 @@ RECIPES = {
     "select_finding": [({"index": 0}, has_finding)],
     "copy_findings": [({}, has_finding)],
     "decompose": [({"threshold": 0.5, "max_hulls": 2}, on("BODY", "link1"))],
+    "fetch_coacd": [({}, without_coacd)],
+    "low_resolution": [({"vertices": 5, "collides": "CONVEX_HULL"}, on("BODY", "link1"))],
     "measure_collision": [({}, on("BODY", "link1"))],
+    "copy_keys": [({"panel": "MASS"}, on("BODY", "link1", "base"))],
+    "edit_selected": [({"key": "mass", "how": "MULTIPLY", "value": 2.0}, on("BODY", "link1"))],
+    "copy_shapes": [({}, on("BODY", "link1", "base"))],
+    "set_gains": [({"output": output}, on("JOINT", "link1")) for output in ("FORCE", "VELOCITY")],
+    "mirror": [({"across": "Y"}, on("BODY", "link1"))],
+    "add_sensor": [({"which": which}, on("BODY", "link1")) for which in ("BEAM", "FAN", "RING", "PAD", "CONTACT")],
+    "make_tissue": [({"material": "skin"}, on("BODY", "base"))],
+    "make_rigid": [({}, is_tissue)],
+    "hold_face": [({"face": "+x"}, is_tissue)],
+    "add_slit": [({"depth": 0.0}, is_tissue)],
+    "add_layer": [({"material": "fat"}, is_tissue)],
+    "import_robot": [({"filepath": str(OUT / "robot.urdf")}, robot)],
+    "export_robot": [({"filepath": str(OUT / "model.urdf"), "collection": "scene"}, nothing)],
+    "store_pose": [({"name": "work"}, is_moved)],
+    "show_pose": [({"name": "work"}, has_pose)],
+    "remove_pose": [({"name": "work"}, has_pose)],
     "move_joint": [({"part": 0.9}, on("JOINT", "link1"))],
     "rest_pose": [({}, is_moved)],
     "simulate": [({"seconds": 0.1}, nothing)],
@@ -267,6 +321,7 @@ def try_operator(name):
 
 
 STATE = {}
+LAUNCH = str(OUT / "files" / "launch.yaml")
 
 
 @step
@@ -361,6 +416,32 @@ def quality_is_drawn():
     redraw()
 
 
+@step
+def tissue():
+    """A pad with two layers and a wound, under its panel."""
+    bpy.ops.mesh.primitive_cube_add(size=0.04, location=(3.0, 3.0, 0.1))
+    pad = bpy.context.object
+    pad.name, pad.scale = "Pad", (1.5, 1.0, 0.4)
+    select(pad)
+    bpy.ops.adf.make(role="BODY")
+    bpy.ops.adf.make_tissue(material="silicone pad", cell_size=0.004)
+    for face in ("-x", "+x"):
+        bpy.ops.adf.hold_face(face=face)
+    bpy.ops.adf.add_layer(material="skin", thickness=0.003)
+    bpy.ops.adf.add_layer(material="fat")
+    bpy.context.scene.cursor.location = (3.0, 3.0, 0.1)
+    bpy.ops.adf.add_slit(along="X", length=0.03, depth=0.006)
+    window.look((3.0, 3.0, 0.1), (0.8, 0.0, 0.5), 0.11)
+    view()["space_data"].shading.show_xray = True
+    window.scroll_physics(14)
+
+
+@step
+def tissue_is_drawn():
+    picture("blender_tissue")
+    view()["space_data"].shading.show_xray = False
+
+
 def pieces():
     return [o for o in find("BODY", "Ring").children if o.adf.role == "HULL"]
 
@@ -399,9 +480,7 @@ def end_a_decomposition():
 @step
 def press_escape():
     RESULT["ended"]["before"] = len(workers())
-    area = view()["area"]
-    for value in ("PRESS", "RELEASE"):
-        window.main().event_simulate(type="ESC", value=value, x=area.x + 200, y=area.y + 200)
+    escape()
 
 
 @step
@@ -413,6 +492,57 @@ def escape():
     area = view()["area"]
     for value in ("PRESS", "RELEASE"):
         window.main().event_simulate(type="ESC", value=value, x=area.x + 200, y=area.y + 200)
+
+
+@step
+def import_in_slices():
+    """One step of work at a time, so that there is time for a key."""
+    from adf_studio import steps
+
+    steps.FIRST = steps.SLICE = 0.0
+    files()
+    bpy.ops.ed.undo_push(message="before an import")
+    STATE["before"], STATE["files"] = scene_print(), len(bpy.context.scene.collection.children)
+    RESULT["import"] = {"begun": sorted(bpy.ops.adf.import_file("INVOKE_DEFAULT", filepath=LAUNCH))}
+
+
+@step
+def press_escape_while_it_imports():
+    RESULT["import"]["going on"] = len(bpy.data.collections)
+    escape()
+
+
+@step
+def nothing_was_imported():
+    from adf_studio import steps
+
+    RESULT["import"] |= {"ended": len(bpy.data.collections), "as before": scene_print() == STATE["before"]}
+    steps.SLICE = 0.05
+    bpy.ops.adf.import_file("INVOKE_DEFAULT")
+    STEPS[:0] = [redraw, choose_the_file, wait_for_the_import, undo_the_import]
+
+
+def choose_the_file():
+    """As a user does in the file browser."""
+    browser = next(w for w in bpy.context.window_manager.windows if "FILE_BROWSER" in [a.type for a in w.screen.areas])
+    area = next(a for a in browser.screen.areas if a.type == "FILE_BROWSER")
+    area.spaces[0].params.directory = str(Path(LAUNCH).parent).encode()
+    area.spaces[0].params.filename = Path(LAUNCH).name
+    with bpy.context.temp_override(window=browser, area=area, region=area.regions[-1]):
+        bpy.ops.file.execute()
+    RESULT["import"]["waited"] = 0
+
+
+def wait_for_the_import():
+    RESULT["import"]["waited"] += 1
+    if len(bpy.data.scenes[0].collection.children) <= STATE["files"] and RESULT["import"]["waited"] < 600:
+        STEPS.insert(0, wait_for_the_import)
+
+
+def undo_the_import():
+    RESULT["import"]["done"] = len(bpy.data.collections)
+    bpy.ops.ed.undo()
+    RESULT["import"]["undone"] = scene_print() == STATE["before"]
 
 
 @step

@@ -124,6 +124,17 @@ def scroll_sidebar(times):
             bpy.ops.view2d.scroll_down(deltay=60)
 
 
+def scroll_physics(times):
+    """Scroll the keys of the active object down."""
+    area = next(a for a in main().screen.areas if a.type == "PROPERTIES")
+    area.spaces[0].context = "PHYSICS"
+    redraw()
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=main(), area=area, region=region):
+        for _ in range(times):
+            bpy.ops.view2d.scroll_down(deltay=60)
+
+
 def run():
     """The next step; a failure ends the session with its traceback."""
     if not STEPS:

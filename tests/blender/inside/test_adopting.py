@@ -1,5 +1,8 @@
 """Scenes of the original add-on and of Blender's own rigid bodies become models that state the same."""
 
+import json
+import os
+import subprocess
 from math import radians
 
 import bpy
@@ -157,6 +160,77 @@ def test_a_scene_of_the_original_add_on_states_the_same_as_a_model(tmp_path, ori
     ghost = document.elements("ghost objects")[0]
     assert ghost.text("parent") == "BODY link"
     assert ghost.pose("location")[0] == (0.0, 0.0, 0.1)  # 0.4 - 0.3, of which single precision leaves 0.09999999
+
+
+SIMULATED = """
+import json, sys, ligature
+scene = ligature.load(sys.argv[1])
+simulation = ligature.Simulation(scene, dt=1e-3)
+def stand(): return {b.identity.name: simulation.bodies[b.identity.identifier].pose.tolist() for b in scene.bodies}
+start = stand()
+simulation.step(200)
+joints = [[j.type.value, j.low, j.high, simulation.joints[j.identity.identifier].position] for j in scene.joints]
+print(json.dumps({"mass": {b.identity.name: b.mass for b in scene.bodies}, "start": start, "end": stand(), "joints": joints}))
+"""
+
+
+def simulated(file):
+    """Masses, poses at the start and after 0.2 s, and joints of an exported file, by Ligature's own Python."""
+    python = os.environ.get("LIGATURE_PYTHON")
+    if python is None:
+        pytest.skip("set LIGATURE_PYTHON to a Python that has ligature")
+    environment = {**os.environ, "PYTHONPATH": os.path.join(os.environ["LIGATURE_ROOT"], "simulator")}
+    words = [python, "-c", SIMULATED, str(file)]
+    done = subprocess.run(words, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def reopened(tmp_path):
+    """The scene as it comes back from its blend file."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_blend_file_of_the_original_add_on_is_adopted_exported_and_simulated(tmp_path, original, enabled):
+    robot()
+    if not enabled:
+        original()
+    reopened(tmp_path)
+    where = {
+        name: np.array(bpy.data.objects[f"/ambf/env/arm/{name}"].matrix_world)[:3, 3] for name in ("base link", "link")
+    }
+    export_file(adopt(bpy.context.scene).collection, tmp_path / "arm.yaml")
+    found = simulated(tmp_path / "arm.yaml")
+    assert found["mass"] == {"baselink": 0.0, "link": 0.25}
+    for name, place in where.items():
+        np.testing.assert_allclose(found["start"][name.replace(" ", "")][:3], place, atol=1e-6)
+    ((kind, low, high, position),) = found["joints"]
+    assert kind == "revolute" and (low, high) == pytest.approx((radians(-30.0), radians(45.0)), abs=1e-6)
+    assert low - 0.01 <= position <= high + 0.01
+    np.testing.assert_allclose(found["end"]["baselink"], found["start"]["baselink"], atol=1e-12)
+    pivot = np.array([0.1, 0.1, 0.3])  # the link swings about its joint, at the distance that it had
+    for when in ("start", "end"):
+        distance = np.linalg.norm(np.array(found[when]["link"][:3]) - pivot)
+        assert distance == pytest.approx(0.1, abs=1e-4)
+
+
+def test_a_blend_file_with_rigid_bodies_is_adopted_exported_and_simulated(tmp_path):
+    cube("floor", 1.0, (0.0, 0.0, -0.5))
+    bpy.ops.rigidbody.object_add()
+    bpy.context.object.rigid_body.type = "PASSIVE"
+    cube("stone", 0.1, (0.0, 0.0, 2.0))
+    bpy.ops.rigidbody.object_add()
+    bpy.context.object.rigid_body.mass, bpy.context.object.rigid_body.collision_shape = 1.5, "BOX"
+    reopened(tmp_path)
+    export_file(adopt(bpy.context.scene).collection, tmp_path / "m.yaml")
+    found = simulated(tmp_path / "m.yaml")
+    assert found["mass"] == {"floor": 0.0, "stone": 1.5}
+    np.testing.assert_allclose(found["start"]["stone"][:3], [0.0, 0.0, 2.0], atol=1e-6)
+    fallen = 2.0 - found["end"]["stone"][2]
+    assert fallen == pytest.approx(0.5 * 9.8 * 0.2**2, rel=0.03)  # damping of 0.04 takes some
 
 
 def test_rigid_bodies_of_blender_become_bodies_and_joints(tmp_path):

@@ -12,6 +12,7 @@ from adf_studio.launch_file import export_scene
 from adf_studio.ligature.adf import Resolver, read_any
 from adf_studio.ligature.mesh import load_mesh
 from adf_studio.read_file import import_file
+from adf_studio.steps import finished
 from adf_studio.write_file import ExportError, ForeignFiles, export_file, members, prepared
 
 from .scene import body, corpus_sample, model
@@ -241,18 +242,18 @@ def test_meshes_outside_are_read_where_the_user_allows_it_once(tmp_path):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     from adf_studio.read_file import outside_folders
 
-    folders = outside_folders(file)
+    folders = finished(outside_folders(file))
     assert folders == [str(tmp_path / "scene" / "meshes" / "tools")]
     bpy.ops.adf.allow_folders(folders=json.dumps(folders))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
-    assert outside_folders(file) == []
+    assert finished(outside_folders(file)) == []
     done = import_file(file, bpy.context.scene)
     assert not done.problems and [o.type for o in members(done.collection)] == ["MESH", "MESH"]
     launch = file.parent / "launch.yaml"
     launch.write_text("multibody configs: [mine.yaml]\n")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert outside_folders(launch) == folders
+    assert finished(outside_folders(launch)) == folders
     bpy.ops.adf.import_launch(filepath=str(launch), root=folders[0])
     assert all(o.type == "MESH" for o in members(bpy.context.scene.adf.models[0].collection))
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from adf_studio.launch_file import prepared_scene
+from adf_studio.launch_file import preparing_scene
 from adf_studio.ligature.adf import AdfError, Resolver, read_any
 from adf_studio.ligature.authoring.placement import matrix_of
 from adf_studio.placing import rest_pose
 from adf_studio.read_file import import_file
+from adf_studio.steps import finished
 from adf_studio.write_file import export_file, prepared
 
 
@@ -58,7 +59,7 @@ def test_every_launch_file_comes_back_with_all_that_it_names(corpus, tmp_path):
         world = bpy.context.scene.adf.world
         if world is not None and world.adf.world.environment:
             here.append(os.path.join(os.path.dirname(launch.world.text), world.adf.world.environment))
-        done, _ = prepared_scene(bpy.context.scene, file)  # what an export in its place would write
+        done = finished(preparing_scene(bpy.context.scene, file)).export  # what an export in its place would write
         assert {path.resolve(): data for path, data in done.files.items()} == {
             path: path.read_bytes()
             for path in {(file.parent / name).resolve() for name in (".", *here)} - {file.parent.resolve()}
