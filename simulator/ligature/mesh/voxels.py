@@ -21,6 +21,9 @@ Integers = NDArray[np.int64]
 FULL = 0.5
 """Share of a cell that the mesh fills from which it is tissue."""
 
+HELD_CELLS, FREE_CELLS = 600, 150
+"""Cells of tissue whose cell size the file does not state, about; of one that nothing holds."""
+
 CHUNK = 256
 """Points that are bound at a time."""
 
@@ -81,8 +84,23 @@ def voxelise(
     ValueError
         When the mesh is not closed, the cells are so large that none is filled, or a slit lies outside.
     """
-    points = np.asarray(vertices, dtype=np.float64)
-    welded, faces = weld(points, np.asarray(triangles, dtype=np.int32))
+    axes, filled, found = lattice(vertices, triangles, cell, slits, planes)
+    grid = build_grid(axes, filled, cuts=[*cuts, *found], closing=(0, 1, 2) if slits else (0, 1))
+    return grid, embed(grid, np.asarray(vertices, dtype=np.float64))
+
+
+def lattice(
+    vertices: Array,
+    triangles: NDArray[np.integer],
+    cell: float | Sequence[float],
+    slits: Sequence[Array] = (),
+    planes: Sequence[Sequence[float]] = ((), (), ()),
+) -> tuple[list[Array], NDArray[np.bool_], list[Cut]]:
+    """The lattice of `voxelise`: its planes along x, y, z (m), which cells are tissue (nx, ny, nz), the slits' cuts.
+
+    NumPy alone does it, so that Blender, which lacks SciPy, can show the cells. Raises ValueError like `voxelise`.
+    """
+    welded, faces = weld(np.asarray(vertices, dtype=np.float64), np.asarray(triangles, dtype=np.int32))
     if not len(faces) or open_edges(faces):
         raise ValueError("the mesh has open edges, so it encloses no tissue; close it or give it a thickness")
     low, high = welded.min(axis=0), welded.max(axis=0)
@@ -90,7 +108,7 @@ def voxelise(
     wanted = [[*planes[a], *(float(x) for box in slits for x in box[:, a])] for a in range(3)]
     axes = [_lattice(low[a], high[a], edge[a], wanted[a]) for a in range(3)]
     filled = _filling(welded[faces], axes) >= FULL
-    cuts = list(cuts)
+    cuts: list[Cut] = []
     for box in slits:
         flat = np.flatnonzero(box[0] == box[1])
         inside = [(a[:-1] + np.diff(a) / 2 > lo) & (a[:-1] + np.diff(a) / 2 < hi)
@@ -105,8 +123,12 @@ def voxelise(
             filled &= ~(inside[0][:, None, None] & inside[1][:, None] & inside[2])
     if not filled.any():
         raise ValueError(f"no cell of {cell} m is filled by the mesh of {high - low} m; use smaller cells")
-    grid = build_grid(axes, filled, cuts=cuts, closing=(0, 1, 2) if slits else (0, 1))
-    return grid, embed(grid, points)
+    return axes, filled, cuts
+
+
+def usual_cell(vertices: Array, held: bool) -> float:
+    """Edge of a cell, m, of tissue whose file states none: about `HELD_CELLS` cells, fewer where nothing holds it."""
+    return float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / (HELD_CELLS if held else FREE_CELLS))) or 1e-3
 
 
 def _lattice(low: float, high: float, cell: float, planes: Sequence[float]) -> Array:
