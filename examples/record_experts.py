@@ -14,33 +14,26 @@ from pathlib import Path
 import numpy as np
 from ligature.datasets import DatasetError, DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
-from ligature.environments import SuturingEnv
-from ligature.environments.experts import EXPERTS, Hand
+from ligature.environments import SuturingEnv, env_id
+from ligature.environments.experts import EXPERTS, demonstrate
 from ligature.environments.suturing import CONTROL
 
 MOST = 400
 """Actions of an episode."""
 
 
-def demonstrate(env: SuturingEnv, writer: DatasetWriter, task: str, seed: int, noise: float) -> bool:
-    """One episode; ``noise`` (of an action) disturbs the expert, which corrects itself. Whether it succeeded.
+def record(env: SuturingEnv, writer: DatasetWriter, seed: int, noise: float) -> bool:
+    """One episode, with what the environment observes and what the expert does then; whether it succeeded."""
 
-    A sample is what the environment observes and what the expert does then, without the disturbance.
-    """
-    observation, info = env.reset(seed=seed)
-    rng, hand, why = np.random.default_rng(seed), Hand(env), ""
-    disturbance = np.zeros(6)
+    def look(observation: np.ndarray, action: np.ndarray) -> None:
+        writer.sample(env.task, extra={"environment_state": observation, "expert_action": action})
+
     try:
-        for action in EXPERTS[task](hand, observation):
-            writer.sample(task, extra={"environment_state": observation, "expert_action": action})
-            disturbance = 0.9 * disturbance + noise * rng.standard_normal(6)
-            disturbed = np.append(action[:6] + disturbance, action[6]).astype(np.float32)
-            observation, _, ended, cut, info = env.step(disturbed)
-            if ended or cut:
-                break
+        _, info = demonstrate(env, seed, noise, look)
     except ValueError as error:
-        why = str(error)
-    writer.end_episode(info["is_success"], judged=True, seed=seed, why=why or info["lost"])
+        writer.end_episode(False, judged=True, seed=seed, why=str(error))
+        return False
+    writer.end_episode(info["is_success"], judged=True, seed=seed, why=info["lost"])
     return bool(info["is_success"])
 
 
@@ -51,7 +44,9 @@ def main() -> int:
     arguments.add_argument("--task", choices=sorted(EXPERTS), default="reach")
     arguments.add_argument("--episodes", type=int, default=50)
     arguments.add_argument("--seed", type=int, default=1000, help="of the first episode")
-    arguments.add_argument("--noise", type=float, default=0.3, help="that disturbs the expert, as a share of an action")
+    arguments.add_argument(
+        "--noise", type=float, default=0.2, help="the most that disturbs the expert, as a share of an action"
+    )
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
     given = arguments.parse_args()
     env = SuturingEnv(given.task, max_steps=MOST)
@@ -61,10 +56,10 @@ def main() -> int:
             try:
                 with DatasetWriter(
                     given.out, env.simulation, given.camera, (640, 480), 1.0 / CONTROL, (given.task,), env.goal.text,
-                    remarks={"source": "scripted expert", "environment": f"ligature/{given.task.capitalize()}-v0"},
+                    remarks={"source": "scripted expert", "environment": env_id(given.task)},
                 ) as writer:  # fmt: skip
                     for seed in range(given.seed, given.seed + given.episodes):
-                        done += demonstrate(env, writer, given.task, seed, given.noise)
+                        done += record(env, writer, seed, given.noise)
                         ended += 1
             except KeyboardInterrupt:
                 print("interrupted")

@@ -285,7 +285,7 @@ def operate(
 def main() -> int:
     """Make a suture and print how well it went."""
     arguments = argparse.ArgumentParser(description="Two arms suture a wound in soft tissue by themselves.")
-    arguments.add_argument("--stitches", type=int, choices=(1, 2), default=1)
+    arguments.add_argument("--stitches", type=int, choices=(1, 2, 3), default=1)
     arguments.add_argument("--width", type=float, default=0.0045, help="metres of each lip that a stitch takes")
     arguments.add_argument("--spacing", type=float, default=0.008, help="metres between stitches")
     arguments.add_argument("--depth", type=float, help="metres below the top at the walls, instead of a width")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
 import sys
 import time
 from pathlib import Path
@@ -17,34 +16,34 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import torch
-from torch import nn
+from networks import Scale, ToolView, base_pose, save
+from torch import Tensor, nn
 
 OBSERVATION, ACTION = "observation.environment_state", "extra.expert_action"
 HIDDEN = 256
 BATCH = 256
-STILL = 1e-4
-"""Deviation, in the units of an observation, below which a number is taken as constant: scaling would magnify noise."""
 
 
 class Policy(nn.Module):
-    """Observations (n, k) to actions (n, 7) within -1 and 1; it scales what it sees by itself."""
+    """Observations (n, 52) to actions (n, 7) within -1 and 1; steps are learnt along the axes of the tool."""
 
-    mean: torch.Tensor
-    scale: torch.Tensor
-
-    def __init__(self, mean: torch.Tensor, scale: torch.Tensor) -> None:
+    def __init__(self, view: ToolView, scale: Scale) -> None:
         super().__init__()
-        self.register_buffer("mean", mean)
-        self.register_buffer("scale", scale)
+        self.view, self.scale = view, scale
         self.body = nn.Sequential(
-            nn.Linear(len(mean), HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, 7)
+            nn.Linear(len(scale.mean), HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, 7)
         )
 
-    def forward(self, observation: torch.Tensor) -> torch.Tensor:
-        """Actions for observations."""
-        # what is constant has a scale of 0 and tells nothing; beyond five deviations nothing was seen
-        seen = ((observation - self.mean) * self.scale).clip(-5.0, 5.0)
-        return torch.tanh(self.body(seen))
+    def forward(self, observation: Tensor) -> Tensor:
+        """Actions for observations, within -1 and 1."""
+        features, R = self.view(observation)
+        return self.act(self.scale(features), R).clip(-1.0, 1.0)
+
+    def act(self, features: Tensor, R: Tensor) -> Tensor:
+        """Actions for scaled features, with the step turned from the tool (n, 3, 3) to the base."""
+        found = self.body(features)
+        step = (R @ found[:, :3, None])[:, :, 0]
+        return torch.cat([step, found[:, 3:]], dim=1)
 
 
 def demonstrations(folder: Path) -> tuple[np.ndarray, np.ndarray, int]:
@@ -60,39 +59,34 @@ def demonstrations(folder: Path) -> tuple[np.ndarray, np.ndarray, int]:
 
 
 def train(observations: np.ndarray, actions: np.ndarray, epochs: int, seed: int) -> Policy:
-    """Least squares of the actions by Adam, with a learning rate that falls to zero (half a cosine)."""
+    """A policy, by Adam, with a learning rate that falls to zero (half a cosine).
+
+    Huber's loss: where the expert turns from one deed to the next, a network of finite slope is far off for one sample.
+    """
     torch.manual_seed(seed)
     torch.set_num_threads(1)
-    seen, wanted = torch.from_numpy(observations), torch.from_numpy(actions)
-    deviation = seen.std(dim=0)
-    scale = torch.where(deviation > STILL, 1.0 / deviation.clip(min=STILL), torch.zeros_like(deviation))
-    policy = Policy(seen.mean(dim=0), scale)
-    batches = -(-len(seen) // BATCH)
+    view, wanted = ToolView(*base_pose(observations)), torch.from_numpy(actions)
+    raw, R = view(torch.from_numpy(observations))
+    policy = Policy(view, Scale(raw))
+    features = policy.scale(raw)
+    batches = -(-len(features) // BATCH)
     optimiser = torch.optim.AdamW(policy.parameters(), lr=1e-3, weight_decay=1e-4)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, epochs * batches)
     begin = time.perf_counter()
     for epoch in range(epochs):
         total = 0.0
-        for batch in torch.randperm(len(seen)).split(BATCH):
-            loss = nn.functional.mse_loss(policy(seen[batch]), wanted[batch])
+        for batch in torch.randperm(len(features)).split(BATCH):
+            loss = nn.functional.huber_loss(policy.act(features[batch], R[batch]), wanted[batch], delta=0.2)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
             schedule.step()
             total += float(loss.detach()) * len(batch)
         if epoch == epochs - 1 or epoch % max(1, epochs // 10) == 0:
-            print(f"epoch {epoch + 1} of {epochs}: loss {total / len(seen):.5f}, {time.perf_counter() - begin:.0f} s")
+            print(
+                f"epoch {epoch + 1} of {epochs}: loss {total / len(features):.5f}, {time.perf_counter() - begin:.0f} s"
+            )
     return policy
-
-
-def save(policy: Policy, path: Path, numbers: int) -> None:
-    """Write the network as ONNX, whose input is one observation (1, k)."""
-    policy.eval()
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of packages that this does not use
-    torch.onnx.export(
-        policy, (torch.zeros(1, numbers),), path, input_names=["state"], output_names=["action"], dynamo=True,
-        external_data=False, verbose=False,
-    )  # fmt: skip
 
 
 def main() -> int:

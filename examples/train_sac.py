@@ -10,16 +10,19 @@ from __future__ import annotations
 
 import argparse
 import csv
-import logging
 import sys
 import time
 from functools import partial
 from pathlib import Path
 
 import gymnasium
+import networks
+import numpy as np
 import torch
-from ligature.environments import MAX_STEPS, registered
+from ligature.environments import MAX_STEPS, SuturingEnv, registered
 from ligature.environments.goals import GOALS
+from ligature.environments.layout import STATE
+from networks import ToolView
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.monitor import Monitor
@@ -31,8 +34,31 @@ WINDOW = 50
 """Episodes over which the printed success is counted."""
 
 
+class Seen(gymnasium.ObservationWrapper[np.ndarray, np.ndarray, np.ndarray]):
+    """An environment seen from its tool: observations are features of `ToolView`."""
+
+    def __init__(self, env: gymnasium.Env[np.ndarray, np.ndarray]) -> None:
+        super().__init__(env)
+        torch.set_num_threads(1)
+        self.view = view_of(env)
+        shape = self.observation(np.ones(STATE)).shape
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+
+    def observation(self, observation: np.ndarray) -> np.ndarray:
+        """Features (k,)."""
+        found: np.ndarray = self.view(torch.from_numpy(observation.astype(np.float32)[None]))[0][0].numpy()
+        return found
+
+
+def view_of(env: gymnasium.Env[np.ndarray, np.ndarray]) -> ToolView:
+    """How an environment of ours is seen from its tool."""
+    plain = env.unwrapped
+    assert isinstance(plain, SuturingEnv)
+    return ToolView(*(torch.tensor(part, dtype=torch.float32) for part in (plain.base_rotation, plain.base_position)))
+
+
 class Actor(nn.Module):
-    """The deterministic policy alone, which scales observations (n, k) as `VecNormalize` did in training."""
+    """The deterministic policy alone, from observations (n, 52), scaled as `VecNormalize` did in training."""
 
     mean: torch.Tensor
     deviation: torch.Tensor
@@ -40,8 +66,9 @@ class Actor(nn.Module):
     body: nn.Module
     mu: nn.Module
 
-    def __init__(self, model: SAC, scales: VecNormalize) -> None:
+    def __init__(self, model: SAC, scales: VecNormalize, view: ToolView) -> None:
         super().__init__()
+        self.view = view
         seen = scales.obs_rms
         assert isinstance(seen, RunningMeanStd)
         mean, variance = seen.mean, seen.var
@@ -52,7 +79,7 @@ class Actor(nn.Module):
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         """Actions for observations."""
-        seen = ((observation - self.mean) / self.deviation).clip(-self.limit, self.limit)
+        seen = ((self.view(observation)[0] - self.mean) / self.deviation).clip(-self.limit, self.limit)
         return torch.tanh(self.mu(self.body(seen)))
 
 
@@ -89,7 +116,8 @@ def environments(task: str, jobs: int, seed: int) -> VecNormalize:
     """Environments in processes of their own, with scaled observations."""
 
     def one(max_steps: int) -> gymnasium.Env[object, object]:
-        return Monitor(gymnasium.wrappers.TimeLimit(registered(task), max_steps), info_keywords=("is_success",))
+        env: gymnasium.Env[np.ndarray, np.ndarray] = gymnasium.wrappers.TimeLimit(Seen(registered(task)), max_steps)
+        return Monitor(env, info_keywords=("is_success",))
 
     vector = SubprocVecEnv([partial(one, MAX_STEPS)] * jobs, start_method="spawn")
     vector.seed(seed)
@@ -104,16 +132,12 @@ def save(model: SAC, out: Path) -> None:
     scales.save(str(out.with_suffix(".pkl")))
 
 
-def export(model: SAC, out: Path) -> None:
-    """Write the policy as ONNX, whose input is one observation (1, k)."""
-    scales = model.get_vec_normalize_env()
+def export(model: SAC, task: str, out: Path) -> None:
+    """Write the policy as ONNX."""
+    scales, env = model.get_vec_normalize_env(), registered(task)
     assert scales is not None
-    actor = Actor(model, scales).eval()
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of packages that this does not use
-    torch.onnx.export(
-        actor, (torch.zeros(1, len(actor.mean)),), out, input_names=["state"], output_names=["action"], dynamo=True,
-        external_data=False, verbose=False,
-    )  # fmt: skip
+    networks.save(Actor(model, scales, view_of(env)), out, STATE)
+    env.close()
 
 
 def main() -> int:
@@ -140,7 +164,7 @@ def main() -> int:
             )  # fmt: skip
         model.learn(given.steps, Progress(given.policy, 2000), reset_num_timesteps=not given.resume)
         save(model, given.policy)
-        export(model, given.policy)
+        export(model, given.task, given.policy)
     except FileNotFoundError as error:
         print(f"nothing to resume: {error}")
         return 2

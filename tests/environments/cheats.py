@@ -12,9 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 from ligature.environments import SuturingEnv
-from ligature.environments.experts import EXPERTS, OPEN, SHUT, Hand, Policy, drive
+from ligature.environments.experts import EXPERTS, Policy
+from ligature.environments.goals import Insert
+from ligature.environments.hand import OPEN, SHUT, Hand
 from ligature.model.frames import frame, inverse
 from ligature.tasks.throws import PAD, UP
+
+from tests.environments import more_cheats as more
 
 Array = np.ndarray
 MOST = 400
@@ -23,12 +27,12 @@ MOST = 400
 
 def still(hand: Hand, observation: Array) -> Iterator[Array]:
     """do nothing"""
-    yield from np.zeros((100, 7))
+    yield from np.zeros((100, *hand.env.action_space.shape))
 
 
 def flail(hand: Hand, observation: Array) -> Iterator[Array]:
     """random actions"""
-    yield from np.random.default_rng(5).uniform(-1.0, 1.0, (100, 7))
+    yield from np.random.default_rng(5).uniform(-1.0, 1.0, (100, *hand.env.action_space.shape))
 
 
 # --- reach ----------------------------------------------------------------------------------
@@ -63,7 +67,7 @@ def lift_by_thread(hand: Hand, observation: Array) -> Iterator[Array]:
     """grasp the thread beside the needle and lift both"""
     bodies = list(hand.simulation.scene.rods[0].bodies)
     points = hand.simulation.state["body_pose"][0, bodies, :3]
-    tail = hand.env._scenery.needle_points(hand.simulation.state["body_pose"][0])[0]
+    tail = hand.env.goal.scenery.needle_points(hand.simulation.state["body_pose"][0])[0]
     nearest = int(np.argmin(np.linalg.norm(points - tail, axis=1)))
     k = int(np.clip(nearest + (3 if nearest < len(points) / 2 else -3), 1, len(points) - 2))
     along = points[k + 1] - points[k - 1]
@@ -111,6 +115,22 @@ def hold_low(hand: Hand, observation: Array) -> Iterator[Array]:
 
 
 # --- insert and puncture --------------------------------------------------------------------
+
+
+def drive(
+    hand: Hand, observation: Array, aside: Array | None = None, end: float = 2.6, turn: float = 0.03
+) -> Iterator[Array]:
+    """Turn the needle along its circle moved ``aside`` (3,); ``end`` is the tip's last angle."""
+    goal = hand.env.goal
+    assert isinstance(goal, Insert)
+    T_arc_tool = inverse(hand.needle_arc) @ hand.tool
+    shift = frame(np.eye(3), np.zeros(3) if aside is None else aside)
+    angle = -0.4
+    while angle < end:
+        wanted = shift @ goal.throw.arc_at(angle, goal.arc) @ T_arc_tool
+        found, left = hand.action(wanted, SHUT)
+        angle += turn if left <= 1.0 else 0.0
+        yield found
 
 
 def let_go(hand: Hand, observation: Array) -> Iterator[Array]:
@@ -163,6 +183,10 @@ CHEATS: dict[str, tuple[Policy, ...]] = {
     "pick": (still, flail, close_in_the_air, sweep, lift_by_thread, toss, hold_low),
     "insert": (still, flail, backwards, beside, let_go, over_the_top, leave_it_in),
     "puncture": (still, backwards, beside, peck, let_go, over_the_top, leave_it_in),
+    "hand_over": (still, flail, *more.HAND_OVER),
+    "pull_through": (still, flail, *more.PULL_THROUGH),
+    "peg_transfer": (still, flail, *more.PEG_TRANSFER),
+    "suture": (still, flail, *more.SUTURE),
 }
 
 

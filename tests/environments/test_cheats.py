@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from ligature.environments import SuturingEnv
-from ligature.environments.experts import EXPERTS, SHUT, Hand, Policy
+from ligature.environments.experts import CORRECTING, EXPERTS, Policy, demonstrate
 from ligature.environments.goals import GOALS
+from ligature.environments.hand import SHUT, Hand
 
 from tests.environments.cheats import CHEATS, MOST, QUICK, described, roll
 
@@ -65,11 +68,11 @@ def lifted(env: SuturingEnv, policy: Policy, seed: int) -> tuple[float, bool]:
     """How high the needle's lowest point came, and whether the thread was ever held."""
     observation, _ = env.reset(seed=seed)
     hand, highest, held = Hand(env), 0.0, False
-    start = env._scenery.needle_points(env._simulation.state["body_pose"][0])[:, 2].min()
+    start = env.goal.scenery.needle_points(env._simulation.state["body_pose"][0])[:, 2].min()
     thread = env._simulation.scene.rod_bodies
     for action in policy(hand, observation):
         env.step(np.asarray(action, dtype=np.float32))
-        now = env._scenery.needle_points(env._simulation.state["body_pose"][0])[:, 2].min()
+        now = env.goal.scenery.needle_points(env._simulation.state["body_pose"][0])[:, 2].min()
         highest = max(highest, float(now - start))
         held = held or int(env._simulation.state["jaw_body"][0, 0]) in thread
     return highest, held
@@ -120,3 +123,37 @@ def test_an_open_hand_ends_no_episode_in_which_nothing_was_lifted() -> None:
         assert not ended and not info["lost"]
     env.close()
     assert SHUT < 0.0
+
+
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, 10**6), noise=st.floats(0.0, 0.3))
+def test_what_an_expert_does_follows_from_where_things_are(env: SuturingEnv, seed: int, noise: float) -> None:
+    """One that is asked for the first time at any moment answers as one does that has acted since the beginning."""
+    if env.task not in CORRECTING:
+        return
+    answers, count = [], iter(range(MOST))
+
+    def look(observation: np.ndarray, action: np.ndarray) -> None:
+        if next(count) % 10 == 0:
+            answers.append((action, next(EXPERTS[env.task](Hand(env), observation))))
+
+    demonstrate(env, seed, noise, look)
+    assert len(answers) > 1
+    for whole, anew in answers:
+        np.testing.assert_allclose(whole, anew, rtol=0.0, atol=1e-9)
+
+
+def test_an_expert_corrects_a_policy_that_acts_in_its_stead(env: SuturingEnv) -> None:
+    """A policy that does nothing leaves the arm where it is: the expert has the same answer again and again."""
+
+    def stay(_: np.ndarray) -> np.ndarray:
+        return np.zeros(env.action_space.shape)
+
+    if env.task not in CORRECTING:
+        with pytest.raises(ValueError, match=f"the expert of '{env.task}' cannot correct a policy"):
+            demonstrate(env, 5, 0.3, lambda *_: None, stay)
+        return
+    answers: list[np.ndarray] = []
+    steps, info = demonstrate(env, 5, 0.3, lambda _, action: answers.append(action[:6]), stay)
+    assert steps == len(answers) == MOST and not info["is_success"]
+    np.testing.assert_allclose(answers[1:50], np.tile(answers[0], (49, 1)), atol=0.02)

@@ -12,8 +12,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from ligature.environments import MAX_STEPS, SuturingEnv, make_vec, suturing
-from ligature.environments.suturing import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGTH, STEP_LENGTH
+from ligature.environments import MAX_STEPS, SuturingEnv, env_id, make_vec, suturing
+from ligature.environments.actions import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGTH, STEP_LENGTH
+from ligature.environments.goals import GOALS
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.robots.poses import rotation_vector
 
@@ -38,7 +39,7 @@ def test_two_episodes_with_one_seed_are_the_same_to_the_bit(name: str) -> None:
         rng = np.random.default_rng(3)
         seen = [observation]
         for _ in range(15):
-            observation, reward, *_ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+            observation, reward, *_ = env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32))
             seen.append(np.append(observation, reward))
         rolls.append(np.concatenate(seen))
     env.close()
@@ -173,6 +174,8 @@ def test_what_the_arm_refuses_is_reported_and_the_episode_goes_on() -> None:
         ({"action": "torque"}, "action must be one of cartesian, joint"),
         ({"arm": "MTML"}, "'MTML' is not a PSM"),
         ({"arm": "PSM9"}, "no arm is called 'PSM9'"),
+        ({"arm": ("PSM1", "PSM2")}, "reach is done by 1 arm, such as PSM1, not by PSM1, PSM2"),
+        ({"task": "hand_over", "arm": "PSM1"}, "hand_over is done by 2 arms, such as PSM1, PSM2, not by PSM1"),
     ],
 )
 def test_wrong_options_are_reported_with_the_right_ones(wrong: dict[str, str], message: str) -> None:
@@ -218,7 +221,7 @@ def test_an_environment_simulates_the_arm_of_its_task_alone() -> None:
 def test_what_takes_no_part_in_a_task_neither_moves_nor_is_there() -> None:
     env = SuturingEnv("reach", max_steps=None)
     needle, observation = env.needle, env.reset(seed=1)[0]
-    start, middle = observation[14:21], env._scenery.needle_points(env.simulation.state["body_pose"][0])[1]
+    start, middle = observation[14:21], env.goal.scenery.needle_points(env.simulation.state["body_pose"][0])[1]
     for _ in range(120):
         way = env.base_rotation.T @ (middle - observation[27:30]) / STEP_LENGTH
         way /= max(float(np.abs(way).max()), 1.0)
@@ -238,13 +241,15 @@ def rolled_out(env: SuturingEnv, seed: int, steps: int) -> tuple[np.ndarray, str
     """What an episode of random actions shows, the jaw closing as often as not, and the state at its end."""
     rng, seen = np.random.default_rng(seed), [env.reset(seed=seed)[0]]
     for _ in range(steps):
-        action = rng.uniform(-1, 1, 7).astype(np.float32)
+        action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
         action[6] = -1.0 if seed % 2 else action[6]
         seen.append(env.step(action)[0])
     return np.array(seen), env.simulation.state_hash(clock=False)
 
 
-@pytest.fixture(scope="module", params=["reach", "pick", "insert"])
+@pytest.fixture(
+    scope="module", params=["reach", "pick", "insert", "hand_over", "pull_through", "peg_transfer", "suture"]
+)
 def used(request: pytest.FixtureRequest) -> Iterator[SuturingEnv]:
     """An environment that all examples use in turn."""
     env = SuturingEnv(request.param, max_steps=None)
@@ -281,7 +286,7 @@ def soft() -> Iterator[SuturingEnv]:
 
 def ahead_of(env: SuturingEnv) -> tuple[float, float]:
     """How far the set-point is ahead of the tip: metres and radians."""
-    ahead = inverse(pose7_matrix(env._arm.local_measured_cp())) @ pose7_matrix(env.setpoint)
+    ahead = inverse(pose7_matrix(env.arm.local_measured_cp())) @ pose7_matrix(env.setpoint)
     return float(np.linalg.norm(ahead[:3, 3])), float(np.linalg.norm(rotation_vector(ahead[:3, :3])))
 
 
@@ -320,7 +325,7 @@ def test_joint_actions_are_bounded_too() -> None:
     env.reset(seed=3)
     for _ in range(60):
         env.step(np.array([0, 0, 1, 0, 0, 0, 0], dtype=np.float32))
-        ahead = np.abs(env._arm.setpoint_js().position - env._arm.measured_js().position)
+        ahead = np.abs(env.arm.setpoint_js().position - env.arm.measured_js().position)
         assert (ahead <= 1.5 * AHEAD_JOINTS).all()
     env.close()
 
@@ -331,26 +336,29 @@ def test_the_set_point_is_observed(soft: SuturingEnv) -> None:
     for _ in range(5):
         observation, *_ = soft.step(rng.uniform(-1, 1, 7).astype(np.float32))
         assert (observation[41:48] == soft.setpoint).all()
-        assert observation[48] == soft._arm.jaw.setpoint_js().position[0]
-        assert (observation[34:40] == soft._arm.measured_js().velocity).all()
+        assert observation[48] == soft.arm.jaw.setpoint_js().position[0]
+        assert (observation[34:40] == soft.arm.measured_js().velocity).all()
 
 
 # --- keeping a moment -----------------------------------------------------------------------
 
-ACTIONS = np.random.default_rng(6).uniform(-1, 1, (12, 7)).astype(np.float32)
+ACTIONS = np.random.default_rng(6).uniform(-1, 1, (12, 14)).astype(np.float32)
 
 
 def rolled(env: gymnasium.Env) -> np.ndarray:
     """Observations and rewards of the same actions, and the start of the episode after them."""
-    seen = [np.append(*env.step(action)[:2]) for action in ACTIONS]
+    seen = [np.append(*env.step(action)[:2]) for action in ACTIONS[:, : env.action_space.shape[0]]]
     return np.array([*seen, np.append(env.reset()[0], 0.0)])
 
 
-@pytest.mark.parametrize("task", ["reach", "insert", pytest.param("pick", marks=pytest.mark.slow)])
+SLOW = [pytest.param(task, marks=pytest.mark.slow) for task in ("pick", "pull_through", "peg_transfer", "suture")]
+
+
+@pytest.mark.parametrize("task", ["reach", "insert", "hand_over", *SLOW])
 def test_what_was_saved_goes_on_to_the_bit_and_copies_go_on_alike(task: str) -> None:
     env = SuturingEnv(task)
     env.reset(seed=4)
-    for action in ACTIONS:
+    for action in ACTIONS[:, : env.action_space.shape[0]]:
         env.step(action)
     state = env.save()
     first = rolled(env)
@@ -367,9 +375,9 @@ def test_what_was_saved_goes_on_to_the_bit_and_copies_go_on_alike(task: str) -> 
 def test_a_copy_of_a_made_environment_steps() -> None:
     env = gymnasium.make("ligature/Reach-v0")
     env.reset(seed=1)
-    env.step(ACTIONS[0])
+    env.step(ACTIONS[0, :7])
     other = copy.deepcopy(env)
-    a, b = env.step(ACTIONS[1])[0], other.step(ACTIONS[1])[0]
+    a, b = env.step(ACTIONS[1, :7])[0], other.step(ACTIONS[1, :7])[0]
     env.close()
     other.close()
     assert np.isfinite(b).all()
@@ -391,7 +399,7 @@ def test_a_state_of_another_task_is_refused() -> None:
     with pytest.raises(RuntimeError, match=r"call reset\(\) before save\(\)"):
         pick.save()
     with pytest.raises(RuntimeError, match=r"call reset\(\) before step\(\)"):
-        pick.step(ACTIONS[0])
+        pick.step(ACTIONS[0, :7])
     reach.close()
     pick.close()
 
@@ -404,9 +412,10 @@ def test_options_of_reset_are_refused() -> None:
     env.close()
 
 
-@pytest.mark.parametrize("name", IDS)
-def test_the_specification_has_the_length_of_episodes(name: str) -> None:
-    assert gymnasium.spec(name).max_episode_steps == MAX_STEPS
+@pytest.mark.parametrize("task", sorted(GOALS))
+def test_the_specification_has_the_length_of_episodes(task: str) -> None:
+    assert gymnasium.spec(env_id(task)).max_episode_steps == GOALS[task].steps
+    assert task in ("hand_over", "pull_through", "peg_transfer", "suture") or GOALS[task].steps == MAX_STEPS
 
 
 def test_episodes_of_made_environments_are_cut_where_the_specification_has_it() -> None:

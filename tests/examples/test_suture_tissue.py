@@ -87,13 +87,14 @@ def test_one_stitch_closes_the_wound_without_tearing_it() -> None:
 
 
 @pytest.mark.slow
-def test_two_stitches_of_one_thread_close_the_wound_where_they_are() -> None:
+@pytest.mark.parametrize("stitches", [2, 3])
+def test_stitches_of_one_thread_close_the_wound_where_they_are(stitches: int) -> None:
     simulation = ligature.Simulation(ligature.load(suture_tissue.SCENE))
-    plan = suture_tissue.Plan(stitches=2, spacing=0.008)
+    plan = suture_tissue.Plan(stitches=stitches, spacing=0.008)
     score, measures, stopped = suture_tissue.operate(simulation, plan)
     assert stopped == ""
     assert score.success, score.lines()
-    assert len(score.stitches) == 2
+    assert len(score.stitches) == stitches
     assert max(score.gaps) < 0.5e-3
     for stitch in score.stitches:
         assert stitch.widths == pytest.approx((0.0045, 0.0045), abs=1e-3)

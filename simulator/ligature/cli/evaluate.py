@@ -14,6 +14,7 @@ from ligature import __version__
 from ligature.cli.evaluation_page import write_page
 from ligature.environments import SuturingEnv
 from ligature.environments.evaluation import MEASURES, UNITS, Episode, report, run_episode, run_episodes
+from ligature.environments.goals import GOALS, Goal
 from ligature.environments.policies import PolicyError, load_policy
 from ligature.render.files import write_json, write_png
 
@@ -25,7 +26,7 @@ def evaluate(
     policy: str,
     options: Mapping[str, Any],
     seeds: range,
-    max_steps: int,
+    max_steps: int | None,
     out: Path | None,
     pictures: int,
     jobs: int,
@@ -33,13 +34,14 @@ def evaluate(
 ) -> int:
     """Run the episodes, print the summary, write JSON and page below ``out``; returns the exit status."""
     try:
+        steps = max_steps or GOALS.get(options["task"], Goal).steps
         load_policy(policy)  # what is wrong with it is said before anything is simulated
-        episodes = _run(policy, options, seeds, max_steps, jobs, console)
+        episodes = _run(policy, options, seeds, steps, jobs, console)
         found = report(policy, options, episodes, __version__)
         _print(found["summary"], console)
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
-            shown = _pictures(policy, options, episodes[:pictures], max_steps, out)
+            shown = _pictures(policy, options, episodes[:pictures], steps, out)
             files = [write_json(found, out / "evaluation.json"), write_page(found, shown, out / "index.html")]
             console.print("\n".join(map(str, files)), markup=False)
     except (PolicyError, ValueError, OSError) as error:

@@ -4,14 +4,14 @@ from typing import Any
 
 import gymnasium
 
-from ligature.environments.goals import GOALS
+from ligature.environments.goals import GOALS, Goal
+from ligature.environments.randomisation import Randomisation
 from ligature.environments.suturing import EnvState, SuturingEnv
 from ligature.environments.vector import SuturingVectorEnv
 
-__all__ = ["EnvState", "SuturingEnv", "SuturingVectorEnv", "make_vec", "registered"]
-
-MAX_STEPS = 200
-"""Actions until an episode of a registered environment is cut; ``gymnasium.make`` has ``max_episode_steps``."""
+__all__ = ["EnvState", "Randomisation", "SuturingEnv", "SuturingVectorEnv", "env_id", "make_vec", "registered"]
+MAX_STEPS = Goal.steps
+"""Actions until an episode of most registered environments is cut; ``gymnasium.make`` has ``max_episode_steps``."""
 
 
 def registered(task: str, **options: Any) -> SuturingEnv:
@@ -26,11 +26,17 @@ def registered(task: str, **options: Any) -> SuturingEnv:
 
 registered.metadata = SuturingEnv.metadata  # type: ignore[attr-defined]
 
+
+def env_id(task: str) -> str:
+    """The name of the registered environment of ``task``: ``ligature/HandOver-v0`` for ``hand_over``."""
+    return f"ligature/{''.join(part.capitalize() for part in task.split('_'))}-v0"
+
+
 for _task in GOALS:
     gymnasium.register(
-        id=f"ligature/{_task.capitalize()}-v0",
+        id=env_id(_task),
         entry_point="ligature.environments:registered",
-        max_episode_steps=MAX_STEPS,
+        max_episode_steps=GOALS[_task].steps,
         kwargs={"task": _task},
     )
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest, bootstrap
 
+from ligature.environments.layout import ACTION
 from ligature.environments.policies import Policy, checked, load_policy
 from ligature.environments.suturing import CONTROL, SuturingEnv
 
@@ -40,9 +41,9 @@ class Episode:
     reward
         The sum over all actions.
     path_length
-        Way of the tool's control point in metres.
+        Way of the control point of the tool in metres, of all tools together.
     peak_force
-        Largest force on the tool's tip in newtons.
+        Largest force on the tip of a tool in newtons.
     tissue_force
         Largest force of tissue on the needle in newtons.
     """
@@ -75,16 +76,16 @@ def run_episode(
     observation, info = env.reset(seed=seed)
     act = policy(env, seed)
     reward = way = peak = tissue = 0.0
-    at, ended, steps = env.tool_position, False, 0
+    at, ended, steps, width = env.tool_positions, False, 0, len(env.arms) * ACTION
     look(0)
     while not ended and steps < max_steps:
-        observation, gained, ended, _, info = env.step(checked(act(observation)))
+        observation, gained, ended, _, info = env.step(checked(act(observation), width))
         steps += 1
         look(steps)
         reward += gained
-        way += float(np.linalg.norm(env.tool_position - at))
-        at = env.tool_position
-        peak = max(peak, float(np.linalg.norm(env.arm.spatial_measured_cf()[:3])))
+        way += sum(np.linalg.norm(env.tool_positions - at, axis=1).tolist())
+        at = env.tool_positions
+        peak = max(peak, *(float(np.linalg.norm(arm.spatial_measured_cf()[:3])) for arm in env.arms))
         tissue = max(tissue, float(np.linalg.norm(env.needle_force)))
     return Episode(seed, bool(info["is_success"]), str(info["lost"]), steps, steps * CONTROL, reward, way, peak, tissue)
 

@@ -1,148 +1,168 @@
 """Scripted experts of the environments: each does the deed by the actions that an agent has.
 
-They find their way by the ground truth of the simulation. World axes, metres, radians.
+They find their way by the ground truth of the simulation. What an expert does follows from where things are, not from
+what it did before: it says what to do wherever a disturbance or another policy has brought the arm, so that a policy
+that sees the state can learn it. World axes, metres, radians.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.environments.goals import Insert, holds
-from ligature.environments.suturing import STEP_ANGLE, STEP_JAW, STEP_LENGTH, SuturingEnv
-from ligature.model.frames import frame, inverse, pose7_matrix
-from ligature.robots.poses import rotation_vector
-from ligature.tasks.throws import UP, NeedleArc, best_grasp
+from ligature.environments.goals import Insert, Suture, holds
+from ligature.environments.hand import JAW, OPEN, SHUT, TIGHT, WIDE, Hand
+from ligature.environments.layout import ACTION, TARGET, action_width
+from ligature.environments.scripts import hand_over, peg_transfer, pull_through
+from ligature.environments.suturing import SuturingEnv
+from ligature.model.frames import frame, inverse
+from ligature.tasks.throws import BEHIND, drawn_back
 
 Array = NDArray[np.float64]
-OPEN, SHUT = 0.8, -0.34
-"""Angles of the jaw."""
+HIGHER = 0.02
+"""Metres above where it must be to which the needle is lifted: some of it hangs below."""
 
-TRIES = 3
-"""How often an expert goes for the needle."""
+LAST = 2.6
+"""Angle on its circle at which a needle has gone far enough."""
 
+GAP, LEAVE = 0.025, 0.005
+"""Metres from the needle to the tool of a hand that has left it, and back to where its set-point goes until then."""
 
-class Hand:
-    """The arm of an environment, driven by its actions."""
-
-    def __init__(self, env: SuturingEnv) -> None:
-        self.env = env
-        self.base = frame(env.base_rotation, env.base_position)
-        self.simulation, self.arm, self.needle = env.simulation, env.arm, env.needle
-        self.arc = NeedleArc.of(self.simulation.scene.needles[0], self.simulation.scene.bodies[self.needle])
-
-    @property
-    def tool(self) -> Array:
-        """The set-point of the tool (4, 4)."""
-        return self.base @ pose7_matrix(self.env.setpoint)
-
-    @property
-    def needle_arc(self) -> Array:
-        """The needle's arc frame (4, 4)."""
-        return pose7_matrix(self.simulation.state["body_pose"][0, self.needle]) @ self.arc.T_body_arc
-
-    def action(self, T: Array, jaw: float) -> tuple[Array, float]:
-        """The action towards a pose of the tool and a jaw angle, and how many of them are left."""
-        wanted, now = inverse(self.base) @ T, pose7_matrix(self.env.setpoint)
-        found = np.zeros(7)
-        found[:3] = (wanted - now)[:3, 3] / STEP_LENGTH
-        found[3:6] = rotation_vector(now[:3, :3].T @ wanted[:3, :3]) / STEP_ANGLE
-        left = float(np.abs(found).max())
-        found[:6] /= max(left, 1.0)
-        assert self.arm.jaw is not None
-        closing = (jaw - float(self.arm.jaw.setpoint_js().position[0])) / STEP_JAW
-        found[6] = np.clip(closing, -1.0, 1.0)
-        return found, max(left, abs(closing))
-
-    def go(self, T: Array, jaw: float, most: int = 120) -> Iterator[Array]:
-        """Actions until the set-point is there."""
-        for _ in range(most):
-            found, left = self.action(T, jaw)
-            if left < 0.2:
-                return
-            yield found
-
-    def stay(self, count: int, jaw: float) -> Iterator[Array]:
-        """Actions that only move the jaw."""
-        T = self.tool
-        for _ in range(count):
-            yield self.action(T, jaw)[0]
-
-    def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
-        """The set-point moved by so much."""
-        return frame(np.eye(3), np.array([x, y, z])) @ self.tool
-
-    def grasp(self) -> Array:
-        """Pose (4, 4) of the tool at which the jaws can close on the needle from above."""
-        now = self.needle_arc
-        raised = frame(np.eye(3), 0.03 * UP) @ now
-        surface = self.simulation.state["body_pose"][0, self.needle, :3] - np.array([0.0, 0.0, 0.004])
-        depths = (0.004, 0.006, 0.5 * self.arc.length)
-        found = best_grasp(self.arc, depths, self.arm.kinematics, self.base, [raised], now, surface, upright=True)
-        if found is None:
-            raise ValueError("the arm cannot reach a grasp from which it could lift the needle")
-        return now @ found.tool_in_arc(self.arc)
-
-    def take(self, T: Array) -> Iterator[Array]:
-        """Close the jaws at a pose of the tool, from above."""
-        yield from self.go(_above(T), OPEN)
-        yield from self.go(T, OPEN)
-        yield from self.stay(20, SHUT)
-
-    def fetch(self) -> Iterator[Array]:
-        """Grasp the needle; a thread that falls off the pad's edge may turn it meanwhile."""
-        for _ in range(TRIES):
-            T = self.grasp()
-            T_arc_tool = inverse(self.needle_arc) @ T
-            yield from self.go(_above(T), OPEN)
-            yield from self.take(self.needle_arc @ T_arc_tool)
-            if holds(self.simulation, self.arm, self.needle):
-                return
-            yield from self.go(self.moved(z=0.015), OPEN)
+MORE = 0.003
+"""Metres of thread that are pulled through beyond those that are asked for."""
 
 
-def _above(T: Array) -> Array:
-    """The pose from which the tool goes straight to ``T``."""
-    return frame(np.eye(3), -0.015 * T[:3, 2]) @ T
-
+Act = Callable[[Array], NDArray[Any]]
+"""The action of a policy for an observation."""
 
 Policy = Callable[[Hand, Array], Iterator[Array]]
-"""Actions (7,) of an episode, from the arm and the first observation."""
+"""Actions of an episode, from the first arm and the first observation; each when what came of the last one is seen."""
 
 
 def reach(hand: Hand, observation: Array) -> Iterator[Array]:
     """Go there and stop."""
-    yield from hand.go(frame(hand.tool[:3, :3], observation[30:33]), 0.0)
-    yield from hand.stay(30, 0.0)
+    while True:
+        yield hand.action(frame(hand.tool[:3, :3], observation[TARGET]), 0.0)[0]
 
 
 def pick(hand: Hand, observation: Array) -> Iterator[Array]:
     """Grasp the needle, lift it, hold it."""
-    yield from hand.fetch()
-    yield from hand.go(hand.moved(z=0.045), SHUT)
-    yield from hand.stay(60, SHUT)
+    height = float(observation[32]) + HIGHER
+    while True:
+        held = holds(hand.simulation, hand.arm, hand.needle)
+        yield hand.lift_to(height) if held else hand.approach()
 
 
-def drive(
-    hand: Hand, observation: Array, aside: Array | None = None, end: float = 2.6, turn: float = 0.03
-) -> Iterator[Array]:
-    """Turn the needle along its circle.
-
-    The circle is moved ``aside`` (3,); ``end`` is the tip's last angle, ``turn`` how far it goes in an action.
-    """
+def insert(hand: Hand, observation: Array) -> Iterator[Array]:
+    """Turn the needle along its circle."""
     goal = hand.env.goal
     assert isinstance(goal, Insert)
-    T_arc_tool = inverse(hand.needle_arc) @ hand.tool
-    shift = frame(np.eye(3), np.zeros(3) if aside is None else aside)
-    angle = -0.4
-    while angle < end:
-        wanted = shift @ goal.throw.arc_at(angle, goal.arc) @ T_arc_tool
-        found, left = hand.action(wanted, SHUT)
-        angle += turn if left <= 1.0 else 0.0
-        yield found
+    while True:
+        yield hand.turn_needle(goal.throw, LAST)
 
 
-EXPERTS: dict[str, Policy] = {"reach": reach, "pick": pick, "insert": drive, "puncture": drive}
+def suture(hand: Hand, observation: Array) -> Iterator[Array]:
+    """Drive the needle, take it with the other hand at the exit, let go, draw it out, and pull the thread up."""
+    goal = hand.env.goal
+    assert isinstance(goal, Suture)
+    puller = hand.other(1)
+    while True:
+        firm = holds(hand.simulation, puller.arm, puller.needle) and puller.opening < TIGHT
+        if not firm:
+            yield hand.turn_needle(goal.throw, goal.last) + _meet(puller, goal)
+        elif not _left(hand):
+            yield _leave(hand) + puller.turn_needle(goal.throw, goal.last)
+        else:
+            yield _draw(puller, goal)
+
+
+def _meet(puller: Hand, goal: Suture) -> Array:
+    """The puller's action that takes the needle beyond the exit; before it is there, that waits behind the place."""
+    if goal.driven:
+        return puller.close_at(puller.needle_arc @ goal.T_arc_puller)
+    wait = goal.throw.arc_at(goal.last, goal.arc) @ goal.T_arc_puller
+    return puller.action(drawn_back(wait, 2.0 * BEHIND), OPEN)[0]
+
+
+def _left(hand: Hand) -> bool:
+    """Whether a hand is farther than `GAP` from all of the needle."""
+    depths = np.linspace(0.0, hand.arc.length, 9)
+    T = inverse(hand.measured_tool) @ hand.needle_arc
+    places = np.array([T[:3, :3] @ hand.arc.point(float(depth)) + T[:3, 3] for depth in depths])
+    return bool(np.linalg.norm(places, axis=1).min() > GAP)
+
+
+def _leave(hand: Hand) -> Array:
+    """The action that opens the jaws, and then draws the hand back along itself."""
+    way = LEAVE if hand.opening > WIDE else 0.0
+    return hand.action(drawn_back(hand.tool, way), OPEN)[0]
+
+
+def _draw(puller: Hand, goal: Suture) -> Array:
+    """The puller's action that turns the needle out along its circle, and raises it then until the thread is out."""
+    pulled = goal.pulled()
+    if pulled.needle_inside:
+        return puller.turn_needle(goal.throw, goal.out)
+    missing = goal.LENGTH + MORE - pulled.drawn
+    return puller.action(puller.moved(z=float(np.clip(missing, 0.0, 0.001))), SHUT)[0]
+
+
+EXPERTS: dict[str, Policy] = {
+    "reach": reach, "pick": pick, "insert": insert, "puncture": insert,
+    "hand_over": hand_over, "pull_through": pull_through, "peg_transfer": peg_transfer,
+    "suture": suture,
+}  # fmt: skip
 """Experts by the names of the tasks."""
+
+CORRECTING = ("reach", "pick", "insert", "puncture", "suture")
+"""Tasks whose experts act by where things are alone, so that they can correct what others do."""
+
+
+def demonstrate(
+    env: SuturingEnv, seed: int, noise: float, look: Callable[[Array, Array], None], act: Act | None = None
+) -> tuple[int, dict[str, Any]]:
+    """One episode in which the expert says all the time what is to be done; what is done may be something else.
+
+    Parameters
+    ----------
+    env
+        With state observations.
+    seed
+        Of the reset and of the disturbance.
+    noise
+        Disturbs the expert, as a share of an action; each episode has its own part of it, from none to all. A policy
+        that is shown nothing but the expert's own way cannot find back to it (Laskey et al., Conference on Robot
+        Learning 2017).
+    look
+        Called with each observation and with what the expert would do there.
+    act
+        A policy that acts in the stead of an expert of `CORRECTING`, which only corrects it (Ross, Gordon and Bagnell,
+        International Conference on Artificial Intelligence and Statistics 2011).
+
+    Returns
+    -------
+    tuple
+        Number of actions, and the last ``info``; raises ValueError where the expert finds no way.
+    """
+    if act is not None and env.task not in CORRECTING:
+        raise ValueError(f"the expert of '{env.task}' cannot correct a policy; those of {', '.join(CORRECTING)} can")
+    observation, info = env.reset(seed=seed)
+    rng, steps = np.random.default_rng(seed), 0
+    noise *= float(rng.uniform())
+    disturbance = np.zeros(action_width(len(env.arms)))
+    for action in EXPERTS[env.task](Hand(env), observation):
+        look(observation, action)
+        if act is None:
+            disturbance = 0.9 * disturbance + noise * rng.standard_normal(disturbance.shape)
+            disturbance[JAW::ACTION] = 0.0
+            taken = action + disturbance
+        else:
+            taken = act(observation)
+        observation, _, ended, cut, info = env.step(np.asarray(taken, dtype=np.float32))
+        steps += 1
+        if ended or cut:
+            break
+    return steps, info

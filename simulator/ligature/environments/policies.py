@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.environments.experts import EXPERTS, Hand
+from ligature.environments.experts import EXPERTS
+from ligature.environments.hand import Hand
+from ligature.environments.layout import ACTION
 from ligature.environments.suturing import SuturingEnv
 from ligature.paths import real_path
 
 Act = Callable[[Any], NDArray[Any]]
-"""The action (7,) for an observation; of one episode, whose first observation is the first that it is called with."""
+"""The action (7 numbers for each arm) for an observation; of one episode, whose first is the first that it gets."""
 
 Policy = Callable[[SuturingEnv, int], Act]
 """What acts in an episode, from the environment, which has been reset, and the seed of the episode."""
-
-STILL = np.zeros(7, dtype=np.float32)
 
 
 class PolicyError(ValueError):
@@ -59,30 +59,30 @@ def _expert(env: SuturingEnv, seed: int) -> Act:
     task = env.task
     if env.action != "cartesian":
         raise PolicyError("experts act with action='cartesian'")
-    hand = Hand(env)
+    hand, still = Hand(env), np.zeros(env.action_space.shape or (), dtype=np.float32)
     actions: list[Iterator[NDArray[Any]]] = []
 
     def act(observation: Any) -> NDArray[Any]:
         if not actions:
             actions.append(EXPERTS[task](hand, observation["state"] if isinstance(observation, dict) else observation))
         try:
-            return next(actions[0], STILL)
+            return next(actions[0], still)
         except ValueError:  # the needle lies where it cannot be grasped: an episode that the expert loses
-            return STILL
+            return still
 
     return act
 
 
 def _random(env: SuturingEnv, seed: int) -> Act:
     rng = np.random.default_rng(seed)
-    return lambda observation: rng.uniform(-1.0, 1.0, 7)
+    return lambda observation: rng.uniform(-1.0, 1.0, env.action_space.shape)
 
 
 BUILT_IN: dict[str, Policy] = {"expert": _expert, "random": _random}
 
 
 def _network(path: Path) -> Policy:
-    """A network whose inputs are observations with a first axis of 1, and whose first output is (1, 7)."""
+    """A network whose inputs are observations with a first axis of 1, and whose first output is (1, 7 for each arm)."""
     import onnxruntime
 
     if not path.is_file():
@@ -138,10 +138,10 @@ def _module(place: str) -> Any:
     return module
 
 
-def checked(action: Any) -> NDArray[np.float32]:
-    """An action (7,) as the environment takes it; PolicyError where it is none."""
+def checked(action: Any, width: int = ACTION) -> NDArray[np.float32]:
+    """An action (``width``,) as the environment takes it; PolicyError where it is none."""
     found = np.asarray(action)
-    if found.shape != (7,) or not np.issubdtype(found.dtype, np.number) or not np.isfinite(found).all():
-        what = f"shape {found.shape}" if found.shape != (7,) else "a value that is not finite"
-        raise PolicyError(f"an action is 7 finite numbers; the policy returned {what}")
+    if found.shape != (width,) or not np.issubdtype(found.dtype, np.number) or not np.isfinite(found).all():
+        what = f"shape {found.shape}" if found.shape != (width,) else "a value that is not finite"
+        raise PolicyError(f"an action is {width} finite numbers; the policy returned {what}")
     return found.astype(np.float32)

@@ -1,12 +1,11 @@
-"""An environment over the simulation in process: one arm learns to reach, to pick up a needle and to drive it.
+"""An environment over the simulation in process: arms learn to reach, to handle a needle and to drive it.
 
 Metres, radians, world axes.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cache
@@ -21,38 +20,27 @@ from numpy.typing import NDArray
 
 from ligature.bundle import SCENES
 from ligature.camera_simulation import Simulation
-from ligature.environments.goals import GOALS, Goal, Progress
+from ligature.environments import layout
+from ligature.environments.actions import ArmActions
+from ligature.environments.goals import GOALS, Goal, Progress, holds
+from ligature.environments.randomisation import Drawn, Randomisation
 from ligature.environments.reading import ArmReading
-from ligature.model.frames import axis_rotation, pose7_matrix
+from ligature.environments.variation import Channel, dress, place, varied
+from ligature.model.frames import pose7_matrix
 from ligature.model.load import load
 from ligature.model.scene import Scene
-from ligature.robots.operating_state import Rejected
-from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
 from ligature.simulation import Snapshot
-from ligature.tasks.scenery import Scenery
 
 Array = NDArray[np.float64]
 
 CONTROL = 0.02
 """Seconds of an action."""
 
-STEP_LENGTH, STEP_ANGLE, STEP_JAW = 0.001, 0.05, 0.1
-"""Metres, radians and radians of jaw that an action of 1 means."""
-
-STEP_JOINTS = np.array([0.01, 0.01, 0.001, 0.08, 0.06, 0.06])
 SUCCESS_REWARD = 1.0
 
-AHEAD_LENGTH, AHEAD_ANGLE, AHEAD_JOINTS = 0.005, 0.25, 5.0 * STEP_JOINTS
-"""How far a set-point may be ahead of what is measured: an arm that something stops does not wind up."""
-
-LEAP = 0.5
-"""Radians and metres that a joint's set-point may go in an action: a step of the tip takes a tenth of that."""
-
-NEAR_COSINE = math.cos(AHEAD_ANGLE)
-
-STATE = 52
-"""Numbers of a state observation."""
+TRIES = 20
+"""How often an episode is drawn anew whose start cannot be simulated, such as one with a needle too smooth to hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +53,14 @@ class EnvState:
     progress: Progress
     count: int
     random: Mapping[str, Any]
+    drawn: Drawn | None = None
+    channel: Channel | None = None
 
 
 class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
-    """One PSM before a pad with a needle.
+    """One PSM or several before a pad with a needle, or a board.
 
-    **Actions**, `Box(-1, 1, (7,))`, for 20 ms each:
+    **Actions**, `Box(-1, 1, (7,))`, for 20 ms each; of several arms 7 numbers each, one arm after the other:
 
     | number | ``action="cartesian"`` | ``action="joint"`` |
     |---|---|---|
@@ -88,20 +78,26 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 0 to 5 | joint values | rad, m |
     | 6 | jaw | rad |
     | 7 to 13 | pose of the tip in the arm's base, x y z qx qy qz qw | m |
-    | 14 to 20 | pose of the needle | m |
-    | 21 to 26 | twist of the needle | m/s, rad/s |
+    | 14 to 20 | pose of what is handled: the needle, or another body of the task | m |
+    | 21 to 26 | twist of it | m/s, rad/s |
     | 27 to 29 | the tool's control point | m |
     | 30 to 32 | the target | m |
     | 33 | how far there is to go | m |
     | 34 to 40 | joint velocities, that of the jaw last | rad/s, m/s |
     | 41 to 47 | set-point of the tip in the arm's base | m |
     | 48 | set-point of the jaw | rad |
-    | 49 | 1 while the arm's jaws hold the needle | |
+    | 49 | 1 while the arm's jaws hold it | |
     | 50 | share of the time for which something must be so until the task is done | |
-    | 51 | stage: the needle was lifted by half (``pick``), share of the holes passed (``insert``, ``puncture``) | |
+    | 51 | stage: lifted by half (``pick``), share of the holes passed (``insert``, ``puncture``), 0.5 when the second \
+arm holds the needle and 1 when it alone does (``hand_over``), a quarter each for entry and exit passed, the needle \
+driven, and taken by the second arm (``suture``) | |
+
+    Each further arm adds 33 numbers: joint values, jaw, pose of the tip, control point, joint velocities, set-point of
+    the tip and of the jaw, and 1 while its jaws hold what is handled.
 
     Quaternions have the sign that is nearer to where tip and needle begin: they do not leap from one to the other.
-    What the next state and reward depend on is among these but for the shapes of thread and tissue.
+    What the next state and reward depend on is among these but for the shapes of thread and tissue, and for what
+    ``randomise`` draws.
 
     With ``observation="image"`` they are pictures of ``camera``, `Box(0, 255, (height, width, 3), uint8)`; with
     ``"both"``, a `Dict` of ``image`` and ``state``.
@@ -111,18 +107,22 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     **Episodes** end when the task is done or the needle is dropped (``info["lost"]`` has the reason), and are cut after
     ``max_steps`` actions. The same seed and actions give the same bits.
 
+    With ``randomise`` each episode draws its own world, `randomisation` has it, and ``info`` of `reset` in
+    ``"randomisation"``.
+
     `save` and `restore` keep and take up any moment; copies (``copy.deepcopy``) and pickles go on alike.
 
     Parameters
     ----------
     task
-        ``reach``, ``pick``, ``insert`` or ``puncture`` (`ligature.environments.goals`).
+        A name of `ligature.environments.goals.GOALS`, such as ``reach``.
     scene
-        A launch file with a PSM and a needle, holes for ``insert`` and soft tissue for ``puncture``; by default what
-        the task needs of a scene of ours, without the other arms, and for ``reach`` without the thread and with the
-        needle fixed.
+        A launch file with PSMs and what the task needs: a needle, holes for ``insert``, soft tissue for ``puncture``;
+        by default what it needs of a scene of ours, without other arms, and for ``reach`` without the thread and with
+        the needle fixed.
     arm
-        Name of the arm; by default the one that does the task. Another one brings the whole scene.
+        Name of the arm, or names of the arms in the order of the task; by default those of the task. Others bring the
+        whole scene.
     action, observation, reward
         As above.
     camera, size
@@ -131,6 +131,9 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         Actions until an episode is cut, None for no end; ``gymnasium.make`` has ``max_episode_steps`` for this.
     render_mode
         ``rgb_array`` to draw with `render`, or None.
+    randomise
+        What differs from episode to episode: a `Randomisation`, a mapping or a YAML file of its ranges, or None. With
+        ranges of masses, friction or the needle's size each `reset` makes another `simulation`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012 (as the base class)
@@ -139,7 +142,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self,
         task: str = "reach",
         scene: str | Path | None = None,
-        arm: str | None = None,
+        arm: str | Sequence[str] | None = None,
         action: str = "cartesian",
         observation: str = "state",
         reward: str = "dense",
@@ -147,6 +150,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         size: tuple[int, int] = (84, 84),
         max_steps: int | None = 200,
         render_mode: str | None = None,
+        randomise: Randomisation | Mapping[str, Any] | str | Path | None = None,
     ) -> None:
         self._options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         for name, value, allowed in (
@@ -155,42 +159,49 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         ):  # fmt: skip
             if value not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
-        self._goal: Goal = GOALS[task]()
-        arm = arm or self._goal.arm
-        self._simulation = Simulation(_scene(task, arm) if scene is None else load(scene))
-        found = self._simulation.arms[arm]
-        if not isinstance(found, PsmArm):
-            raise ValueError(f"'{arm}' is not a PSM")
-        self._arm = found
-        self._scenery = Scenery.of(self._simulation.scene, self._goal.holes)
-        self._action, self._observation, self._dense = action, observation, reward == "dense"
-        self._camera, self._size, self._most = camera, size, max_steps
+        self._randomisation = self._options["randomise"] = Randomisation.of(randomise)
+        names = _arms(task, arm)
+        self._scene = _scene(task, names) if scene is None else load(scene)
+        self._arm_names, self._action, self._observation = names, action, observation
+        self._dense, self._camera, self._size, self._most = reward == "dense", camera, size, max_steps
         self.render_mode = render_mode
-        self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (layout.action_width(len(names)),), np.float32)
         image = spaces.Box(0, 255, (size[1], size[0], 3), np.uint8)
-        state = spaces.Box(-np.inf, np.inf, (STATE,), np.float64)
+        state = spaces.Box(-np.inf, np.inf, (layout.state_width(len(names)),), np.float64)
         both = spaces.Dict({"image": image, "state": state})
         self.observation_space: spaces.Space[Any] = {"image": image, "state": state, "both": both}[observation]
-        self._reading = ArmReading(self._simulation, found)
-        self._needle_pose, self._needle_twist = (
-            self._simulation.state[name][0, self._scenery.needle] for name in ("body_pose", "body_twist")
-        )
-        self._ticks = round(CONTROL / self._simulation.dt)
-        self._goal.prepare(self._simulation, self._scenery, self._arm)
-        self._settled = self._start()
-        self._tip_side = self._arm.local_measured_cp()[3:]
-        self._needle_side = self._simulation.state["body_pose"][0, self.needle, 3:].copy()
-        self._count, self._closed = 0, False
+        self._drawn: Drawn | None = None
+        self._channel: Channel | None = None
+        self._dressed, self._count, self._closed = True, 0, False
         self._progress: Progress | None = None
+        self._build(self._scene)
+
+    def _build(self, scene: Scene) -> None:
+        """Simulate ``scene`` up to where episodes begin."""
+        self._simulation = Simulation(scene)
+        try:
+            self._arms = tuple(_psm(self._simulation, name) for name in self._arm_names)
+            self._readings = tuple(ArmReading(self._simulation, arm) for arm in self._arms)
+            self._hands = tuple(
+                ArmActions(arm, reading, self._action) for arm, reading in zip(self._arms, self._readings, strict=True)
+            )
+            self._ticks = round(CONTROL / self._simulation.dt)
+            self._goal: Goal = GOALS[self.task](self._simulation, self._arms)
+            self._settled = self._start()
+        except Exception:
+            self._simulation.close()
+            raise
+        self._tip_sides = [arm.local_measured_cp()[3:] for arm in self._arms]
+        self._side = self._simulation.state["body_pose"][0, self.needle, 3:].copy()
 
     def _start(self) -> Snapshot:
-        """Where all episodes begin from: it follows from scene, task and arm, and is simulated once in a process."""
+        """Where all episodes begin from: it follows from scene, task and arms, and is simulated once in a process."""
         known = _STARTS.setdefault(self._simulation.scene, {})
-        which = type(self._goal), self._arm.name
+        which = type(self._goal), self._arm_names
         if which in known:
             self._simulation.restore(known[which])
         else:
-            self._goal.settle(self._simulation, self._arm)
+            self._goal.settle()
             known[which] = self._simulation.snapshot()
         return known[which]
 
@@ -201,18 +212,36 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     @property
     def simulation(self) -> Simulation:
-        """The simulation, which is the ground truth for scripted experts and for datasets."""
+        """The simulation, which is the ground truth for scripted experts and for datasets.
+
+        With ranges of masses, friction or the needle's size it is another one after each `reset`.
+        """
         return self._simulation
 
     @property
     def arm(self) -> PsmArm:
-        """The arm that acts."""
-        return self._arm
+        """The arm that acts, the first of several."""
+        return self._arms[0]
+
+    @property
+    def arms(self) -> tuple[PsmArm, ...]:
+        """The arms that act."""
+        return self._arms
+
+    @property
+    def readings(self) -> tuple[ArmReading, ...]:
+        """What the arms report."""
+        return self._readings
+
+    @property
+    def randomisation(self) -> dict[str, Any]:
+        """What was drawn for this episode, by the names of `Randomisation`; empty without ``randomise``."""
+        return {} if self._drawn is None else self._drawn.as_dict()
 
     @property
     def needle(self) -> int:
-        """The body of the needle."""
-        return self._scenery.needle
+        """The body that is handled, such as the needle."""
+        return self._goal.body
 
     @property
     def task(self) -> str:
@@ -226,8 +255,13 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     @property
     def tool_position(self) -> Array:
-        """The tool's control point (3,), world axes."""
-        return self._reading.tip_position()
+        """The control point (3,) of the first arm's tool, world axes."""
+        return self._readings[0].tip_position()
+
+    @property
+    def tool_positions(self) -> Array:
+        """The control points (arms, 3) of all tools, world axes."""
+        return np.array([reading.tip_position() for reading in self._readings])
 
     @property
     def needle_force(self) -> Array:
@@ -239,17 +273,17 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     @property
     def base_rotation(self) -> Array:
         """Rotation (3, 3) of the arm's base in the world; actions are along the base's axes, targets in the world's."""
-        return pose7_matrix(self._reading.base)[:3, :3]
+        return pose7_matrix(self._readings[0].base)[:3, :3]
 
     @property
     def base_position(self) -> Array:
         """Where the arm's base is (3,), world axes."""
-        return np.array(self._reading.base[:3])
+        return np.array(self._readings[0].base[:3])
 
     @property
     def setpoint(self) -> Array:
         """Pose (7,) of the tip in the arm's base that is asked for; Cartesian actions are added to it."""
-        return np.array(self._reading.setpoint)
+        return np.array(self._readings[0].setpoint)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; ``seed`` begins another series of random starts.
@@ -261,11 +295,37 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
                 f"reset takes no options, but got {', '.join(map(repr, options))}; pass options to the class"
             )
         super().reset(seed=seed)
+        if self._randomisation is not None:
+            self._vary(self._randomisation)
         self._simulation.restore(self._settled)
-        self._goal.begin(self._simulation, self._scenery, self._arm, self.np_random)
+        if self._drawn is not None:
+            place(self._simulation, self._drawn)
+        self._goal.begin(self.np_random)
         self._count = 0
-        self._progress = self._goal.observe(self._simulation, self._arm)
-        return self._observe(), self._info()
+        self._progress = self._goal.observe()
+        drawn = {} if self._drawn is None else {"randomisation": self.randomisation}
+        return self._seen(), {**self._info(), **drawn}
+
+    def _vary(self, ranges: Randomisation) -> None:
+        """Draw what this episode has, and simulate its start where that is another one."""
+        rng = np.random.default_rng(int(self.np_random.integers(2**62)))
+        for tries in range(TRIES):
+            try:
+                self._take(ranges.draw(self._scene, rng))
+            except ValueError as error:
+                if tries == TRIES - 1:
+                    raise ValueError(f"no episode can begin in {TRIES} draws of these ranges: {error}") from error
+            else:
+                break
+
+    def _take(self, drawn: Drawn) -> None:
+        """Make ``drawn`` what this episode has."""
+        before = self._drawn.physics if self._drawn is not None else Drawn().physics
+        if drawn.physics != before:
+            self._drawn = None
+            self._simulation.close()
+            self._build(varied(self._scene, drawn))
+        self._drawn, self._channel, self._dressed = drawn, Channel(drawn, len(self._arms)), False
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for 20 ms."""
@@ -274,48 +334,19 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         wanted = np.array(action, dtype=float)
         wanted[np.isnan(wanted)] = 0.0
         wanted = np.minimum(np.maximum(wanted, -1.0), 1.0)
-        rejected, bounded = self._act(wanted)
+        if self._channel is not None:
+            wanted = self._channel.act(wanted)
+        answers = [hand.act(wanted[layout.ACTION * k : layout.ACTION * (k + 1)]) for k, hand in enumerate(self._hands)]
         self._simulation.step(self._ticks)
         self._count += 1
-        before, self._progress = self._progress, self._goal.observe(self._simulation, self._arm)
+        before, self._progress = self._progress, self._goal.observe()
         left, done, lost = self._progress
         reward = SUCCESS_REWARD * done + (100.0 * (before.left - left) if self._dense else 0.0)
         cut = self._most is not None and self._count >= self._most
-        return self._observe(), float(reward), done or bool(lost), cut, {
+        rejected, bounded = "; ".join(filter(None, (text for text, _ in answers))), any(held for _, held in answers)
+        return self._seen(), float(reward), done or bool(lost), cut, {
             **self._info(), "refused": rejected, "bounded": bounded,
         }  # fmt: skip
-
-    def _act(self, action: Array) -> tuple[str, bool]:
-        """Command the arm; what it rejects is logged, and it stays. Also whether the set-point was held back."""
-        arm, bounded = self._arm, False
-        try:
-            if self._action == "joint":
-                bounded = self._act_on_joints(action[:6] * STEP_JOINTS)
-            else:
-                bounded = self._act_on_tip(action)
-            if arm.jaw is not None:
-                arm.jaw.servo_jp(self._reading.jaw_setpoint[:1] + STEP_JAW * action[6])
-        except Rejected as rejection:
-            return str(rejection), bounded
-        return "", bounded
-
-    def _act_on_tip(self, action: Array) -> bool:
-        """Move the set-point by an action, near the tip; whether it was held back for that."""
-        forward, reading = self._arm.kinematics.forward, self._reading
-        before = reading.joint_setpoints.copy()
-        T, bounded = _bounded(forward(reading.joints), _stepped(forward(before), action))
-        self._arm.servo_cp(T)
-        if np.abs(self._arm.setpoint_js().position - before).max() <= LEAP:
-            return bounded
-        # beyond the limits of the wrist the same pose has other joints, and on the way there the tip is elsewhere
-        self._arm.servo_jp(before)
-        return True
-
-    def _act_on_joints(self, step: Array) -> bool:
-        measured, wanted = self._reading.joints, self._reading.joint_setpoints + step
-        near = np.clip(wanted, measured - AHEAD_JOINTS, measured + AHEAD_JOINTS)
-        self._arm.servo_jp(near)
-        return bool((near != wanted).any())
 
     # --- keeping a moment -------------------------------------------------------------------
 
@@ -329,22 +360,25 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             raise RuntimeError("no episode has begun: call reset() before save()")
         return EnvState(
             self._options, self._simulation.snapshot(), self._goal.snapshot(), self._progress, self._count,
-            deepcopy(self.np_random.bit_generator.state),
+            deepcopy(self.np_random.bit_generator.state), self._drawn, deepcopy(self._channel),
         )  # fmt: skip
 
     def restore(self, state: EnvState) -> Any:
         """Go on from where `save` was called; returns the observation there.
 
-        Raises ValueError for a state of another task, scene or arm.
+        Raises ValueError for a state of another task, scene, arm or randomisation.
         """
-        for name in ("task", "scene", "arm"):
+        for name in ("task", "scene", "arm", "randomise"):
             if state.options[name] != self._options[name]:
                 raise ValueError(f"the state has {name}={state.options[name]!r}, not {self._options[name]!r}")
+        if state.drawn is not None:
+            self._take(state.drawn)
         self._simulation.restore(state.snapshot)
         self._goal.restore(dict(state.goal))
         self._progress, self._count = state.progress, state.count
         self.np_random.bit_generator.state = deepcopy(dict(state.random))
-        return self._observe()
+        self._channel = deepcopy(state.channel)
+        return self._observe() if self._channel is None else self._channel.last
 
     def __deepcopy__(self, memo: dict[int, Any]) -> SuturingEnv:
         """Another simulation that goes on as this one does."""
@@ -356,6 +390,11 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def __reduce__(self) -> tuple[Any, ...]:
         return _made, (self._options, None if self._progress is None else self.save())
 
+    def _seen(self) -> Any:
+        """What the agent sees after an action: by default what is."""
+        now = self._observe()
+        return now if self._channel is None else self._channel.late(now)
+
     def _observe(self) -> Any:
         if self._observation == "both":
             return {"image": self._picture(self._size), "state": self._numbers()}
@@ -364,12 +403,21 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def _numbers(self) -> Array:
         """The state, as the table of the class has it."""
         assert self._progress is not None
-        arm = self._reading
-        return np.concatenate([
-            arm.joints, arm.jaw[:1], _on_side(arm.tip, self._tip_side), _on_side(self._needle_pose, self._needle_side),
-            self._needle_twist, arm.tip_position(), self._goal.target(), (self._progress.left,), arm.joint_velocities,
-            arm.jaw[1:2], _on_side(arm.setpoint, self._tip_side), arm.jaw_setpoint[:1], self._goal.marks(),
-        ])  # fmt: skip
+        arm, state = self._readings[0], self._simulation.state
+        pose, twist = state["body_pose"][0, self.needle], state["body_twist"][0, self.needle]
+        numbers = [
+            arm.joints, arm.jaw[:1], _on_side(arm.tip, self._tip_sides[0]), _on_side(pose, self._side), twist,
+            arm.tip_position(), self._goal.target(), (self._progress.left,), arm.joint_velocities,
+            arm.jaw[1:2], _on_side(arm.setpoint, self._tip_sides[0]), arm.jaw_setpoint[:1], self._goal.marks(),
+        ]  # fmt: skip
+        for arm, described, side in zip(self._readings[1:], self._arms[1:], self._tip_sides[1:], strict=True):
+            numbers += [
+                arm.joints, arm.jaw[:1], _on_side(arm.tip, side), arm.tip_position(), arm.joint_velocities,
+                arm.jaw[1:2], _on_side(arm.setpoint, side), arm.jaw_setpoint[:1],
+                (holds(self._simulation, described, self.needle),),
+            ]  # fmt: skip
+        found = np.concatenate(numbers)
+        return found if self._channel is None else self._channel.sense(found)
 
     def _info(self) -> dict[str, Any]:
         assert self._progress is not None
@@ -387,9 +435,22 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self._picture((640, 480)) if self.render_mode == "rgb_array" else None
 
     def _picture(self, size: tuple[int, int]) -> NDArray[np.uint8]:
-        picture = self._simulation.cameras[self._camera].capture(size, passes=("rgb",)).rgb
+        if self._drawn is not None and not self._dressed:
+            dress(self._simulation, self._drawn, self._camera)
+            self._dressed = True
+        camera = self._simulation.cameras[self._camera]
+        picture = camera.capture(size, passes=("rgb",), **self._sensor()).rgb
         assert picture is not None
         return picture
+
+    def _sensor(self) -> dict[str, Any]:
+        """What the camera's sensor does to a picture, where something was drawn."""
+        drawn = self._drawn
+        if drawn is None or not (drawn.exposure or drawn.picture_noise):
+            return {}
+        from ligature.render.sensor import ImageSensor
+
+        return {"sensor": ImageSensor(drawn.exposure or 0.0, drawn.picture_noise or 0.0, seed=drawn.noise_seed)}
 
     def close(self) -> None:
         """Give the physics back; a second time does nothing."""
@@ -398,19 +459,36 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             self._simulation.close()
 
 
-_STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], str], Snapshot]] = WeakKeyDictionary()
-"""Starts that were simulated, by scene, task and arm; the processes of a vector have them from the one that forks."""
+_STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], tuple[str, ...]], Snapshot]] = WeakKeyDictionary()
+"""Starts that were simulated, by scene, task and arms; the processes of a vector have them from the one that forks."""
+
+
+def _arms(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:
+    """Names of the arms that act; ValueError where the task needs more or fewer."""
+    own = GOALS[task].arms
+    names = own if given is None else (given,) if isinstance(given, str) else tuple(given)
+    if len(names) != len(own) or len(set(names)) != len(names):
+        wanted = f"{len(own)} arm{'s' * (len(own) > 1)}, such as {', '.join(own)}"
+        raise ValueError(f"{task} is done by {wanted}, not by {', '.join(names) or 'none'}")
+    return names
+
+
+def _psm(simulation: Simulation, name: str) -> PsmArm:
+    arm = simulation.arms[name]
+    if not isinstance(arm, PsmArm):
+        raise ValueError(f"'{name}' is not a PSM")
+    return arm
 
 
 @cache
-def _scene(task: str, arm: str) -> Scene:
-    """What a task needs of its scene; all of it when another arm than the task's own is asked for."""
+def _scene(task: str, arms: tuple[str, ...]) -> Scene:
+    """What a task needs of its scene; all of it when other arms than the task's own are asked for."""
     goal = GOALS[task]
     path = SCENES / goal.scene / "launch.yaml"
-    if arm != goal.arm:
+    if arms != goal.arms:
         return load(path)
     scene = load(path, goal.models)
-    scene = replace(scene, arms=tuple(found for found in scene.arms if found.name == arm))
+    scene = replace(scene, arms=tuple(found for found in scene.arms if found.name in arms))
     if goal.thread:
         return scene
     fixed = {needle.body for needle in scene.needles}
@@ -421,42 +499,6 @@ def _scene(task: str, arm: str) -> Scene:
 def _on_side(pose: Array, side: Array) -> Array:
     """A pose (7,) whose quaternion has the sign that is nearer to ``side`` (4,): it has no leaps near there."""
     return pose if pose[3:] @ side >= 0.0 else np.concatenate([pose[:3], -pose[3:]])
-
-
-def _stepped(T: Array, action: Array) -> Array:
-    """The set-point ``T`` (4, 4) moved by an action, in place."""
-    T[:3, 3] += STEP_LENGTH * action[:3]
-    turn = STEP_ANGLE * action[3:6]
-    angle = _length(turn)
-    if angle > 0.0:
-        T[:3, :3] = T[:3, :3] @ axis_rotation(turn / angle, angle)
-    return T
-
-
-def _is_near(T_measured: Array, T: Array) -> bool:
-    """Whether a set-point (4, 4) is within `AHEAD_LENGTH` and `AHEAD_ANGLE` of what is measured."""
-    cosine = 0.5 * (float((T_measured[:3, :3] * T[:3, :3]).sum()) - 1.0)
-    return _length(T[:3, 3] - T_measured[:3, 3]) <= AHEAD_LENGTH and cosine >= NEAR_COSINE
-
-
-def _bounded(T_measured: Array, T: Array) -> tuple[Array, bool]:
-    """A set-point (4, 4) no farther from what is measured than `AHEAD_LENGTH` and `AHEAD_ANGLE`, and whether it was."""
-    if _is_near(T_measured, T):
-        return T, False
-    ahead, found = T[:3, 3] - T_measured[:3, 3], T.copy()
-    length, turn = _length(ahead), rotation_vector(T_measured[:3, :3].T @ T[:3, :3])
-    angle = _length(turn)
-    if length > AHEAD_LENGTH:
-        found[:3, 3] = T_measured[:3, 3] + ahead * (AHEAD_LENGTH / length)
-    if angle > AHEAD_ANGLE:
-        found[:3, :3] = T_measured[:3, :3] @ axis_rotation(turn / angle, AHEAD_ANGLE)
-    return found, True
-
-
-def _length(vector: Array) -> float:
-    """Length of a vector (3,)."""
-    x, y, z = vector.tolist()
-    return math.sqrt(x * x + y * y + z * z)
 
 
 def _made(options: Mapping[str, Any], state: EnvState | None) -> SuturingEnv:

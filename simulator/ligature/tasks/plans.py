@@ -8,15 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ligature.model.frames import frame, pose7_matrix
+from ligature.model.frames import axis_rotation, frame, inverse, pose7_matrix
 from ligature.model.scene import Scene
+from ligature.robots.poses import rotation_vector
 from ligature.robots.psm import Psm
 from ligature.tasks.scenery import MissingBodies, Scenery
-from ligature.tasks.throws import UP, NeedleArc, NeedleGrasp, Throw, margin, rated_grasp, reach
+from ligature.tasks.throws import JUMP, UP, NeedleArc, Throw, clearances, grasps, margin, margins, reach
 from ligature.tasks.wounds import Wound
 
 Array = np.ndarray
@@ -53,13 +55,19 @@ DEPTHS = (0.8, 0.87, 0.915)
 """Where a needle is held to be driven, as shares of its length from the tip."""
 
 UPRIGHT_DEPTHS = (0.3, 0.5)
-"""The same where it can only be picked up."""
+"""The same to lay it down in another direction."""
 
 PLANNED, HELD = (0.002, 0.0006), 0.0
 """Metres that an instrument is to keep from the tissue before it has the needle, best first, and when it has it.
 
 A needle moves in the jaws while they close; what is planned leaves room for that.
 """
+
+APPROACH = 0.02
+"""Metres along itself by which a tool must be able to stand back from where it takes a needle."""
+
+LIES, LAID = 24, 0.0004
+"""Directions in which a needle may be laid down, and metres above its resting place at which it is let go."""
 
 STEPS = 10
 """Poses along a throw at which a hold is judged."""
@@ -97,6 +105,34 @@ def _ends(scene: Scene, state: Any, search: Search) -> Iterator[tuple[Array, Arr
         yield lips[1], lips[0]
 
 
+class Pick(NamedTuple):
+    """How to take a needle: the tool's pose (4, 4) in its arc frame, and whether the needle can be driven held so."""
+
+    T_arc_tool: Array
+    drives: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Options:
+    """Holds that are tried: tool poses ``T`` (n, 4, 4) in the arc frame, the cost of their lean (n,), which drive."""
+
+    T: Array
+    cost: Array
+    drives: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, arc: NeedleArc) -> Options:
+        """For a needle."""
+        found = [
+            (grasp.tool_in_arc(arc), 0.05 * (abs(grasp.tilt) + abs(grasp.pivot)), share in DEPTHS)
+            for below in (False, True)
+            for share in (*DEPTHS, *UPRIGHT_DEPTHS)
+            for grasp in grasps([share * arc.length], False, below)
+        ]
+        T, cost, drives = zip(*found, strict=True)
+        return cls(np.array(T), np.array(cost), np.array(drives))
+
+
 @dataclass(frozen=True, eq=False)
 class Planner:
     """Plans for one arm with ``kinematics``, and the first needle of a scene, whose centre line is ``arc``."""
@@ -104,12 +140,14 @@ class Planner:
     scene: Scene
     kinematics: Psm
     arc: NeedleArc
+    _options: Options
 
     @classmethod
     def of(cls, scene: Scene, kinematics: Psm) -> Planner:
         """For the first needle of ``scene``, which must have one."""
         needle = scene.needles[0]
-        return cls(scene, kinematics, NeedleArc.of(needle, scene.bodies[needle.body]))
+        arc = NeedleArc.of(needle, scene.bodies[needle.body])
+        return cls(scene, kinematics, arc, Options.of(arc))
 
     def needle(self, state: Any) -> Array:
         """The needle's arc frame (4, 4)."""
@@ -117,10 +155,8 @@ class Planner:
 
     def point(self, state: Any, share: float) -> Array:
         """A point (3,) of the needle's centre line, ``share`` of its length from the tip."""
-        angle = self.arc.angle(share * self.arc.length)
-        local = self.arc.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
         T = self.needle(state)
-        return np.asarray(T[:3, :3] @ local + T[:3, 3])
+        return np.asarray(T[:3, :3] @ self.arc.point(share * self.arc.length) + T[:3, 3])
 
     def way(self, throw: Throw) -> list[Array]:
         """Poses (4, 4) of the needle's arc frame from above the entry to beyond the exit."""
@@ -142,31 +178,115 @@ class Planner:
         local = throw.axes.T @ (self.point(state, 0.0) - throw.centre)
         return float((np.arctan2(local[1], local[0]) + 1.0) % (2.0 * np.pi) - 1.0)
 
-    def pick(self, state: Any, T_world_base: Array) -> Array | None:
-        """Pose (4, 4) of the tool in the arc frame that can take the needle where it is, and drive it if any can."""
-        now = self.needle(state)
-        best: NeedleGrasp | None = None
-        for least in PLANNED:
-            best = best or self._grasp(state, T_world_base, least)
-        if best is None:
-            raised = frame(np.eye(3), 1.5 * ABOVE * UP) @ now
-            depths = [share * self.arc.length for share in UPRIGHT_DEPTHS]
-            low = now[:3, 3] - 0.004 * UP
-            found = rated_grasp(self.arc, depths, self.kinematics, T_world_base, [raised], now, low, upright=True)
-            best = None if found is None else found[0]
-        return None if best is None else best.tool_in_arc(self.arc)
+    def pick(self, state: Any, T_world_base: Array) -> Pick | None:
+        """How the tool can take the needle where it is; None where it cannot.
 
-    def _grasp(self, state: Any, T_world_base: Array, least: float) -> NeedleGrasp | None:
-        """The grasp that can drive the needle, of all throws the one farthest from the joints' limits."""
-        best, rating, now = None, -np.inf, self.needle(state)
-        depths = [share * self.arc.length for share in DEPTHS]
-        for throw in throws(self.scene, state, self.arc.radius, COARSE):
-            found = rated_grasp(
-                self.arc, depths, self.kinematics, T_world_base, self.way(throw), now, self.entry(throw), least=least
-            )
-            if found is not None and found[1] > rating:
-                best, rating = found
-        return best
+        At best it can drive the needle then; else it can lay it down in another direction, from which it can.
+        """
+        now, options = self.needle(state), self._options
+        least = self._pickable(now, T_world_base)
+        drives = self._drivable(state, T_world_base, least > 0.0)
+        rating = np.minimum(least, drives) - options.cost
+        if rating.max() > -np.inf:
+            return Pick(options.T[int(rating.argmax())], True)
+        drives = self._drivable(state, T_world_base, np.ones(len(options.T), bool))
+        best, found = -np.inf, None
+        for lie in self._lies(now):
+            after = float((np.minimum(self._pickable(lie, T_world_base), drives) - options.cost).max())
+            if after > best:
+                rating = np.minimum(least, self._laid(lie, options.T, T_world_base)) - options.cost
+                rated = min(after, float(rating.max()))
+                if rated > best:
+                    best, found = rated, options.T[int(rating.argmax())]
+        if found is None and least.max() > 0.0:
+            found = options.T[int((np.where(least > 0.0, least, -np.inf) - options.cost).argmax())]
+        return None if found is None else Pick(found, False)
+
+    def lie(self, state: Any, T_world_base: Array, T_arc_tool: Array, rest: Array) -> Array | None:
+        """Where a tool that holds the needle so can lay it down to pick it up better; None for nowhere.
+
+        A pose (4, 4) of its arc frame, turned about the vertical from ``rest`` (4, 4), in which it lay before.
+        """
+        options = self._options
+        drives = self._drivable(state, T_world_base, np.ones(len(options.T), bool))
+        best, found = -np.inf, None
+        for lie in self._lies(rest):
+            laid = float(self._laid(lie, T_arc_tool[None], T_world_base)[0])
+            if laid > best:
+                after = float((np.minimum(self._pickable(lie, T_world_base), drives) - options.cost).max())
+                if min(laid, after) > best:
+                    best, found = min(laid, after), lie
+        return found
+
+    def _lies(self, rest: Array) -> Iterator[Array]:
+        """Poses (4, 4) of the arc frame of a needle that lay at ``rest`` (4, 4), turned in its place."""
+        for angle in np.linspace(0.0, 2.0 * np.pi, LIES, endpoint=False)[1:]:
+            turn = axis_rotation(UP, float(angle))
+            yield frame(turn @ rest[:3, :3], rest[:3, 3] + LAID * UP)
+
+    def _pickable(self, now: Array, T_world_base: Array) -> Array:
+        """How far (n,) the joints stay from their limits where the needle is taken and lifted; -inf where it cannot."""
+        here = now @ self._options.T
+        behind, over = here.copy(), here.copy()
+        behind[:, :3, 3] -= APPROACH * here[:, :3, 2]
+        over[:, 2, 3] += 1.5 * ABOVE
+        return self._margins(T_world_base, np.stack([behind, here, over], axis=1), float(now[2, 3]), 0.0)
+
+    def _laid(self, lie: Array, tools: Array, T_world_base: Array) -> Array:
+        """The same (n,) where ``tools`` (n, 4, 4) in the arc frame lay it down."""
+        here = lie @ tools
+        over = here.copy()
+        over[:, 2, 3] += 1.5 * ABOVE
+        return self._margins(T_world_base, np.stack([over, here], axis=1), float(lie[2, 3]), 0.0)
+
+    def _drivable(self, state: Any, T_world_base: Array, tried: NDArray[np.bool_]) -> Array:
+        """The same (n,) of the best throw of a scene for each hold that is ``tried`` (n,) and meant to drive."""
+        found, tried = np.full(len(tried), -np.inf), tried & self._options.drives
+        rows = np.flatnonzero(tried)
+        for least in PLANNED:
+            for throw in throws(self.scene, state, self.arc.radius, COARSE) if len(rows) else ():
+                way = np.array(self.way(throw))[None] @ self._options.T[rows, None]
+                rated = self._margins(T_world_base, way, float(self.entry(throw)[2]), least)
+                found[rows] = np.maximum(found[rows], rated)
+            if found.max(initial=-np.inf) > -np.inf:
+                break
+        return found
+
+    def _margins(self, T_world_base: Array, ways: Array, surface: float, least: float) -> Array:
+        """How far (n,) joints stay from their limits along ``ways`` (n, k, 4, 4) of the tool; -inf where one fails.
+
+        It fails where a pose cannot be reached, a joint would swing, or the instrument comes nearer than ``least`` to
+        the level ``surface``.
+        """
+        path = self.kinematics.inverse(inverse(T_world_base) @ ways)
+        found = np.full(len(ways), -np.inf)
+        good = path.ok.all(axis=1)
+        good[good] = np.abs(np.diff(path.q[good], axis=1)).max(axis=(1, 2), initial=0.0) <= JUMP
+        good[good] = clearances(self.kinematics, path.q[good], T_world_base, UP) - surface >= least
+        found[good] = margins(self.kinematics, path.q[good])
+        return found
+
+    def straight(self, T_world_base: Array, q: Array, begin: Array, end: Array) -> bool:
+        """Whether a tip goes straight from ``begin``, where joints are at ``q`` (6,), to ``end``, both (4, 4).
+
+        It must come to where joints are least turned: else the motion after it would meet their limits.
+        """
+        way, turn = end[:3, 3] - begin[:3, 3], rotation_vector(end[:3, :3] @ begin[:3, :3].T)
+        angle = float(np.linalg.norm(turn))
+        for share in np.linspace(0.0, 1.0, STEPS)[1:]:
+            R = axis_rotation(turn / angle, float(share) * angle) if angle > 0.0 else np.eye(3)
+            T = frame(R @ begin[:3, :3], begin[:3, 3] + share * way)
+            found = self.kinematics.inverse(inverse(T_world_base) @ T, q)
+            if not found.ok or np.abs(found.q - q).max() > JUMP:
+                return False
+            q = found.q
+        wanted = self.joints(T_world_base, end)
+        return wanted is not None and bool(np.abs(wanted - q).max() < 0.1)
+
+    def joints(self, T_world_base: Array, T: Array) -> Array | None:
+        """Joint values (6,) at a pose (4, 4) of the tip, as little turned as can be; None where it is out of reach."""
+        found = self.kinematics.inverse(inverse(T_world_base) @ T)
+        return np.asarray(found.q) if found.ok else None
 
     def throw(self, state: Any, T_world_base: Array, T_arc_tool: Array) -> Throw | None:
         """The throw that an arm reaches best which holds the needle so; None where it reaches none."""

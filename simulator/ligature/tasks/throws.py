@@ -29,6 +29,9 @@ SHAFT_END, PALM, JAW = 3, 4, 5
 LEAST_CLEARANCE = 0.0006
 """Metres that an instrument keeps from the tissue while it drives."""
 
+BEHIND = 0.015
+"""Metres along itself by which a tool must be able to stand back from where it grasps."""
+
 JUMP = 1.0
 """Radians between two poses of a way beyond which a joint would swing round."""
 
@@ -62,25 +65,40 @@ class NeedleArc:
         """Length from base to tip."""
         return self.radius * (self.end - self.begin)
 
+    @property
+    def tip(self) -> Array:
+        """The tip (3,) in the arc frame."""
+        return self.point(0.0)
+
     def angle(self, depth: float) -> float:
         """The angle at which ``depth`` metres are left to the tip."""
         return self.end - depth / self.radius
 
+    def point(self, depth: float) -> Array:
+        """The point (3,) of the centre line, in the arc frame, at which ``depth`` metres are left to the tip."""
+        angle = self.angle(depth)
+        return self.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+
 
 @dataclass(frozen=True)
 class NeedleGrasp:
-    """How a tool holds a needle: ``depth`` metres from its tip; ``tilt``, ``pivot`` and ``flipped`` describe how."""
+    """How a tool holds a needle: ``depth`` metres from its tip; ``tilt``, ``pivot`` and ``flipped`` describe how.
+
+    It comes along the normal of the needle's plane, or against it: from ``below``.
+    """
 
     depth: float
     tilt: float
     pivot: float
     flipped: bool
+    below: bool = False
 
     def tool_in_arc(self, arc: NeedleArc) -> Array:
         """Pose (4, 4) of the tool in the arc frame."""
         a = arc.angle(self.depth)
         out, along, normal = np.array([np.cos(a), np.sin(a), 0.0]), np.array([-np.sin(a), np.cos(a), 0.0]), [0.0, 0, 1]
         R = np.column_stack([along, np.cross(normal, along), normal])
+        R = R * [1.0, -1.0, -1.0] if self.below else R
         R = axis_rotation(out, self.pivot) @ axis_rotation(along, self.tilt) @ R
         if self.flipped:
             R = R @ axis_rotation((0.0, 0.0, 1.0), np.pi)
@@ -122,13 +140,16 @@ class Throw:
         return frame(self.axes @ axis_rotation((0.0, 0.0, 1.0), tip - arc.end), self.centre)
 
 
-def grasps(depths: Sequence[float], upright: bool) -> Iterator[NeedleGrasp]:
-    """All ways to hold a needle that are worth a try; ``upright`` ones stand on its plane, to pick it up."""
+def grasps(depths: Sequence[float], upright: bool, below: bool = False) -> Iterator[NeedleGrasp]:
+    """All ways to hold a needle that are worth a try; ``upright`` ones stand on its plane, to pick it up.
+
+    They come along the normal of that plane, or from ``below`` it.
+    """
     for depth in depths:
         for tilt in (0.0,) if upright else TILTS:
             for pivot in (0.0,) if upright else PIVOTS:
                 for flipped in (False, True):
-                    yield NeedleGrasp(depth, float(tilt), float(pivot), flipped)
+                    yield NeedleGrasp(depth, float(tilt), float(pivot), flipped, below)
 
 
 def best_grasp(
@@ -146,41 +167,27 @@ def best_grasp(
     It must also reach the needle where it is ``now`` (4, 4), from 15 mm behind, and on the way keep clear of the
     tissue, whose upper side is level through the point ``surface`` (3,).
     """
-    found = rated_grasp(arc, depths, kinematics, T_world_base, way, now, surface, upright)
-    return None if found is None else found[0]
-
-
-def rated_grasp(
-    arc: NeedleArc,
-    depths: Sequence[float],
-    kinematics: Psm,
-    T_world_base: Array,
-    way: Sequence[Array],
-    now: Array,
-    surface: Array,
-    upright: bool = False,
-    least: float = LEAST_CLEARANCE,
-) -> tuple[NeedleGrasp, float] | None:
-    """What `best_grasp` finds, and how good it is: the larger the farther from the limits of the joints.
-
-    ``least`` are the metres that the tool keeps from the tissue.
-    """
     T_base = inverse(T_world_base)
     best: tuple[NeedleGrasp, float] | None = None
     for grasp in grasps(depths, upright):
         T_arc_tool = grasp.tool_in_arc(arc)
-        q = reach(kinematics, T_world_base, [T @ T_arc_tool for T in way], surface, least)
+        q = reach(kinematics, T_world_base, [T @ T_arc_tool for T in way], surface)
         if q is None:
             continue
         here = now @ T_arc_tool
-        behind = frame(np.eye(3), -0.015 * here[:3, 2]) @ here
+        behind = drawn_back(here, BEHIND)
         start = kinematics.inverse(np.array([T_base @ here, T_base @ behind]))
         if not start.ok.all():
             continue
         left = margin(kinematics, np.vstack([q, start.q])) - 0.05 * abs(grasp.tilt) - 0.05 * abs(grasp.pivot)
         if best is None or left > best[1]:
             best = grasp, left
-    return best
+    return None if best is None else best[0]
+
+
+def drawn_back(T: Array, way: float) -> Array:
+    """The pose ``T`` (4, 4) of a tool moved back along itself by ``way`` metres."""
+    return frame(np.eye(3), -way * T[:3, 2]) @ T
 
 
 def reach(
@@ -197,8 +204,13 @@ def reach(
 
 def margin(kinematics: Psm, q: Array) -> float:
     """How far joint values (k, 6) stay from their limits, as a share of the joints' travel: the least of all."""
+    return float(margins(kinematics, q))
+
+
+def margins(kinematics: Psm, q: Array) -> Array:
+    """The same of many ways, (..., k, 6) to (...)."""
     inside = np.minimum(q - kinematics.lower, kinematics.upper - q) / (kinematics.upper - kinematics.lower)
-    return float(inside.min())
+    return np.asarray(inside.min(axis=(-2, -1)))
 
 
 def clearance(kinematics: Psm, q: Array, T_world_base: Array, up: Array) -> float:
@@ -206,11 +218,16 @@ def clearance(kinematics: Psm, q: Array, T_world_base: Array, up: Array) -> floa
 
     The end of the shaft is a disc, the wrist a ball about its yaw axis.
     """
+    return float(clearances(kinematics, q, T_world_base, up))
+
+
+def clearances(kinematics: Psm, q: Array, T_world_base: Array, up: Array) -> Array:
+    """The same of many ways, (..., k, 6) to (...)."""
     frames = T_world_base @ kinematics.frames(q)
-    palm, jaw = frames[:, PALM, :3, 3] @ up, frames[:, JAW, :3, 3] @ up
-    along = frames[:, SHAFT_END, :3, 2] @ up
+    palm, jaw = frames[..., PALM, :3, 3] @ up, frames[..., JAW, :3, 3] @ up
+    along = frames[..., SHAFT_END, :3, 2] @ up
     disc = palm - SHAFT_RADIUS * np.sqrt(np.maximum(1.0 - along**2, 0.0))
-    return float(min(disc.min(), (jaw - WRIST_RADIUS).min()))
+    return np.asarray(np.minimum(disc, jaw - WRIST_RADIUS).min(axis=-1))
 
 
 def pose_of(pose7: Array) -> Array:

@@ -1,0 +1,31 @@
+"""Where the numbers of an action and of a state observation stand (`SuturingEnv` has the tables)."""
+
+from __future__ import annotations
+
+ACTION = 7
+"""Numbers of an arm's action."""
+
+STATE, FURTHER = 52, 33
+"""Numbers of a state observation of one arm, and of each further one."""
+
+PLACE, TURN, TARGET = slice(14, 17), slice(17, 21), slice(30, 33)
+"""Place and quaternion of what is handled, and the target."""
+
+_ANGLES = (0, 1, 3, 4, 5, 6)
+"""Joints that turn, and the jaw, among the numbers of an arm."""
+
+
+def action_width(arms: int) -> int:
+    """Numbers of an action of so many arms."""
+    return ACTION * arms
+
+
+def state_width(arms: int) -> int:
+    """Numbers of a state observation of so many arms."""
+    return STATE + FURTHER * (arms - 1)
+
+
+def angles(arms: int) -> list[int]:
+    """Where a state observation has the angles of joints and jaws."""
+    starts = [0, *(STATE + FURTHER * k for k in range(arms - 1))]
+    return [start + angle for start in starts for angle in _ANGLES]
