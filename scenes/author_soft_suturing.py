@@ -34,7 +34,10 @@ SHARP = {"puncture force": 0.2, "cutting force": 0.08, "exit force": 0.06}
 ASIDE = 0.015
 """How far along X the pad lies from the middle of the board, which leaves room for the needle."""
 
-BOARD_LOW, BOARD_HIGH = (-0.055, -0.09, 0.0), (0.055, 0.055, 0.004)
+THREAD_ELEMENTS = 60
+"""Of 2.5 mm: 150 mm of thread, enough for three stitches and both ends."""
+
+BOARD_LOW, BOARD_HIGH = (-0.055, -0.13, 0.0), (0.055, 0.055, 0.004)
 NEEDLE = (-0.04, 0.03)
 """Where the needle lies on the board; its thread lies along -Y, beside the pad."""
 
@@ -86,7 +89,7 @@ def board() -> dict[str, Any]:
 
 def task() -> dict[str, Any]:
     """Pad, board, the needle with its thread, and the endoscope."""
-    thread = small.phantom()
+    thread = small.phantom(THREAD_ELEMENTS)
     at = thread["BODY Needle"]["location"]["position"]
     x, y, z = theatre.PLACE
     height = z + BOARD_HIGH[2] + small.NEEDLE_THICKNESS + 0.0002

@@ -312,8 +312,8 @@ def arc_shapes() -> tuple[list[dict[str, Any]], np.ndarray, float]:
     return shapes, np.average(centres, axis=0, weights=lengths), mass
 
 
-def phantom() -> dict[str, Any]:
-    """The block, the needle, the thread and the frame that carries the cameras."""
+def phantom(elements: int | None = None) -> dict[str, Any]:
+    """The block, the needle, a thread of ``elements`` (`THREAD_ELEMENTS`), and the frame that carries the cameras."""
     top = 0.715
     T_world_block = pose_matrix((0.03, 0.18, top - 0.015), (0, 0, 0))
     block_shape = [shape("BOX", (0, 0, 0), x=0.1, y=0.2, z=0.03)]
@@ -340,7 +340,7 @@ def phantom() -> dict[str, Any]:
     tail = NEEDLE_RADIUS * np.array([np.cos(NEEDLE_START), np.sin(NEEDLE_START), 0.0])
     T_needle_tail = pose_matrix(tuple(tail), (HALF_PI, 0, NEEDLE_START - np.pi))
     joints: dict[str, Any] = {}
-    names = ["Thread"] + [f"Thread_{i:03d}" for i in range(1, THREAD_ELEMENTS)]
+    names = ["Thread"] + [f"Thread_{i:03d}" for i in range(1, elements or THREAD_ELEMENTS)]
     mass_element = THREAD_DENSITY * area * length
     for i, name in enumerate(names):
         at = T_world_needle @ T_needle_tail @ pose_matrix((0, 0, (i + 0.5) * length), (0, 0, 0))

@@ -1,10 +1,10 @@
 """Sutures soft tissue by the demonstration, over wounds, stiffnesses and places of the needle, and keeps how each went.
 
-    python -m tests.bench.tissue_seeds [N] [START] [--into FILE] [--table]
+    python -m tests.bench.tissue_seeds [N] [START] [--stitches K] [--into FILE] [--table]
 
 Each seed from START on draws where the needle lies, how wide the wound gapes (2 to 6 mm) and how stiff the pad is (50 to
-300 kPa); seed 0 is the scene's own. A line of JSON a seed goes to FILE (default `build/tissue_seeds.jsonl`); seeds that
-FILE has are passed over. Ends with the table of FILE in Markdown; ``--table`` does only that.
+300 kPa); seed 0 is the scene's own. A line of JSON a seed goes to FILE (default `build/tissue_seeds_K.jsonl`, with K stitches
+of one thread); seeds that FILE has are passed over. Ends with the table of FILE in Markdown; ``--table`` does only that.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
 import suture_tissue  # noqa: E402
+from suture import scatter  # noqa: E402
 
 Row = dict[str, Any]
 """What is kept of one seed: millimetres, kilopascals, newtons, seconds."""
@@ -57,14 +58,14 @@ def scene_of(gap: float, youngs: float, folder: Path) -> ligature.Scene:
     return ligature.load(folder / "launch.yaml", roots=[scenes])
 
 
-def attempt(seed: int) -> Row:
+def attempt(seed: int, stitches: int = 1) -> Row:
     """One suture in a world of its own, and what came of it."""
     gap, youngs = drawn(seed)
     with tempfile.TemporaryDirectory() as folder:
         simulation = ligature.Simulation(scene_of(gap, youngs, Path(folder)))
-    suture_tissue.scatter(simulation, seed)
+    scatter(simulation, seed)
     started = time.perf_counter()
-    score, measures, stopped = suture_tissue.operate(simulation, suture_tissue.Plan())
+    score, measures, stopped = suture_tissue.operate(simulation, suture_tissue.Plan(stitches))
     report = score.report()
     return {
         "seed": seed, "wound": round(1e3 * gap, 2), "youngs": round(1e-3 * youngs, 1),
@@ -103,19 +104,21 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description="Sutures soft tissue over many wounds.")
     arguments.add_argument("count", type=int, nargs="?", default=100)
     arguments.add_argument("start", type=int, nargs="?", default=0)
-    arguments.add_argument("--into", type=Path, default=ROOT / "build" / "tissue_seeds.jsonl")
+    arguments.add_argument("--stitches", type=int, default=1)
+    arguments.add_argument("--into", type=Path)
     arguments.add_argument("--table", action="store_true", help="only print the table of what is there")
     given = arguments.parse_args()
-    given.into.parent.mkdir(parents=True, exist_ok=True)
+    into = given.into or ROOT / "build" / f"tissue_seeds_{given.stitches}.jsonl"
+    into.parent.mkdir(parents=True, exist_ok=True)
     for seed in () if given.table else range(given.start, given.start + given.count):
-        if seed in read(given.into):
+        if seed in read(into):
             continue
-        row = attempt(seed)
-        with given.into.open("a", encoding="utf-8") as kept:
+        row = attempt(seed, given.stitches)
+        with into.open("a", encoding="utf-8") as kept:
             kept.write(json.dumps(row) + "\n")
         sys.stdout.write(json.dumps(row) + "\n")
         sys.stdout.flush()
-    sys.stdout.write("\n".join(table(list(read(given.into).values()))) + "\n")
+    sys.stdout.write("\n".join(table(list(read(into).values()))) + "\n")
     return 0
 
 

@@ -90,7 +90,7 @@ def test_a_thread_pulled_beyond_the_limit_slides_against_it(thread: Stretched) -
 
 def test_a_thread_slips_out_when_the_jaws_open(thread: Stretched) -> None:
     thread.pull(0.3e-3)
-    thread.sim.arms["PSM1"].servo_jaw([0.5])
+    thread.sim.arms["PSM1"].servo_jaw([0.5])  # type: ignore[attr-defined]  # a PSM
     thread.sim.step(200)
     assert thread.sim.grasps["PSM1"] is None
     assert abs(thread.rod.tension[5]) < 1e-2

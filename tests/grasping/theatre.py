@@ -78,12 +78,12 @@ class Theatre:
 
     def open(self, name: str) -> None:
         """Open an arm's jaw and wait."""
-        self.sim.arms[name].move_jaw([0.5])
+        self.sim.arms[name].move_jaw([0.5])  # type: ignore[attr-defined]  # a PSM
         self.wait()
 
     def close(self, name: str, angle: float = -0.14, ticks: int = 600) -> None:
         """Close an arm's jaw until it holds the needle."""
-        self.sim.arms[name].servo_jaw([angle])
+        self.sim.arms[name].servo_jaw([angle])  # type: ignore[attr-defined]
         for _ in range(ticks):
             self.sim.step()
             if self.sim.grasps[name] is not None:

@@ -4,34 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ligature.mesh.grid import build_grid
-from ligature.model.material import TissueMaterial
-from ligature.tissue.block import TissueBlock
 
 from tests.tissue.strings import String
-
-GAP, MIDDLE, TOP, DEEP = 0.004, 0.017, 0.0079, 0.0035
-"""Width of the wound and where its middle is; heights of the tissue's top, and of the bites."""
+from tests.tissue.wounds import GAP, MIDDLE, gap_at, gaping_pad, way_through
 
 PLACES = (0.0135, 0.0225, 0.0315)
 """Of the bites, along the wound."""
-
-
-def _pad():
-    """45 x 34 x 8 mm of 100 kPa, held below and at two sides, with a gaping wound 30 mm long and 6 mm deep."""
-    y = np.concatenate([np.linspace(0.0, MIDDLE - 0.5 * GAP, 5), np.linspace(MIDDLE + 0.5 * GAP, 2.0 * MIDDLE, 5)])
-    filled = np.ones((12, len(y) - 1, 4), dtype=bool)
-    filled[2:10, 4, 1:] = False
-    grid = build_grid([np.linspace(0.0, 0.045, 13), y, np.linspace(0.0, 0.008, 5)], filled, closing=(1,))
-    rim = (grid.nodes[:, 2] < 1e-9) | (grid.nodes[:, 1] < 1e-9) | (grid.nodes[:, 1] > y[-1] - 1e-9)
-    return TissueBlock(grid, [TissueMaterial(1e5, friction=2.0, strength=1e4)], rim)
-
-
-def _way(x, side):
-    """A thread's way through a lip, (5, 3) from the wall of the wound to the top."""
-    reach = 0.5 * GAP + 0.0045
-    across = np.array([0.5 * GAP + 2e-4, reach - 2.6e-3, reach - 1.3e-3, reach - 4e-4, reach])
-    return np.column_stack([np.full(5, x), MIDDLE + side * across, [DEEP, DEEP, 0.0044, 0.006, TOP]])
 
 
 def _over(a, b):
@@ -44,9 +22,9 @@ class RunningSuture:
     """One thread through three bites, slack between them, its ends up in the air; two hands hold these."""
 
     def __init__(self):
-        self.block = _pad()
+        self.block = gaping_pad()
         up = np.array([0.0, 0.0, 1.0])
-        ways = [way for x in PLACES for way in (_way(x, -1)[::-1], _way(x, 1))]
+        ways = [way for x in PLACES for way in (way_through(x, -1)[::-1], way_through(x, 1))]
         points = [ways[0][0] + up * d for d in np.linspace(0.012, 0.0, 13)[:-1]]
         begins = []
         for number, way in enumerate(ways):
@@ -71,9 +49,7 @@ class RunningSuture:
     @property
     def gaps(self):
         """Of the wound at the bites (3,), and the least of all."""
-        gaps = self.block.lips.gaps()
-        along = self.block.elastic.grid.nodes[self.block.lips.pairs[:, 0], 0]
-        return np.array([gaps[np.abs(along - x) < 2e-3].min() for x in PLACES]), gaps.min()
+        return np.array([gap_at(self.block, x) for x in PLACES]), self.block.lips.gaps().min()
 
     def run(self, ticks=1):
         for _ in range(ticks):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ligature.mesh.grid import build_grid
 from ligature.model.material import TissueMaterial
-from ligature.tissue.block import TissueBlock
 
 from tests.tissue.strings import String
+from tests.tissue.wounds import draw_together, gap_at, gaping_pad, held_stitch
 
 
 def _block(kit, material):
@@ -80,56 +79,21 @@ def test_the_first_node_of_a_path_holds_the_thread_before_the_needle_has_left_th
     np.testing.assert_array_equal(block.interface.points.weights[first], before)
 
 
-def _wound(gap):
-    """A pad with a gaping wound."""
-    y = np.concatenate([np.linspace(0.0, 0.015, 5), np.linspace(0.015 + gap, 0.03 + gap, 5)])
-    filled = np.ones((12, len(y) - 1, 4), dtype=bool)
-    filled[2:10, 4, 1:] = False
-    grid = build_grid([np.linspace(0.0, 0.045, 13), y, np.linspace(0.0, 0.008, 5)], filled, closing=(1,))
-    rim = (grid.nodes[:, 2] < 1e-9) | (grid.nodes[:, 1] < 1e-9) | (grid.nodes[:, 1] > y[-1] - 1e-9)
-    return TissueBlock(grid, [TissueMaterial(1e5, friction=2.0, strength=1e4)], rim)
-
-
-def _stitch(block, x, middle, gap):
-    """A loop of thread through both lips, over the wound, whose ends are drawn together there."""
-    deep, top, reach = 0.0035, 0.0079, 0.5 * gap + 0.0045
-    thread = block.add_thread(1e-4)
-    place = lambda y, z: np.array([x, middle + y, z])  # noqa: E731
-    right = [place(reach, top), place(reach - 4e-4, 0.006), place(reach - 1.3e-3, 0.0044),
-             place(reach - 2.6e-3, deep), place(0.5 * gap + 2e-4, deep)]  # fmt: skip
-    left = [[x, 2 * middle - p[1], p[2]] for p in reversed(right)]
-    over = [place(y, 0.0088) for y in np.linspace(0.0, reach, 5)]
-    points = [*over, *right, place(0.0, deep), *left, *([x, 2 * middle - p[1], p[2]] for p in reversed(over))]
-    points = np.array(points)
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    thread.insert(block.lay_path(np.array(right)[::-1], 1e-4), length[5])
-    thread.insert(block.lay_path(np.array(left)[::-1], 1e-4), length[11])
-    fine = np.column_stack(
-        [np.interp(np.arange(0.0, len(points) - 0.99, 0.5), np.arange(len(points)), column) for column in points.T]
-    )
-    return String(block, thread, fine, stiffness=3e4)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.002, 0.004])
 def test_stitches_draw_the_lips_of_a_wound_together_without_overlap(kit, gap):
-    block = _wound(gap)
-    middle = 0.015 + 0.5 * gap
+    block = gaping_pad(gap)
     stitches = (0.0135, 0.0225, 0.0315)
-    strings = [_stitch(block, x, middle, gap) for x in stitches]
+    strings = [held_stitch(block, x, gap) for x in stitches]
     assert block.lips.gaps().min() == pytest.approx(gap)
     for tick in range(180 if gap < 0.003 else 350):
         for string in strings:
-            # Two hands draw the ends past each other over the wound.
-            drawn = np.array([0.0, 1.1e-2 * tick / 250, 0.0])
-            above = np.array([string.x[0, 0], middle, 0.0088])
-            string.held = {0: above - drawn, len(string.x) - 1: above + drawn}
+            draw_together(string, 4.4e-5 * tick)
             string.tick()
         block.step()
     gaps = block.lips.gaps()
-    along = block.elastic.grid.nodes[block.lips.pairs[:, 0], 0]
     for x in stitches:
-        assert gaps[np.abs(along - x) < 2e-3].min() < 1e-4
+        assert gap_at(block, x) < 1e-4
     assert gaps.min() > -5e-5
 
 

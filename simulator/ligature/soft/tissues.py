@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ligature.adf import Diagnostic, Severity
 from ligature.model.scene import Scene
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem
-from ligature.soft.piece import Piece
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.rods import Rods
+
+if TYPE_CHECKING:
+    from ligature.soft.piece import Piece
 
 
 class Tissues(Subsystem):
@@ -18,7 +20,11 @@ class Tissues(Subsystem):
 
     def __init__(self, scene: Scene, bodies: SutureBodies, rods: Rods, dt: float) -> None:
         self._rods = rods
-        self.pieces = [Piece(scene, tissue, bodies, rods.rods, dt) for tissue in scene.tissues]
+        self.pieces: list[Piece] = []
+        if scene.tissues:
+            from ligature.soft.piece import Piece  # scenes without tissue start without it and SciPy, 20 MB smaller
+
+            self.pieces = [Piece(scene, tissue, bodies, rods.rods, dt) for tissue in scene.tissues]
         self._names = [scene.bodies[tissue.body].identity.identifier for tissue in scene.tissues]
         self._reported: set[str] = set()
         self._problems: list[Diagnostic] = []

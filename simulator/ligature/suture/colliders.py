@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, HULL, SPHERE, hull_planes
+from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HALF_SPACE, HULL, SPHERE
+from ligature.mesh.hulls import hull_planes
 from ligature.model.frames import inverse, matrix_pose7
 from ligature.model.scene import Scene
 from ligature.model.shapes import Box, Capsule, Cone, Cylinder, Hull, Plane, Shape, Sphere, TriMesh
@@ -40,7 +41,8 @@ class Colliders:
     """Convex parts of every body of a scene that is not an element of a rod.
 
     ``bodies`` are those that have parts, in order, and ``row_of`` where each stands among them; ``motion`` (b, 13)
-    holds pose of the inertial frame and twist as they were last read.
+    holds pose of the inertial frame and twist as they were last read, ``local`` (n, 7) the poses of the parts in the
+    inertial frames of their bodies.
     """
 
     def __init__(self, scene: Scene, dt: float) -> None:
@@ -77,7 +79,7 @@ class Colliders:
             "friction": np.array([scene.bodies[b].friction for b in body]),
         }
         self._nearby: list[int] = []
-        self.motion = own.motion
+        self.motion, self.local = own.motion, own.local
 
     def shapes(self, elements: int) -> Shapes:
         """The parts as a rod of ``elements`` elements sees them; all rods share poses."""

@@ -33,6 +33,9 @@ RECOVERY = 0.1
 BLEND = 0.05
 """Difference in depth, in radii, within which both ends of an element count as touching alike."""
 
+MAX_SINK = 0.25
+"""Depth, as a share of the sum of the radii, from which two elements inside each other part at once."""
+
 GROUP = 8
 """Elements that share a box in the search for self contact."""
 
@@ -147,7 +150,7 @@ def _touch_part(
     planes = shapes.planes[shapes.plane_range[c, 0] : shapes.plane_range[c, 1]]
     thrown, radius = work.thrown[e], nodes.radius[first + e]
     reach = radius + work.reach[e] + (shapes.sweep[c] + thrown)
-    s, d = _deepest(shapes.kind[c], shapes.size[c], planes, shapes.pose[c], R, work.segment[e], reach, radius, p,
+    s, d = deepest(shapes.kind[c], shapes.size[c], planes, shapes.pose[c], R, work.segment[e], reach, radius, p,
                     normal)  # fmt: skip
     nx, ny, nz = rotate(R, normal[0], normal[1], normal[2])
     if d > reach or _recede(nodes, work, e, k, s, d - radius - thrown, nx, ny, nz, dt):
@@ -188,7 +191,7 @@ def _depth_at(
 
 
 @inlined
-def _deepest(
+def deepest(
     kind: int, size: Array, planes: Array, pose: Array, R: Array, segment: Array, reach: float, radius: float,
     p: Array, normal: Array,
 ) -> tuple[float, float]:  # fmt: skip
@@ -291,18 +294,19 @@ def _touch_self(
     offset = shapes.node.shape[0]
     for g in range(groups):
         for h in range(g, groups):
-            if not _overlap(work.group_box[g], work.group_box[h]):
+            if not overlap(work.group_box[g], work.group_box[h]):
                 continue
             for i in range(g * GROUP, min(n, (g + 1) * GROUP)):
                 for j in range(max(i + 1 + self_skip, h * GROUP), min(n, (h + 1) * GROUP)):
-                    if not _overlap(work.box[i], work.box[j]):
+                    if not overlap(work.box[i], work.box[j]):
                         continue
                     missed += _touch_pair(first, nodes, new, work, capacity, i, j, offset)
     return missed
 
 
 @inlined
-def _overlap(a: Array, b: Array) -> bool:
+def overlap(a: Array, b: Array) -> bool:
+    """Whether two boxes (2, 3) share a point."""
     return (
         a[0, 0] <= b[1, 0] and b[0, 0] <= a[1, 0]
         and a[0, 1] <= b[1, 1] and b[0, 1] <= a[1, 1]
@@ -311,7 +315,7 @@ def _overlap(a: Array, b: Array) -> bool:
 
 
 @inlined
-def _nearest(a: Array, b: Array) -> tuple[float, float]:
+def nearest(a: Array, b: Array) -> tuple[float, float]:
     """Parameters (0..1) of the nearest points of two segments, for crossing and parallel ones alike.
 
     Source: Ericson, Real-Time Collision Detection, §5.1.9; parallel segments meet in the middle of
@@ -343,7 +347,7 @@ def _nearest(a: Array, b: Array) -> tuple[float, float]:
 @inlined
 def _pass(a: Array, b: Array, dx: float, dy: float, dz: float, length: float, both: float) -> bool:
     """Whether strands that were (dx, dy, dz) apart end the tick apart, and on the same sides of each other."""
-    s, t = _nearest(a, b)
+    s, t = nearest(a, b)
     ex = a[0, 0] + s * (a[1, 0] - a[0, 0]) - b[0, 0] - t * (b[1, 0] - b[0, 0])
     ey = a[0, 1] + s * (a[1, 1] - a[0, 1]) - b[0, 1] - t * (b[1, 1] - b[0, 1])
     ez = a[0, 2] + s * (a[1, 2] - a[0, 2]) - b[0, 2] - t * (b[1, 2] - b[0, 2])
@@ -354,7 +358,7 @@ def _pass(a: Array, b: Array, dx: float, dy: float, dz: float, length: float, bo
 @inlined
 def _touch_pair(first: int, nodes: Nodes, new: Touches, work: Work, capacity: int, i: int, j: int, offset: int) -> int:
     a, b = work.segment[i], work.segment[j]
-    s, t = _nearest(a, b)
+    s, t = nearest(a, b)
     dx = a[0, 0] + s * (a[1, 0] - a[0, 0]) - b[0, 0] - t * (b[1, 0] - b[0, 0])
     dy = a[0, 1] + s * (a[1, 1] - a[0, 1]) - b[0, 1] - t * (b[1, 1] - b[0, 1])
     dz = a[0, 2] + s * (a[1, 2] - a[0, 2]) - b[0, 2] - t * (b[1, 2] - b[0, 2])
@@ -369,9 +373,11 @@ def _touch_pair(first: int, nodes: Nodes, new: Touches, work: Work, capacity: in
     if new.count[0] == capacity:
         return 1
     per = 1.0 / length
-    # Already inside each other: recover no faster than other contacts.
+    # Already inside each other: recover no faster than other contacts, but do not yield to a load either.
+    c = new.count[0]
     _record(first, nodes, new, work, i, first + j, offset + j, s, d, near, dx * per, dy * per, dz * per,
             nodes.friction[first + j], 1e-3)  # fmt: skip
+    new.target[c] = max(new.target[c], -MAX_SINK * both)
     return 0
 
 

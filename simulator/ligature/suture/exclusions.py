@@ -32,6 +32,11 @@ class Exclusions:
     rod, shapes
         The rod, and the parts as it sees them; what `Shapes.skip` holds now belongs to the scene and stays.
 
+    Attributes
+    ----------
+    of_scene
+        (parts, n) the pairs that never collide.
+
     Notes
     -----
     An attached rod that starts deep inside a body is held there, so that contacts and attachment would fight.
@@ -40,7 +45,7 @@ class Exclusions:
 
     def __init__(self, rod: Rod, shapes: Shapes) -> None:
         self._rod, self._shapes = rod, shapes
-        self._scene = shapes.skip.copy()
+        self.of_scene = shapes.skip.copy()
         self._pads, self._inside = np.zeros((2, *shapes.skip.shape), dtype=np.bool_)
         self._tick = 0
 
@@ -61,7 +66,7 @@ class Exclusions:
         for c in np.flatnonzero(shapes.node >= 0).tolist():
             low, high = shapes.box[c]
             near = ((rod.positions > low - DEEP) & (rod.positions < high + DEEP)).all(axis=1)
-            for e in np.flatnonzero(near & ~self._scene[c]).tolist():
+            for e in np.flatnonzero(near & ~self.of_scene[c]).tolist():
                 depth = self._depth(c, e)
                 if depth > DEEP:
                     self._inside[c, e] = True
@@ -87,7 +92,7 @@ class Exclusions:
         self._write()
 
     def _write(self) -> None:
-        self._shapes.skip[:] = self._scene | self._pads | self._inside
+        self._shapes.skip[:] = self.of_scene | self._pads | self._inside
 
     def restart(self) -> None:
         """Begin anew where the rod is now, between no pads."""

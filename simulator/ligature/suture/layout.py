@@ -143,6 +143,7 @@ class Work(NamedTuple):
     thrown: Array  # (elements,) how far tension may throw it beyond its motion
     group_box: Array  # (elements, 2, 3) of `ligature.suture.contacts.GROUP` elements
     group_thrown: Array  # (elements,)
+    pair: Array  # (2, 2, 3) two segments on their way
 
 
 class Constants(NamedTuple):
@@ -225,7 +226,7 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         kept_angle=z((j, 3)), kept_load=z((j, 6)),
         three=z((3, 3)), segment=z((elements, 2, 3)), ahead=z((elements, 2, 3)), reach=z(elements),
         clear=z(elements), box=z((elements, 2, 3)), thrown=z(elements), group_box=z((elements, 2, 3)),
-        group_thrown=z(elements),
+        group_thrown=z(elements), pair=z((2, 2, 3)),
     )  # fmt: skip
 
 

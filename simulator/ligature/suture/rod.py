@@ -98,6 +98,10 @@ class Rod:
         The joints of the chain with their springs, angles and loads, those of the attachments at its ends included.
     springs
         What tissue does to the nodes; whoever fills them does so before every tick.
+    shapes
+        The convex parts of bodies around the rod.
+    self_skip
+        Elements on either side of one that it does not touch.
     tension
         (n,) pull along each element in newtons at the last tick.
     settled_soundly
@@ -133,14 +137,15 @@ class Rod:
         self._total = self._chain + len(rest)
         self.joints = _joints(description, head, tail)
         self._nodes = self._new_nodes()
-        self._shapes = shapes or layout.no_shapes(n)
+        self.shapes = shapes or layout.no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
         self._touches = tuple(layout.touches(capacity) for _ in range(3))
-        self._touch_tables = {id(touches): table_of(touches) for touches in self._touches}
+        self._touch_tables = tuple(table_of(touches) for touches in self._touches)
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
+        self.self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._arrays = layout.rod_arrays(
-            self._nodes, self.joints, self._shapes, layout.work(self._chain, self._total, n, capacity), self._first,
-            1 + int(np.ceil(np.pi * description.radius.max() / lengths.min())),
+            self._nodes, self.joints, self.shapes, layout.work(self._chain, self._total, n, capacity), self._first,
+            self.self_skip,
             1.0 / (INDENTATION * float(description.radius.min())), MAX_SPEED, dt,
         )  # fmt: skip
         self._table = table_of(self._arrays)
@@ -154,6 +159,7 @@ class Rod:
         self._pushed: list[tuple[int, int]] = []
         self._pushed_nodes, self._found = np.zeros((2, 0), dtype=np.int64)
         self._pulled: dict[int, tuple[Array, float, Array]] = {}
+        self._external: dict[int, tuple[Array, Array]] = {}
         self._attached = [attachment.body for attachment in description.attachments]
         self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
@@ -208,6 +214,7 @@ class Rod:
             nodes.fixed[self.node_of[partner.body]] = partner.fixed
         self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
         self.constraints, self._pads, self._near = [], (), None
+        self._external.clear()
         self._constraint_rows = self._gather_constraints()
         self.tension[:], self.impulse[:] = 0.0, 0.0
         self.newton_steps, self.settled_soundly = 0, True
@@ -342,6 +349,37 @@ class Rod:
             nodes.gravity[i], nodes.mass[i], nodes.inertia[i] = gravity, mass, inertia
         self._pulled.clear()
 
+    def push(self, element: int, force: Array, point: Array, stiffness: Array) -> None:
+        """Push an element with ``force`` (3,) at ``point`` (3,) in the coming tick.
+
+        ``stiffness`` (3, 3) is how the force gives way to the point's motion within the tick: the force of a stiff
+        penalty law would throw an element of micrograms otherwise.
+        """
+        x, y, z = (point - self.positions[element]).tolist()
+        J = np.hstack([np.eye(3), [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]])
+        K, load = self._external.get(element, (np.zeros((6, 6)), np.zeros(6)))
+        self._external[element] = K + J.T @ stiffness @ J, load + J.T @ force
+
+    def _begin_pushes(self) -> int:
+        """Make springs of what `push` took, as many as there is room for; returns how many springs there were."""
+        springs = self.springs
+        before = int(springs.filled[0])
+        for element, (K, load) in self._external.items():
+            row = int(springs.filled[0])
+            if row < len(springs.node):
+                springs.node[row], springs.K[row], springs.load[row] = self._first + element, K, load
+                springs.filled[0] = row + 1
+        self._external.clear()
+        return before
+
+    def _end_pushes(self, before: int) -> None:
+        """Remove the springs of pushes, which come after the first ``before``."""
+        if int(self.springs.filled[0]) == before:
+            return
+        for array in self.springs[1:]:
+            array[before : self.springs.filled[0]] = 0
+        self.springs.filled[0] = before
+
     def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
         """Set the gravity ``acceleration`` (3,) of an element from now on."""
         self._nodes.gravity[self._first + element] = acceleration
@@ -390,9 +428,9 @@ class Rod:
     def _gather_partners(self, colliders: Colliders, near: list[int]) -> None:
         """Collect the partners of this tick: their shapes, the source of their motion, and which of them can move."""
         self._near = near
-        self._shapes.node[:] = -1
+        self.shapes.node[:] = -1
         for body in near:
-            self._shapes.node[colliders.parts_of(body)] = self.node_of[body]
+            self.shapes.node[colliders.parts_of(body)] = self.node_of[body]
         rows = [(colliders.row_of[body], self.node_of[body]) for body in near]
         self._met = np.array(rows, dtype=np.int64).reshape(-1, 2)
         holding = sorted({*self._attached, *(g.body for g in self.constraints), *(p.body for p in self._pads)})
@@ -468,19 +506,20 @@ class Rod:
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds the impulse on each partner."""
-        a, b, c = self._touches
-        last, next_, scratch = (self._touch_tables[id(touches)] for touches in self._touches)
+        last, next_, scratch = self._touch_tables
         if self._pads:
             self._find_grasped()
         constraints, points = self._constraint_rows
+        springs = self._begin_pushes()
         run_tick(
             self._table, last, next_, scratch, self._passage_table, self._owner, self._spring_table, constraints,
             points, self._motion, self._met,
         )  # fmt: skip
+        self._end_pushes(springs)
         _, _, self.newton_steps, in_scratch, finite = self._arrays.counts.tolist()
         self.settled_soundly = bool(finite)
         self._end_pulls()
-        self._touches = (c, a, b) if in_scratch else (b, c, a)
+        self._touches, self._touch_tables = _turned(self._touches, in_scratch), _turned(self._touch_tables, in_scratch)
 
     def impulse_on(self, body: int) -> Array:
         """Linear and angular impulse (6,) of the last tick on a partner, about its centre of mass."""
@@ -494,6 +533,12 @@ TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "
 
 _KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly")
 """Attributes of a `Rod` that do."""
+
+
+def _turned(buffers: tuple[Any, ...], in_scratch: int) -> tuple[Any, ...]:
+    """The last, next and scratch buffer of the coming tick: what this one left in the next, or the scratch, is last."""
+    last, next_, scratch = buffers
+    return (scratch, last, next_) if in_scratch else (next_, scratch, last)
 
 
 def _grasp_rows(pads: JawPads) -> list[Array]:

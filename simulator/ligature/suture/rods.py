@@ -38,30 +38,39 @@ class Rods:
         Its recognised chains become the rods.
     dt
         Length of a tick in seconds.
+
+    Attributes
+    ----------
+    rods
+        The rods, in the order of the scene's chains.
+    colliders
+        The convex parts of the bodies around them.
     """
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
-        self._colliders = Colliders(scene, dt)
+        self.colliders = Colliders(scene, dt)
         self._exclusions: list[Exclusions] = []
         self.rods = [self._rod(scene, from_chain(scene, chain), dt) for chain in scene.rods]
         self._names = [body.identity.identifier for body in scene.bodies]
         self.problems: list[Diagnostic] = []
         self._reported = [False] * len(self.rods)
-        self._of_body = {body: (rod, e) for rod in self.rods for e, body in enumerate(rod.description.bodies)}
+        self._places = {
+            body: (number, e) for number, rod in enumerate(self.rods) for e, body in enumerate(rod.description.bodies)
+        }
 
     def _rod(self, scene: Scene, description: RodDescription, dt: float) -> Rod:
         elements = len(description.mass)
-        shapes = self._colliders.shapes(elements)
+        shapes = self.colliders.shapes(elements)
         attached = [attachment.body for attachment in description.attachments]
-        bodies = sorted({*attached, *self._colliders.bodies})
+        bodies = sorted({*attached, *self.colliders.bodies})
         free = {a.links[0].body for a in scene.articulations if len(a.links) == 1}
         rod = Rod(description, [_partner(scene, b, b in free) for b in bodies], shapes, dt)
         for attachment in description.attachments:
             beside = np.abs(np.arange(elements) - attachment.element) < NEXT_TO_ATTACHMENT
-            shapes.skip[self._colliders.parts_of(attachment.body)] |= beside
+            shapes.skip[self.colliders.parts_of(attachment.body)] |= beside
         for e, element in enumerate(description.bodies):
             for other in scene.bodies[element].no_collision_with:
-                shapes.skip[self._colliders.parts_of(other), e] = True
+                shapes.skip[self.colliders.parts_of(other), e] = True
         self._exclusions.append(Exclusions(rod, shapes))
         return rod
 
@@ -73,9 +82,9 @@ class Rods:
         for rod in self.rods[1:]:
             other = rod.box()
             box = np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
-        near = self._colliders.update(bodies, box)
+        near = self.colliders.update(bodies, box)
         for number, rod in enumerate(self.rods):
-            rod.meet(self._colliders, near, bodies)
+            rod.meet(self.colliders, near, bodies)
             self._report_inside(number, self._exclusions[number].step())
             rod.step()
             for body, impulse in rod.pushes():
@@ -88,14 +97,14 @@ class Rods:
 
         Raises ValueError when ``element_body`` is no element of a rod or ``body`` has no collision shape.
         """
-        if element_body not in self._of_body:
+        if element_body not in self._places:
             raise ValueError(f"body {element_body} is not an element of a rod")
-        rod, element = self._of_body[element_body]
+        rod, element = self._element(element_body)
         rod.attach(element, body, T_element_b, T_body_a)
 
     def detach(self, body: int, element_body: int) -> None:
         """Remove an attachment that `attach` made."""
-        rod, element = self._of_body[element_body]
+        rod, element = self._element(element_body)
         rod.detach(element, body)
 
     def carry(self, body: int, T: Array) -> None:
@@ -103,23 +112,47 @@ class Rods:
 
         Threads that are attached to it alone move with it, at rest.
         """
-        self._colliders.restart()
+        self.colliders.restart()
         for rod in self.rods:
             if rod.hangs_on(body):
                 rod.carry(T)
 
     def pose7(self, body: int) -> Array:
         """Pose (7,) of an element's body frame now."""
-        rod, element = self._of_body[body]
+        rod, element = self._element(body)
         pose: Array = rod.body_poses[element]
         return pose
+
+    def twist(self, body: int) -> Array:
+        """Velocity (6,) of an element now."""
+        rod, element = self._element(body)
+        twist: Array = rod.twists[element]
+        return twist
+
+    def element_of(self, body: int) -> tuple[int, int] | None:
+        """Number of the rod and of the element that a body is; None for bodies outside rods."""
+        return self._places.get(body)
+
+    def _element(self, body: int) -> tuple[Rod, int]:
+        """The rod of an element, and the place of the element in it."""
+        number, element = self._places[body]
+        return self.rods[number], element
+
+    def push(self, body: int, force: Array, point: Array, stiffness: Array) -> None:
+        """Push an element with ``force`` (3,) at ``point`` (3,) in the coming tick; see `Rod.push`."""
+        rod, element = self._element(body)
+        rod.push(element, force, point, stiffness)
+
+    def never_collide(self, number: int) -> NDArray[np.bool_]:
+        """Pairs (parts, elements) of `colliders` and a rod that the scene keeps from colliding."""
+        return self._exclusions[number].of_scene
 
     def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
         """Disable collision of ``bodies`` with the elements around ``element`` of a rod; None enables it again."""
         places = np.arange(len(self.rods[number].positions))
         beside = np.abs(places - element) < NEXT_TO_PADS if element is not None else None
         for body in bodies:
-            self._exclusions[number].between_pads(self._colliders.parts_of(body), beside)
+            self._exclusions[number].between_pads(self.colliders.parts_of(body), beside)
 
     def update_masses(self, masses: Masses) -> None:
         """Read mass and inertia of the bodies that may meet a rod, and whether they are held or fall."""
@@ -137,7 +170,7 @@ class Rods:
 
     def is_attached(self, body: int, element_body: int) -> bool:
         """Whether `attach` holds an element to a body."""
-        rod, element = self._of_body[element_body]
+        rod, element = self._element(element_body)
         return any((constraint.element, constraint.body) == (element, body) for constraint in rod.constraints)
 
     def reset(self) -> None:
@@ -145,7 +178,7 @@ class Rods:
         for rod, exclusions in zip(self.rods, self._exclusions, strict=True):
             rod.reset()
             exclusions.restart()
-        self._colliders.reset()
+        self.colliders.reset()
 
     def take_problems(self) -> list[Diagnostic]:
         """Problems since the last call."""
@@ -160,7 +193,7 @@ class Rods:
         part, element, depth = max(found, key=lambda overlap: overlap[2])
         one, other = (
             self._names[self.rods[number].description.bodies[element]],
-            self._names[self._colliders.body_of(part)],
+            self._names[self.colliders.body_of(part)],
         )
         message = (
             f"'{one}' of an attached rod starts {1e3 * depth:.3g} mm inside '{other}'; such elements do not collide "
@@ -179,7 +212,7 @@ class Rods:
         return {
             "rods": [rod.snapshot() for rod in self.rods],
             "exclusions": [exclusions.snapshot() for exclusions in self._exclusions],
-            "colliders": self._colliders.snapshot(),
+            "colliders": self.colliders.snapshot(),
             "reported": list(self._reported),
         }
 
@@ -189,7 +222,7 @@ class Rods:
             rod.restore(state)
         for exclusions, state in zip(self._exclusions, snapshot["exclusions"], strict=True):
             exclusions.restore(state)
-        self._colliders.restore(snapshot["colliders"])
+        self.colliders.restore(snapshot["colliders"])
         self._reported = list(snapshot["reported"])
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
 from ligature.suture.contacts import detect
+from ligature.suture.crossing import free_share, shorten
 from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
 from ligature.suture.passages import Passages
 from ligature.suture.placing import sound
@@ -20,7 +21,7 @@ from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.springs import Springs, add_spring_impulses, begin_springs, open_springs
-from ligature.suture.step import advance
+from ligature.suture.step import advance, finish
 from ligature.suture.tracking import open_passages
 from ligature.tables import opener
 
@@ -156,11 +157,15 @@ def run_tick(
             rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
         )
         steps += more
-        if not settled and size > 1 and steps < MAX_STEPS:
+        share = free_share(first, elements, nodes, new, work, counts[1])
+        if not (settled and share == 1.0) and size > 1 and steps < MAX_STEPS:
             _take_back(nodes, joints, work)
             restart_passages(passages, owner)
             size, scale = size // REFINEMENT, kept
             continue
+        if share < 1.0:
+            shorten(total, nodes, work, share)
+            finish(n, total, nodes, joints, work, h)
         add_reactions(n, joints, new, work, impulse, h)
         add_passage_impulses(passages, owner, impulse, h)
         add_spring_impulses(springs, impulse, h)
