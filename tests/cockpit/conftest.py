@@ -39,9 +39,11 @@ FLAGS = (
 )  # fmt: skip
 
 
-def until(condition: Callable[[], Any], what: str | Callable[[], str], seconds: float = TIMEOUT) -> Any:
+def until(
+    condition: Callable[[], Any], what: str | Callable[[], str], seconds: float = TIMEOUT, every: float = 0.05
+) -> Any:
     """Wait for ``condition``, as long as a busy browser takes; returns what it returned."""
-    return waiting.until(condition, what, seconds, every=0.05)
+    return waiting.until(condition, what, seconds, every)
 
 
 class Served:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from ligature.cockpit.pursuit import LINEAR
 
 from tests.cockpit.conftest import Served, tip, until
 from tests.cockpit.wired import Wired
@@ -39,10 +41,21 @@ def operator(running: Served) -> Iterator[Wired]:
     found.goes()
 
 
+def children() -> list[list[str]]:
+    """All processes: number, parent's number, command."""
+    listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+    return [line.split(None, 2) for line in listing.splitlines()[1:]]
+
+
+def physics_process(running: Served) -> int:
+    """Physics."""
+    ours = [(int(pid), words) for pid, parent, words in children() if int(parent) == running.process.pid]
+    return next(pid for pid, words in ours if "ligature.cli.physics" in words)
+
+
 def page_processes(running: Served) -> tuple[int, int]:
     """The page's process, and the one that draws its pictures."""
-    listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
-    rows = [line.split(None, 2) for line in listing.splitlines()[1:]]
+    rows = children()
     page = next(int(pid) for pid, parent, words in rows if int(parent) == running.process.pid and "cockpit" in words)
     return page, next(int(pid) for pid, parent, _ in rows if int(parent) == page)
 
@@ -73,6 +86,34 @@ def test_physics_goes_on_and_the_arm_stands_while_the_page_is_frozen(running: Se
     operator.holds(UP, -1.0)
     until(lambda: np.linalg.norm((tip(running, ARM) - after)[:3, 3]) > 0.003, "the page hears its operator again")
     operator.holds(UP, 0.0)
+
+
+def test_an_arm_keeps_its_speed_while_physics_is_held_up(running: Served, operator: Wired) -> None:
+    """Goals move in simulated time: what physics missed does not wait for it as a leap."""
+    operator.orders("speed", "fast")
+    operator.holds(UP, 1.0)
+    begin = tip(running, ARM)
+    until(lambda: np.linalg.norm((tip(running, ARM) - begin)[:3, 3]) > 0.003, "the tip moves")
+    samples: list[np.ndarray] = []
+    way = 1.0
+    for _ in range(4):
+        with stopped(physics_process(running)):
+            time.sleep(0.4)
+        deadline = time.monotonic() + 0.4
+        while time.monotonic() < deadline:
+            samples.append(np.append(tip(running, ARM)[:3, 3], float(running.state["sim_time"])))
+            time.sleep(0.005)
+        way = -way
+        operator.holds(UP, way)
+    operator.holds(UP, 0.0)
+    operator.orders("speed", "normal")
+    found = np.array(samples)
+    later = np.searchsorted(found[:, 3], found[:, 3] + 0.1)
+    pairs = np.flatnonzero(later < len(found))
+    assert len(pairs) > 20
+    away = np.linalg.norm(found[later[pairs], :3] - found[pairs, :3], axis=1)
+    speed = away / (found[later[pairs], 3] - found[pairs, 3])
+    assert 0.5 * LINEAR < speed.max() < 1.6 * LINEAR, "goals come at turns of the page's loop"
 
 
 def test_hands_work_while_the_drawing_of_pictures_is_frozen(running: Served, operator: Wired) -> None:

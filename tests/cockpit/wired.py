@@ -1,9 +1,13 @@
-"""An operator without a browser: speaks what the page's own script speaks, for tests of networks and frozen processes."""
+"""An operator without a browser: speaks what the page's own script speaks, for tests of networks and frozen processes.
+
+``python -m tests.cockpit.wired URL`` presses what the page offers for a throw, one after the other.
+"""
 
 from __future__ import annotations
 
 import json
 import re
+import sys
 import threading
 import time
 from contextlib import suppress
@@ -113,3 +117,33 @@ class Wired:
         self._page.close()
         with suppress(Exception):
             self._wire.close()
+
+    # --- a throw ---------------------------------------------------------------------------------
+
+    @property
+    def help(self) -> dict[str, Any]:
+        """What the page shows of a throw."""
+        return dict(self.facts.get("assist") or {"stage": ""})
+
+    def presses(self, word: str, then: str) -> None:
+        """Press a button of the help, and wait until the next step is offered."""
+        self.orders("assist", word)
+        until(lambda: self.help["stage"] == then and not self.help["busy"], lambda: f"{then}: {self.help}", 300.0)
+
+
+def main() -> None:
+    """Do a throw."""
+    operator = Wired(sys.argv[1])
+    operator.starts(120.0)
+    until(lambda: operator.help["stage"] == "pick" and not operator.facts["starting"], "it starts", 120.0)
+    for word, then in (("pick", "bring"), ("bring", "drive")):
+        operator.presses(word, then)
+        sys.stdout.write(f"{then}\n")
+        sys.stdout.flush()
+    operator.orders("drive", 1.0)
+    until(lambda: operator.help.get("through"), lambda: f"through: {operator.help}", 300.0)
+    sys.stdout.write("through\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -8,40 +8,62 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.cockpit.arm_facts import ArmFacts
-from ligature.cockpit.pursuit import ArmPursuits
+from ligature.cockpit.pursuit import JAW, ArmPursuits
 from ligature.model.frames import frame, inverse
 from ligature.model.scene import Scene
 from ligature.robots.fitting import kinematics_of
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm import Psm
-from ligature.tasks.plans import ABOVE, BEFORE, BEYOND, DEPTHS, Planner
-from ligature.tasks.throws import PAD, UP, Throw
+from ligature.tasks.plans import ABOVE, APPROACH, BEFORE, BEYOND, DEPTHS, Pick, Planner
+from ligature.tasks.throws import PAD, UP, Throw, drawn_back
 
 Array = NDArray[np.float64]
 
-OPEN, SHUT = 0.8, -0.35
-"""Angles of the jaw."""
+OPEN, SHUT = 0.4, -0.35
+"""Angles of the jaw. The lower finger of a leaning tool that is wide open gets under the needle and flings it away."""
 
-LIFT, BEHIND = 0.03, 0.02
-"""Metres by which a needle is lifted, and along itself from which a tool comes to it."""
+LIFT = 0.03
+"""Metres by which a needle is lifted."""
 
 NEAR, TURNED = 2e-4, 0.01
 """Metres and radians within which a set-point counts as arrived."""
 
-PRESSES = (0.0002, 0.0005, 0.0008)
-"""Metres by which a tool goes further than where it holds the needle in the middle of its pads, try by try."""
+PRESSES = (-0.0004, 0.0, 0.0004)
+"""Metres by which a tool goes further than where it holds the needle in the middle of its pads, try by try.
+
+A little less at first: fingers that press on soft tissue fling the needle away.
+"""
+
+BLUNT, SHALLOWER = 10.0, 0.0006
+"""Newtons at which closing fingers have met what the needle lies on, and metres less by which they go there next.
+
+Fingers reach farther when they are closed than open, and what is hard does not give way.
+"""
 
 CLOSING, STUCK = 0.6, 1.0
 """Seconds in which jaws must have closed on a needle, and for which a set-point may rest before its goal."""
 
+GRIP = 1.0
+"""Speed in rad/s at which a jaw closes: a needle jumped out of fingers that snapped at it with twice that."""
+
+PRESSED = 20.0
+"""Newtons at a tip above which an arm has met something that no plan knows of: needles and tissue take a few."""
+
+SPEED = 0.5
+"""Share of the maximum velocity of joints at which an arm goes over the work."""
+
 SETTLING = 0.2
 """Seconds in which an arm comes to rest at its set-point."""
+
+TURNS = 3
+"""Times that a needle is laid down in another direction before the operator is asked."""
 
 THROUGH, BESIDE = 0.15, 0.004
 """Angle of the tip beyond the exit from which the needle counts as through, and metres from it to its puncture."""
@@ -72,6 +94,8 @@ class Assist:
         self._steps: Steps | None = None
         self._arm = -1
         self._state: Any = None
+        self._rest: Array | None = None
+        """Where the needle lay when it was taken last (4, 4)."""
         self._throw: tuple[int, Throw, Array] | None = None
         """Of which arm, where, and the tool's pose (4, 4) in the needle's arc frame."""
         self._target = 0.0
@@ -83,6 +107,7 @@ class Assist:
         """Do what ``word`` (`orders.HELP`) asks for with ``arm``, instead of what was done so far."""
         self.stop()
         if arm in self._planners and self._arms[arm].ready(state):
+            self._pursuits[arm].stop()  # it rests while a plan is made
             self._arm, self._state, self.note = arm, state, ""
             self._steps = {"align": self._align, "pick": self._pick, "bring": self._bring}[word]()
 
@@ -98,21 +123,27 @@ class Assist:
         self._arm, self._state, self.note = arm, state, ""
         self._steps = self._drive()
 
-    def stop(self) -> None:
-        """Leave everything to the operator, from where the arm is going."""
+    def stop(self, why: str = "") -> None:
+        """Leave everything to the operator, from where the arm is going, and say ``why``."""
         if self._steps is not None:
             self._pursuits[self._arm].stop()
+            self.note = why
         self._steps = None
 
     def forget(self) -> None:
         """Stop, and forget the throw: the scene has been reset."""
         self.stop()
-        self._throw, self.note = None, ""
+        self._throw, self._rest, self.note = None, None, ""
 
     @property
     def busy(self) -> bool:
         """Whether something is being done."""
         return self._steps is not None
+
+    @property
+    def arm(self) -> int:
+        """The arm that does it, -1 for none."""
+        return self._arm if self.busy else -1
 
     @property
     def thinking(self) -> bool:
@@ -126,13 +157,18 @@ class Assist:
             self._throw = None
         if self._steps is None:
             return
+        if not self._arms[self._arm].ready(state):
+            self.stop(f"{self._arms[self._arm].name} stopped: it is not enabled and homed any more.")
+            return
+        if self._pressure > PRESSED:
+            self.stop(f"{self._arms[self._arm].name} stopped: it presses on something. Lead it away by hand.")
+            return
         try:
             next(self._steps)
         except StopIteration:
             self._steps = None
         except Failed as failure:
-            self.stop()
-            self.note = str(failure)
+            self.stop(str(failure))
 
     # --- what the page shows -----------------------------------------------------------------------
 
@@ -192,32 +228,78 @@ class Assist:
 
     def _align(self) -> Steps:
         """Turn the jaw to the needle, and stand before it, open."""
-        grasp = yield from self._grasp()
-        yield from self._jaw(OPEN)
-        yield from self._go(self._behind(grasp))
+        pick = yield from self._plan()
+        yield from self._stand(pick.T_arc_tool)
 
     def _pick(self) -> Steps:
-        """Take the needle and lift it; jaws that close on nothing go a little deeper the next time."""
-        for press in PRESSES:
-            grasp = yield from self._grasp()
-            yield from self._jaw(OPEN)
-            yield from self._go(self._behind(grasp))
-            yield from self._go(self._planner.needle(self._state) @ grasp @ frame(np.eye(3), np.array([0, 0, press])))
-            yield from self._jaw(SHUT)
-            yield from self._wait(CLOSING, lambda: self._holds(self._arm, self._state))
-            if self._holds(self._arm, self._state):
-                yield from self._go(_raised(self._tip, LIFT))
+        """Take the needle so that it can be driven, if need be by laying it down in another direction first."""
+        for _ in range(TURNS):
+            if (yield from self._take()):
                 return
+            if not (yield from self._lay()):
+                return
+
+    def _stand(self, grasp: Array) -> Steps:
+        """Stand before the needle with the jaw open, without touching it on the way there."""
+        planner = self._planner
+        yield from self._jaw(OPEN)
+        T = self._tip
+        if np.linalg.norm(planner.needle(self._state)[:3, 3] - T[:3, 3]) < PAD + 2.0 * planner.arc.radius:
+            yield from self._go(drawn_back(T, APPROACH))  # it may stand about the needle
+        before = drawn_back(planner.needle(self._state) @ grasp, APPROACH)
+        over = _raised(before, ABOVE)
+        if planner.joints(self._arms[self._arm].base_in_world(self._state), over) is not None:
+            yield from self._go(over)
+        yield from self._go(before)
+
+    def _take(self) -> Generator[None, None, bool]:
+        """Take the needle and lift it; jaws that close on nothing try it at another depth.
+
+        Whether it can be driven held so.
+        """
+        deepest = np.inf
+        for press in PRESSES:
+            pick = yield from self._plan()
+            grasp = pick.T_arc_tool
+            yield from self._stand(grasp)
+            self._rest = self._planner.needle(self._state)
+            depth = min(press, deepest)
+            yield from self._go(self._rest @ grasp @ frame(np.eye(3), np.array([0, 0, depth])))
+            if not (yield from self._close()):
+                deepest = depth - SHALLOWER
+                yield from self._jaw(OPEN)
+            elif self._holds(self._arm, self._state):
+                if not self._inside(self._state):
+                    yield from self._go(_raised(self._tip, LIFT))
+                return pick.drives or self._inside(self._state)
         raise Failed("The jaws closed on nothing. Try again.")
+
+    def _lay(self) -> Generator[None, None, bool]:
+        """Lay the needle down in a direction from which it can be picked up and driven; whether there is one."""
+        rest, hold = self._rest, self._hold
+        if rest is None:
+            return False
+        lie = yield from self._think(self._arm, self._planner.lie, hold, rest)
+        if lie is None:
+            return False
+        down = lie @ hold
+        yield from self._go(_raised(down, ABOVE))
+        yield from self._go(down)
+        yield from self._jaw(OPEN)
+        yield from self._go(drawn_back(down, APPROACH))
+        return True
 
     def _bring(self) -> Steps:
         """Take the needle's tip to before the entry of the throw that the arm reaches best."""
-        hold = inverse(self._planner.needle(self._state)) @ self._tip
-        throw = yield from self._think(lambda state, T_base: self._planner.throw(state, T_base, hold))
-        if throw is None:
-            raise Failed("Held like this the needle does not reach through. Put it down (X) and pick it up again.")
+        for left in reversed(range(TURNS)):
+            hold = self._hold
+            throw = yield from self._think(self._arm, self._planner.throw, hold)
+            if throw is not None:
+                break
+            if not left or not (yield from self._lay()):
+                raise Failed("Held like this the needle does not reach through. Put it down (X) and pick it up again.")
+            yield from self._take()
         start = throw.arc_at(-BEFORE, self._planner.arc) @ hold
-        yield from self._go(_raised(self._tip, max(0.0, float((start - self._tip)[2, 3]) + ABOVE)))
         yield from self._go(_raised(start, ABOVE))
         yield from self._go(start)
         self._throw = self._arm, throw, hold
@@ -228,7 +310,8 @@ class Assist:
         _, throw, hold = self._throw
         facts, pursuits, planner = self._arms[self._arm], self._pursuits[self._arm], self._planner
         angle = planner.angle(self._state, throw) if self._inside(self._state) else -BEFORE
-        yield from self._go(throw.arc_at(angle, planner.arc) @ hold)
+        begin = throw.arc_at(angle, planner.arc) @ hold
+        yield from self._slide(begin) if self._inside(self._state) else self._go(begin)
         T_reference_world = facts.in_reference(self._state, np.eye(4))
         pursuits.along(lambda a: T_reference_world @ throw.arc_at(a, planner.arc) @ hold, angle, self._target)
         while pursuits.active:
@@ -242,20 +325,31 @@ class Assist:
     def _tip(self) -> Array:
         return self._arms[self._arm].tip_in_world(self._state)
 
-    def _behind(self, grasp: Array) -> Array:
-        T = self._planner.needle(self._state) @ grasp
-        return np.asarray(frame(np.eye(3), -BEHIND * T[:3, 2]) @ T)
+    @property
+    def _hold(self) -> Array:
+        """Pose (4, 4) of the tool in the arc frame of the needle that it holds."""
+        return np.asarray(inverse(self._planner.needle(self._state)) @ self._tip)
 
-    def _grasp(self) -> Generator[None, None, Array]:
-        grasp = yield from self._think(self._planner.pick)
-        if grasp is None:
-            raise Failed(f"{self._arms[self._arm].name} cannot reach the needle. Try the other arm (N).")
-        return grasp
+    def _plan(self) -> Generator[None, None, Pick]:
+        """How the needle is taken: by the operator's arm, or by another that is ready and can."""
+        others = [arm for arm in self._planners if arm != self._arm and self._arms[arm].ready(self._state)]
+        found: dict[int, Pick] = {}
+        for arm in (self._arm, *others):
+            pick = yield from self._think(arm, self._planners[arm].pick)
+            if pick is not None:
+                found[arm] = pick
+                if pick.drives:
+                    break
+        if not found:
+            names = " and ".join(self._arms[arm].name for arm in (self._arm, *others))
+            raise Failed(f"{names} cannot reach the needle. Push it nearer by hand, or reset the simulation.")
+        self._arm = next((arm for arm, pick in found.items() if pick.drives), next(iter(found)))
+        return found[self._arm]
 
-    def _think(self, plan: Callable[[Any, Array], Any]) -> Generator[None, None, Any]:
-        """What ``plan`` finds, of a copy of the state and on a thread of its own: the page goes on meanwhile."""
+    def _think(self, arm: int, plan: Callable[..., Any], *given: Any) -> Generator[None, None, Any]:
+        """What ``plan`` finds for an arm, of a copy of the state and on a thread of its own: the page goes on."""
         state = self._state.copy()
-        found = self._thinker.submit(plan, state, self._arms[self._arm].base_in_world(state))
+        found = self._thinker.submit(plan, state, self._arms[arm].base_in_world(state), *given)
         self._thought = found
         while not found.done():
             yield
@@ -265,9 +359,34 @@ class Assist:
             raise Failed(str(error)) from error
 
     def _go(self, T: Array) -> Steps:
-        """Take the tip to ``T`` (4, 4)."""
+        """Take the tip to ``T`` (4, 4): straight, or up and over to it where joints would meet their limits."""
+        planner, q = self._planner, self._arms[self._arm].setpoints(self._state)
+        T_base = self._arms[self._arm].base_in_world(self._state)
+        if not planner.straight(T_base, q, self._tip, T):
+            for through in (_raised(self._tip, ABOVE), _raised(T, ABOVE)):
+                joints = planner.joints(T_base, through)
+                if joints is not None:
+                    yield from self._turn(joints)
+            q = self._arms[self._arm].setpoints(self._state)
+            if not planner.straight(T_base, q, self._tip, T):
+                joints = planner.joints(T_base, T)
+                if joints is None:
+                    raise Failed(f"{self._arms[self._arm].name} cannot get there.")
+                yield from self._turn(joints)
+        yield from self._slide(T)
+
+    def _turn(self, joints: Array) -> Steps:
+        """Take the arm to joint values (6,)."""
         facts, pursuits = self._arms[self._arm], self._pursuits[self._arm]
-        pursuits.pose(facts.in_reference(self._state, self._tip), facts.in_reference(self._state, T))
+        pursuits.joints(facts.setpoints(self._state), joints, SPEED * facts.speed)
+        while pursuits.active:
+            yield
+        yield from self._wait(STUCK, lambda: bool(np.abs(facts.setpoints(self._state) - joints).max() < NEAR))
+
+    def _slide(self, T: Array) -> Steps:
+        """Take the tip straight to ``T`` (4, 4)."""
+        facts, pursuits = self._arms[self._arm], self._pursuits[self._arm]
+        pursuits.pose(facts.in_reference(self._state, self._tip), facts.in_reference(self._state, T), True)
         since = None
         while not self._at(T):
             yield
@@ -288,15 +407,32 @@ class Assist:
         turn = rotation_vector(away[:3, :3].T @ T[:3, :3])
         return bool(np.linalg.norm((away - T)[:3, 3]) < NEAR and np.linalg.norm(turn) < TURNED)
 
+    def _close(self) -> Generator[None, None, bool]:
+        """Close the jaw on the needle; False as soon as the fingers press on what it lies on."""
+
+        def held() -> bool:
+            return self._holds(self._arm, self._state)
+
+        for _ in chain(self._jaw(SHUT), self._wait(CLOSING, held)):
+            if self._pressure > BLUNT and not held():
+                return False
+            yield
+        return True
+
     def _jaw(self, angle: float) -> Steps:
         """Take the jaw to ``angle``."""
         facts, pursuits = self._arms[self._arm], self._pursuits[self._arm]
         assert facts.grip is not None
         angle = float(np.clip(angle, facts.grip.low, facts.grip.high))
-        pursuits.jaw(self._setpoint, angle, facts.grip_verb)
+        pursuits.jaw(self._setpoint, angle, facts.grip_verb, True, JAW if angle > self._setpoint else GRIP)
         while pursuits.active:
             yield
         yield from self._wait(STUCK, lambda: abs(self._setpoint - angle) < TURNED)
+
+    @property
+    def _pressure(self) -> float:
+        """Newtons at the tip of the arm."""
+        return float(np.linalg.norm(self._state["arm"][self._arm]["spatial_measured_cf"][:3]))
 
     @property
     def _setpoint(self) -> float:

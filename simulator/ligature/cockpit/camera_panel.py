@@ -1,4 +1,4 @@
-"""Which camera the page shows: the operator's choice."""
+"""Which camera the page shows, and what the 3D view leaves out: the operator's choice."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 from viser import ClientHandle
 
 NO_PICTURES = "off"
+
+MOST_CUT = 500
+"""Millimetres from the eye within which the 3D view may be left empty."""
 
 
 class CameraControls:
@@ -22,9 +25,13 @@ class CameraControls:
             self._tube = client.gui.add_checkbox(
                 "Endoscope", tube, hint="Its tube in the 3D view, where it stands in the way at first"
             )
+            self._cut = client.gui.add_slider(
+                "Cut away mm", 0, MOST_CUT, 5, 0, hint="The 3D view leaves out what is nearer to your eye than this"
+            )
         self._act = act
         self._choice.on_update(self._on_choice)
         self._tube.on_update(self._on_tube)
+        self._cut.on_update(self._on_cut)
 
     async def _on_choice(self, event: Any) -> None:
         if event.client_id is not None:
@@ -34,7 +41,11 @@ class CameraControls:
         if event.client_id is not None:
             self._act("tube", bool(event.target.value))
 
+    async def _on_cut(self, event: Any) -> None:
+        if event.client_id is not None:
+            self._act("cut", 1e-3 * float(event.target.value))
+
     def remove(self) -> None:
         """Take the choice off the page."""
-        self._choice.remove()
-        self._tube.remove()
+        for handle in (self._choice, self._tube, self._cut):
+            handle.remove()

@@ -22,11 +22,11 @@ from ligature.cockpit.arm_facts import ArmFacts
 from ligature.cockpit.arm_panel import ArmControls, ArmStatus
 from ligature.cockpit.assist import Assist
 from ligature.cockpit.audience import Audience
-from ligature.cockpit.camera_panel import NO_PICTURES, CameraControls
+from ligature.cockpit.camera_panel import MOST_CUT, NO_PICTURES, CameraControls
 from ligature.cockpit.curves import Curves
-from ligature.cockpit.deadman import GONE, DeadMan
+from ligature.cockpit.deadman import AWAKE, GONE, LEFT, DeadMan
 from ligature.cockpit.gate import Gate
-from ligature.cockpit.hands import Hands, Sightline
+from ligature.cockpit.hands import NEAREST, Hands, Sightline
 from ligature.cockpit.orders import Order, View
 from ligature.cockpit.page import (
     CAMERA_HEIGHT,
@@ -63,6 +63,10 @@ AFTER_FAILURE = 1.0
 CLAIM_TIMEOUT = 30.0
 """Seconds in which who pressed *Start* gets control, or has to press it again."""
 
+AGAIN = "Press again to go on from here."
+BY_HAND = f"Your hand took over. {AGAIN}"
+"""Why help of the page has stopped, and how it goes on."""
+
 REPORTED = ("warning", "error")
 """Events of an arm that are shown beside it."""
 
@@ -90,7 +94,7 @@ class Cockpit:
         self._address = address
         self._wire = Wire()
         self.server = serve(address, Gate(address, token, warn), self._wire)
-        self._deadman = DeadMan(self.server)
+        self._deadman = DeadMan(self.server, self._wire)
         self._inbox: deque[tuple[str, int, Any]] = deque()
         self._clockwork = Clockwork(self._outbox.push)
         self._speed = "1"
@@ -100,7 +104,7 @@ class Cockpit:
         self._hands = Hands(facts, self._pursuits)
         self._starter = Starter(facts, self._outbox.push)
         self._assist = Assist(scene, facts, self._pursuits)
-        self._resets = 0
+        self._resets, self._followed = 0, float(self._state["sim_time"][0])
         self._views: dict[int, View] = {}
         self._begins = (-1, 0.0)
         self._curves = Curves(scene, task)
@@ -226,7 +230,6 @@ class Cockpit:
         self._controls, self._run_controls, self._camera_controls, self._teleop_controls = [], None, None, None
 
         self._starter.end()
-        self._assist.stop()
         self._hands.rest()
 
     # --- the page's own script -------------------------------------------------------------------
@@ -260,7 +263,7 @@ class Cockpit:
     def _obey_hands(self, word: str, value: Any, client: ClientHandle) -> None:
         state, hands = self._state[0], self._hands
         if word in ("next", "drag") or (word == "move" and any(value)):
-            self._assist.stop()  # the hand takes over
+            self._assist.stop(BY_HAND)
         if word == "move":
             self._forget_note(hands.selected)
             hands.move(value, time.monotonic())
@@ -290,7 +293,7 @@ class Cockpit:
         for arm, pursuits in enumerate(self._pursuits):
             if pursuits.stop():
                 self._outbox.push(Hold(arm))
-        self._assist.stop()
+        self._assist.stop(f"Every arm holds. {AGAIN}")
 
     def _forget_note(self, arm: int) -> None:
         if 0 <= arm < len(self._arms):
@@ -374,11 +377,19 @@ class Cockpit:
             self._record(bool(value))
         elif word == "sight":
             self._sight = value
+        elif word == "cut":
+            self._cut(value)
         elif word == "tube":
             self._tube = bool(value)
             self._stage.show_endoscope(self._tube)
         elif self._ros is not None:
             obey_teleop(self._ros.remote, word, value)
+
+    def _cut(self, distance: float) -> None:
+        """Leave out of the operator's 3D view what is nearer than ``distance`` metres."""
+        client = self._operating
+        if client is not None:
+            client.camera.near = float(np.clip(distance, NEAREST, 1e-3 * MOST_CUT))
 
     def _obey_arm(self, word: str, arm: int, value: Any) -> None:
         state, facts, pursuits = self._state[0], self._arms[arm].facts, self._pursuits[arm]
@@ -386,7 +397,7 @@ class Cockpit:
             self._controls[arm].show_gizmo(value)
             return
         self._arms[arm].note = ""
-        self._assist.stop()
+        self._assist.stop(BY_HAND)
         if word == "command":
             pursuits.stop()
             if value == "Hold":
@@ -405,42 +416,68 @@ class Cockpit:
 
     def _follow(self, now: float, dt: float) -> None:
         """Send the next goals of what is pursued, slower or not at all while the operator's browser is silent."""
-        client = self._audience.clients.get(
-            -1 if self._audience.desk.operator is None else self._audience.desk.operator
-        )
-        state = self._state[0]
+        client, state = self._operating, self._state[0]
+        # goals move in simulated time: an arm keeps a hand's speed in a simulation that is slow, held up, or paused
+        step = float(np.clip(state["sim_time"] - self._followed, 0.0, AWAKE))
+        self._followed = float(state["sim_time"])
         if client is not None:
-            if self._starter.advance(self._state[0]) and self._camera_sight is not None:
-                self._hands.bring(self._state[0], work_place(self._scene, self._state), self._camera_sight)
+            if self._starter.advance(state) and self._camera_sight is not None:
+                place = work_place(self._scene, self._state)
+                self._hands.bring(state, place, self._camera_sight, self._assist.arm)
             if int(state["resets"]) != self._resets:
                 self._resets = int(state["resets"])
                 self._assist.forget()
             self._assist.advance(state)
+            if self._assist.busy:
+                self._hands.selected = self._assist.arm  # it takes the arm that reaches the needle
             if self._hands.busy:
-                self._hands.advance(self._state[0], self._sightline(client), now, dt)
+                self._hands.advance(state, self._sightline(client), now, dt)
         driven = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
-        dragged = self._hands.dragging is not None or any(controls.dragging for controls in self._controls)
-        self._deadman.watch(None if client is None else client.client_id, bool(driven or dragged))
+        following = bool(driven or self._assist.busy or self._dragged)
+        self._deadman.watch(None if client is None else client.client_id, following, dt)
+        by_hand, by_plan = self._deadman.paces(dt)
         silence = self._deadman.silence
-        pace = self._deadman.pace(dt)
-        if silence > GONE:
-            self._stop_all(f"the operator's browser has not answered for {1e3 * silence:.0f} ms")
-            return
-        for arm in driven if pace > 0.0 else ():
-            for command in self._pursuits[arm].advance(pace * min(dt, 0.05)):
-                self._outbox.push(command)
+        if silence > LEFT:
+            self._stop_all(f"the operator's browser has not answered for {silence:.0f} s")
+        elif silence > GONE:
+            self._give_up(f"the operator's browser has not answered for {1e3 * silence:.0f} ms")
+        for arm in driven:
+            pace = by_plan if self._pursuits[arm].planned else by_hand
+            if pace * step > 0.0:
+                for command in self._pursuits[arm].advance(pace * step):
+                    self._outbox.push(command)
 
-    def _stop_all(self, why: str) -> None:
-        """Hold every arm that the operator drives, and show why."""
+    @property
+    def _operating(self) -> ClientHandle | None:
+        """The operator's browser."""
+        operator = self._audience.desk.operator
+        return None if operator is None else self._audience.clients.get(operator)
+
+    @property
+    def _dragged(self) -> set[int]:
+        """The arms whose tips are dragged."""
+        dragged = {arm for arm, controls in enumerate(self._controls) if controls.dragging}
+        return dragged if self._hands.dragging is None else dragged | {self._hands.dragging}
+
+    def _give_up(self, why: str) -> None:
+        """Hold every arm that a hand steers, and show why."""
+        dragged = self._dragged
         for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
-            dragged = arm == self._hands.dragging or (arm < len(self._controls) and self._controls[arm].dragging)
-            if pursuits.stop() or dragged:
+            steered = pursuits.active and not pursuits.planned
+            if steered or arm in dragged:
+                pursuits.stop()
                 self._outbox.push(Hold(arm))
                 if why and status.note != f"hold: {why}":
                     status.note = f"hold: {why}"
                     self._warn(f"{status.facts.name} holds: {why}")
-        self._assist.stop()
         self._hands.rest()
+
+    def _stop_all(self, why: str) -> None:
+        """Hold every arm that the operator drives, and what is done for the operator, and show why."""
+        for pursuits in self._pursuits:
+            pursuits.planned = False
+        self._give_up(why)
+        self._assist.stop(f"It stopped: {why}. {AGAIN}" if why else "")
 
     @property
     def _recording(self) -> bool:
@@ -477,6 +514,8 @@ class Cockpit:
                 self._arms[event.arm].note = str(event.value)
                 if "servo" in str(event.value):
                     self._pursuits[event.arm].stop()
+                    if event.arm == self._assist.arm:
+                        self._assist.stop(f"It stopped: {event.value}. {AGAIN}")
         if self._tick != int(state["tick"]):
             self._tick, self._moved_at = int(state["tick"]), now
         if self._audience.clients:

@@ -1,7 +1,8 @@
-"""Whether the operator's browser still answers while an arm follows it: pings on its own connection.
+"""Whether the operator's browser still answers while an arm follows it: pings on a connection of its page.
 
 A closed browser closes its connection at once. One that is frozen, or behind a cut network, is noticed only because it
-stops to answer; the browser answers pings apart from its page, so that a slow page alone does not stop an arm.
+stops to answer. Pings go over the connection of the page's script, on which little waits to be read: a browser that is
+slow to draw what viser sends it leaves that unread, and with it the pings of that connection.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from typing import cast
 import websockets.exceptions
 from viser import ViserServer
 
-from ligature.cockpit.rhythm import Rhythm
+from ligature.cockpit.rhythm import Pace, Rhythm
+from ligature.cockpit.wire import Wire
 
 PERIOD = 0.02
 """Seconds between pings while an arm follows."""
@@ -24,46 +26,59 @@ IDLE_PERIOD = 0.2
 """Seconds between those by which the rhythm of an operator's browser is known before an arm follows."""
 
 GONE = 0.5
-"""Seconds without an answer after which what an arm follows is given up, instead of waited for."""
+"""Seconds without an answer after which what a hand steers is given up, instead of waited for."""
+
+ALONE, LEFT = 2.0, 15.0
+"""The same of what the page steers by a plan: it stands after the first, goes on when the browser answers, and is given
+up after the second. A plan needs nobody's hand; the bound is for an operator who cannot stop it any more."""
+
+AWAKE = 0.05
+"""Seconds that one turn of the page's loop adds to a silence at most.
+
+A page that is held up itself sends no goals meanwhile, and hears no answers.
+"""
 
 
 class DeadMan:
-    """Pings the browser ``watched`` while it is set; seconds on the monotonic clock."""
+    """Pings the browser ``watched`` while it is set."""
 
-    def __init__(self, server: ViserServer) -> None:
-        self._server = server
+    def __init__(self, server: ViserServer, wire: Wire) -> None:
+        self._server, self._wire = server, wire
         self._client: int | None = None
         self._following = False
-        self._answered = 0.0
-        self._rhythm = Rhythm()
+        self._answers = 0
+        self._heard_of = 0
+        self._rhythm, self._plan = Rhythm(), Pace()
         self._loop = server.get_event_loop()
-
-    def watch(self, client: int | None, following: bool) -> None:
-        """Ping ``client`` from now on, None for nobody; ``following``: whether an arm follows it."""
-        if following and not self._following:
-            self._answered = time.monotonic()
-        self._following = following
-        if client == self._client:
-            return
-        self._client, self._answered, self._rhythm = client, time.monotonic(), Rhythm()
-        if client is not None:
-            asyncio.run_coroutine_threadsafe(self._ping(client), self._loop)
-
-    @property
-    def silence(self) -> float:
+        self.silence = 0.0
         """Seconds since the watched browser last answered; 0 while no arm follows."""
-        return 0.0 if self._client is None or not self._following else time.monotonic() - self._answered
 
-    def pace(self, dt: float) -> float:
-        """Share 0..1 of its speed that an arm may go at, ``dt`` seconds after the last call."""
-        return self._rhythm.pace(self.silence, dt)
+    def watch(self, client: int | None, following: bool, dt: float) -> None:
+        """Ping ``client`` from now on, None for nobody; an arm may be ``following`` it. Once a turn of ``dt``."""
+        if client != self._client:
+            self._client, self._rhythm, self.silence = client, Rhythm(), 0.0
+            if client is not None:
+                asyncio.run_coroutine_threadsafe(self._ping(client), self._loop)
+        answers, before = self._answers, self._heard_of
+        self._heard_of = answers
+        silent = client is not None and following and self._following and answers == before
+        self.silence = self.silence + min(dt, AWAKE) if silent else 0.0
+        self._following = following
+
+    def paces(self, dt: float) -> tuple[float, float]:
+        """Shares 0..1 of its speed that an arm may go at that a hand steers, and one that a plan steers.
+
+        ``dt`` seconds have gone by since the last call.
+        """
+        return self._rhythm.pace(self.silence, dt), self._plan.advance(self.silence, ALONE, dt)
 
     async def _ping(self, client: int) -> None:
         while self._client == client:
             # viser keeps its connections to itself; there is no other way to ping one of them
-            connection = self._server._websock_server._live_connections.get(client)
-            if connection is None:
+            own = self._server._websock_server._live_connections.get(client)
+            if own is None:
                 return
+            connection = self._wire.connection(client) or own
             with suppress(websockets.exceptions.ConnectionClosed):
                 sent = time.monotonic()
                 answer = cast("asyncio.Future[float]", await connection.ping())
@@ -72,5 +87,5 @@ class DeadMan:
 
     def _heard(self, client: int, sent: float, answer: asyncio.Future[float]) -> None:
         if client == self._client and not answer.cancelled() and answer.exception() is None:
-            self._answered = time.monotonic()
-            self._rhythm.note(PERIOD + self._answered - sent)
+            self._answers += 1
+            self._rhythm.note(PERIOD + time.monotonic() - sent)

@@ -134,8 +134,8 @@ class Hands:
         """Nothing is held any more."""
         self._motion, self._grabbed = np.zeros(7), None
 
-    def bring(self, state: Any, work: Array, sight: Sightline) -> None:
-        """Bring tips that are not in the picture into it: side by side before ``work`` (3,)."""
+    def bring(self, state: Any, work: Array, sight: Sightline, but: int = -1) -> None:
+        """Bring tips that are not in the picture into it, side by side before ``work`` (3,), all ``but`` one."""
         depth = BEFORE * sight.depth(work)
         tips = {i: self._arms[i].tip_in_world(state) for i in self._choices if self._arms[i].ready(state)}
         if depth < NEAREST:
@@ -144,12 +144,12 @@ class Hands:
         for place, arm in zip(
             np.linspace(-ASIDE, ASIDE, len(beside)) if len(beside) > 1 else (0.0,), beside, strict=False
         ):
-            if np.abs(sight.place(tips[arm][:3, 3])).max() < 0.5:  # it is seen already
+            if arm == but or np.abs(sight.place(tips[arm][:3, 3])).max() < 0.5:  # it is seen already
                 continue
             target = tips[arm].copy()
             target[:3, 3] = sight.point(float(place), 0.0, depth)
             facts = self._arms[arm]
-            self._pursuits[arm].pose(facts.in_reference(state, tips[arm]), facts.in_reference(state, target))
+            self._pursuits[arm].pose(facts.in_reference(state, tips[arm]), facts.in_reference(state, target), True)
 
     def drag(self, state: Any, drag: Drag, sight: Sightline) -> int | None:
         """Take the tip along; returns the arm whose tip is taken, None for none."""

@@ -11,8 +11,8 @@ from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 from ligature.cockpit.tone import displayed, linear, reflecting, rendered
+from ligature.model.pictures import read_picture
 from ligature.model.scene import Scene
-from ligature.render.picture_files import read_picture
 from ligature.render.surface import Physical, Surface, roughness_of
 from ligature.render.visuals import Piece, VisualLoader
 

@@ -151,6 +151,8 @@ class ArmPursuits:
         self._arm = arm
         self._motion: JointPursuit | PosePursuit | TwistPursuit | ArcPursuit | None = None
         self._jaw: JointPursuit | None = None
+        self.planned = False
+        """Whether a plan of the page steers it, not a hand: who asks last decides."""
 
     @property
     def active(self) -> bool:
@@ -164,15 +166,26 @@ class ArmPursuits:
             self._motion = JointPursuit(goal, goal.copy(), np.asarray(speed, dtype=float))
         self._motion.target = self._motion.target.copy()
         self._motion.target[joint] = target
+        self.planned = False
 
-    def pose(self, start: Array, target: Array) -> None:
+    def joints(self, start: ArrayLike, target: ArrayLike, speed: ArrayLike) -> None:
+        """Take all joints from ``start`` (n,) to ``target`` (n,) by a plan, all arriving together."""
+        start, target = np.array(start, dtype=float), np.array(target, dtype=float)
+        speed = np.asarray(speed, dtype=float)
+        longest = max(float((np.abs(target - start) / speed).max()), 1e-9)
+        self._motion = JointPursuit(start, target, np.abs(target - start) / longest)
+        self.planned = True
+
+    def pose(self, start: Array, target: Array, planned: bool = False) -> None:
         """Go to ``target`` (4, 4), from ``start`` (4, 4) unless a pose is pursued already."""
         goal = np.array(start) if isinstance(self._motion, JointPursuit | None) else self._motion.goal
         self._motion = PosePursuit(goal, np.array(target))
+        self.planned = planned
 
     def along(self, pose: Callable[[float], Array], start: float, target: float) -> None:
-        """Go along the poses (4, 4) of an arc from the angle ``start`` to ``target``."""
+        """Go along the poses (4, 4) of an arc from the angle ``start`` to ``target``, by a plan."""
         self._motion = ArcPursuit(pose, start, target)
+        self.planned = True
 
     def steer(self, target: float) -> bool:
         """Go to another angle of the arc; False where no arc is pursued."""
@@ -188,16 +201,18 @@ class ArmPursuits:
         elif np.any(twist):
             goal = self._motion.goal if isinstance(self._motion, PosePursuit | ArcPursuit) else np.array(start)
             self._motion = TwistPursuit(goal, np.array(twist))
+        self.planned = False
 
     @property
     def twists(self) -> bool:
         """Whether it moves with a twist."""
         return isinstance(self._motion, TwistPursuit)
 
-    def jaw(self, start: float, target: float, verb: str) -> None:
-        """Open or close to ``target``."""
+    def jaw(self, start: float, target: float, verb: str, planned: bool = False, speed: float = JAW) -> None:
+        """Open or close to ``target`` at ``speed``, in rad/s."""
+        self.planned = planned
         goal = np.array([start]) if self._jaw is None else self._jaw.goal
-        self._jaw = JointPursuit(goal, np.array([target]), np.array([JAW]), verb)
+        self._jaw = JointPursuit(goal, np.array([target]), np.array([speed]), verb)
 
     def rest_jaw(self) -> None:
         """Leave the jaw where it is."""
@@ -219,4 +234,5 @@ class ArmPursuits:
         """Pursue nothing any more; True when something was."""
         was = self.active
         self._motion = self._jaw = None
+        self.planned = False
         return was

@@ -25,13 +25,26 @@ RISE = 0.15
 """Seconds from standing to full speed when the browser answers again."""
 
 
+class Pace:
+    """Share 0..1 of the full speed of an arm; it falls over the second half of the silence that is allowed."""
+
+    def __init__(self) -> None:
+        self._share = 1.0
+
+    def advance(self, silence: float, limit: float, dt: float) -> float:
+        """The share after a ``silence`` of which ``limit`` are allowed, ``dt`` after the last call."""
+        allowed = min(max(2.0 * (1.0 - silence / limit), 0.0), 1.0)
+        self._share = min(allowed, self._share + dt / RISE)
+        return self._share
+
+
 class Rhythm:
     """Silences between answers, or the delays of answers, and the limit that follows from them."""
 
     def __init__(self) -> None:
         self._silences: deque[float] = deque(maxlen=KEPT)
         self._limit = LEAST
-        self._pace = 1.0
+        self._pace = Pace()
 
     def note(self, silence: float) -> None:
         """A silence has ended."""
@@ -45,7 +58,5 @@ class Rhythm:
         return self._limit
 
     def pace(self, silence: float, dt: float) -> float:
-        """Share 0..1 of the full speed, ``dt`` after the last call; it falls over the limit's second half."""
-        allowed = min(max(2.0 * (1.0 - silence / self._limit), 0.0), 1.0)
-        self._pace = min(allowed, self._pace + dt / RISE)
-        return self._pace
+        """Share 0..1 of the full speed, ``dt`` after the last call."""
+        return self._pace.advance(silence, self._limit, dt)

@@ -87,6 +87,11 @@ class Wire:
 
     # --- on the network's thread -----------------------------------------------------------------
 
+    def connection(self, client: int) -> ServerConnection | None:
+        """The connection of a page's script, None while it has none."""
+        line = self._lines.get(client)
+        return None if line is None else line.connection
+
     def _hang_up(self, client: int) -> None:
         line = self._lines.pop(client, None)
         if line is not None:

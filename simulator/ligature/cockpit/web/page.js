@@ -27,7 +27,7 @@
   ];
   const WORDS = [
     ["Behind the clock", "time that the simulation has lost to the wall clock since it began. It does not grow on a machine that is fast enough; the present speed is the figure beside “× real time”."],
-    ["Hold", "an arm slows down and stops when your browser answers late, and goes on when it answers again within half a second."],
+    ["Hold", "an arm slows down and stops when your browser answers late, and goes on when it answers again within half a second. What a button has begun waits longer: the arm goes on for two seconds without your browser, then stands until it answers."],
   ];
   const REPEAT = 40; // milliseconds between messages while something is held
   const DEAD_ZONE = 0.15;
@@ -243,7 +243,7 @@
     if (stage !== "drive") driving = -Infinity;
     else if (!pulled && (driving === -Infinity || (!busy && performance.now() - driving > 2000))) drives.value = String(Math.min(Math.max(driven, 0), 1));
     const now = through ? "The needle is through the tissue." : inside ? "The tip is in the tissue: go on." : TOLD[stage] ?? "";
-    set(told, (busy && BUSY[stage]) || note || now);
+    set(told, (busy && BUSY[stage]) || (!through && note) || now);
     for (const [element, at] of [[picks, "pick"], [aligns, "pick"], [brings, "bring"], [drive, "drive"]]) element.hidden = stage !== at;
     for (const element of [picks, aligns, brings]) element.disabled = busy;
     aims();
