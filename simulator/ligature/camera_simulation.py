@@ -12,6 +12,7 @@ from ligature import simulation
 
 if TYPE_CHECKING:
     from ligature.render.cameras import CameraHandle, Studio
+    from ligature.render.look import Look
 
 
 class Simulation(simulation.Simulation):
@@ -29,6 +30,12 @@ class Simulation(simulation.Simulation):
 
         self._studio = Studio(self)
         return camera_handles(self._studio)
+
+    def change_look(self, look: Look) -> None:
+        """Have lights and bodies look otherwise in all pictures from now on; raises ImportError as `cameras` does."""
+        _ = self.cameras
+        assert self._studio is not None
+        self._studio.change_look(look)
 
     def close(self) -> None:
         """Release the physics engine and OpenGL; the simulation can neither step nor draw after this."""

@@ -289,6 +289,38 @@ def test_a_new_parent_name_carries_the_camera_along(simulator: Program, node: An
     states.wait(lambda m: m.parent_name.data == "")
 
 
+def test_clouds_of_clients_are_drawn_where_they_are(
+    simulator: Program, node: Any, listen: Callable[..., Any], publish: Callable[..., Any]
+) -> None:
+    """As AMBF's example does: a list of topics in a parameter, a cloud in the frame of a body, its size in pixels."""
+    from geometry_msgs.msg import Point32
+    from sensor_msgs.msg import Image, PointCloud
+    from std_msgs.msg import Float32
+
+    topics = node.get_param("/ambf/env/World/point_cloud_topics")
+    node.set_param("/ambf/env/World/point_cloud_topics", [*topics, "/own_cloud"])
+    cloud, size = publish("/own_cloud", PointCloud), publish("/own_cloud/radius", Float32)
+    message = PointCloud()
+    message.header.frame_id = "/ambf/env/Wall"  # at x = -2.1; its face at -2
+    message.points = [Point32(1.1, 0.03, 0.0), Point32(0.0, 0.2, 0.2)]  # one before the face, one inside the wall
+    size.publish(Float32(5.0))
+    depth = listen(f"{NS}/cameraR/DepthImage", Image)
+
+    def drawn(message: Any) -> bool:
+        return abs(float(pixels(message)[message.height // 2, message.width // 2]) - 1.0) < 0.01
+
+    def sent() -> bool:
+        cloud.publish(message)
+        return bool(depth.messages) and drawn(depth.messages[-1])
+
+    until(sent, "the point in the middle of the picture", 20.0, 0.2)
+    shown = pixels(depth.messages[-1])
+    assert int((shown < 1.05).sum()) == 25
+    assert (shown[(shown > 1.05)] >= 1.1).all()
+    node.set_param("/ambf/env/World/point_cloud_topics", topics)
+    until(lambda: not drawn(depth.messages[-1]), "the cloud goes with its topic", 20.0)
+
+
 def test_diagnostics_count_frames(simulator: Program, listen: Callable[..., Any]) -> None:
     from diagnostic_msgs.msg import DiagnosticArray
 

@@ -43,22 +43,32 @@ class Batch:
         self._instances = context.buffer(reserve=len(pieces) * INSTANCE.itemsize, dynamic=True)
         self._before = context.buffer(reserve=len(pieces) * 64, dynamic=True)
         self._arrays: dict[Program, moderngl.VertexArray] = {}
-        self._indices: moderngl.Buffer | None = None
+        self._loaded: Triangles | None = None
         self._legacy: LegacyBuffers | None = None
         self._past: moderngl.Buffer | None = None
         self.load(pieces[0].triangles)
 
     def load(self, triangles: Triangles) -> None:
-        """Put ``triangles`` in the buffers, in place when as many are there already."""
-        self.triangles = triangles
+        """Put ``triangles`` in the buffers, in place when they have the same faces as those that are there."""
+        fresh = self._loaded is None or self._loaded.faces is not triangles.faces
+        self._loaded = triangles
         data = triangles.interleaved(self._tangents).tobytes()
-        if self._indices is None:
-            self._vertices = self._context.buffer(data)
-            self._indices = self._context.buffer(np.ascontiguousarray(triangles.faces, dtype="i4").tobytes())
+        if fresh:
+            self._vertices = self._context.buffer(data or bytes(4))
+            self._indices = self._context.buffer(
+                np.ascontiguousarray(triangles.faces, dtype="i4").tobytes() or bytes(4)
+            )
+            self._arrays, self._legacy = {}, None
         else:
             self._vertices.write(data)
             if self._legacy is not None:
                 self._legacy.load(triangles)
+
+    @property
+    def triangles(self) -> Triangles:
+        """What is in the buffers."""
+        assert self._loaded is not None
+        return self._loaded
 
     def load_past(self, positions: Array) -> None:
         """Put where the vertices (n, 3) were in the picture before in a buffer of their own."""
@@ -163,7 +173,9 @@ class Seen:
 
 
 def _bounding_sphere(triangles: Triangles) -> tuple[float, float, float, float]:
-    """Centre and radius of a sphere about the box of ``triangles``."""
+    """Centre and radius of a sphere about the box of ``triangles``; a point where there are none."""
+    if not len(triangles.positions):
+        return 0.0, 0.0, 0.0, 0.0
     low, high = triangles.positions.min(axis=0), triangles.positions.max(axis=0)
     centre = (low + high) / 2
     radius = float(np.linalg.norm(triangles.positions - centre, axis=1).max())

@@ -16,6 +16,7 @@ from ligature.model.optics import Calibration, stereo_partners
 from ligature.model.scene import Camera
 from ligature.render.calibration import calibrations
 from ligature.render.camera import CameraView, view_of
+from ligature.render.look import Look
 from ligature.render.renderer import Renderer
 from ligature.render.sensor import IDEAL, ImageSensor
 from ligature.render.target import Frame
@@ -31,6 +32,7 @@ class Studio:
         self.scene = simulation.scene
         self.partners = stereo_partners(self.scene)
         self._renderer: Renderer | None = None
+        self._look: Look | None = None
         self._closed = False
         self.handles = [CameraHandle(simulation, self, camera) for camera in simulation.scene.cameras]
 
@@ -41,7 +43,15 @@ class Studio:
             raise RuntimeError("the simulation is closed: its cameras take no more pictures")
         if self._renderer is None:
             self._renderer = Renderer(self.scene)
+            if self._look is not None:
+                self._renderer.change_look(self._look)
         return self._renderer
+
+    def change_look(self, look: Look) -> None:
+        """Have the scene look otherwise from the next picture on."""
+        self._look = look
+        if self._renderer is not None:
+            self._renderer.change_look(look)
 
     def close(self) -> None:
         """Give OpenGL back."""

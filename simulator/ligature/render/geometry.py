@@ -80,7 +80,7 @@ def of_shape(shape: Shape) -> Triangles:
         return plane(shape.normal, shape.offset)
     if isinstance(shape, Hull):
         return hull(shape.vertices)
-    return flat_shaded(shape.vertices, shape.faces)
+    return (smooth_shaded if shape.smooth else flat_shaded)(shape.vertices, shape.faces)
 
 
 def box(size: Array) -> Triangles:
@@ -151,6 +151,17 @@ def flat_shaded(vertices: Array, faces: NDArray[np.int32]) -> Triangles:
         np.zeros((n, 2)),
         np.arange(n, dtype=np.int32).reshape(-1, 3),
     )
+
+
+def smooth_shaded(vertices: Array, faces: NDArray[np.int32]) -> Triangles:
+    """Triangles that share their vertices, whose normals are means over the triangles around, by area."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    areas, normal = np.cross(b - a, c - a), np.zeros_like(vertices)
+    for k in range(3):
+        np.add.at(normal, faces[:, k], areas)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return Triangles(np.asarray(vertices, dtype=float), normal, np.zeros((len(vertices), 2)), faces)
 
 
 def _arc(

@@ -254,13 +254,15 @@ def bind_surface(program: Program, surface: Surface, textures: Textures, lights:
     maps: dict[str, Path | None] = {
         "diffuseMap": surface.texture, "albedoMap": surface.texture, "normalMap": surface.normal_map,
         "metallicMap": look.metallic_map if look else None, "roughnessMap": look.roughness_map if look else None,
-        "aoMap": None, "uMatcapMap": None,
+        "aoMap": surface.occlusion_map, "uMatcapMap": surface.sphere_map,
     }  # fmt: skip
     for name, path in maps.items():
         if name in program:
             (textures.get(path) or textures.white).use(_UNITS[name])
     program.set("uTextureEnabled", surface.texture is not None)
     program.set("vEnableNormalMapping", surface.normal_map is not None)
+    if "skybox" in program:
+        textures.around.use(_UNITS["skybox"])
     if "shadowMap" in program:
         shadow = lights.shadow()
         (shadow[0] if shadow else textures.lit).use(_UNITS["shadowMap"])

@@ -109,6 +109,13 @@ def senses(scene: Scene, state: NDArray[np.void], pixel: float) -> list[Segment]
     return found
 
 
+def plugin_lines(state: NDArray[np.void]) -> list[Segment]:
+    """What plug-ins draw."""
+    rows = range(int(state["plugin_line_count"][0]))
+    lines, colours = state["plugin_line"][0], state["plugin_line_colour"][0].tolist()
+    return [(lines[row, 0], lines[row, 1], tuple(colours[row])) for row in rows]
+
+
 def _rays(sensor: Sensor, state: NDArray[np.void], rows: slice) -> list[Segment]:
     T = pose7_matrix(state["body_pose"][0, sensor.parent]) @ sensor.T_body_sensor
     ends = sensor.rays @ T[:3, :3].T + T[:3, 3]

@@ -182,7 +182,7 @@ def bind_surface(program: Program, surface: Surface, textures: Textures) -> None
     program.set("uEmission", colour.emission)
     program.set("uShininess", float(max(colour.shininess, 1)))
     program.set("uAlpha", colour.alpha)
-    maps = {"uTexture": surface.texture, "uNormalMap": surface.normal_map}
+    maps = {"uTexture": surface.texture, "uNormalMap": surface.normal_map, "uOcclusionMap": surface.occlusion_map}
     if look is not None:
         program.set("uMetallic", look.metallic)
         program.set("uRoughness", look.roughness)

@@ -13,7 +13,7 @@ import moderngl
 _INCLUDE = re.compile(r'^#include "(\w+\.glsl)"$', re.MULTILINE)
 
 _SAMPLERS = range(0x8B5D, 0x8B63)
-"""OpenGL's numbers of the types sampler1D to sampler2DShadow."""
+"""OpenGL's numbers of the types sampler1D to sampler2DShadow, samplerCube among them."""
 
 Defines = frozenset[tuple[str, int]]
 

@@ -21,7 +21,8 @@ from ligature.model.shapes import ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
 from ligature.render.context import create_context, draws_on_processor
-from ligature.render.lights import Lights
+from ligature.render.lights import Lights, LightSettings
+from ligature.render.look import Look, brighter, tinted
 from ligature.render.movement import Movement
 from ligature.render.outlines import smoothed
 from ligature.render.painter import Brushes, Painter
@@ -34,6 +35,7 @@ from ligature.render.textures import Textures
 from ligature.render.thread import Tube
 from ligature.render.tissue import Marks, tissue_surfaces
 from ligature.render.visuals import Piece, VisualLoader
+from ligature.render.volume import volume_surfaces
 
 Array = NDArray[np.float64]
 
@@ -50,8 +52,8 @@ THREAD = Physical(roughness=0.45)
 MAX_TARGETS = 16
 """Frame buffers, one for each size and choice of passes, that are kept for the next picture."""
 
-PLACES = ("body_pose", "ghost_world", "light_world", "tissue_node")
-"""What of a state moves things and their shadows, wherever it is looked at from."""
+PLACES = ("body_pose", "ghost_world", "light_world", "tissue_node", "volume_value")
+"""What of a state moves things or changes their shape, and so their shadows, wherever it is looked at from."""
 
 LARGE = 2.0
 """Radius in metres above which a piece is ground or wall and does not set the extent of shadow maps."""
@@ -92,14 +94,18 @@ class Renderer:
         self._lights = Lights(self._context, scene)
         pieces = loader.of_scene(scene)
         self._tissues = tissue_surfaces(scene, pieces)
+        self._volumes = volume_surfaces(scene, pieces)
         self._marks = [Marks(scene, tissue) for tissue in scene.tissues]
         self._tubes = [Tube(scene, rod) for rod in scene.rods]
         self._in_world = [t.body for t in scene.tissues] + [rod.bodies[0] for rod in scene.rods]
-        soft = {tissue.body for tissue in scene.tissues}
+        soft = {tissue.body for tissue in scene.tissues} | {volume.body for volume in scene.volumes}
         rigid = [piece for piece in pieces if piece.owner not in soft]
+        rigid += [surface.piece for surface in self._volumes]
         deforming = [*(surface.piece for surface in self._tissues), *self._rod_pieces(loader)]
         self._batches, ordered = self._batched([*rigid, *deforming])
-        self._deforming = self._batches[len(self._batches) - len(deforming) :]
+        self._surfaces = [batch.surface for batch in self._batches]
+        first = len(self._batches) - len(deforming)
+        self._cut, self._deforming = self._batches[first - len(self._volumes) : first], self._batches[first:]
         for batch in self._deforming[: len(self._tissues)]:
             batch.marks = np.zeros((0, 8))
         self._instances = Instances(ordered)
@@ -110,12 +116,26 @@ class Renderer:
         self._brushes.prepare(batch.shaders for batch in self._batches)
         self._brushes.prepare(camera.preprocessing_shaders for camera in scene.cameras)
         self._sky = Sky.of(self._context, scene, resolver, self.problems)
+        if self._sky is not None:
+            self._textures.around = self._sky.cube
         self._movement = Movement()
 
     @property
     def lights(self) -> Lights:
         """The lights, whose settings may be changed between pictures."""
         return self._lights
+
+    def change_look(self, look: Look) -> None:
+        """Have the scene look otherwise from the next picture on; `Look` () is as its files state.
+
+        Settings of lights that were changed meanwhile are lost.
+        """
+        stated = [LightSettings.of(light) for light in self._scene.lights[: len(self._lights.settings)]]
+        factors = [*look.brightness, *[1.0] * len(stated)]
+        self._lights.settings[:] = [brighter(light, factors[k]) for k, light in enumerate(stated)]
+        for batch, surface in zip(self._batches, self._surfaces, strict=True):
+            tint = look.tints.get(batch.pieces[0].owner)
+            batch.surface = surface if tint is None else tinted(surface, tint)
 
     @property
     def device(self) -> str:
@@ -223,6 +243,8 @@ class Renderer:
             surface,
             texture=surface.texture if get(surface.texture) else None,
             normal_map=surface.normal_map if get(surface.normal_map) else None,
+            occlusion_map=surface.occlusion_map if get(surface.occlusion_map) else None,
+            sphere_map=surface.sphere_map if get(surface.sphere_map) else None,
         )
         look = surface.physical
         if look is not None:
@@ -242,6 +264,11 @@ class Renderer:
             if surface is not batch.triangles:
                 batch.load(surface)
                 self._instances.reach(batch.rows.start, surface)
+        for batch, volume in zip(self._cut, self._volumes, strict=True):
+            cut = volume.triangles(state["volume_value"][0])
+            if cut is not batch.triangles:
+                batch.load(cut)
+                self._instances.reach(batch.rows.start, cut)
         for batch, drawn in zip(self._deforming, self._tissues, strict=False):
             batch.marks = self._marks[drawn.index].of(state)
         self._lights.place(pose7_matrices(state["light_world"][0]), view)

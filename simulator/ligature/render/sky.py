@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image
 
 from ligature.adf import AdfError, Diagnostic, Mark, Resolver, Severity
+from ligature.model.pictures import PictureError, read_picture
 from ligature.model.scene import Scene
 from ligature.render.camera import CameraView
-from ligature.render.picture_files import PictureError, read_picture
 from ligature.render.programs import Program, source
 
 FACES = ("right", "left", "bottom", "top", "front", "back")
@@ -25,7 +25,8 @@ class Sky:
         self._context = context
         size = min(pictures[0].size)
         faces = b"".join(picture.convert("RGB").resize((size, size)).tobytes() for picture in pictures)
-        self._cube = context.texture_cube((size, size), 3, faces, alignment=1)
+        self.cube = context.texture_cube((size, size), 3, faces, alignment=1)
+        self.cube.build_mipmaps()
         header = "#version 330 core\n"
         self._program = Program(context.program(header + source("sky.vert"), header + source("sky.frag")))
         self._array = context.vertex_array(self._program.linked, [])
@@ -58,7 +59,7 @@ class Sky:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<="
         self._program.write("uWorldFromClip", np.linalg.inv(view.projection[:, :] @ _turned(view.view)))
-        self._cube.use(0)
+        self.cube.use(0)
         self._array.render(moderngl.TRIANGLES, vertices=3)
         self._context.depth_func = "<"
 

@@ -35,12 +35,17 @@ class Physical:
 
 @dataclass(frozen=True)
 class Surface:
-    """Colours, textures and, when the material asks for it, physically based reflectance."""
+    """Colours, textures and, when the material asks for it, physically based reflectance.
+
+    ``occlusion_map`` dims ambient light; ``sphere_map`` is for shaders of scene files.
+    """
 
     colour: Colour = Colour()
     texture: Path | None = None
     normal_map: Path | None = None
     physical: Physical | None = None
+    occlusion_map: Path | None = None
+    sphere_map: Path | None = None
 
     @property
     def opaque(self) -> bool:
@@ -54,6 +59,7 @@ class Surface:
         present = {
             "TEXTURED": self.texture,
             "NORMAL_MAP": self.normal_map,
+            "OCCLUSION_MAP": self.occlusion_map,
             "PHYSICAL": look,
             "METALLIC_MAP": look and look.metallic_map,
             "ROUGHNESS_MAP": look and look.roughness_map,
@@ -66,8 +72,9 @@ class Surface:
 def surface_of(override: Colour | None, material: Material | None) -> Surface:
     """The surface of a mesh part: ADF colours replace the material's, textures stay (specification §10.2)."""
     if override is not None:
-        texture, normal_map = (material.texture, material.normal_map) if material else (None, None)
-        return Surface(override, texture, normal_map, evident(override, texture is not None))
+        own = material or Material("")
+        look = evident(override, own.texture is not None)
+        return Surface(override, own.texture, own.normal_map, look, own.occlusion_map, own.sphere_map)
     if material is None:
         return Surface()
     colour = Colour(
@@ -78,9 +85,8 @@ def surface_of(override: Colour | None, material: Material | None) -> Surface:
         shininess=int(material.shininess),
         alpha=material.alpha,
     )
-    return Surface(
-        colour, material.texture, material.normal_map, _asked(material) or evident(colour, material.texture is not None)
-    )
+    look = _asked(material) or evident(colour, material.texture is not None)
+    return Surface(colour, material.texture, material.normal_map, look, material.occlusion_map, material.sphere_map)
 
 
 def _asked(material: Material) -> Physical | None:

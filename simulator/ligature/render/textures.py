@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from ligature.adf import AdfError, Diagnostic, Mark, Severity
-from ligature.render.picture_files import read_picture
+from ligature.model.pictures import read_picture
 
 
 class Textures:
@@ -20,6 +20,9 @@ class Textures:
         self._loaded: dict[Path, moderngl.Texture | None] = {}
         self.white = context.texture((1, 1), 4, b"\xff" * 4)
         """Stands in where a shader wants a texture that a surface lacks."""
+
+        self.around = context.texture_cube((1, 1), 4, b"\xff" * 24)
+        """What surrounds the scene: its sky box; white where it has none."""
 
         self.lit = context.depth_texture((1, 1), b"\xff" * 4)
         """Stands in for a shadow map where there is no shadow."""

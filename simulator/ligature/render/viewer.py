@@ -127,7 +127,7 @@ class Viewer:
 
     def _segments(self, state: NDArray[np.void]) -> list[overlay.Segment]:
         size = MARK_SHARE * self._reach(state)
-        found = overlay.senses(self.scene, state, PAN_RATE * self._reach(state))
+        found = overlay.senses(self.scene, state, PAN_RATE * self._reach(state)) + overlay.plugin_lines(state)
         if "frames" in self.shown:
             found += overlay.frames(self.scene, state, size)
         if "joints" in self.shown:

@@ -95,6 +95,7 @@ vec3 physical(vec3 shown, vec3 eye, vec3 n, vec3 v) {
 #else
     colour += (f0 * ab.x + ab.y) * surrounding(mirrored, sharpnessOf(a2));
 #endif
+    colour *= ambientShare();
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 l;
         float strength = lightAt(i, eye, l);

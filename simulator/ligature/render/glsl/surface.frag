@@ -15,6 +15,10 @@ uniform sampler2D uNormalMap;
 in vec4 vTangent;
 #endif
 
+#ifdef OCCLUSION_MAP
+uniform sampler2D uOcclusionMap;  // red: how much ambient light arrives
+#endif
+
 #ifdef ANALYTIC
 #include "analytic.glsl"
 in vec3 vLocal;
@@ -27,6 +31,15 @@ in vec2 vTexCoord;
 flat in ivec2 vIds;
 
 #include "lights.glsl"
+
+float ambientShare() {
+#ifdef OCCLUSION_MAP
+    return texture(uOcclusionMap, vTexCoord).r;
+#else
+    return 1.0;
+#endif
+}
+
 #ifdef PHYSICAL
 #include "physical.glsl"
 #endif
@@ -85,7 +98,7 @@ vec3 shadedNormal(vec3 n) {
 
 vec3 phong(vec3 texel, vec3 eye, vec3 n, vec3 toEye) {
     vec3 base = uDiffuse * texel;
-    vec3 colour = (uEmission + AMBIENT_LIGHT * uAmbient) * texel;
+    vec3 colour = (uEmission + ambientShare() * AMBIENT_LIGHT * uAmbient) * texel;
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 toLight;
         float strength = lightAt(i, eye, toLight);
