@@ -15,7 +15,7 @@ KILLS ?= 200
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
-.PHONY: run demo film test test-slow setup developers lint types check-imports unit fuzz bench contact-sheet soak docs site wheel addon test-blender blender-module clean
+.PHONY: run demo film test test-slow setup developers lint types check-imports unit fuzz bench curves contact-sheet soak docs site wheel addon test-blender blender-module clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -72,7 +72,8 @@ lint: developers
 	.venv/bin/lint-imports
 
 # those that watch real time come alone, one after the other
-IN_REAL_TIME := tests/ros tests/cli tests/cockpit tests/teleop
+IN_REAL_TIME := tests/ros tests/cockpit \
+  $(foreach test,ambf_simulator master physics recorder replay set_up supervisor,tests/cli/test_$(test).py)
 unit: developers blender-module
 	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python $(PYTHON) -m pytest -m "not slow" -n 2 --dist loadfile \
 		tests $(IN_REAL_TIME:%=--ignore=%); first=$$?; \
@@ -98,6 +99,18 @@ fuzz: developers
 
 bench: developers
 	$(PYTHON) -m tests.bench.run
+
+# docs/pictures/learning_curves.png: three trainings of three tasks; needs the extra `train`
+CURVES := build/curves
+curves: developers
+	mkdir -p $(CURVES)
+	set -e; for seed in 0 1 2; do \
+	  $(PYTHON) examples/scale_out.py reach $(CURVES)/reach_$$seed.onnx --seed $$seed --rounds 5 --episodes 10; \
+	  $(PYTHON) examples/scale_out.py pick $(CURVES)/pick_$$seed.onnx --seed $$seed --rounds 5 --episodes 20 --epochs 150; \
+	  $(PYTHON) examples/scale_out.py insert $(CURVES)/insert_$$seed.onnx --seed $$seed --rounds 4 --episodes 8 --noise 0.1; \
+	done
+	$(PYTHON) examples/learning_curves.py docs/pictures/learning_curves.png "episodes shown" \
+	  $(foreach task,reach pick insert,$(task)=$(CURVES)/$(task)_0.csv,$(CURVES)/$(task)_1.csv,$(CURVES)/$(task)_2.csv)
 
 # every scene drawn with and without shaders of its own, in build/contact_sheet.png
 contact-sheet: setup

@@ -56,6 +56,19 @@ def test_all_files_that_kernels_take_constants_from_decide_which_code_is_taken()
     assert not missing, missing
 
 
+LINKED = """
+from ligature import kernels
+@kernels.kernel
+def twice(x):
+    return 2 * x
+@kernels.kernel
+def thrice(x):
+    return twice(x) + x
+def hits(kernel):
+    return sum(kernel.stats.cache_hits.values())
+"""
+
+
 def run(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
     env = {**os.environ, **environment}
     return subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, timeout=120)
@@ -66,6 +79,16 @@ def program(tmp_path: Path) -> str:
     """Defines a kernel in a file: Numba keeps no code of what has no source."""
     (tmp_path / "doubling.py").write_text(PROGRAM)
     return f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import doubling"
+
+
+def test_a_kernel_that_is_new_links_with_one_that_was_kept(tmp_path: Path) -> None:
+    """Of a kernel that is loaded, only bitcode is left to link with."""
+    (tmp_path / "linked.py").write_text(LINKED)
+    environment = {"PYTHONPATH": str(tmp_path), "LIGATURE_CACHE": str(tmp_path / "cache")}
+    first = run("from linked import *; print(twice(2.0))", **environment)
+    second = run("from linked import *; print(twice(2.0), hits(twice), thrice(2.0), hits(thrice))", **environment)
+    third = run("from linked import *; print(thrice(2.0), hits(thrice))", **environment)
+    assert [done.stdout.strip() for done in (first, second, third)] == ["4.0", "4.0 1 6.0 0", "6.0 1"], second.stderr
 
 
 @pytest.mark.parametrize("variable", ["LIGATURE_CACHE", "XDG_CACHE_HOME", "HOME"])

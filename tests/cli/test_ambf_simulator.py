@@ -67,7 +67,7 @@ def test_flags_without_effect_are_accepted_and_reported() -> None:
     run = options("-t 0 -g 1 -f 1 --plugins 'a.so, b.so'")
     assert run.notes == (
         "-f (fixed haptic step) has no effect here",
-        "--plugins (simulator plug-ins) has no effect here",
+        "--plugins (AMBF's plug-ins in C++) has no effect here",
         "-t 0: the step is fixed here anyway; simulated time falls behind on a machine that is too slow",
     )
 

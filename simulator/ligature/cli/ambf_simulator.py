@@ -13,7 +13,7 @@ MAX_UPDATE_RATE = 1000.0
 
 _WITHOUT_EFFECT = {
     ("-f", "--fixed_htx_timestep"): "fixed haptic step",
-    ("--plugins",): "simulator plug-ins",
+    ("--plugins",): "AMBF's plug-ins in C++",
 }
 
 
@@ -38,6 +38,9 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("--arm", action="append", default=[], type=_arm, help="NAME=KIND:BODY:TOOL (not an AMBF flag)")
     flags.add_argument("--only", default="", help="names of the arms that are there (not an AMBF flag)")
     flags.add_argument("--no-masters", action="store_true", help="no master arms (not an AMBF flag)")
+    flags.add_argument(
+        "--allow-plugins", action="store_true", help="run plug-ins in Python that the files name (not an AMBF flag)"
+    )
     flags.add_argument("--base-frames", default="", help="ECM: poses of arms relative to it (not an AMBF flag)")
     flags.add_argument("--src-crtk", action="store_true", help="arms under /CRTK too (not an AMBF flag)")
     flags.add_argument("--names", choices=("ambf", "src"), default="ambf", help="name policy (not an AMBF flag)")
@@ -101,7 +104,7 @@ def options_of(arguments: list[str]) -> RunOptions:
         min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
         window=bool(given.g), notes=_notes(given), devices=devices, only=only, masters=not given.no_masters,
-        base_frames=given.base_frames, haptic_rate=given.d, haptic_forces=given.e,
+        base_frames=given.base_frames, haptic_rate=given.d, haptic_forces=given.e, allow_plugins=given.allow_plugins,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""``ligature convert``: a URDF or MJCF robot as an ADF model with its meshes."""
+"""``ligature convert``: a URDF, SDF or MJCF robot as an ADF model with its meshes, and a model as URDF or SDF."""
 
 from __future__ import annotations
 
@@ -7,35 +7,46 @@ from pathlib import Path
 
 from rich.console import Console
 
+from ligature.adf import AdfError, Resolver, read_any
 from ligature.adf.patch import PatchError
 from ligature.adf.update import new_text
 from ligature.authoring.conversion import Converted
 from ligature.authoring.mjcf import from_mjcf
 from ligature.authoring.objfile import MeshWriteError, Paint, Surface, obj_texts
+from ligature.authoring.robot import exported, read_sdf, read_urdf, sdf_text, to_adf, urdf_text
 from ligature.authoring.save import SaveError, checked_text, save_all
-from ligature.authoring.urdf import from_urdf
 from ligature.authoring.xml_files import XmlError, check_xml
 from ligature.paths import real_path
+
+MODELS = (".yaml", ".yml", ".ambf")
+READ = (".urdf", ".sdf", ".world", ".xml", *MODELS)
+WRITTEN = {".urdf": urdf_text, ".sdf": sdf_text}
 
 
 def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
     """Write the model and its meshes; returns the exit status."""
-    if source.suffix.lower() not in (".urdf", ".xml"):
-        console.print(f"{source}: only URDF (.urdf) and MJCF (.xml) are converted", style="red", markup=False)
+    kind = source.suffix.lower()
+    if kind not in READ:
+        console.print(
+            f"{source}: only URDF (.urdf), SDF (.sdf, .world), MJCF (.xml) and ADF models (.yaml) are converted",
+            style="red", markup=False,
+        )  # fmt: skip
         return 1
     if not source.is_file():
         console.print(f"{source}: file not found", style="red", markup=False)
         return 1
+    if kind in MODELS:
+        return _export(source, out, console)
     try:
         check_xml(source)
-        converted = _mjcf(source) if _is_mjcf(source) else _urdf(source)
+        converted = _robot(source)
         written = save_all(_files(converted, real_path(out), namespace))
     except (SaveError, PatchError, MeshWriteError, MissingReaderError, XmlError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
     except Exception as error:  # what a library raises for bad files is its own affair
-        kind = "an MJCF" if _is_mjcf(source) else "a URDF"
-        console.print(f"{source}: this is not {kind} that can be read: {error}", style="red", markup=False)
+        name = "an MJCF" if _is_mjcf(source) else "a URDF" if kind != ".sdf" else "an SDF"
+        console.print(f"{source}: this is not {name} that can be read: {error}", style="red", markup=False)
         return 1
     for note in converted.notes:
         console.print(f"note: {note}", style="yellow", markup=False)
@@ -60,12 +71,37 @@ def _is_mjcf(source: Path) -> bool:
     return found is not None and found[1] in ("mujoco", "mujocoinclude")
 
 
-def _urdf(source: Path) -> Converted:
-    import yourdfpy
+def _robot(source: Path) -> Converted:
+    """A robot in whichever of the three formats it is."""
+    if _is_mjcf(source):
+        return _mjcf(source)
+    robot = read_urdf(source) if source.suffix.lower() in (".urdf", ".xml") else read_sdf(source)
+    return to_adf(robot, real_path(source).parent)
 
-    # meshes are read by our own reader, so that the file's paths mean what its folder makes of them
-    robot = yourdfpy.URDF.load(str(source), build_scene_graph=False, load_meshes=False).robot
-    return from_urdf(robot, real_path(source).parent)
+
+def _export(source: Path, out: Path, console: Console) -> int:
+    """Write a model as URDF or SDF with its meshes; returns the exit status."""
+    if out.suffix.lower() not in WRITTEN:
+        console.print(f"{out}: a model is written as .urdf or .sdf; name such a file", style="red", markup=False)
+        return 1
+    try:
+        resolver = Resolver.for_file(source)
+        document = read_any(source, resolver)
+        if document.kind != "model":
+            console.print(f"{source}: this is a {document.kind} file; give a model", style="red", markup=False)
+            return 1
+        done = exported(document, resolver, out.stem)
+        text, notes = WRITTEN[out.suffix.lower()](done.robot)
+        folder = real_path(out).parent
+        written = save_all({**{folder / n: data for n, data in done.files.items()}, real_path(out): text.encode()})
+    except (AdfError, SaveError) as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
+    for note in (*done.notes, *notes):
+        console.print(f"note: {note}", style="yellow", markup=False)
+    links, joints = len(done.robot.links), len(done.robot.joints)
+    console.print(f"{out}: {links} links, {joints} joints, {len(written)} files", markup=False)
+    return 0
 
 
 def _mjcf(source: Path) -> Converted:

@@ -62,6 +62,12 @@ Cameras = Annotated[
     typer.Option("--camera", help="For a dataset: a camera, or 'none'; repeatable. By default cameraL and cameraR."),
 ]
 
+AllowPlugins = Annotated[
+    bool,
+    typer.Option(
+        "--allow-plugins", help="Run the plug-ins that the scene's files name; their code can do all you can."
+    ),
+]
 Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies the scene gets.")]  # noqa: UP045
 
 FIRST_THROW = Path("needle_insertion")
@@ -159,6 +165,7 @@ def run(
         Optional[list[str]],  # noqa: UP045
         typer.Option(help="A rigid body that is to be soft tissue, BODY or BODY=MATERIAL; repeatable."),
     ] = None,
+    allow_plugins: AllowPlugins = False,
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
@@ -177,7 +184,7 @@ def run(
         task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
         devices=indices(devices) or (), soft=tuple(soft or ()), only=names_of_arms, masters=masters,
-        base_frames=base_frames,
+        base_frames=base_frames, allow_plugins=allow_plugins,
     )  # fmt: skip
     supervise(options)
 
@@ -204,6 +211,7 @@ def cockpit(
     rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
     speed: Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)] = 1.0,
     devices: Devices = None,
+    allow_plugins: AllowPlugins = False,
 ) -> None:
     """Run a scene with a live web page and without ROS; see `run --cockpit` for both.
 
@@ -212,6 +220,7 @@ def cockpit(
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
         cockpit=_served_at(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
+        allow_plugins=allow_plugins,
     )  # fmt: skip
     supervise(options)
 
@@ -364,11 +373,11 @@ def inertia(
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(help="A URDF or MJCF file.")],
-    out: Annotated[Path, typer.Option("-o", help="The model file to write.")],
+    source: Annotated[Path, typer.Argument(help="A URDF, SDF or MJCF file, or a model.")],
+    out: Annotated[Path, typer.Option("-o", help="The model to write; of a model the .urdf or .sdf.")],
     namespace: Annotated[str, typer.Option(help="Namespace of the model.")] = "/ambf/env/",
 ) -> None:
-    """Turn a URDF or MJCF robot into an ADF model with its meshes; reports what ADF cannot express."""
+    """Turn a URDF, SDF or MJCF robot into an ADF model, or a model into URDF or SDF; reports what is lost."""
     from ligature.cli.convert import convert as run_convert
 
     raise typer.Exit(run_convert(source, out, namespace, Console(highlight=False, soft_wrap=True)))
@@ -416,12 +425,21 @@ def evaluate(
         str,
         typer.Argument(help="expert, random, a network *.onnx, FILE.py:FUNCTION or MODULE:FUNCTION (its code runs)."),
     ],
-    env: Annotated[str, typer.Option("--env", help="Task of the environment: reach, pick, insert or puncture.")],
+    env: Annotated[str, typer.Option("--env", help="Task of the environment, such as reach, pick or hand_over.")],
     episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 100,
     first_seed: Annotated[int, typer.Option(help="Seed of the first; train with seeds below it.", min=0)] = 1_000_000,
-    max_steps: Annotated[int, typer.Option(help="Actions until an episode is cut.", min=1)] = 200,
+    max_steps: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            help="Actions until an episode is cut; by default as many as the registered environment allows.", min=1
+        ),
+    ] = None,
     action: Annotated[str, typer.Option(help="cartesian or joint.")] = "cartesian",
     observation: Annotated[str, typer.Option(help="state, image or both.")] = "state",
+    randomise: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="YAML file of ranges from which every episode draws masses, lights, delays and more."),
+    ] = None,
     out: Annotated[Optional[Path], typer.Option(help="Folder for evaluation.json and a page with pictures.")] = None,  # noqa: UP045
     pictures: Annotated[int, typer.Option(help="Episodes with pictures on the page.", min=0)] = 4,
     jobs: Annotated[int, typer.Option("-j", help="Processes.", min=1)] = 1,
@@ -430,6 +448,8 @@ def evaluate(
     from ligature.cli.evaluate import evaluate as run_evaluate
 
     options = {"task": env, "action": action, "observation": observation}
+    if randomise is not None:
+        options["randomise"] = str(randomise)
     seeds = range(first_seed, first_seed + episodes)
     console = Console(highlight=False, soft_wrap=True)
     raise typer.Exit(run_evaluate(policy, options, seeds, max_steps, out, pictures, jobs, console))
@@ -480,6 +500,7 @@ def replay(
         typer.Option("--success/--failure", help="For a dataset: how the run went, where nothing judges it."),
     ] = None,
     text: Annotated[str, typer.Option(help="For a dataset: the task as an instruction in words.")] = "",
+    allow_plugins: AllowPlugins = False,
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
     if page or compare is not None:
@@ -497,7 +518,8 @@ def replay(
     if dataset is None and (task or text or success is not None):
         raise typer.BadParameter("--task, --success and --text are for '--dataset'")
     sampled = None if dataset is None else Sampled(dataset, sampling, task, success, text)
-    raise typer.Exit(run_replay(file, scene, joints, speed, Console(highlight=False, soft_wrap=True), sampled))
+    console = Console(highlight=False, soft_wrap=True)
+    raise typer.Exit(run_replay(file, scene, joints, speed, console, sampled, allow_plugins))
 
 
 @app.command()

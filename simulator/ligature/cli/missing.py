@@ -14,7 +14,6 @@ EXTRAS: Mapping[str, str] = {
     "pyarrow": "lerobot",
     "av": "lerobot",
     "onnxruntime": "train",
-    "yourdfpy": "convert",
     "mujoco": "convert",
 }
 """Modules that only one feature needs, and the extra of the distribution that installs each."""

@@ -31,7 +31,7 @@ class RunOptions:
     that are soft tissue, ``only`` the names of the arms that are there (empty: all), ``masters`` whether
     master arms are, ``base_frames`` the arm in the frame of whose tip the others give their poses (empty: each in its
     base). ``haptic_rate`` in Hz (0: that of the device) and ``haptic_forces`` (None: as teleoperation has them) are
-    left to teleoperation as parameters.
+    left to teleoperation as parameters. ``allow_plugins``: the plug-ins that the scene's files name are run.
     """
 
     scene: str
@@ -61,6 +61,7 @@ class RunOptions:
     base_frames: str = ""
     haptic_rate: float = 0.0
     haptic_forces: bool | None = None
+    allow_plugins: bool = False
 
     def load(self) -> Scene:
         """The scene of this run; raises `ligature.SceneError`."""
@@ -68,7 +69,16 @@ class RunOptions:
         scene = ligature.load(
             self.scene, self.models, self.files, self.roots, self.prefix, arms, self.devices, self.soft
         )
-        return replace(scene, arms=self._chosen(scene))
+        return self._permitted(replace(scene, arms=self._chosen(scene)))
+
+    def _permitted(self, scene: Scene) -> Scene:
+        """The scene without its plug-ins, unless they are allowed; a finding then names them."""
+        if self.allow_plugins or not scene.plugins:
+            return scene
+        names = ", ".join(plugin.name for plugin in scene.plugins)
+        text = f"the scene's plug-ins are not run: {names}"
+        note = Diagnostic(Severity.INFO, text, hint="--allow-plugins runs them: their code can do all that you can")
+        return replace(scene, plugins=(), diagnostics=(*scene.diagnostics, note))
 
     def _chosen(self, scene: Scene) -> tuple[ArmDescription, ...]:
         """The arms of a scene that are asked for; raises `ligature.SceneError` for one that is missing."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +11,9 @@ from rich.console import Console
 
 import ligature
 from ligature.adf import AdfError
+
+PROGRESS_SECONDS = 0.5
+"""Seconds between two lines ``N of M frames``, which editors show as progress."""
 
 
 def poses(
@@ -35,10 +39,14 @@ def poses(
     simulation = ligature.Simulation(scene, dt=1e-3)
     names = [body.identity.identifier for body in scene.bodies]
     ticks = np.rint(np.arange(int(seconds * rate + 1e-9) + 1) * 1000.0 / rate).astype(int)
-    frames = []
+    frames: list[np.ndarray] = []
+    reported = time.monotonic()
     for wait in np.diff(ticks, prepend=0):
         simulation.step(int(wait))
         frames.append(np.array([simulation.bodies[name].pose for name in names]))
+        if time.monotonic() - reported > PROGRESS_SECONDS:
+            console.print(f"{len(frames)} of {len(ticks)} frames", markup=False)
+            reported = time.monotonic()
     times = ticks * 1e-3
     np.savez(out, identifiers=np.array(names), times=times, poses=np.array(frames))
     console.print(f"{out}: {len(names)} bodies, {len(frames)} frames", markup=False)

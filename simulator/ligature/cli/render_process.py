@@ -19,10 +19,12 @@ from ligature.model.state import new_state
 from ligature.process import report
 from ligature.render import CameraView, ImageSensor, LightKind, Renderer, RenderUnavailable, unproject, view_of
 from ligature.render.calibration import Eye, calibrations
+from ligature.render.clouds import with_clouds
 from ligature.render.sensor import IDEAL
 from ligature.render.shutter import Shutter
 from ligature.ros.camera_facts import CameraFacts, facts
 from ligature.ros.cameras import CameraNode, CameraTopics, Picture, Wishes
+from ligature.ros.clouds import Clouds
 from ligature.ros.master import MasterWatch
 from ligature.ros.parameters import Follower
 from ligature.ros.registrations import NameTaken
@@ -86,6 +88,7 @@ class Studio:
         self._node = CameraNode(scene, self.cameras, bool(options.cameras))
         self._follower = Follower(scene)
         self._facts, self._seen = CameraFacts(), new_state(scene)
+        self._clouds = Clouds(scene)
         MasterWatch(self._look_at_parameters).start()
         self._rejected: set[str] = set()
         self._exposures = [_Exposure(topics) for topics in self._node.topics]
@@ -93,6 +96,7 @@ class Studio:
     def _look_at_parameters(self) -> None:
         """Read what users have set, and write what follows from it; on the thread that watches the master."""
         self._follower.poll()
+        self._clouds.poll()
         if self._block.filled and self._block.read(self._seen):
             poses = self._seen["camera_world"][0]
             found = self._calibrations(poses)
@@ -147,7 +151,10 @@ class Studio:
         sensor = self._sensor(camera, view)
         moment = (index, int(self._state["tick"][0]))
         passes = wishes.passes | {"rgb", "depth"} if wishes.cloud else wishes.passes
+        clouds = self._clouds.shown(self._state["body_pose"][0])
+        passes = passes | {"depth"} if clouds else passes
         drawn = self._renderer.render(self._state, sensor.view(view), sorted(passes), camera.preprocessing_shaders)
+        drawn = with_clouds(drawn, clouds, sensor.view(view)) if clouds else drawn
         frame = sensor.expose(drawn, view, moment)
         if wishes.passes:
             exposure.topics.publish_picture(Picture(frame.rgb, frame.depth, frame.ids), stamp)

@@ -17,12 +17,18 @@ from ligature.cli.sampling import Sampled
 
 
 def replay(
-    file: Path, scene: Path | None, joints: str, speed: float, console: Console, dataset: Sampled | None = None
+    file: Path,
+    scene: Path | None,
+    joints: str,
+    speed: float,
+    console: Console,
+    dataset: Sampled | None = None,
+    allow_plugins: bool = False,
 ) -> int:
     """Replay ``file``, a record into ``dataset`` too; the exit status is 1 when a run did not repeat bit for bit."""
     try:
         if is_record(file):
-            return _again(Record.read(file), scene, dataset, console)
+            return _again(Record.read(file), scene, dataset, console, allow_plugins)
         if dataset is not None:
             raise ValueError(f"{file}: not a record of a run; a dataset needs one")
         return _play(file, joints, speed, console)
@@ -36,12 +42,12 @@ def replay(
     return 1
 
 
-def _again(record: Record, scene: Path | None, dataset: Sampled | None, console: Console) -> int:
+def _again(record: Record, scene: Path | None, dataset: Sampled | None, console: Console, allow_plugins: bool) -> int:
     rate = RunOptions.from_text(record.header.options).rate
     console.print(f"{len(record.commands)} commands, {record.updates / rate:.3f} s of simulated time", markup=False)
     clock = time.perf_counter()
     if dataset is None:
-        simulation = resimulate(record, scene)
+        simulation = resimulate(record, scene, allow_plugins=allow_plugins)
     else:
         from ligature.cli.replay_dataset import sampled
 

@@ -21,18 +21,22 @@ class Differs(ValueError):
 
 
 def resimulate(
-    record: Record, scene: Path | None, watch: Callable[[ligature.Simulation], None] = lambda _: None
+    record: Record,
+    scene: Path | None,
+    watch: Callable[[ligature.Simulation], None] = lambda _: None,
+    allow_plugins: bool = False,
 ) -> ligature.Simulation:
     """Simulate a recorded run again; ``scene`` replaces the launch file that the record names.
 
-    ``watch`` sees the simulation where what was asked to be recorded begins, and after each update from there on.
-    Raises `ligature.SceneError`, and `Differs` when the scene does not begin as the recorded one did, or goes on
-    otherwise.
+    The user alone allows plug-ins, never a record. ``watch`` sees the simulation where what was asked to be recorded
+    begins, and after each update from there on. Raises `ligature.SceneError`, and `Differs` when the scene does not
+    begin as the recorded one did, or goes on otherwise.
     """
     options = RunOptions.from_text(record.header.options)
-    if scene is not None:
-        options = replace(options, scene=str(scene))
-    simulation = ligature.Simulation(options.load(), TICK, 1.0 / options.rate)
+    if options.allow_plugins and not allow_plugins:
+        raise Differs("the run was recorded with --allow-plugins; replay it with 'ligature replay --allow-plugins'")
+    options = replace(options, allow_plugins=allow_plugins, scene=options.scene if scene is None else str(scene))
+    simulation = ligature.Simulation(options.load(), TICK, 1.0 / options.rate, allow_plugins)
     ticks = simulation.ticks_per_update
     simulation.step(ticks)
     if simulation.state_hash() != record.header.begin:
