@@ -16,6 +16,7 @@ from ligature.robots.psm import Psm
 CACHES: dict[str, str] = {
     # what a rod or hole works with within one tick; every row is written before it is read
     "Rod._table": "addresses of arrays",
+    "Engine._restored": "what Bullet makes of a pose that it is given: the same for the same pose",
     "Rod._arrays": "what of it lasts are attributes of the rod, too",
     "Joints._table": "addresses of arrays",
     "Motions.table": "addresses of arrays",
@@ -209,8 +210,8 @@ CACHES: dict[str, str] = {
     # what sensors make of the state
     **dict.fromkeys(
         (
-            *(f"GhostArrays.{name}" for name in ("measured_ghost", "measured_body", "room", "inside", "due")),
-            *(f"Ghosts._{name}" for name in ("measured_ghost", "measured_body", "room", "inside", "due")),
+            *(f"GhostArrays.{name}" for name in ("apart", "measured", "room", "inside", "due")),
+            *(f"Ghosts._{name}" for name in ("apart", "measured", "room", "inside", "due")),
             "Contacts._tick",
             "Contacts._found",
             "Contacts._numbers",

@@ -112,6 +112,7 @@ def test_snapshots_and_resets_are_exact_at_random_times(name: str) -> None:
     expected = one.state_hash()
     for other in (one, Simulation(scene)):
         other.restore(taken)
+        other.restore(other.snapshot())
         assert other.state_hash() == before
         driver.run(other, at, at + more)
         assert other.state_hash() == expected

@@ -151,7 +151,7 @@ IMPORTED = {
     "lerobot": ("h5py", "pyarrow.parquet", "av", "ligature.datasets.lerobot"),
     "train": ("torch", "stable_baselines3", "onnx", "onnxscript", "onnxruntime"),
     "cockpit": ("viser", "websockets", "ligature.cockpit.page"),
-    "convert": ("yourdfpy", "mujoco"),
+    "convert": ("mujoco",),
 }
 """What each extra for users brings, as it is imported."""
 

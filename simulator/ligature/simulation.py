@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -25,6 +25,7 @@ from ligature.model.commands import (
     CommandType,
     ParentCommand,
     PlaceCommand,
+    PluginCommand,
     Release,
     Reset,
     WatchContacts,
@@ -38,15 +39,18 @@ from ligature.model.state import StateRecord, new_state
 from ligature.model.subsystem import Subsystem, copied
 from ligature.physics import Controllers, World, failed, failure
 from ligature.physics.guard import Guard
+from ligature.physics.volumes import Volumes
+from ligature.plugins import AfterStep, Host, Plugins
 from ligature.robots.commands import ArmCommand
 from ligature.sensing.actuators import Actuators
 from ligature.sensing.contacts import Contacts
 from ligature.sensing.ghosts import Ghosts
 from ligature.sensing.mounts import Mounts
 from ligature.sensing.rays import Rays
+from ligature.sensing.targets import Targets
 from ligature.sensing.touches import Touches
 from ligature.soft import BeforeRods, Tissues
-from ligature.suture import Insertion, Suture
+from ligature.suture import Insertion, RodQueries, Suture
 
 Array = NDArray[np.float64]
 Handle = TypeVar("Handle")
@@ -202,9 +206,15 @@ class Simulation:
     update
         Length of an update in seconds, a whole number of ticks: how often commands of servers are
         taken and states are written for them.
+    allow_plugins
+        Whether the plug-ins that the scene's files name are run: their code has the rights of this process.
     """
 
-    def __init__(self, scene: Scene, dt: float = 1e-3, update: float | None = None) -> None:
+    def __init__(
+        self, scene: Scene, dt: float = 1e-3, update: float | None = None, allow_plugins: bool = False
+    ) -> None:
+        if scene.plugins and not allow_plugins:
+            scene = replace(scene, plugins=())
         self.scene = scene
         self.dt = dt
         self.ticks_per_update = max(1, round((update or dt) / dt))
@@ -218,7 +228,8 @@ class Simulation:
         queries = self._world.queries
         self._suture = Suture(scene, self._world, dt)
         self._mounts = Mounts(scene)
-        self._rays = Rays(scene, queries, self._world, self._suture.rods)
+        targets = Targets(self._world, queries, self._suture.rods, RodQueries(self._suture.rods, self._world))
+        self._rays = Rays(scene, targets)
         self._touches = Touches(queries)
         self.arms = ArmSet(scene, self._world, dt)
         actuator_grasps, rods = ActuatorGrasps(scene, self._world), self._suture.rods
@@ -226,11 +237,15 @@ class Simulation:
         self.grasps = Grasps(scene, self._world, rods, actuator_grasps, lambda: self._actuators.held)
         self.tissues = Tissues(scene, self._world, rods, dt)
         before, after = ((BeforeRods(self.tissues),), (self.tissues,)) if scene.tissues else ((), ())
+        volumes = Volumes(scene, self._world)
+        host = Host(scene, dt, targets, self._world.joints.state, lambda: self._clock.tick, self.apply, volumes.of_body)
+        self._plugins = Plugins(host)
+        before_all, after_all = ((self._plugins,), (AfterStep(self._plugins),)) if scene.plugins else ((), ())
         self._tick: dict[str, tuple[Subsystem, ...]] = {
-            "control": (self.arms, self._actuators, self._rays, Controllers(self._world)),
+            "control": (*before_all, self.arms, self._actuators, self._rays, Controllers(self._world)),
             "suture": (*before, self._suture, *after, self.grasps),
-            "bodies": (self._world,),
-            "sensing": (self._touches, self._mounts, Ghosts(scene, queries), Contacts(scene, queries)),
+            "bodies": (self._world, *((volumes,) if scene.volumes else ())),
+            "sensing": (self._touches, self._mounts, Ghosts(scene, queries), Contacts(scene, targets), *after_all),
         }
         """What a tick does, phase by phase: all subsystems in the order of their steps."""
         self._subsystems = [subsystem for phase in self._tick.values() for subsystem in phase]
@@ -253,11 +268,13 @@ class Simulation:
             PlaceCommand: lambda c: self._mounts.place(c.kind, c.index, c.pose),
             ParentCommand: lambda c: self._mounts.adopt(c.kind, c.index, c.parent),
             ArmCommand: self.arms.apply,
+            PluginCommand: self._plugins.receive,
             WatchContacts: lambda c: self._touches.watch(c.enabled),
             Release: self._release,
             Reset: lambda c: self.reset(bodies_only=c.bodies_only),
         }
         self._guard = Guard(scene, self._world, self.state)
+        self._plugins.load()
         self._write_state()
         self._watch_anew()
 
@@ -466,7 +483,8 @@ class Simulation:
         return digest.hexdigest()
 
     def close(self) -> None:
-        """Give the physics engine back."""
+        """Let plug-ins end, and give the physics engine back."""
+        self._plugins.close()
         self._world.close()
 
 

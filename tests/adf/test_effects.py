@@ -23,6 +23,7 @@ import trimesh
 import yaml
 from ligature.adf import Severity
 from ligature.adf.schema import NOT_SIMULATED, SCHEMA, Key, Status, Type
+from PIL import Image
 
 from tests.fuzz.seeds import ASCII_STL, MTL, OBJ
 
@@ -49,6 +50,10 @@ SUBJECTS: dict[str, dict[str, Any]] = {
     "camera": {"name": "subject", "location": {"x": 1, "y": 0, "z": 0}, "look at": AT},
     "light": {"name": "subject", "location": {"x": 1, "y": 0, "z": 1}, "direction": {"x": 0, "y": 0, "z": -1}},
     "suture": {"name": "subject", "length": 0.1, "diameter": 0.0004, "elements": 12},
+    "volume": {
+        "name": "subject", "parent": "BODY base",
+        "images": {"path": "./", "prefix": "slice", "format": "png", "count": 3},
+    },
     "soft body": {"name": "subject", "mass": 0.2, "mesh": "lump.obj", "config": {"kLST": 0.01, "kMT": 0.01}},
     "input device": {"hardware name": "MTMR", "simulated multibody": "proxy.yaml", "root link": "BODY handle"},
 }  # fmt: skip
@@ -56,7 +61,7 @@ SUBJECTS: dict[str, dict[str, Any]] = {
 
 LISTS = {
     "body": "bodies", "joint": "joints", "ghost object": "ghost objects", "sensor": "sensors",
-    "actuator": "actuators", "camera": "cameras", "light": "lights", "suture": "sutures", "soft body": "soft bodies",
+    "actuator": "actuators", "camera": "cameras", "light": "lights", "suture": "sutures", "soft body": "soft bodies", "volume": "volumes",
 }  # fmt: skip
 
 ROUND = {"shape": "CYLINDER", "geometry": {"radius": 0.1, "height": 0.2}}
@@ -127,8 +132,9 @@ CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
     ("body", "controller output type"): {"controller": {half: {"P": 10, "D": 1} for half in ("linear", "angular")}},
     **{
         (kind, "use material"): {"color rgba": {"r": 1, "g": 0, "b": 0, "a": 1}}
-        for kind in ("body", "ghost object", "soft body")
+        for kind in ("body", "ghost object", "soft body", "volume")
     },
+    ("volume", "color components.ambient.level"): {"color components": {"diffuse": {"r": 0.5, "g": 0.5, "b": 0.5}, "transparency": 1}},
     ("soft body", "color components.ambient.level"): {"color components": {"diffuse": {"r": 0.5, "g": 0.5, "b": 0.5}, "transparency": 1}},
     **{("soft body", f"config.{key}"): {"config": {"kLST": 0.5, "kMT": 0.0}} for key in ("kLST", "piterations", "kMT")},
     **{
@@ -201,7 +207,8 @@ PAIRS: dict[tuple[str, str], list[Any]] = {
     ("*", "direction"): [{"x": 0, "y": 0, "z": -1}, {"x": 1, "y": 0, "z": 0}],
     ("*", "array[].direction"): [{"x": 0, "y": 0, "z": -1}, {"x": 1, "y": 0, "z": 0}],
     ("*", "collision groups"): [[0], [1]], ("*", "pair cameras"): [["one"], ["other"]],
-    ("suture", "USP size"): ["2-0", "5-0"], ("joint", "enable motor"): [0, 1],
+    ("suture", "USP size"): ["2-0", "5-0"], ("volume", "images.path"): ["./", "./more/"],
+    ("volume", "images.prefix"): ["slice", "layer"], ("volume", "images.format"): ["png", "bmp"], ("joint", "enable motor"): [0, 1],
     ("launch", "world config"): ["world.yaml", "other_world.yaml"],
     ("launch", "input devices config"): ["devices.yaml", "no_devices.yaml"],
     ("launch", "multibody configs"): [["model.yaml"], ["model.yaml", "proxy.yaml"]],
@@ -220,7 +227,6 @@ CHECKED_ELSEWHERE = {
     ("actuator", "type"): "there is only one",
     ("launch", "color config"): "never opened, as the table says",
     ("model", "vehicles"): "of kinds that are not simulated",
-    ("model", "volumes"): "of kinds that are not simulated",
 }
 
 
@@ -454,6 +460,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (place / "part.mtl").write_text(MTL)
         (place / "plate.stl").write_text(ASCII_STL)
         (place / "red.png").touch()
+        for k, (prefix, suffix) in enumerate((("slice", "png"), ("layer", "png"), ("slice", "bmp"))):
+            levels = np.linspace(0, 255, 5 + k + (place != folder)).astype(np.uint8)
+            for number in range(5):
+                Image.fromarray(np.minimum.outer(levels, levels)).save(place / f"{prefix}{number}.{suffix}")
         for name in ("a.vs", "a.fs", "a.png", "b.png"):
             (place / name).write_text("void main() {}\n")
     return folder

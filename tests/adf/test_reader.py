@@ -133,9 +133,10 @@ def test_another_adf_version_is_an_error(model) -> None:
     assert "'adf version' is not 1.0; write 1.0" in messages(model("adf version: 2.0\n" + BODY))[0]
 
 
-def test_volumes_are_read_and_reported(model) -> None:
+def test_volumes_are_read(model) -> None:
     document = model("volumes: [V]\nV:\n  name: v\n  images: {path: ./, prefix: a, format: png, count: 3}\n")
-    assert "volume 'V' is read and checked, but not simulated" in messages(document)[0]
+    assert messages(document) == []
+    assert [volume.number("images.count") for volume in document.elements("volumes")] == [3]
 
 
 def test_launch_references_that_do_not_exist_are_kept_by_index(tmp_path: Path) -> None:

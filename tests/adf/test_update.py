@@ -6,7 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from ligature.adf import Document, Resolver, read_any
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ligature.adf import Document, Element, Resolver, read_any
+from ligature.adf.nodes import parse
 from ligature.adf.patch import PatchError
 from ligature.adf.update import Item, given_values, items_of, new_text, same, updated
 
@@ -117,6 +120,45 @@ def test_a_new_object_is_listed_and_defined_at_the_end(tmp_path: Path) -> None:
     assert differing(TEXT, after) == ["ghost objects:", "- GHOST g", "GHOST g:", "  name: g", "  visible: false"]
     assert after.index("ghost objects:") < after.index("namespace:")
     assert read(tmp_path, after).elements("ghost objects")[0].text("parent") == "BODY a"
+
+
+KEYS: dict[str, object] = {
+    "name": "a",
+    "mesh": "a.OBJ",
+    "mass": 2.0,
+    "collision shape": "SPHERE",
+    "collision geometry.radius": 0.01,
+    "compound collision shape": ({"shape": "BOX", "geometry.x": 0.5},),
+    "friction.static": 0.5,
+    "friction.rolling": 0.01,
+    "collision mesh": "b.OBJ",
+    "collision groups": (0, 3),
+    "location": ((1.0, 2.0, 3.0), (0.0, 0.5, 0.0)),
+}
+bodies = st.lists(st.sampled_from(sorted(KEYS)), min_size=1, unique=True)
+
+
+@settings(max_examples=60)
+@given(st.lists(bodies, min_size=1, max_size=3), st.lists(bodies, min_size=1, max_size=4), st.booleans())
+def test_any_keys_give_place_to_any_others(before: list[list[str]], after: list[list[str]], flow: bool) -> None:
+    """Objects and keys come and go at once, also the last of a block, and the file states what is wanted."""
+    files = [
+        [Item("body", f"BODY {number}", {name: KEYS[name] for name in names}) for number, names in enumerate(bodies)]
+        for bodies in (before, [*after[1:], *after[:1]])
+    ]
+    files[1] = [replace(item, key=f"BODY {3 - number}") for number, item in enumerate(files[1])]
+    text = new_text("model", {}, files[0])
+    if flow:
+        text = text.replace("\n    radius: 0.01", " {radius: 0.01}")
+    kept = {item.key for item in files[1]}
+    removed = [item.key for item in files[0] if item.key not in kept]
+    after_all = updated(text, "model", {}, files[1], removed)
+    root = parse(after_all, Path("m.yaml"))
+    wanted = {item.key: item.values for item in files[1]}
+    assert {key: given_values(Element("body", key, root.get(key))) for key in wanted} == wanted
+    assert sorted(entry.text for entry in root.get("bodies").items) == sorted(wanted)
+    assert not set(removed) & set(root.entries)
+    assert updated(after_all, "model", {}, files[1]) == after_all
 
 
 def test_an_object_is_renamed_in_the_list_and_where_it_stands(tmp_path: Path) -> None:

@@ -37,10 +37,10 @@ def rate(name: str, processes: int, seconds: float) -> float:
     rng = np.random.default_rng(0)
     envs.reset(seed=0)
     for _ in range(20):
-        envs.step(rng.uniform(-1, 1, (processes, 7)).astype(np.float32))
+        envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))
     steps, begin = 0, time.perf_counter()
     while time.perf_counter() - begin < seconds:
-        envs.step(rng.uniform(-1, 1, (processes, 7)).astype(np.float32))
+        envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))
         steps += processes
     found = steps / (time.perf_counter() - begin)
     envs.close()
@@ -53,12 +53,14 @@ def rate_alone(name: str, seconds: float) -> tuple[float, float, float]:
     env.reset(seed=0)
     steps, begin, spent = 0, time.perf_counter(), time.process_time()
     while time.perf_counter() - begin < seconds:
-        *_, done, cut, _ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+        *_, done, cut, _ = env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32))
         steps += 1
         if done or cut:
             env.reset()
     wall, spent = time.perf_counter() - begin, time.process_time() - spent
-    reset = median_ms(env.reset, lambda: [env.step(rng.uniform(-1, 1, 7).astype(np.float32)) for _ in range(10)])
+    reset = median_ms(
+        env.reset, lambda: [env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)) for _ in range(10)]
+    )
     env.close()
     return steps / wall, steps / spent, reset
 

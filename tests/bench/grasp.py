@@ -49,7 +49,7 @@ def _needle() -> Array:
 def _thread(angle: float) -> tuple[Array, Array, float]:
     """Way of the thread's end (m), tension (N), and the limit for jaws closed to ``angle``."""
     theatre = Stretched()
-    theatre.sim.arms["PSM1"].servo_jaw([angle])
+    theatre.sim.arms["PSM1"].servo_jaw([angle])  # type: ignore[attr-defined]  # a PSM
     theatre.sim.step(100)
     ways, tensions = [], []
     for k in range(60):

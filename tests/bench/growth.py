@@ -11,7 +11,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import ligature
 from ligature.cli.bench import measure
@@ -50,7 +50,7 @@ BODY floor:
 """
 
 
-def _author() -> ModuleType:
+def _author() -> Any:
     """The script that writes `suturing_small`."""
     spec = importlib.util.spec_from_file_location("author", ROOT / "scenes" / "author_suturing_small.py")
     assert spec is not None and spec.loader is not None
@@ -59,7 +59,7 @@ def _author() -> ModuleType:
     return module
 
 
-def _written(folder: Path, author: ModuleType, names: tuple[str, ...]) -> Path:
+def _written(folder: Path, author: Any, names: tuple[str, ...]) -> Path:
     for kind in ("high_res", "low_res"):
         source = ROOT / "scenes" / "suturing_small" / kind
         if source.exists():

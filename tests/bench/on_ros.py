@@ -11,6 +11,8 @@ import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ligature.cli.master import master_answers
@@ -67,6 +69,23 @@ def processor_seconds(parent: int) -> dict[str, float]:
         stat = Path(f"/proc/{child}/stat").read_text().rsplit(")", 1)[1].split()
         spent[Path(name).name] = (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
     return spent
+
+
+@contextmanager
+def own_master(node: str) -> Iterator[None]:
+    """A ROS master of its own, with a ``node`` of this process."""
+    port = 11900 + os.getpid() % 200
+    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
+    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL)
+    try:
+        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
+        import rospy
+
+        rospy.init_node(node, anonymous=True, disable_signals=True)
+        yield
+    finally:
+        master.terminate()
+        master.wait()
 
 
 def main() -> int:

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 BENCHMARKS = (
-    "scenes", "resets", "start", "growth", "environments", "on_ros", "latency", "arm_latency", "teleop_latency",
+    "scenes", "resets", "start", "growth", "environments", "datasets", "on_ros", "latency", "arm_latency", "teleop_latency",
     "teleop_suture", "kinematics", "cameras", "render", "suturing_on_ros", "ledger",
 )  # fmt: skip
 

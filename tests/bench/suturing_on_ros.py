@@ -14,10 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from ligature.cli.master import master_answers
-
-from tests.bench.on_ros import ROOT, SETTLING, UNTHROTTLED, UPDATES, Listener, processor_seconds
-from tests.waiting import until
+from tests.bench.on_ros import ROOT, SETTLING, UNTHROTTLED, UPDATES, Listener, own_master, processor_seconds
 
 SECONDS = 10.0
 CLOCK = 120
@@ -81,14 +78,7 @@ def measure(launch: Path, cameras: bool, limit: str, seconds: float) -> str:
 def main() -> int:
     """Entry point."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
-    port = 11900 + os.getpid() % 200
-    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
-    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL)
-    try:
-        until(lambda: master_answers(os.environ["ROS_MASTER_URI"]), "the ROS master answers", 60.0)
-        import rospy
-
-        rospy.init_node("suturing_on_ros", anonymous=True, disable_signals=True)
+    with own_master("suturing_on_ros"):
         load = os.getloadavg()[0]
         with tempfile.TemporaryDirectory() as folder:
             launch = scene_at(HZ, Path(folder))
@@ -97,9 +87,6 @@ def main() -> int:
                 sys.stdout.write(f"suturing, {name}: {found}\n")
                 sys.stdout.flush()
         sys.stdout.write(f"load of the machine at the start: {load:.1f}\n")
-    finally:
-        master.terminate()
-        master.wait()
     return 0
 
 

@@ -149,8 +149,8 @@ class Hand:
         self.closed = closed
         if isinstance(self.driver, Pen):
             self.driver.press(int(grey), int(closed))
-        else:
-            self.driver.grasp = float(closed)
+        elif isinstance(self.driver, Paddle):
+            self.driver.grip = float(closed)
             self.driver.buttons[0] = grey
 
     def follows(self, name: str) -> bool:
@@ -240,6 +240,9 @@ class Operator(suture.Surgeon):
     def hole(self, side: str, pair: int) -> Array:
         body = next(b for b in self._scene.bodies if b.identity.topic.endswith(f"/{side}{pair}"))
         return np.asarray(body.T_world_body[:3, 3])
+
+    def ends(self, pair: int) -> tuple[Array, Array]:
+        return self.hole("Entry", pair), self.hole("Exit", pair)
 
     def holds(self, name: str) -> bool:
         """Whether the needle goes along when the tool does: seen at the next lift."""
@@ -436,8 +439,8 @@ class Operator(suture.Surgeon):
         cases: dict[str, tuple[Callable[[], None], str]] = {
             "silence": (mute, "silent"),
             "a leap": (sends(5, 5, 5, 0, 0, 0, 1), "leapt"),
-            "NaN": (sends(np.nan, 0, 0, 0, 0, 0, 1), "no pose"),
-            "a quaternion of zeros": (sends(0, 0, 0, 0, 0, 0, 0), "no pose"),
+            "NaN": (sends(np.nan, 0, 0, 0, 0, 0, 1), "invalid poses"),
+            "a quaternion of zeros": (sends(0, 0, 0, 0, 0, 0, 0), "invalid poses"),
             "a rival": (lambda: select.publish("paddle_PSM1"), "claims"),
         }
         for what, (act, word) in cases.items():

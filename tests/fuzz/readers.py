@@ -179,6 +179,18 @@ URDF = """<?xml version="1.0"?>
 </robot>
 """
 
+SDF = """<?xml version="1.0"?>
+<sdf version="1.7"><model name="arm">
+  <link name="base"><pose>0 0 0.1 0 0 0.3</pose><inertial><mass>2</mass></inertial>
+    <visual name="v"><geometry><box><size>0.1 0.2 0.3</size></box></geometry></visual></link>
+  <link name="tip"><pose relative_to="turn">0 0 0.1 0 0.1 0</pose>
+    <inertial><pose>0 0 0.1 0 0 0</pose><mass>0.2</mass><inertia><ixx>1e-3</ixx><iyy>1e-3</iyy><izz>1e-3</izz></inertia></inertial>
+    <collision name="c"><geometry><cylinder><radius>0.01</radius><length>0.2</length></cylinder></geometry></collision></link>
+  <joint name="turn" type="revolute"><pose relative_to="base">0 0 0.2 0 0 0</pose><parent>base</parent><child>tip</child>
+    <axis><xyz expressed_in="__model__">0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint>
+</model></sdf>
+"""
+
 MJCF = """<mujoco model="arm">
   <compiler angle="radian"/>
   <asset><material name="red" rgba="1 0 0 1"/></asset>
@@ -237,7 +249,7 @@ def png_of(width: int, height: int) -> bytes:
 
 
 def read_any_picture(path: Path) -> None:
-    from ligature.render.picture_files import MOST_PIXELS, PictureError, read_picture
+    from ligature.model.pictures import MOST_PIXELS, PictureError, read_picture
 
     try:
         picture = read_picture(path)
@@ -255,6 +267,7 @@ READERS = (
     Reader("recorded input", "a.jsonl", INPUT.encode, read_input, text=True),
     Reader("teleoperation", "teleop.yaml", TELEOP.encode, read_teleop, text=True),
     Reader("URDF", "robot.urdf", URDF.encode, convert_robot, text=True),
+    Reader("SDF", "robot.sdf", SDF.encode, convert_robot, text=True),
     Reader("MJCF", "robot.xml", MJCF.encode, convert_robot, text=True),
     *(
         Reader(

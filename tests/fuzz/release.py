@@ -292,7 +292,7 @@ class Trial:
         for _ in range(int(3.0 / self.update * 1e3) if names else 0):
             self._step()
         for name in names:
-            self.sim.arms[name].servo_jaw([float(self._rng.uniform(-0.15, 0.2))])
+            self.sim.arms[name].servo_jaw([float(self._rng.uniform(-0.15, 0.2))])  # type: ignore[attr-defined]
 
     def _statics(self) -> tuple[np.ndarray, np.ndarray]:
         static = [b.index for b in self.scene.bodies if b.static and b.colliders]

@@ -503,8 +503,10 @@ class _Author:
 def _child_at_zero(parent: Block, child: Block, joint: Block) -> Array:
     """Pose (4, 4) of the child's body frame in the parent's at joint position zero."""
     T_parent, T_child = (_inertial(block) for block in (parent, child))
+    keys = ("parent pivot", "child pivot", "parent axis", "child axis")
+    parent_pivot, child_pivot, parent_axis, child_axis = (tuple(joint[key].values()) for key in keys)
     frames = joint_frames(
-        T_parent, T_child, *(tuple(joint[k].values()) for k in ("parent pivot", "child pivot", "parent axis", "child axis")),
+        T_parent, T_child, parent_pivot, child_pivot, parent_axis, child_axis,
         joint.get("offset", 0.0), joint.get("joint offset", 0.0), joint["type"] == "prismatic",
     )  # fmt: skip
     T: Array = T_parent @ _scaled(frames.T_parent_child, parent, child, joint, T_parent, T_child) @ inverse(T_child)

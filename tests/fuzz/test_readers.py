@@ -131,7 +131,7 @@ LAUGHS = "<!DOCTYPE r [" + "<!ENTITY a0 'ha'>" + "".join(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "root"), [("robot.urdf", "robot"), ("robot.xml", "mujoco")])
+@pytest.mark.parametrize(("name", "root"), [("robot.urdf", "robot"), ("robot.sdf", "sdf"), ("robot.xml", "mujoco")])
 @pytest.mark.parametrize(
     ("text", "why"),
     [

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
+from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, signed_distance
+from ligature.mesh.hulls import hull_planes
 
 SHAPES = {
     BOX: ((0.4, 0.6, 1.0), trimesh.creation.box((0.4, 0.6, 1.0))),

@@ -48,6 +48,23 @@ def test_the_box_spans_all_shapes_along_the_axes_of_the_inertial_frame() -> None
     assert np.allclose(estimate_size(balls, quarter, 0.0), (0.2, 3.2, 0.2))
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_shapes_anywhere_span_the_box_of_their_corners_wherever_the_inertial_frame_is(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    parts, corners = [], []
+    for kind in rng.permutation(["mesh", "box", "mesh"]):
+        T = frame(np.eye(3), rng.uniform(-2, 2, 3))
+        points = rng.uniform(-1, 3, (8, 3))
+        if kind == "box":
+            size = rng.uniform(0.1, 1.0, 3)
+            points = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+        shape: Shape = Box(size) if kind == "box" else TriMesh(points, np.array([[0, 1, 2]], dtype=np.int32))
+        parts.append(Collider(shape, T))
+        corners.append(points + T[:3, 3])
+    found = estimate_size(tuple(parts), frame(np.eye(3), rng.uniform(-5, 5, 3)), 0.0)
+    assert found is not None and np.allclose(found, np.ptp(np.concatenate(corners), axis=0))
+
+
 def test_a_mesh_is_larger_by_its_margin_and_a_hull_by_bullets_default_too() -> None:
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
     faces = np.array([[0, 1, 2]], dtype=np.int32)

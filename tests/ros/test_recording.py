@@ -16,7 +16,7 @@ import pytest
 from rich.console import Console
 
 from tests.ros.conftest import BIN, ROOT, Program
-from tests.waiting import until
+from tests.waiting import stays, until
 
 pytestmark = pytest.mark.ros
 SCENE = ROOT / "scenes" / "suturing" / "launch.yaml"
@@ -62,6 +62,7 @@ def moved(node: Any) -> None:
     psm.check_connections(10.0)
     assert psm.enable(10.0)
     assert psm.home(20.0)
+    stays(lambda: psm.state.now.is_homed, "it stays homed", 0.5)  # as a person looks before the next move
     assert psm.move_jp(psm.setpoint_jp() + [0.2, -0.1, 0.02, 0.4, 0.2, -0.2]).wait()
     report = node.Publisher("/surgical_robotics_challenge/completion_report/testers/task2", Bool, queue_size=1)
     until(lambda: report.get_num_connections() == 2, "recorder and judge listen")

@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
-import ligature
 import numpy as np
 import pytest
-from ligature import Simulation
 
-Make = Callable[[str], Simulation]
+from tests.sensing.conftest import Make
 
 WALL = (
     "Wall: {name: Wall, mass: 0, collision shape: BOX, collision geometry: {x: 0.2, y: 4, z: 4}, collision margin: 0.0001, "
     "location: {position: {x: 1.1, y: 0, z: 0}}}\n"
 )
-
-
-@pytest.fixture
-def simulate(tmp_path: Path) -> Make:
-    def make(text: str) -> Simulation:
-        (tmp_path / "m.yaml").write_text("namespace: /ambf/env/\ngravity: {x: 0, y: 0, z: 0}\n" + text)
-        return Simulation(ligature.load(tmp_path / "m.yaml"))
-
-    return make
 
 
 def sensor(type_: str, more: str) -> str:

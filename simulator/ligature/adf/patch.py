@@ -30,17 +30,24 @@ class Edit:
 def apply(text: str, edits: Iterable[Edit]) -> str:
     """The text with all edits made; raises `PatchError` when two of them meet.
 
-    Several insertions at one place come in the order given.
+    Several insertions at one place come in the order given, those into inner blocks first.
     """
     pieces: list[str] = []
     done = 0
-    for edit in sorted(edits, key=lambda e: e.span):
+    for edit in sorted(edits, key=lambda e: (e.span, _outwards(e.text))):
         start, end = edit.span
         if start < done:
             raise PatchError(f"two changes meet at offset {start}")
         pieces += (text[done:start], edit.text)
         done = end
     return "".join((*pieces, text[done:]))
+
+
+def _outwards(text: str) -> tuple[int, bool]:
+    """What sorts lines that are added behind a line: the deeper first, items of a list before keys beside it."""
+    line = text.lstrip("\r\n")
+    inner = line.lstrip(" ")
+    return (len(inner) - len(line), not inner.startswith("-")) if line != text else (0, False)
 
 
 def set_value(text: str, owner: Mapping, path: str, value: Any) -> Edit:

@@ -76,7 +76,9 @@ def plugins(element: Element) -> Iterator[Diagnostic]:
             message = f"a plug-in of {element.kind} '{element.key}' lacks name or filename"
             yield Diagnostic(Severity.WARNING, message, entry.mark, "it is left out", "plugin")
     if entries:
-        yield _finding(element, Severity.INFO, "plugins", "has plug-ins, which Ligature does not load", "", "plugin")
+        yield _finding(
+            element, Severity.INFO, "plugins", "has plug-ins", "--allow-plugins runs those in Python", "plugin"
+        )
 
 
 def shapes(element: Element) -> Iterator[Diagnostic]:

@@ -12,7 +12,7 @@ numbers (§) are those of the ADF specification. Keys that are not here are repo
 - **used**, where nothing else is stated: has the effect that AMBF gives it (`tests/adf/test_effects.py` tries each).
 - **{ignored}**: legal, without effect there and here; reported at debug level (`ligature check -v`).
 - **{unused}**: AMBF uses it, and its meaning is stated; its value is checked, and `ligature check -v` names it.
-- **{kept}**: handed on as written; no plug-in is run.
+- **{kept}**: handed to them as written; those in Python are run when the user allows it ([plug-ins](plugins.md)).
 - **{not_simulated_status}**: of kinds that are not simulated.
 - **{ours}**, so files that use it stay valid there.
 
@@ -51,7 +51,7 @@ def support_table() -> str:
 
 def _enumerated(kinds: list[str]) -> str:
     *first, last = (PLURALS[kind] for kind in kinds)
-    return f"{', '.join(first)} and {last}"
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _row(key: Key) -> str:

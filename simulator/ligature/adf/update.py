@@ -177,8 +177,9 @@ def _object_edits(
         gone = [i for i, name in enumerate(listed) if name in removed]
         new = [i.key for i in items if i.kind == object_kind and i.key not in listed]
         if isinstance(node, nodes.Sequence) and node.items and len(gone) < len(listed):
-            yield from (remove_item(text, node, i) for i in (gone[:1] if node.flow else gone))
             yield from (add_item(text, node, name) for name in new)
+            if not new:
+                yield from (remove_item(text, node, i) for i in (gone[:1] if node.flow else gone))
         elif gone or new:
             yield _list_edit(text, root, list_name, new)
     removals = [remove_key(text, root, name) for name in dict.fromkeys(removed) if name in root.entries]
@@ -227,7 +228,28 @@ def _changes(
     behind_alias: list[Edit],
     unheld: frozenset[str] = frozenset(),
 ) -> Iterator[Edit]:
-    """Edits that give ``owner`` the wanted values; those of aliased values go to ``behind_alias``."""
+    """Edits that give ``owner`` the wanted values; those of aliased values go to ``behind_alias``.
+
+    Keys go when all others are there: what is added at the end of a block is put behind its last key.
+    """
+    edits = list(_additions(text, owner, element, wanted, behind_alias, unheld))
+    yield from edits
+    if edits:
+        return
+    old = _given(element, element.prefix)
+    gone = [path for path in old if path not in wanted and element.prefix + path not in unheld]
+    yield from _removals(text, owner, element, gone)
+
+
+def _additions(
+    text: str,
+    owner: nodes.Mapping,
+    element: Element,
+    wanted: Mapping[str, Any],
+    behind_alias: list[Edit],
+    unheld: frozenset[str],
+) -> Iterator[Edit]:
+    """Edits that give ``owner`` the wanted values that it does not have."""
     prefix = element.prefix
     old = _given(element, prefix)
     known = BY_PATH[element.kind]
@@ -250,8 +272,6 @@ def _changes(
                 _put(additions.setdefault(block, {}), inner[len(block) + 1 :], part)
     for block, values in additions.items():
         yield set_value(text, owner, block, values)
-    gone = [path for path in old if path not in wanted and prefix + path not in unheld]
-    yield from _removals(text, owner, element, gone)
 
 
 def _items_at(owner: nodes.Mapping, path: str) -> list[nodes.Node]:

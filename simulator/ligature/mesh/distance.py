@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from ligature.kernels import kernel
 
@@ -102,15 +101,3 @@ def _cone(size: Array, p: Array, normal: Array) -> float:
         return side
     normal[0], normal[1], normal[2] = 0.0, 0.0, -1.0
     return bottom
-
-
-def hull_planes(points: Array) -> Array:
-    """Planes (n, 4) of the hull of ``points``; flat sets of points become thin slabs of both sides."""
-    try:
-        equations = ConvexHull(points).equations
-    except (QhullError, ValueError):
-        centred = points - points.mean(axis=0)
-        axes = np.linalg.svd(centred, full_matrices=True)[2]
-        equations = np.vstack([np.append(sign * a, -(sign * points @ a).max()) for a in axes for sign in (1.0, -1.0)])
-    planes: Array = np.column_stack([equations[:, :3], -equations[:, 3]])
-    return np.unique(planes.round(12), axis=0)

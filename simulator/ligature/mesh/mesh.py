@@ -34,6 +34,7 @@ class MeshError(AdfError):
 class Material:
     """A material of a mesh file; colours 0..1, ``alpha`` 1 is opaque; texture paths may not exist.
 
+    ``occlusion_map`` is how much ambient light arrives, ``sphere_map`` what a ball of the material looks like.
     ``roughness``, ``metallic`` and ``coat`` (a clear film, of ``coat_roughness``) are None unless the file gives them.
     """
 
@@ -52,6 +53,8 @@ class Material:
     coat_roughness: float = 0.1
     roughness_map: Path | None = None
     metallic_map: Path | None = None
+    occlusion_map: Path | None = None
+    sphere_map: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)

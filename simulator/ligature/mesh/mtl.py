@@ -16,7 +16,8 @@ _SCALARS = ("Ns", "d", "Tr", "Pr", "Pm", "Pc", "Pcr")
 """The reference honours the first three; the rest are roughness, metallic, clear coat and its roughness, as Blender
 and others write them for physically based rendering."""
 
-_TEXTURES = ("map_Kd", "map_Bump", "map_Pr", "map_Pm")
+_TEXTURES = ("map_Kd", "map_Bump", "map_Pr", "map_Pm", "map_ao", "refl")
+"""The last two are what shades from ambient light, and the sphere that a surface mirrors, which shaders call matcap."""
 
 _OPTIONS = {
     "-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
@@ -55,6 +56,8 @@ class _Draft:
             coat_roughness=self.scalars.get("Pcr", plain.coat_roughness),
             roughness_map=self.textures.get("map_Pr"),
             metallic_map=self.textures.get("map_Pm"),
+            occlusion_map=self.textures.get("map_ao"),
+            sphere_map=self.textures.get("refl"),
         )
 
 

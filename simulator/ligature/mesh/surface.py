@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.mesh.hulls import convex_hull
 from ligature.mesh.mesh import Array, MeshPart
 
 Faces = NDArray[np.int32]
@@ -58,8 +59,6 @@ def hull_vertices(points: Array) -> Array:
 
     Points in one plane give the corners of their polygon, points in one line its two ends.
     """
-    from scipy.spatial import ConvexHull, QhullError
-
     distinct = np.sort(np.unique(points, axis=0, return_index=True)[1])
     points = points[distinct]
     if len(points) < 3:
@@ -71,21 +70,19 @@ def hull_vertices(points: Array) -> Array:
         along = centred @ axes[0]
         return points[np.sort([np.argmin(along), np.argmax(along)])]
     try:
-        return points[np.sort(ConvexHull(centred if rank == 3 else centred @ axes[:2].T).vertices)]
-    except QhullError:  # thinner than Qhull's own tolerance: all points stand for the hull
+        return points[np.sort(convex_hull(centred if rank == 3 else centred @ axes[:2].T).vertices)]
+    except ValueError:  # thinner than Qhull's own tolerance: all points stand for the hull
         return points
 
 
 def convex_surface(points: Array) -> tuple[Array, Faces]:
     """Corners (n, 3) and outward triangles (m, 3) of the hull of ``points``; raises ValueError when it is flat."""
-    from scipy.spatial import ConvexHull, QhullError
-
     corners = hull_vertices(points)
     try:
         if len(corners) < 4:
             raise ValueError
-        hull = ConvexHull(corners - corners.mean(axis=0))
-    except (QhullError, ValueError):
+        hull = convex_hull(corners - corners.mean(axis=0))
+    except ValueError:
         raise ValueError("the points are coplanar: they enclose no volume") from None
     faces = hull.simplices.astype(np.int32)
     a, b, c = corners[faces[:, 0]], corners[faces[:, 1]], corners[faces[:, 2]]

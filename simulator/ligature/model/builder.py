@@ -109,6 +109,7 @@ class SceneBuilder:
         if not top.flag("ligature rod"):
             self.no_rod.update(local)
         self._add_soft_bodies(parts, model)
+        self._add_volumes(parts, model, local)
         self._add_sutures(document, parts.gravity, model, local)
         self._add_ghosts(parts, model)
         self._add_sensors(parts, model, local)
@@ -178,6 +179,28 @@ class SceneBuilder:
                 self.bodies.append(part.make(index=len(self.bodies), identity=identity))
                 self._scales.append(1.0)
                 self.groups.append(())
+
+    def _add_volumes(self, parts: ModelParts, model: Model, local: list[int]) -> None:
+        """Bodies in the shape of volumes, without topics: static, or fixed to the moving body that they name."""
+        for part in parts.volumes:
+            self.diagnostics += part.findings
+            if part.make is None:
+                continue
+            place = self._body(part.element, "parent", local, "") if part.element.text("parent") else None
+            if place is None and part.element.text("parent"):
+                continue
+            parent = None if place is None else self.bodies[place]
+            identity = self._names["body"].identity(part.element, model.namespace, model.index, passive=True)
+            body = part.make(index=len(self.bodies), identity=identity, parent=parent)
+            self.bodies.append(body)
+            self.no_rod.add(body.index)
+            self._scales.append(1.0)
+            self.groups.append(())
+            if parent is not None and not body.static:
+                held = replace(identity, key=f"{identity.key} parent")
+                self.joints.append(fixed_joint(len(self.joints), held, parent, body))
+                self._names["joint"].identifiers.append(held.identifier)
+                self.linked.append((parent.index, body.index))
 
     def _note_unusable(self, document: Document, model: Model) -> None:
         """Remember the listed bodies that an error took away, so that what names them is no further error."""

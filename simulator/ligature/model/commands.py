@@ -169,6 +169,23 @@ class WatchContacts(Command, code=9):
     enabled: bool = wire(FLAG)
 
 
+@dataclass(frozen=True)
+class PluginCommand(Command, code=12):
+    """Numbers for topic number ``topic`` of those that plug-in number ``plugin`` of the scene subscribes."""
+
+    plugin: int = wire(INDEX)
+    topic: int = wire(INDEX)
+    values: Vector = wire(Numbers(), "the message")
+
+    @property
+    def slot(self) -> Hashable:  # noqa: D102
+        return "plugin", self.plugin, self.topic
+
+    def check_together(self, counts: Mapping[str, int] | None) -> None:  # noqa: D102
+        if counts is not None and not 0 <= self.plugin < counts["plugin"]:
+            raise ValueError(f"the scene has no plug-in number {self.plugin} that runs")
+
+
 def object_counts(scene: Scene) -> dict[str, int]:
     """How many objects of each kind that can be commanded a scene has, for `Message.check`."""
     return {
@@ -177,4 +194,5 @@ def object_counts(scene: Scene) -> dict[str, int]:
         "camera": len(scene.cameras),
         "light": len(scene.lights),
         "arm": len(scene.arms),
+        "plugin": len(scene.plugins),
     }

@@ -20,6 +20,7 @@ from ligature.model.parts import body_of, sensor_of
 from ligature.model.scene import Body, Camera, Ghost, Light, Sensor
 from ligature.model.shapes import ShaderFiles
 from ligature.model.soft_bodies import soft_body_of
+from ligature.model.volumes import volume_of
 
 Kind = TypeVar("Kind")
 
@@ -59,6 +60,7 @@ class ModelParts:
     bodies: tuple[Part[Body], ...]
     soft_bodies: tuple[Part[Body], ...]
     ghosts: tuple[Part[Ghost], ...]
+    volumes: tuple[Part[Body], ...]
     sensors: tuple[Part[Sensor], ...]
     mounts: Mounts
 
@@ -78,6 +80,7 @@ def converted(document: Document, resolver: Resolver, shaders: ShaderFiles | Non
         each("bodies", lambda element, context: body_of(element, context, gravity, shaders)),
         each("soft bodies", lambda element, context: soft_body_of(element, context, world, shaders)),
         each("ghost objects", ghost_of),
+        each("volumes", volume_of),
         each("sensors", lambda element, _: sensor_of(element, sensor_rays(element, folder, resolver))),
         mounts(document),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ligature.adf import AdfError, Diagnostic, Resolver, Severity
@@ -12,6 +13,7 @@ from ligature.model.completion import completed
 from ligature.model.conversion import converted
 from ligature.model.files import read_scene
 from ligature.model.naming import prefixed
+from ligature.model.plugins import plugin_entries
 from ligature.model.scene import Scene
 from ligature.model.softening import soften
 
@@ -77,6 +79,9 @@ def load(
     for model, part in zip(found.models, parts, strict=True):
         builder.add(model, part)
     scene = completed(builder)
+    documents = [found.start, *(model.document for model in found.models)]
+    plugins, findings = plugin_entries(documents, {body.identity.mark: body.index for body in scene.bodies}, resolver)
+    scene = replace(scene, plugins=plugins, diagnostics=(*scene.diagnostics, *findings))
     if not scene.bodies:
         # What kept the bodies out says enough.
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]

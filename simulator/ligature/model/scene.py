@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 from ligature.adf import Diagnostic, Mark
 from ligature.model.axis import Axis
 from ligature.model.piercing import Hole, Needle, Tissue
+from ligature.model.plugins import PluginEntry
 from ligature.model.shapes import Collider, ShaderFiles, Visual
 from ligature.model.soft import TissueBody, TissueForm
+from ligature.model.voxels import VolumeBody, VolumeForm
 
 Array = NDArray[np.float64]
 """A float64 array; the docstring beside each use gives its shape and frame."""
@@ -88,6 +90,7 @@ class Body:
     bodies whose contacts with this one are switched off by joints, files or groups. ``needle`` is what
     the file states of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
     ``tissue`` is what a body of soft tissue consists of; its shapes and visual are then those of the body at rest.
+    ``volume`` are the voxels of a volume; shapes and visual are those of its surface at the start.
     """
 
     index: int
@@ -115,6 +118,7 @@ class Body:
     needle: bool | None = None
     inertia_estimated: bool = False
     tissue: TissueForm | None = None
+    volume: VolumeForm | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -499,7 +503,7 @@ class Scene:
     that constraints must hold, as ``closures`` state; ``start`` is where all of them start; ``rods``
     are the recognised sutures, ``arms`` the recognised manipulators, ``jaws`` what can grasp.
     ``diagnostics`` are all the findings of reading and resolving, in order. ``roots`` are the folders
-    below which a scene file may have other files opened.
+    below which a scene file may have other files opened. ``plugins`` are what the files name; nothing of it is loaded.
     """
 
     name: str
@@ -524,6 +528,7 @@ class Scene:
     jaws: tuple[Jaw, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
     roots: tuple[Path, ...] = ()
+    plugins: tuple[PluginEntry, ...] = ()
 
     @cached_property
     def body_index(self) -> dict[str, int]:
@@ -543,6 +548,15 @@ class Scene:
         ends = np.cumsum([0] + [len(form.grid.nodes) for _, form in soft]).tolist()
         return tuple(
             TissueBody(index, body, slice(*ends[index : index + 2]), form) for index, (body, form) in enumerate(soft)
+        )
+
+    @cached_property
+    def volumes(self) -> tuple[VolumeBody, ...]:
+        """The volumes that change, in order of their bodies; a scene whose plug-ins do not run has none."""
+        found = [(body.index, body.volume) for body in self.bodies if body.volume is not None and self.plugins]
+        ends = np.cumsum([0] + [form.values.size for _, form in found]).tolist()
+        return tuple(
+            VolumeBody(index, body, slice(*ends[index : index + 2]), form) for index, (body, form) in enumerate(found)
         )
 
     @cached_property

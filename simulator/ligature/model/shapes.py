@@ -71,11 +71,15 @@ class Hull:
 
 @dataclass(frozen=True, eq=False)
 class TriMesh:
-    """Triangle mesh: ``vertices`` (n, 3), ``faces`` (m, 3) of int32 indices; ``source`` is its file, for messages."""
+    """Triangle mesh: ``vertices`` (n, 3), ``faces`` (m, 3) of int32 indices; ``source`` is its file, for messages.
+
+    A ``smooth`` one is drawn without edges.
+    """
 
     vertices: Array
     faces: NDArray[np.int32]
     source: str = ""
+    smooth: bool = False
 
 
 Shape = Box | Sphere | Cylinder | Capsule | Cone | Plane | Hull | TriMesh

@@ -59,6 +59,9 @@ the instrument's model number. Local poses are in the arm's base frame. Twists a
 MAX_INSERTIONS = 64
 """Most passages of needles and threads through tissue holes in one state."""
 
+MAX_LINES = 256
+"""Most lines that plug-ins draw."""
+
 MAX_PUNCTURES = 32
 """Most places at which needles have punctured the surface of one body of tissue."""
 
@@ -87,6 +90,9 @@ def state_dtype(scene: Scene) -> StateDtype:
     out, and the outward normals there.
     ``jaw_body`` is what each jaw holds by friction or -1; ``jaw_force`` presses its fingers together, ``jaw_wrench``
     acts on the body about the patch, ``jaw_slip`` are metres and radians slipped since it was grasped.
+    ``volume_value`` are the voxels of the volumes that plug-ins may change, in rows `VolumeBody.rows`.
+    ``plugin_value`` is what plug-ins publish, topic after topic; of ``plugin_line`` (ends of lines that they draw) the
+    first ``plugin_line_count`` rows count.
     """
     nb, nj = len(scene.bodies), len(scene.joints)
     ng, na = len(scene.ghosts), len(scene.actuators)
@@ -141,17 +147,22 @@ def state_dtype(scene: Scene) -> StateDtype:
             ("puncture_count", "i4", (len(scene.tissues),)),
             ("puncture_point", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),
             ("puncture_normal", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),
+            ("volume_value", "u1", (scene.volumes[-1].rows.stop if scene.volumes else 0,)),
             ("jaw_body", "i4", (len(scene.jaws),)),
             ("jaw_force", "f8", (len(scene.jaws),)),
             ("jaw_wrench", "f8", (len(scene.jaws), 6)),
             ("jaw_slip", "f8", (len(scene.jaws), 2)),
             ("arm", ARM_DTYPE, (len(scene.arms),)),
+            ("plugin_value", "f8", (sum(sum(plugin.publishes.values()) for plugin in scene.plugins),)),
+            ("plugin_line_count", "i4"),
+            ("plugin_line", "f8", (MAX_LINES if scene.plugins else 0, 2, 3)),
+            ("plugin_line_colour", "u1", (MAX_LINES if scene.plugins else 0, 3)),
         ]
     )
 
 
 def new_state(scene: Scene) -> StateRecord:
-    """A zeroed state record of ``scene`` with identity poses and tissue at rest, shape (1,)."""
+    """A zeroed state record of ``scene`` with identity poses, tissue at rest and volumes whole, shape (1,)."""
     state = np.zeros(1, dtype=state_dtype(scene))
     for field_name in (
         "body_pose",
@@ -165,6 +176,8 @@ def new_state(scene: Scene) -> StateRecord:
     for tissue in scene.tissues:
         T = scene.bodies[tissue.body].T_world_body
         state["tissue_node"][0, tissue.rows] = tissue.form.grid.nodes @ T[:3, :3].T + T[:3, 3]
+    for volume in scene.volumes:
+        state["volume_value"][0, volume.rows] = volume.form.values.ravel()
     state["ray_body"] = -1
     state["actuator_body"] = -1
     state["jaw_body"] = -1

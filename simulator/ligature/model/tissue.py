@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ligature.adf import Diagnostic, Element, Severity
 from ligature.mesh import load_mesh
 from ligature.mesh.surface import joined
-from ligature.mesh.voxels import voxelise
+from ligature.mesh.voxels import usual_cell, voxelise
 from ligature.model.frames import Array, frame
 from ligature.model.geometry import FileContext, GeometryError
 from ligature.model.material import KEYS, MATERIALS, TissueMaterial
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from ligature.model.shapes import Collider, Visual
 
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
-DEFAULT_CELLS, DEFAULT_FREE_CELLS = 600, 150
-"""Cells of a body whose cell size the file does not state, about; of one that nothing holds."""
-
 MOST_NODES = 6000
 """Most nodes of a body: with more, a step takes longer than the four ticks that it stands for."""
 
@@ -53,8 +50,7 @@ def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: T
     """The tissue that fills a surface, vertices (n, 3) in B and faces (m, 3); raises `GeometryError`."""
     cell = element.value("ligature tissue.cell size")
     if cell is None:
-        usual = DEFAULT_CELLS if element.texts("ligature tissue.fixed") else DEFAULT_FREE_CELLS
-        cell = float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / usual)) or 1e-3
+        cell = usual_cell(vertices, bool(element.texts("ligature tissue.fixed")))
     if not cell > 0.0:
         raise _error(element, "ligature tissue.cell size", f"has cells of {cell:g} m", "give metres above 0")
     cells = np.prod(np.ceil(np.ptp(vertices, axis=0) / cell) + 1.0)

@@ -195,7 +195,8 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         "physicsClientId": client,
     }
     T_own = inverse(root.T_body_inertial)
-    shape = shapes.create(client, cache, root.colliders, T_own, not root.static, root.collision_margin)
+    colliders = () if any(volume.body == root.index for volume in scene.volumes) else root.colliders
+    shape = shapes.create(client, cache, colliders, T_own, not root.static, root.collision_margin)
     stand = None
     if root.static and plan.masses and shape != shapes.NO_SHAPE:
         stand = pybullet.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape, **at)

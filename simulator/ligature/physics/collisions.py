@@ -35,6 +35,16 @@ class Collisions:
         parted = {pair for pair in self._overlapped if overlap(self._engine, *pair) == 0.0}
         self._change(self._disabled_pairs, self._overlapped - parted)
 
+    def collide(self, body: int, other: int) -> bool:
+        """Whether two bodies collide where they touch."""
+        bodies, disabled = self._engine.scene.bodies, self._disabled_pairs | self._overlapped
+        return (
+            other not in bodies[body].no_collision_with
+            and (body, other) not in disabled
+            and (other, body) not in disabled
+            and not (bodies[body].static and bodies[other].static)
+        )
+
     def disable(self, body: int, other: int, disabled: bool) -> None:
         """Disable collision between two bodies, or enable it again unless they are disabled for another reason."""
         pair = {(body, other)}

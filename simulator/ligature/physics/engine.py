@@ -24,6 +24,8 @@ from ligature.physics.trees import Places
 from ligature.tables import table_of
 
 Array = NDArray[np.float64]
+Pose = tuple[tuple[float, ...], tuple[float, ...]]
+"""Position (3,) and quaternion (4,) as Bullet returns them."""
 
 SOLVER_ITERATIONS = 50
 """With 10, a step on the base of an arm shakes its jaws by 0.06 rad; contacts at rest cost the same."""
@@ -34,8 +36,9 @@ LOOP_ITERATIONS = 200
 CLOSING = 0.8
 """Part of a loop's gap that Bullet closes within a tick; its 0.2 lets a swinging linkage open by 0.5 mm."""
 
-MOVES, STANDS = (1, -1), (2, -3)
-"""Bullet's collision group and mask of what moves, and of what stands and meets only what moves: its own defaults."""
+MOVES, STANDS, VOID = (1, -1), (2, -3), (0, 0)
+"""Bullet's collision group and mask of what moves, of what stands and meets only what moves, its own defaults, and of
+what has no shape: Bullet would look for contacts of each such link with all whose boxes it lies in, in each tick."""
 
 MOST_PAIRED = 128
 """Bodies up to which Bullet compares all pairs of boxes in a tick, which costs nothing up to a hundred.
@@ -77,6 +80,8 @@ class Engine:
         Where each body outside rods is; the same as arrays, and their addresses for compiled code.
     body_at
         The body at Bullet's multibody and link.
+    chunks
+        For bodies whose shapes are in other multibodies than their own: these, with link, group and mask.
     gravity
         Bullet's gravity (3,).
     forgets
@@ -102,6 +107,7 @@ class Engine:
             deterministicOverlappingPairs=1, contactBreakingThreshold=NEAR, physicsClientId=self.client,
         )  # fmt: skip
         pybullet.setGravity(*self.gravity.tolist(), physicsClientId=self.client)
+        self._restored: dict[tuple[int, Pose], Pose] = {}
         self.trees = [build(self.client, self.cache, scene, a, dt=self.dt) for a in scene.articulations]
         self.motions = Motions(self.client, handle, self.trees)
         self.place_of = {
@@ -115,7 +121,8 @@ class Engine:
                 array[body] = value
         self.place_table = table_of(self.places)
         self.body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
-        self._colliders = [collider for tree in self.trees for collider in _colliders(tree)]
+        self._colliders = [collider for tree in self.trees for collider in _colliders(self.client, tree)]
+        self.chunks: dict[int, list[tuple[int, int, int, int]]] = {}
         self.start = self.snapshot()
         self.restore(self.start)  # as every later start: Bullet turns what it makes by a last bit
 
@@ -130,9 +137,14 @@ class Engine:
         Their contacts, pairs and boxes go, with what solvers know from the last tick. Where Bullet compares all pairs,
         each shape gets its place and number back, and what follows is a function of poses, velocities and commands.
         """
-        for uid, link, group, mask in self._colliders:
+        for uid, link, group, mask in [*self._colliders, *(chunk for found in self.chunks.values() for chunk in found)]:
             pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)
         self.motions.begin()
+
+    def shapes_of(self, body: int) -> list[tuple[int, int]]:
+        """Multibodies and links that hold the shapes of a body."""
+        place = self.place_of.get(body)
+        return [] if place is None else [(place.uid, place.link), *(chunk[:2] for chunk in self.chunks.get(body, ()))]
 
     def restart(self, tree: int) -> None:
         """Put one tree back to where the scene starts, at rest."""
@@ -146,6 +158,7 @@ class Engine:
         trees = []
         for tree in self.trees:
             pose = pybullet.getBasePositionAndOrientation(tree.uid, physicsClientId=self.client)
+            pose = self._restored.get((tree.uid, pose), pose)
             velocity = pybullet.getBaseVelocity(tree.uid, physicsClientId=self.client)
             links = [link for link, *_ in tree.axes]
             states = pybullet.getJointStates(tree.uid, links, physicsClientId=self.client) if links else []
@@ -155,8 +168,12 @@ class Engine:
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Set the motion of all trees; `forget_contacts` is to follow. Bullet's own saved states are not exact."""
+        self._restored.clear()
         for tree, (pose, velocity, joints) in zip(self.trees, snapshot["trees"], strict=True):
             self.place_of[tree.root].put_inertial(*pose)
+            # Bullet turns what it is given by a last bit: a base that has not moved since keeps the snapshot's pose
+            turned = pybullet.getBasePositionAndOrientation(tree.uid, physicsClientId=self.client)
+            self._restored[tree.uid, turned] = pose
             for (link, *_), (q, qd) in zip(tree.axes, joints, strict=True):
                 pybullet.resetJointState(tree.uid, link, q, qd, physicsClientId=self.client)
             pybullet.resetBaseVelocity(tree.uid, *velocity, physicsClientId=self.client)
@@ -168,8 +185,9 @@ class Engine:
         self._end()
 
 
-def _colliders(tree: Tree) -> list[tuple[int, int, int, int]]:
+def _colliders(client: int, tree: Tree) -> list[tuple[int, int, int, int]]:
     """Multibody, link, group and mask of the shapes of a tree, in the order in which they were made."""
     stand = [(tree.stand, -1, *STANDS)] if tree.stand != tree.uid else []
-    base = (tree.uid, -1, *(STANDS if tree.static else MOVES))
-    return [*stand, base, *((tree.uid, link, *MOVES) for link in range(len(tree.frames)))]
+    links = {-1: STANDS if tree.static else MOVES, **dict.fromkeys(range(len(tree.frames)), MOVES)}
+    shaped = {link for link in links if pybullet.getCollisionShapeData(tree.uid, link, physicsClientId=client)}
+    return [*stand, *((tree.uid, link, *(kind if link in shaped else VOID)) for link, kind in links.items())]

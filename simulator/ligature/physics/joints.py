@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ligature.model.commands import CommandType
 from ligature.model.scene import Body
@@ -123,6 +124,14 @@ class Joints:
         """Position of a joint now."""
         control = self._control_of[joint]
         return float(control.read(np.array([control.row[joint]]))[0, 0])
+
+    def state(self, joint: int) -> NDArray[np.float64]:
+        """Position, velocity and effort (3,) of a joint now; raises LookupError for one that closes a loop."""
+        if joint not in self._control_of:
+            raise LookupError("the joint closes a loop; its position is in the state alone")
+        control = self._control_of[joint]
+        found: NDArray[np.float64] = control.read(np.array([control.row[joint]]))[:, 0]
+        return found
 
     def requested_effort(self, joint: int, stiffness: float) -> float:
         """Effort that a joint's command requests; see `TreeControl.requested_effort`."""

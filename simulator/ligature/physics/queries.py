@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from ligature.model.hits import Contact, RayHits
 from ligature.model.shapes import Collider
 from ligature.physics import shapes
-from ligature.physics.engine import Engine
+from ligature.physics.collisions import Collisions
+from ligature.physics.engine import NEAR, VOID, Engine
 from ligature.physics.wrenches import contact_forces
 
 Array = NDArray[np.float64]
@@ -36,8 +38,8 @@ class Gaps:
 class BulletQueries:
     """Answers `ligature.sensing.queries.Queries`, and what grasping asks, for the bodies of an engine."""
 
-    def __init__(self, engine: Engine) -> None:
-        self._engine = engine
+    def __init__(self, engine: Engine, collisions: Collisions) -> None:
+        self._engine, self._collisions = engine, collisions
         self._probe_shapes: list[tuple[Sequence[Collider], float]] = []
         self._probes: list[int] = []
 
@@ -54,7 +56,7 @@ class BulletQueries:
         client = self._engine.client
         shape = shapes.create(client, self._engine.cache, colliders, np.eye(4), True, margin)
         uid = pybullet.createMultiBody(0, shape, basePosition=_FAR, physicsClientId=client)
-        pybullet.setCollisionFilterGroupMask(uid, -1, 0, 0, physicsClientId=client)
+        pybullet.setCollisionFilterGroupMask(uid, -1, *VOID, physicsClientId=client)
         self._probe_shapes.append((colliders, margin))
         self._probes.append(uid)
         return len(self._probes) - 1
@@ -68,9 +70,9 @@ class BulletQueries:
         pybullet.resetBasePositionAndOrientation(uid, pose[:3].tolist(), pose[3:].tolist(), physicsClientId=client)
         gaps = []
         for body in bodies:
-            place, gap = self._engine.place_of.get(body), within
-            if place is not None:
-                at = (uid, place.uid, within, -1, place.link)
+            gap = within
+            for other, link in self._engine.shapes_of(body):
+                at = (uid, other, within, -1, link)
                 for point in pybullet.getClosestPoints(*at, physicsClientId=client) or ():
                     gap = min(gap, float(point[8]))
             gaps.append(gap)
@@ -91,17 +93,20 @@ class BulletQueries:
     # --- contacts and gaps ------------------------------------------------------------------
 
     def contacts(self, body: int, threshold: float) -> list[Contact]:
-        """Contact points of ``body`` whose distance is at most ``threshold``."""
-        place = self._engine.place_of.get(body)
-        if place is None:
-            return []
+        """Contact points of ``body`` whose distance is at most ``threshold``.
+
+        Bullet keeps those of its last tick up to `NEAR`; for a larger threshold it measures bodies where they are now.
+        """
+        places = self._engine.shapes_of(body)
+        if places and threshold > NEAR:
+            return self._contacts_within(body, threshold)
+        return [contact for place in places for contact in self._contacts_at(body, *place, threshold)]
+
+    def _contacts_at(self, body: int, uid: int, at: int, threshold: float) -> list[Contact]:
+        """Contact points of the shapes of ``body`` that a multibody has at a link."""
         found = []
         for first in (True, False):
-            side = (
-                {"bodyA": place.uid, "linkIndexA": place.link}
-                if first
-                else {"bodyB": place.uid, "linkIndexB": place.link}
-            )
+            side = {"bodyA": uid, "linkIndexA": at} if first else {"bodyB": uid, "linkIndexB": at}
             for point in pybullet.getContactPoints(physicsClientId=self._engine.client, **side):
                 other = self._engine.body_at.get((point[2], point[4]) if first else (point[1], point[3]))
                 if other is None or other == body or point[8] > threshold:
@@ -113,6 +118,21 @@ class BulletQueries:
                 break
         return found
 
+    def _contacts_within(self, body: int, threshold: float) -> list[Contact]:
+        """Nearest points of ``body`` and of the bodies that it collides with, up to ``threshold``."""
+        found = []
+        for other in self.surroundings([body], threshold)[0]:
+            if self._collisions.collide(body, other):
+                for points in self._closest(body, other, threshold):
+                    found += [Contact(other, float(p[8]), np.array(p[6]), np.array(p[7])) for p in points]
+        return found
+
+    def _closest(self, body: int, other: int, within: float) -> Iterator[tuple[tuple[Any, ...], ...]]:
+        """Bullet's nearest points of the shapes of two bodies that are closer than ``within``."""
+        for a, link in self._engine.shapes_of(body):
+            for b, to in self._engine.shapes_of(other):
+                yield pybullet.getClosestPoints(a, b, within, link, to, physicsClientId=self._engine.client) or ()
+
     def touches(self, most: int) -> tuple[Array, Array]:
         """Where bodies touched in the last tick, (n, 3), and the forces on one of the two, (n, 3); ``most`` of them."""
         found = [c for c in pybullet.getContactPoints(physicsClientId=self._engine.client) if c[9] > 0.0][:most]
@@ -120,26 +140,25 @@ class BulletQueries:
             return np.zeros((0, 3)), np.zeros((0, 3))
         return np.array([c[5] for c in found]), contact_forces(found)
 
-    def surroundings(self, bodies: Collection[int]) -> tuple[list[int], Array]:
-        """Bodies whose boxes meet the common box of ``bodies``, in order, and the corners (2, 3) of that."""
+    def surroundings(self, bodies: Collection[int], margin: float = 0.0) -> tuple[list[int], Array]:
+        """Bodies that meet the common box of ``bodies`` with a ``margin`` around, in order, and its corners (2, 3)."""
         place_of, body_at, client = self._engine.place_of, self._engine.body_at, self._engine.client
         boxes = [
-            pybullet.getAABB(place.uid, place.link, physicsClientId=client)
-            for place in (place_of[body] for body in bodies)
+            pybullet.getAABB(*place, physicsClientId=client)
+            for body in bodies
+            for place in self._engine.shapes_of(body)[1:] or [(place_of[body].uid, place_of[body].link)]
         ]
-        low = [min(corner) for corner in zip(*(box[0] for box in boxes), strict=True)]
-        high = [max(corner) for corner in zip(*(box[1] for box in boxes), strict=True)]
+        low = [min(corner) - margin for corner in zip(*(box[0] for box in boxes), strict=True)]
+        high = [max(corner) + margin for corner in zip(*(box[1] for box in boxes), strict=True)]
         met = pybullet.getOverlappingObjects(low, high, physicsClientId=client) or ()
         found = {body_at[at] for at in met if at in body_at}
         return sorted(found - set(bodies)), np.array([low, high])
 
     def gaps(self, body: int, other: int, within: float) -> Gaps | None:
         """Nearest points of the convex parts of two bodies that are closer than ``within``; None without any."""
-        a, b = self._engine.place_of[body], self._engine.place_of[other]
-        found = pybullet.getClosestPoints(a.uid, b.uid, within, a.link, b.link, physicsClientId=self._engine.client)
-        if not found:
+        rows = sorted((row[8], row[5], row[7]) for found in self._closest(body, other, within) for row in found)
+        if not rows:
             return None
-        rows = sorted((row[8], row[5], row[7]) for row in found)
         return Gaps(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
 
     def overlap(self, bodies: set[int]) -> tuple[float, int, int]:

@@ -16,8 +16,9 @@ from ligature.adf import Diagnostic, Severity
 from ligature.model.commands import BodyCommand
 from ligature.model.scene import Body, Scene
 from ligature.model.state import StateRecord
-from ligature.model.subsystem import Subsystem
+from ligature.model.subsystem import Subsystem, copied
 from ligature.physics.body_commands import BodyCommands
+from ligature.physics.chunks import MOST_REPLACED, Chunks
 from ligature.physics.closures import Closures
 from ligature.physics.collisions import Collisions
 from ligature.physics.contact_wrenches import ContactWrenches
@@ -103,6 +104,8 @@ class World(Subsystem):
         Contacts, overlaps, gaps, rays.
     wrenches
         What the rest of the world exerts on bodies.
+    chunks
+        What of volumes that may change collides.
     """
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
@@ -111,6 +114,7 @@ class World(Subsystem):
         self.problems: list[Diagnostic] = []
         self._owned_reported: set[int] = set()
         self.engine = Engine(scene, dt)
+        self.chunks = Chunks(self.engine)
         self.joints = Joints(self.engine)
         self.commands = BodyCommands(self.engine)
         self.impulses = Impulses(self.engine, self.commands)
@@ -119,7 +123,7 @@ class World(Subsystem):
         self.collisions = Collisions(self.engine)
         for found in self.collisions.overlaps:
             self.report(found.finding(scene))
-        self.queries = BulletQueries(self.engine)
+        self.queries = BulletQueries(self.engine, self.collisions)
         self.wrenches = ContactWrenches(self.engine, self.welds, self.impulses)
         self._set_up()
         self.engine.forget_contacts()
@@ -139,12 +143,13 @@ class World(Subsystem):
 
         Bodies are then put where they begin, and at last contacts are forgotten.
         """
-        if self.engine.forgets and not self._broken:
+        if self.engine.forgets and not self._broken and self.chunks.replaced < MOST_REPLACED:
             self.welds.loosen()
             self._closures.begin()
             self._parting.begin()
             return
         self.engine.rebuild()
+        self.chunks.rebuild()
         self.joints.rebuild()
         self.collisions.rebuild()
         self._set_up()
@@ -223,6 +228,7 @@ class World(Subsystem):
         self._closures.pace()
         # here, for a grasp that ended in this tick took the added mass back: its lift would throw a needle at 5 m/s
         self.masses.lift()
+        self.chunks.follow()
         sound = self.engine.motions.step(MAX_SPEED)
         if sound:
             self.problems += self._closures.project()
@@ -266,6 +272,10 @@ class World(Subsystem):
         pose, twist = np.empty(7), np.empty(6)
         self.engine.place_of[body].read_inertial(pose, twist)
         return pose, twist
+
+    def twist(self, body: int) -> Array:
+        """Linear velocity of the centre of mass and angular velocity of a body, (6,)."""
+        return self.motion(body)[1]
 
     def read_motion(self, body: int, pose: Array, twist: Array) -> None:
         """Fill ``pose`` (7,) of a body's inertial frame I, and its ``twist`` (6,)."""
@@ -338,6 +348,7 @@ class World(Subsystem):
         self.collisions.restart()
         self.masses.restart()
         self.welds.repeat()
+        self.chunks.follow()
         self.engine.forget_contacts()
 
     def recover(self) -> None:
@@ -359,7 +370,14 @@ class World(Subsystem):
         for name, part in self._parts().items():
             part.restore(snapshot[name])
         self._owned_reported = snapshot["owned_reported"]
+        self.chunks.follow()
         self.engine.forget_contacts()
+
+    def renew(self) -> None:
+        """Go on in another Bullet client, as after a restore."""
+        snapshot = copied(self.snapshot())
+        self._broken = True
+        self.restore(snapshot)
 
     def _parts(self) -> dict[str, Any]:
         """The parts that keep something from tick to tick, in the order in which they are restored."""

@@ -89,7 +89,7 @@ class Axes:
 
     def clipped(self, position: Array) -> Array:
         """``position`` (n,) within the limits."""
-        return np.clip(position, self.limits[0], self.limits[1])
+        return np.minimum(np.maximum(position, self.limits[0]), self.limits[1])  # np.clip takes three times as long
 
     def checked(self, values: ArrayLike, what: str) -> Array:
         """``values`` as n numbers; raises `Rejected` when they are not."""

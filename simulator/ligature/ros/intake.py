@@ -20,6 +20,9 @@ from rospy.impl.tcpros_service import TCPService
 MOST_BYTES = 32 * 1024
 """Most bytes of a message or request; 250 joints with names and all of position, velocity and effort take 20 KB."""
 
+_ALLOWED: dict[str, int] = {}
+"""Most bytes of a message on topics that take larger ones."""
+
 WARNING_PAUSE = 2.0
 """Seconds between two warnings."""
 
@@ -65,7 +68,7 @@ def read_bounded(connection: Any, b: io.BytesIO, msg_queue: list[Any], sock: Any
         size = announced(b)
         if connection.skipping or size is None:
             return
-        if size <= MOST_BYTES:
+        if size <= _ALLOWED.get(connection.resolved_name, MOST_BYTES):
             break
         oversized.note(connection.resolved_name, size)
         connection.skipping = _LENGTH.size + size
@@ -90,6 +93,11 @@ def read_bounded_request(connection: Any, b: io.BytesIO, msg_queue: list[Any], s
         oversized.note(connection.resolved_name, size)
         raise TransportTerminated(f"rejected a request of {size} bytes; the maximum is {MOST_BYTES}")
     TCPROSTransportProtocol.read_messages(connection, b, msg_queue, sock)
+
+
+def allow_bytes(topic: str, most: int) -> None:
+    """Take messages of up to ``most`` bytes on a topic."""
+    _ALLOWED[topic] = most
 
 
 def bound_messages() -> None:

@@ -32,6 +32,7 @@ from ligature.ros.intake import oversized
 from ligature.ros.master import NO_ANSWER, MasterWatch, node_name
 from ligature.ros.pace import PaceServices
 from ligature.ros.parameters import Parameters
+from ligature.ros.plugins import PluginTemplate, plugin_templates, subscribe_plugins
 from ligature.ros.publisher import Publisher
 from ligature.ros.reception import Reception
 from ligature.ros.registrations import dead_neighbours
@@ -39,6 +40,8 @@ from ligature.ros.schedule import Key, Outlet, Schedule
 from ligature.ros.start import start_node
 
 DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
+PLUGIN_HZ = 200
+"""Messages per second of each topic that a plug-in publishes."""
 HAPTICS = "ligature/haptics"
 """Parameter from which teleoperation reads its haptic ``rate`` in Hz and whether it sends ``forces``."""
 COUNTING = 1.0
@@ -72,10 +75,12 @@ class Node:
         self._publishers: list[Publisher] = []
         outlets = self._advertise(min_hz, max_hz, policy)
         tissues = self._advertise_tissues(outlets)
-        self._schedule = Schedule([*outlets, *tissues], self._reception.commanded)
+        plugins = [self._outlet_of_plugin(t, min_hz, max_hz) for t in plugin_templates(scene)]
+        self._schedule = Schedule([*outlets, *tissues, *plugins], self._reception.commanded)
         for outlet in outlets[1:]:
             self._reception.subscribe(outlet.template, outlet.topic)
         self._reception.subscribe_world()
+        subscribe_plugins(scene, self._outbox.push)
         PaceServices(f"{scene.world.root}ligature", scene, self._block, self._outbox.push)
         self._arms = ArmsNode(scene, self._block, self._outbox, challenge, reference)
         arms = ", ".join(outlet.description.name for outlet in self._arms.outlets) or "none"
@@ -147,6 +152,11 @@ class Node:
                 low, high = rate or own.low, rate or own.high
                 found.append(self._outlet(template(self._scene, body), own.topic, name, low, high))
         return found
+
+    def _outlet_of_plugin(self, template: PluginTemplate, min_hz: int | None, max_hz: int | None) -> Outlet:
+        publisher = Publisher(template.topic, type(template.message))
+        self._publishers.append(publisher)
+        return Outlet(template, template.topic, publisher, min_hz or PLUGIN_HZ, max_hz or PLUGIN_HZ)
 
     def _outlet(self, template: Any, topic: str, name: str, low: float, high: float) -> Outlet:
         publisher = Publisher(f"{topic}/{name}", type(template.message))

@@ -9,14 +9,14 @@ from ligature.model.hits import Contact
 from ligature.model.scene import Scene, SensorType
 from ligature.model.state import MAX_CONTACT_EVENTS, StateRecord
 from ligature.model.subsystem import Subsystem
-from ligature.sensing.queries import Queries
+from ligature.sensing.targets import Targets
 
 
 class Contacts(Subsystem):
     """The contact sensors of a scene and their last contact points."""
 
-    def __init__(self, scene: Scene, queries: Queries) -> None:
-        self._queries = queries
+    def __init__(self, scene: Scene, targets: Targets) -> None:
+        self._targets = targets
         self._sensors = [s for s in scene.sensors if s.type is SensorType.CONTACT]
         self.events: list[tuple[int, Contact]] = []
 
@@ -39,7 +39,7 @@ class Contacts(Subsystem):
         self.events = [
             (sensor.index, contact)
             for sensor in self._sensors
-            for contact in self._queries.contacts(sensor.parent, sensor.distance_threshold)
+            for contact in self._targets.contacts(sensor.parent, sensor.distance_threshold)
         ]
 
     def _write(self, state: StateRecord) -> None:

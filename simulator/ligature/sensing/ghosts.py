@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import compiled
-from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, hull_planes, signed_distance
+from ligature.mesh.distance import BOX, CAPSULE, CONE, CYLINDER, HULL, SPHERE, signed_distance
+from ligature.mesh.hulls import hull_planes
 from ligature.model.frames import matrix_pose7
 from ligature.model.poses import compose
 from ligature.model.scene import Scene
@@ -32,7 +33,7 @@ SAMPLES = 5
 CONVEX = (Box, Sphere, Cylinder, Capsule, Cone, Hull)
 """Shapes that rod elements are tested against."""
 
-BAND = 1e-4
+BAND = 5e-3
 """Distance in metres within which the surfaces of a ghost and a body are measured.
 
 A pair is measured again only after the two may have moved by the distance between their surfaces, so that the result
@@ -59,8 +60,8 @@ class GhostArrays(NamedTuple):
     solid: Integers  # (n,) other bodies
     ghost_reach: Array  # (g,) radius of the ball around a ghost
     reach: Array  # (n,) and around a body
-    measured_ghost: Array  # (g, n, 7) poses at which a pair was measured last
-    measured_body: Array  # (g, n, 7)
+    apart: Array  # (g, n, 7) pose of the smaller of a pair in the frame of the larger one now
+    measured: Array  # (g, n, 7) and as the pair was measured last
     room: Array  # (g, n) how far the two may move until they have to be measured again
     inside: Flags  # (g, n)
     due: Flags  # (g, n) whether a pair has to be measured
@@ -103,12 +104,19 @@ def _elements_inside(
     for g in range(sensed.shape[0]):
         for b in elements:
             sensed[g, b] = False
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for i in range(elements.shape[0]):
+        for a in range(3):
+            at, reach = body_pose[elements[i], a], half_lengths[i] + radii[i]
+            low[a], high[a] = min(low[a], at - reach), max(high[a], at + reach)
     shape, back, normal = np.empty(7), np.empty(7), np.empty(3)
     point, there = np.zeros(7), np.empty(7)
     point[6] = 1.0
     for v in range(kinds.shape[0]):
         hit = sensed[owner[v]]
         compose(ghost_world[owner[v]], local[v], shape)
+        if not _meets(shape, bounds[v], low, high):
+            continue
         _invert(shape, back)
         own = planes[plane_range[v, 0] : plane_range[v, 1]]
         for i in range(elements.shape[0]):
@@ -129,6 +137,15 @@ def _elements_inside(
 
 
 @compiled
+def _meets(centre: Array, radius: float, low: Array, high: Array) -> bool:
+    """Whether the box around a ball may meet the box from ``low`` to ``high`` (3,)."""
+    meets = True
+    for a in range(3):
+        meets = meets and low[a] - radius <= centre[a] <= high[a] + radius
+    return meets
+
+
+@compiled
 def _invert(pose: Array, out: Array) -> None:
     """The inverse of a pose (7,)."""
     turn_back, origin = np.zeros(7), np.zeros(7)
@@ -146,19 +163,25 @@ def _pairs_to_measure(table: Integers, ghost_world: Array, body_pose: Array) -> 
     ghosts = _open_ghosts(table)
     due, inside, room, solid = ghosts.due, ghosts.inside, ghosts.room, ghosts.solid
     ghost_reach, reach = ghosts.ghost_reach, ghosts.reach
-    measured_ghost, measured_body = ghosts.measured_ghost, ghosts.measured_body
-    found = False
+    apart, measured = ghosts.apart, ghosts.measured
+    back, found = np.empty(7), False
     for g in range(due.shape[0]):
         for i in range(due.shape[1]):
-            square, pose = 0.0, body_pose[solid[i]]
+            square, ghost, body = 0.0, ghost_world[g], body_pose[solid[i]]
             for a in range(3):
-                square += (ghost_world[g, a] - pose[a]) ** 2
+                square += (ghost[a] - body[a]) ** 2
             if square > (ghost_reach[g] + reach[i]) ** 2:
                 inside[g, i] = due[g, i] = False
                 room[g, i] = -1.0
                 continue
-            moved = _moved(measured_ghost[g, i], ghost_world[g], ghost_reach[g])
-            moved += _moved(measured_body[g, i], pose, reach[i])
+            # a ghost that moves along with the body, like that of a finger, is measured once
+            if ghost_reach[g] <= reach[i]:
+                _invert(body, back)
+                compose(back, ghost, apart[g, i])
+            else:
+                _invert(ghost, back)
+                compose(back, body, apart[g, i])
+            moved = _moved(measured[g, i], apart[g, i], min(ghost_reach[g], reach[i]))
             due[g, i] = not moved <= room[g, i]
             found = found or due[g, i]
     return found
@@ -216,7 +239,7 @@ class Ghosts(Subsystem):
         self._ghost_reach = np.array([_reach(g.colliders) for g in scene.ghosts])
         self.sensed = np.zeros((len(scene.ghosts), len(scene.bodies)), dtype=bool)
         shape = (len(self._probes), len(self._solid))
-        self._measured_ghost, self._measured_body = np.zeros((*shape, 7)), np.zeros((*shape, 7))
+        self._apart, self._measured = np.zeros((*shape, 7)), np.zeros((*shape, 7))
         self._room = np.full(shape, -1.0)
         self._inside, self._due = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
         self._arrays = GhostArrays(*(np.ascontiguousarray(getattr(self, f"_{name}")) for name in GhostArrays._fields))
@@ -258,18 +281,17 @@ class Ghosts(Subsystem):
         if not self._probes:
             return
         if _pairs_to_measure(self._table, ghost_world, body_pose):
-            self._measure_pairs(ghost_world, body_pose[self._solid])
+            self._measure_pairs(ghost_world)
         _find_inside(self._table, ghost_world, body_pose, self.sensed)
 
-    def _measure_pairs(self, ghost_world: Array, bodies: Array) -> None:
+    def _measure_pairs(self, ghost_world: Array) -> None:
         for ghost in np.flatnonzero(self._due.any(axis=1)):
             rows = np.flatnonzero(self._due[ghost])
             candidates = self._solid[rows].tolist()
             gaps = np.array(self._queries.probe_gaps(self._probes[ghost], ghost_world[ghost], candidates, BAND))
             self._inside[ghost, rows] = gaps <= 0.0
             self._room[ghost, rows] = CONFIDENCE * np.minimum(np.abs(gaps), BAND)
-            self._measured_ghost[ghost, rows] = ghost_world[ghost]
-            self._measured_body[ghost, rows] = bodies[rows]
+            self._measured[ghost, rows] = self._apart[ghost, rows]
 
 
 def _reach(colliders: tuple[Collider, ...]) -> float:

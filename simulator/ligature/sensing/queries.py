@@ -1,4 +1,4 @@
-"""What sensors and actuators need of the physics: `ligature.physics.World` and its parts implement it.
+"""What sensors and actuators need of physics and threads: `ligature.physics.World`, its parts and rods implement it.
 
 Poses are x y z qx qy qz qw in world axes, lengths in metres.
 """
@@ -44,11 +44,38 @@ class Posed(Protocol):
         """Pose (7,) of a body now."""
 
 
-class Pushable(Posed, Protocol):
+class Moving(Posed, Protocol):
+    """Bodies that move."""
+
+    def twist(self, body: int) -> Array:
+        """Linear velocity of the centre of mass and angular velocity of a body, (6,)."""
+
+
+class Pushable(Moving, Protocol):
     """Bodies that sensors push."""
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming step."""
+
+
+class Elements(Moving, Protocol):
+    """Elements of threads: bodies of the scene that the physics does not have; `ligature.suture.Rods`."""
+
+    def element_of(self, body: int) -> tuple[int, int] | None:
+        """Number of the rod and of the element that a body is; None for other bodies."""
+
+    def push(self, body: int, force: Array, point: Array, stiffness: Array) -> None:
+        """Push an element with ``force`` (3,) at ``point`` (3,) less ``stiffness`` (3, 3) times the point's motion."""
+
+
+class ThreadQueries(Protocol):
+    """Geometry questions about threads: `ligature.suture.RodQueries`."""
+
+    def cast(self, starts: Array, ends: Array, hits: RayHits) -> RayHits:
+        """Of what the segments ``starts`` to ``ends`` (n, 3) hit, the nearer: ``hits`` or an element."""
+
+    def contacts(self, body: int, threshold: float) -> list[Contact]:
+        """Where ``body`` is at most ``threshold`` away from elements and, if it is an element itself, from bodies."""
 
 
 class Touchable(Protocol):

@@ -16,7 +16,7 @@ from ligature.model.hits import RayHits
 from ligature.model.scene import Scene, Sensor, SensorType
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem, kept, put_back
-from ligature.sensing.queries import Posed, Pushable, Queries
+from ligature.sensing.targets import Targets
 
 Array = NDArray[np.float64]
 
@@ -24,12 +24,11 @@ Array = NDArray[np.float64]
 class Rays(Subsystem):
     """The rays of all sensors of a scene, one after the other, in the order of the state record.
 
-    Resistance sensors push in every tick; rays are measured when the state is written. ``elements`` gives the poses of
-    rod elements, which ``bodies`` lacks.
+    Resistance sensors push in every tick; rays are measured when the state is written.
     """
 
-    def __init__(self, scene: Scene, queries: Queries, bodies: Pushable, elements: Posed) -> None:
-        self._queries, self._bodies = queries, bodies
+    def __init__(self, scene: Scene, targets: Targets) -> None:
+        self._targets = targets
         self.sensors = [s for s in scene.sensors if s.type is not SensorType.CONTACT]
         counts = [len(s.rays) for s in self.sensors]
         ends = np.cumsum([0, *counts])
@@ -37,12 +36,12 @@ class Rays(Subsystem):
         n = int(ends[-1])
         self.hits = RayHits(np.full(n, -1, dtype=np.int32), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
         pushing = [s for s in self.sensors if s.type is SensorType.RESISTANCE]
-        self._stick = [_Stick(sensor, elements if sensor.parent in scene.rod_bodies else None) for sensor in pushing]
+        self._stick = [_Stick(sensor) for sensor in pushing]
 
     def step(self, tick: int) -> None:
         """Apply the forces of every resistance sensor in the coming step of the bodies."""
         for stick in self._stick:
-            stick.step(self._queries, self._bodies)
+            stick.step(self._targets)
 
     def sense(self, state: StateRecord) -> None:
         """Cast every ray among the bodies of the state, and write the hits."""
@@ -76,7 +75,7 @@ class Rays(Subsystem):
     def update(self, body_pose: Array) -> None:
         """Cast every ray with the bodies at ``body_pose`` (bodies, 7)."""
         segments = np.concatenate([_segments(s, pose7_matrix(body_pose[s.parent])) for s in self.sensors])
-        self.hits = self._queries.ray_test(segments[:, 0], segments[:, 1])
+        self.hits = self._targets.ray_test(segments[:, 0], segments[:, 1])
 
 
 def _segments(sensor: Sensor, T_world_parent: Array) -> Array:
@@ -87,13 +86,10 @@ def _segments(sensor: Sensor, T_world_parent: Array) -> Array:
 
 
 class _Stick:
-    """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3).
+    """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3)."""
 
-    A sensor on a rod finds its parent among ``elements`` and does not push it back.
-    """
-
-    def __init__(self, sensor: Sensor, elements: Posed | None) -> None:
-        self._sensor, self._elements = sensor, elements
+    def __init__(self, sensor: Sensor) -> None:
+        self._sensor = sensor
         n = len(sensor.rays)
         self._body = np.full(n, -1, dtype=np.int64)
         self._on_sensed, self._on_parent = np.zeros((n, 3)), np.zeros((n, 3))
@@ -106,27 +102,27 @@ class _Stick:
         for array in (self._on_sensed, self._on_parent, self._error, self._offset):
             array[:] = 0.0
 
-    def step(self, queries: Queries, bodies: Pushable) -> None:
+    def step(self, targets: Targets) -> None:
         """Push the bodies that the rays hit, and the parent back."""
         parent = self._sensor.parent
-        T_parent = pose7_matrix((self._elements or bodies).pose7(parent))
+        T_parent = pose7_matrix(targets.pose7(parent))
         segments = _segments(self._sensor, T_parent)
-        hits = queries.ray_test(segments[:, 0], segments[:, 1])
-        poses = {body: pose7_matrix(bodies.pose7(body)) for body in set(hits.body.tolist()) if body >= 0}
+        hits = targets.ray_test(segments[:, 0], segments[:, 1])
+        poses = {body: pose7_matrix(targets.pose7(body)) for body in set(hits.body.tolist()) if body >= 0}
         for ray, body in enumerate(hits.body.tolist()):
             if body < 0:
                 self._body[ray] = -1
                 continue
-            force = self._force(ray, segments[ray], hits, T_parent, poses[body])
-            bodies.apply_force(body, force, hits.point[ray])
-            if self._elements is None:
-                bodies.apply_force(parent, -force, hits.point[ray])
+            force, stiffness = self._force(ray, segments[ray], hits, T_parent, poses[body])
+            targets.push(body, force, hits.point[ray], stiffness)
+            targets.push(parent, -force, hits.point[ray], stiffness)
 
-    def _force(self, ray: int, segment: Array, hits: RayHits, T_parent: Array, T_sensed: Array) -> Array:
-        """Force (3,) on the sensed body from one ray: normal, sticking and sliding parts."""
+    def _force(self, ray: int, segment: Array, hits: RayHits, T_parent: Array, T_sensed: Array) -> tuple[Array, Array]:
+        """Force (3,) on the sensed body from one ray: normal, sticking and sliding parts; and its stiffness (3, 3)."""
         law = self._sensor.resistance
         direction = segment[1] - segment[0]
-        direction = direction / np.linalg.norm(direction)
+        length = float(np.linalg.norm(direction))
+        direction = direction / length
         normal = law.contact_stiffness * (1.0 - hits.fraction[ray]) * direction
         weight = float(np.linalg.norm(normal)) if law.variable else 1.0
         if self._body[ray] != hits.body[ray]:
@@ -134,11 +130,14 @@ class _Stick:
         offset, sliding = self._tangential_offset(ray, direction, T_parent, T_sensed)
         previous, self._error[ray] = self._error[ray].copy(), offset
         force: Array = normal + law.dynamic_friction * weight * sliding
+        across = law.dynamic_friction * weight
         if np.linalg.norm(offset) <= law.contact_area:
             force = force + law.static_friction * weight * offset + law.damping * (offset - previous)
+            across += law.static_friction * weight + law.damping
         else:
             self._latch(ray, hits, T_parent, T_sensed)
-        return force
+        along = np.outer(direction, direction)
+        return force, law.contact_stiffness / length * along + across * (np.eye(3) - along)
 
     def _tangential_offset(self, ray: int, direction: Array, T_parent: Array, T_sensed: Array) -> tuple[Array, Array]:
         """Offset of the stuck points across the ray, and its change since the last tick, each (3,)."""

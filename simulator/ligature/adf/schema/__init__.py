@@ -28,7 +28,7 @@ SCHEMA: dict[str, tuple[Key, ...]] = {
     "suture": SUTURE,
     "input device": INPUT_DEVICE,
 }
-NOT_SIMULATED = {"vehicle", "volume"}
+NOT_SIMULATED = {"vehicle"}
 """Kinds that are read and validated, and reported as not simulated."""
 
 BY_PATH: dict[str, dict[str, Key]] = {kind: {key.path: key for key in keys} for kind, keys in SCHEMA.items()}

@@ -128,21 +128,24 @@ LIGHT = (
     Key("attenuation.linear", N, 0.0, "1/m", "linear part"),
     Key("attenuation.quadratic", N, 0.0, "1/m²", "quadratic part"),
 )
-_STATUS = Status.NOT_SIMULATED
 VOLUME = (
-    *IDENTITY,
+    *unused(IDENTITY, "passive", "publish frequency", "publish frequency.low", "publish frequency.high"),
     *PARENT,
     *COLOUR,
-    *shaders("shaders", "shader program of the volume"),
-    Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame", status=_STATUS),
-    Key("scale", N, 1.0, doc="factor on the dimensions", status=_STATUS),
-    Key("images", MAP, doc="stack of slices", required=True, fault=Fault.OBJECT, status=_STATUS),
-    Key("images.path", P, doc="folder of the slices", required=True, fault=Fault.OBJECT, status=_STATUS),
-    Key("images.prefix", T, doc="file name before the number", required=True, fault=Fault.OBJECT, status=_STATUS),
-    Key("images.format", T, doc="file name after the dot", required=True, fault=Fault.OBJECT, status=_STATUS),
-    Key("images.count", Type.UNSIGNED, doc="last number", required=True, fault=Fault.OBJECT, status=_STATUS),
-    Key("dimensions", V, (1.0, 1.0, 1.0), "m", "full size of the box, centred", status=_STATUS),
-    Key("iso-surface value", N, 0.5, doc="level of the surface, 0 to 1", status=_STATUS),
-    Key("optical density", N, 1.0, doc="optical density", status=_STATUS),
-    Key("quality", N, 0.5, doc="sampling quality", status=_STATUS),
+    *unused(shaders("shaders", "shader program of the volume")),
+    Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame"),
+    Key("scale", N, 1.0, doc="factor on the dimensions"),
+    Key("images", MAP, doc="stack of slices", required=True, fault=Fault.OBJECT),
+    Key("images.path", P, doc="folder of the slices", required=True, fault=Fault.OBJECT),
+    Key("images.prefix", T, doc="file name before the number", required=True, fault=Fault.OBJECT),
+    Key("images.format", T, doc="file name after the dot", required=True, fault=Fault.OBJECT),
+    Key("images.count", Type.UNSIGNED, doc="last number", required=True, fault=Fault.OBJECT),
+    Key("dimensions", V, (1.0, 1.0, 1.0), "m", "full size of the box, centred"),
+    Key("iso-surface value", N, 0.5, doc="level of the surface, above 0 to 1"),
+    *unused(
+        (
+            Key("optical density", N, 1.0, doc="of a drawing without surface; the surface is drawn"),
+            Key("quality", N, 0.5, doc="samples along a line of sight; the surface is exact"),
+        )
+    ),
 )

@@ -41,7 +41,12 @@ MESH_TYPES = {
     **{s: "POINT_CLOUD" for s in ("POINT_CLOUD", "point_cloud")},
 }
 
-PLUGINS = Key("plugins", Type.ANY, doc="list of {name, filename, path}; no plug-in is run", status=Status.KEPT)
+PLUGINS = Key(
+    "plugins",
+    Type.ANY,
+    doc="list of {name, filename, path}; of files and bodies those in Python are run",
+    status=Status.KEPT,
+)
 IDENTITY = (
     Key("name", T, "", doc="name of the topics and in messages; blanks are removed"),
     Key("namespace", T, "", doc="absolute with a leading '/', else appended to the file's"),

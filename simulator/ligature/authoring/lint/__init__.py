@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from ligature.adf import Document, Resolver, Severity
 from ligature.authoring.lint import bodies, files, joints
 from ligature.authoring.lint.subject import RULES, Finding, Subject
@@ -17,7 +19,17 @@ def lint(
     inflated: frozenset[str] = frozenset(),
 ) -> list[Finding]:
     """All findings of a model or world file, the reader's first; ``unsaved`` and ``inflated`` are as in `Subject`."""
-    found = [
+    return [finding for found in lint_by_rule(document, resolver, unsaved, inflated) for finding in found]
+
+
+def lint_by_rule(
+    document: Document,
+    resolver: Resolver,
+    unsaved: frozenset[str] = frozenset(),
+    inflated: frozenset[str] = frozenset(),
+) -> Iterator[list[Finding]]:
+    """The findings of `lint`, those of one rule at a time."""
+    yield [
         Finding(f"reader:{d.code}", d.severity, _key_of(document, d.message), d.message, d.hint)
         for d in document.diagnostics
         if d.severity >= Severity.WARNING
@@ -25,8 +37,7 @@ def lint(
     subject = Subject(document, resolver, unsaved, inflated)
     for name, check in RULES.items():
         if document.kind == "model" or name in OF_ALL_FILES:
-            found += check(subject)
-    return found
+            yield list(check(subject))
 
 
 def _key_of(document: Document, message: str) -> str:
@@ -35,4 +46,4 @@ def _key_of(document: Document, message: str) -> str:
     return next((key for key in sorted(keys, key=len, reverse=True) if f"'{key}'" in message), "")
 
 
-__all__ = ["OF_ALL_FILES", "RULES", "Finding", "Subject", "bodies", "files", "joints", "lint"]
+__all__ = ["OF_ALL_FILES", "RULES", "Finding", "Subject", "bodies", "files", "joints", "lint", "lint_by_rule"]

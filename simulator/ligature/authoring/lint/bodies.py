@@ -244,7 +244,16 @@ def _world_shapes(subject: Subject, body: Element) -> list[tuple[Shape, Array]]:
 
 def _depth(a: tuple[Shape, Array], b: tuple[Shape, Array]) -> float:
     """How deep points of one shape lie inside the other, either way round; a lower bound."""
+    if np.linalg.norm(a[1][:3, 3] - b[1][:3, 3]) > _reach(a[0]) + _reach(b[0]):
+        return 0.0
     return max(_points_inside(a, b), _points_inside(b, a))
+
+
+def _reach(shape: Shape) -> float:
+    """Radius of a ball around the origin of a shape's frame that holds it, a cone as a cylinder."""
+    if shape.kind == "BOX":
+        return float(np.linalg.norm(shape.size)) / 2.0
+    return shape.radius if shape.kind == "SPHERE" else float(np.hypot(shape.radius, shape.height / 2.0))
 
 
 def _points_inside(a: tuple[Shape, Array], b: tuple[Shape, Array]) -> float:

@@ -1,0 +1,45 @@
+"""Picture files of scenes: read within bounds of formats and size, whatever they claim to be."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+import zlib
+from pathlib import Path
+
+from PIL import Image
+
+FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "PPM", "WEBP")
+"""What is read. Pillow knows more; of those some start other programs (PostScript)."""
+
+MOST_PIXELS = 1 << 26
+"""Largest picture, 8192 by 8192: four bytes each, they are 256 MiB."""
+
+
+class PictureError(ValueError):
+    """A file that is no picture, a damaged or too large one; the message gives the reason."""
+
+
+def read_picture(path: Path) -> Image.Image:
+    """The picture ``path`` in memory; raises `PictureError`, and FileNotFoundError."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of metadata that nobody asked for, and of sizes that are checked here
+            with Image.open(path, formats=FORMATS) as picture:
+                width, height = picture.size
+                if width * height > MOST_PIXELS:
+                    raise PictureError(f"has {width} × {height} pixels; at most {MOST_PIXELS} are read")
+                picture.load()
+                whole: Image.Image = picture.copy()
+                return whole
+    except FileNotFoundError:
+        raise
+    except Image.DecompressionBombError:
+        raise PictureError(f"has more than the {MOST_PIXELS} pixels that are read") from None
+    except Image.UnidentifiedImageError:
+        raise PictureError(f"none of {', '.join(FORMATS)}") from None
+    except (
+        OSError, SyntaxError, ValueError, TypeError, IndexError, KeyError, AttributeError, OverflowError, MemoryError,
+        EOFError, AssertionError, struct.error, zlib.error,
+    ) as error:  # fmt: skip
+        raise PictureError(str(error) or type(error).__name__) from None
