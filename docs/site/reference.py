@@ -166,6 +166,7 @@ ROOMS = (
     "authoring",
     "model",
     "robots",
+    "plugins",
     "simulation",
     "tasks",
     "datasets",
