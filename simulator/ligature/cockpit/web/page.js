@@ -31,7 +31,7 @@
   ];
   const REPEAT = 40; // milliseconds between messages while something is held
   const DEAD_ZONE = 0.15;
-  const KEPT = { hints: "ligature_hints", theme: "ligature_theme", endoscope: "ligature_endoscope" };
+  const KEPT = { hints: "ligature_hints", theme: "ligature_theme" };
 
   // --- small tools ----------------------------------------------------------------------------------------------------
   const make = (tag, attributes = {}, ...children) => {
@@ -60,7 +60,7 @@
     const mine = (socket = new WebSocket(location.origin.replace(/^http/, "ws") + "/wire"));
     mine.onopen = () => {
       order("hello", shown);
-      if (kept(KEPT.theme) === "light") order("dark", false);
+      if (kept(KEPT.theme)) order("dark", kept(KEPT.theme) !== "light"); // also what was pressed without a connection
       sendView();
     };
     mine.onmessage = (event) => (typeof event.data === "string" ? inform(JSON.parse(event.data)) : show(event.data));
@@ -309,7 +309,7 @@
   const done = (name) => { if (!dones.has(name) && facts.operates) finish(name); };
 
   const theme = () => {
-    const light = document.documentElement.dataset.mantineColorScheme !== "light";
+    const light = kept(KEPT.theme) ? kept(KEPT.theme) !== "light" : document.documentElement.dataset.mantineColorScheme !== "light";
     keep(KEPT.theme, light ? "light" : "dark");
     order("dark", !light);
   };
