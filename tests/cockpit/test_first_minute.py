@@ -19,6 +19,9 @@ from tests.waiting import stays, steady
 pytestmark = pytest.mark.timeout(600)
 
 ARMS = ("PSM1", "PSM2")
+SIZE = (
+    "const i = document.getElementById('lig-image'); return i.naturalHeight ? [i.naturalWidth, i.naturalHeight] : null"
+)
 
 
 def sight(served: Served) -> Sightline:
@@ -47,7 +50,9 @@ def standing(served: Served, name: str = "PSM1") -> np.ndarray:
     return np.asarray(steady(lambda: tip(served, name).copy(), 0.5, 1e-6, "the arm stands"))
 
 
-def held(press: Callable[[], Any], release: Callable[[], Any], happens: Callable[[], Any], what: str) -> None:
+def held(
+    press: Callable[[], Any], release: Callable[[], Any], happens: Callable[[], Any], what: str | Callable[[], str]
+) -> None:
     """Press, wait until something has happened, let go.
 
     On a slow machine the page may let the arm go before, because the browser was silent; a person then presses again.
@@ -131,6 +136,7 @@ def test_keys_in_a_field_are_text(served: Served, operator: Person) -> None:
 
 def test_arrow_keys_step_a_slider_by_a_degree(served: Served, operator: Person) -> None:
     slider = operator.slider("roll °")
+    until(lambda: slider.is_displayed() and slider.get_attribute("aria-disabled") != "true", "the slider can be moved")
     before = float(served.arm("PSM1")["setpoint_js"][0, 3])
     for _ in range(5):
         slider.send_keys(Keys.ARROW_RIGHT)
@@ -218,43 +224,83 @@ def test_a_game_pad_moves_the_tip(served: Served, operator: Person) -> None:
     operator.driver.execute_script("delete navigator.getGamepads")
 
 
-def test_a_drag_in_the_picture_takes_the_tip_along(served: Served, operator: Person) -> None:
-    presses(operator, "lig-swap")
-    size = "const i = document.getElementById('lig-image'); return i.naturalHeight ? [i.naturalWidth, i.naturalHeight] : null"
+class Picture:
+    """The large picture as it stands in the window, of one eye or of both side by side; places in pixels."""
 
-    def one_eye() -> bool:
-        wide, high = operator.driver.execute_script(size) or (2, 1)  # both eyes stand side by side
-        return wide < 2 * high
-
-    until(one_eye, "one eye's picture is large")
-    try:
-        box = operator.driver.execute_script(
+    def __init__(self, served: Served, person: Person, eyes: int) -> None:
+        self._served, self._person = served, person
+        until(lambda: self._eyes == eyes, f"the picture of {eyes} eyes is large")
+        box = person.driver.execute_script(
             "const r = document.getElementById('lig-image').getBoundingClientRect(); return [r.x, r.y, r.width, r.height]"
         )
         # the picture fits its box as a whole
-        wide, high = until(lambda: operator.driver.execute_script(size), "the size of the picture")
-        shown_high = min(box[3], box[2] * high / wide)
-        begin, view = standing(served), sight(served)
-        start = view.place(begin[:3, 3])
-        way = np.array([40.0, 30.0])
+        wide, high = until(lambda: person.driver.execute_script(SIZE), "the size of the picture")
+        self._high = min(box[3], box[2] * high / wide)
+        left = box[0] + box[2] / 2 - 0.5 * (eyes - 1) / eyes * self._high * wide / high
+        self._middle, self._view = np.array([left, box[1] + box[3] / 2]), sight(served)
 
-        def moved(pose: np.ndarray) -> np.ndarray:
-            return np.asarray((view.place(pose[:3, 3]) - start) * shown_high * [1, -1])
+    @property
+    def _eyes(self) -> int:
+        width, height = self._served.scene.cameras[0].resolution
+        wide, high = self._person.driver.execute_script(SIZE) or (0, 1)
+        return round(wide / high * height / width)
 
-        def takes() -> None:
-            """Take the tip where it is seen, and drag it to where it should go."""
-            place = view.place(tip(served, "PSM1")[:3, 3]) * [1, -1]
-            x, y = np.array([box[0] + box[2] / 2, box[1] + box[3] / 2]) + place * shown_high
-            rest = way - moved(tip(served, "PSM1"))
-            operator.holds_at(x, y, [tuple(0.25 * rest), tuple(0.75 * rest)])
+    def place(self, pose: np.ndarray) -> np.ndarray:
+        """Where a tip (4, 4) is seen by the left eye."""
+        return self._middle + self._view.place(pose[:3, 3]) * self._high * [1, -1]
 
+    def depth(self, pose: np.ndarray) -> float:
+        return self._view.depth(pose[:3, 3])
+
+    def drags_to(self, goal: np.ndarray) -> None:
+        """Take the tip where it is seen, drag it to ``goal``, and keep hold of it."""
+        here = self.place(tip(self._served, "PSM1"))
+        self._person.holds_at(*here, [tuple(0.25 * (goal - here)), tuple(0.75 * (goal - here))])
+
+    def there(self, goal: np.ndarray) -> bool:
+        """Whether the tip is seen at ``goal``."""
+        return bool(np.abs(self.place(tip(self._served, "PSM1")) - goal).max() < 4.0)
+
+
+def test_a_drag_in_the_picture_takes_the_tip_along(served: Served, operator: Person) -> None:
+    presses(operator, "lig-swap")
+    try:
+        picture, begin = Picture(served, operator, 1), standing(served)
+        goal = picture.place(begin) + [40.0, 30.0]
         # the arm follows while the pointer is held, however slow the machine is
-        there = lambda: moved(tip(served, "PSM1")) == pytest.approx(way, abs=4.0)  # noqa: E731
-        held(takes, operator.lets_go, there, "the tip moves as far as the pointer")
+        held(
+            lambda: picture.drags_to(goal), operator.lets_go, lambda: picture.there(goal),
+            lambda: f"the tip is at {goal}, not at {picture.place(tip(served, 'PSM1'))}: {served.lines[-3:]}",
+        )  # fmt: skip
         end = standing(served)
-        assert moved(end) == pytest.approx(way, abs=4.0), "and stays there"
-        assert view.depth(end[:3, 3]) == pytest.approx(view.depth(begin[:3, 3]), abs=1e-3)
+        assert picture.there(goal), "and stays there"
+        assert picture.depth(end) == pytest.approx(picture.depth(begin), abs=1e-3)
     finally:
+        presses(operator, "lig-swap")
+
+
+def test_a_picture_of_other_eyes_does_not_move_what_is_dragged(served: Served, operator: Person) -> None:
+    presses(operator, "lig-swap")
+    presses(operator, "lig-eyes")
+    try:
+        picture = Picture(served, operator, 2)
+        goal = picture.place(standing(served)) + [-20.0, -15.0]
+
+        def turns_one_eye_off() -> bool:
+            if not picture.there(goal):
+                return False
+            presses(operator, "lig-eyes")
+            try:
+                Picture(served, operator, 1)
+                ActionChains(operator.driver).move_by_offset(1, 0).perform()
+                stays(lambda: picture.there(goal), "the tip stays where it was dragged to", 1.0)
+            finally:
+                presses(operator, "lig-eyes")
+            return True
+
+        held(lambda: picture.drags_to(goal), operator.lets_go, turns_one_eye_off, "the tip is dragged")
+    finally:
+        presses(operator, "lig-eyes")
         presses(operator, "lig-swap")
 
 

@@ -98,7 +98,8 @@ class Hands:
         self._rhythm = Rhythm()
         self._lost = False
         """Whether what is held was given up, until everything is let go."""
-        self._grabbed: tuple[int, Array, Array] | None = None
+        self._grabbed: tuple[int, Array, Array, Sightline] | None = None
+        """The arm that is dragged, its tip, the pointer, and how the picture looked when it was taken."""
         self._gripping = False
 
     def next(self) -> None:
@@ -157,7 +158,7 @@ class Hands:
             self._grab(state, np.array([drag.right, drag.up]), sight)
         if self._grabbed is None:
             return None
-        arm, T, begin = self._grabbed
+        arm, T, begin, sight = self._grabbed
         target = T.copy()
         way = (np.array([drag.right, drag.up]) - begin) * sight.metres(T[:3, 3])
         target[:3, 3] += sight.R[:, :2] @ way
@@ -179,7 +180,7 @@ class Hands:
         nearest = min(away, key=lambda i: away[i])
         if away[nearest] < NEAR or self.selected not in tips:
             self.selected = nearest
-        self._grabbed = (self.selected, tips[self.selected], at)
+        self._grabbed = (self.selected, tips[self.selected], at, sight)
 
     def advance(self, state: Any, sight: Sightline, now: float, dt: float) -> None:
         """Pursue what is held, slower while the browser that holds it is silent."""

@@ -103,7 +103,7 @@ class Pictures:
             self._try(lambda: self._pipe.send(wish))
 
     def newest(self) -> bytes | None:
-        """The newest picture (JPEG) that was not taken yet; `problem` is the reason why there are none."""
+        """The newest picture that was not taken yet, as `packed`; `problem` is the reason why there are none."""
         picture = None
         while not self.problem and self._try(self._pipe.poll):
             got = self._try(self._pipe.recv)
@@ -178,7 +178,7 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
             return
         picture = easel.picture(replace(wish, height=sharpness.height(wish)))
         if picture is not None:
-            pipe.send(jpeg(picture))
+            pipe.send(packed(picture, len(wish.sight.eyes)))
         spent = time.monotonic() - begin
         if picture is not None and wish.large:
             sharpness.note(spent)
@@ -186,11 +186,15 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
         time.sleep(max(period - spent, rest * spent))
 
 
-def jpeg(picture: NDArray[np.uint8]) -> bytes:
-    """A picture (height, width, 3) as JPEG."""
-    packed = io.BytesIO()
-    Image.fromarray(picture).save(packed, "JPEG", quality=QUALITY)
-    return packed.getvalue()
+def packed(picture: NDArray[np.uint8], eyes: int) -> bytes:
+    """A picture (height, width, 3) of ``eyes`` side by side: a byte that counts them, then a JPEG.
+
+    What a browser was told last may be of another picture than the one that it shows.
+    """
+    stream = io.BytesIO(bytes([eyes]))
+    stream.seek(1)
+    Image.fromarray(picture).save(stream, "JPEG", quality=QUALITY)
+    return stream.getvalue()
 
 
 class _Easel:

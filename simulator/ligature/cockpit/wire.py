@@ -72,7 +72,7 @@ class Wire:
         self._on_loop(lambda: self._hang_up(client))
 
     def show(self, picture: bytes) -> None:
-        """Send a picture (JPEG) to every browser that has shown the one before."""
+        """Send a picture, as `pictures.packed`, to every browser that has shown the one before."""
         self._on_loop(lambda: [self._hand(line, picture=picture) for line in self._lines.values()])
 
     def inform(self, client: int, facts: dict[str, Any]) -> None:

@@ -58,6 +58,7 @@
     socket?.close();
     pass = shown;
     const mine = (socket = new WebSocket(location.origin.replace(/^http/, "ws") + "/wire"));
+    mine.binaryType = "arraybuffer";
     mine.onopen = () => {
       order("hello", shown);
       if (kept(KEPT.theme)) order("dark", kept(KEPT.theme) !== "light"); // also what was pressed without a connection
@@ -128,12 +129,14 @@
   };
 
   // --- the camera's picture -------------------------------------------------------------------------------------------
-  let large = false, stereo = false, url = "";
+  let large = false, stereo = false, url = "", eyes = 1;
   const image = make("img", { id: "lig-image", alt: "What the endoscope sees", draggable: "false" });
-  const show = (blob) => {
-    const old = url;
-    image.src = url = URL.createObjectURL(blob);
-    image.onload = image.onerror = () => { if (old) URL.revokeObjectURL(old); order("seen"); };
+  const show = (picture) => { // a byte that counts the eyes, then a JPEG of them side by side
+    const old = url, count = new Uint8Array(picture)[0];
+    image.src = url = URL.createObjectURL(new Blob([picture.slice(1)], { type: "image/jpeg" }));
+    image.onload = () => { eyes = count; shown(); };
+    image.onerror = () => shown();
+    const shown = () => { if (old) URL.revokeObjectURL(old); order("seen"); };
     place();
   };
   const place = () => {
@@ -157,32 +160,35 @@
     sendView();
   };
   let dragged = false, begun = null;
-  const share = (event) => {
+  // where the eye's picture under the pointer stands in the window as a drag begins: another size or another number of
+  // eyes in between must not move an arm
+  const stands = (event) => {
     // the picture fits its box as a whole, so it may be smaller
-    const box = image.getBoundingClientRect(), eyes = facts.eyes || 1;
+    const box = image.getBoundingClientRect();
     const scale = Math.min(box.width / (image.naturalWidth || 1), box.height / (image.naturalHeight || 1));
     const wide = (scale * image.naturalWidth) / eyes, high = scale * image.naturalHeight;
-    const right = event.clientX - (box.left + box.width / 2 - (eyes * wide) / 2), up = box.top + box.height / 2 - event.clientY;
-    const eye = begun?.eye ?? Math.min(Math.max(Math.floor(right / wide), 0), eyes - 1);
-    begun ??= { eye };
+    const left = box.left + box.width / 2 - (eyes * wide) / 2;
+    const eye = Math.min(Math.max(Math.floor((event.clientX - left) / wide), 0), eyes - 1);
+    return { x: left + (eye + 0.5) * wide, y: box.top + box.height / 2, high };
+  };
+  const share = (event) => {
     const clip = (value) => Math.max(-4, Math.min(4, value || 0));
-    return [clip((right - (eye + 0.5) * wide) / high), clip(up / high)];
+    return [clip((event.clientX - begun.x) / begun.high), clip((begun.y - event.clientY) / begun.high)];
   };
   image.addEventListener("pointerdown", (event) => {
-    begun = null;
     dragged = false;
-    begun = { at: share(event), eye: begun.eye, x: event.clientX, y: event.clientY };
+    begun = { ...stands(event), clientX: event.clientX, clientY: event.clientY };
     image.setPointerCapture(event.pointerId);
     event.preventDefault();
   });
   image.addEventListener("pointermove", (event) => {
-    if (!begun?.at) return;
-    const far = Math.hypot(event.clientX - begun.x, event.clientY - begun.y) > 4;
-    if (!dragged && far && facts.operates) { dragged = true; order("drag", ["start", ...begun.at]); done("move"); }
+    if (!begun) return;
+    const far = Math.hypot(event.clientX - begun.clientX, event.clientY - begun.clientY) > 4;
+    if (!dragged && far && facts.operates && begun.high) { dragged = true; order("drag", ["start", ...share(begun)]); done("move"); }
     if (dragged) order("drag", ["move", ...share(event)]);
   });
   const lets = (event) => {
-    if (!begun?.at) return;
+    if (!begun) return;
     if (dragged) order("drag", ["end", ...share(event)]);
     else if (event.type === "pointerup" && !large) swap();
     begun = null;
@@ -257,7 +263,7 @@
   const aimBox = vector("svg", { id: "lig-aim", "aria-hidden": "true" });
   aimBox.append(aimLine, aimEnd, aimText);
   const aims = () => { // from the tip to where it has to go, over the large picture of one eye
-    const known = facts.operates && facts.aim && facts.eyes === 1 && image.naturalHeight;
+    const known = facts.operates && facts.aim && eyes === 1 && image.naturalHeight;
     aimBox.style.visibility = known ? "visible" : "hidden";
     if (!large || !known) return;
     const wide = main.clientWidth, high = main.clientHeight, [x1, y1, x2, y2, away, deeper] = facts.aim;
