@@ -1,13 +1,18 @@
 """Where the commands begin: an interrupt while modules are imported ends them.
 
 Python turns SIGINT into an exception, which is lost where it arrives while the import system releases a lock, or in a
-module that passes over errors: one start of 150 that were interrupted went on as if nothing had been said.
+module that passes over errors: one start of 150 that were interrupted went on as if nothing had been said. Commands
+import what they need when they need it, so this holds as long as they run.
 """
 
 from __future__ import annotations
 
 import importlib
+import os
 import signal
+from types import FrameType
+
+_IMPORT_SYSTEM = "<frozen importlib._bootstrap>"
 
 
 def ligature() -> None:
@@ -21,9 +26,16 @@ def ambf_simulator() -> None:
 
 
 def _run(module: str) -> None:
-    before = signal.getsignal(signal.SIGINT)
-    if before is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-    main = importlib.import_module(module).main
-    signal.signal(signal.SIGINT, before)
-    main()
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
+        signal.signal(signal.SIGINT, _interrupt)
+    importlib.import_module(module).main()
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """End the process amid an import, as if SIGINT had no handler; elsewhere raise `KeyboardInterrupt`."""
+    while frame is not None:
+        if frame.f_code.co_filename == _IMPORT_SYSTEM:
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+        frame = frame.f_back
+    raise KeyboardInterrupt
