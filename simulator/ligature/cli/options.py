@@ -25,13 +25,14 @@ class RunOptions:
     ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
     whether arms also have the names of the suturing challenge's CRTK node, ``cameras``
     whether pictures are published (None: of those cameras for which the scene asks for it), ``window`` whether
-    one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
-    the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines for the user at
-    the start, ``devices`` are indices of the input devices whose proxies are there, ``soft`` bodies
-    that are soft tissue, ``only`` the names of the arms that are there (empty: all), ``masters`` whether
-    master arms are, ``base_frames`` the arm in the frame of whose tip the others give their poses (empty: each in its
-    base). ``haptic_rate`` in Hz (0: that of the device) and ``haptic_forces`` (None: as teleoperation has them) are
-    left to teleoperation as parameters. ``allow_plugins``: the plug-ins that the scene's files name are run.
+    one is shown, ``camera_windows`` whether there is one for each camera, ``task`` is a task that is judged, ``record``
+    a file that all commands are written to, ``cockpit`` is the address of the web page (empty: none), ``ros`` whether
+    ROS is served, ``notes`` are lines for the user at the start, ``devices`` are indices of the input devices whose
+    proxies are there, ``soft`` bodies that are soft tissue, ``only`` the names of the arms that are there (empty:
+    all), ``masters`` whether master arms are, ``base_frames`` the arm in the frame of whose tip the others give their
+    poses (empty: each in its base). ``haptic_rate`` in Hz (0: that of the device) and ``haptic_forces`` (None: as
+    teleoperation has them) are left to teleoperation as parameters. ``allow_plugins``: the plug-ins that the scene's
+    files name are run.
     """
 
     scene: str
@@ -49,6 +50,7 @@ class RunOptions:
     src_crtk: bool = False
     cameras: bool | None = None
     window: bool = False
+    camera_windows: bool = False
     task: str = ""
     record: str = ""
     cockpit: str = ""
