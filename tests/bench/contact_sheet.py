@@ -20,9 +20,9 @@ from ligature.adf import Resolver, read_any
 from ligature.model.scene import Scene
 from ligature.model.shapes import ShaderFiles
 from ligature.render import CameraView, Renderer, view_of
+from ligature.render.controls import Controls
 from ligature.render.lights import LIGHT_AMBIENT
 from ligature.render.target import saturated_share
-from ligature.render.controls import Controls
 from ligature.render.viewer import Figures, Viewer
 from PIL import Image, ImageDraw
 

@@ -12,7 +12,6 @@ MAX_UPDATE_RATE = 1000.0
 """Updates per second of one tick each: no update can be shorter."""
 
 _WITHOUT_EFFECT = {
-    ("-f", "--fixed_htx_timestep"): "fixed haptic step",
     ("--plugins",): "AMBF's plug-ins in C++",
 }
 
@@ -56,6 +55,10 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument(
         "-d", "--htx_frequency", dest="d", type=float, default=0.0,
         help="most forces per second that `ligature teleop` sends to a device",
+    )  # fmt: skip
+    flags.add_argument(
+        "-f", "--fixed_htx_timestep", dest="f", type=_switch,
+        help="1: damping in `ligature teleop` reckons with one period of -d (1000 Hz) between readings",
     )  # fmt: skip
     flags.add_argument("-e", "--enableforces", dest="e", type=_switch, help="0: `ligature teleop` sends no forces")
     flags.add_argument("-n", "--ndevs", dest="n", type=int, help="the first N input devices, where there is no -i")
@@ -109,7 +112,8 @@ def options_of(arguments: list[str]) -> RunOptions:
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
         window=bool(given.g), camera_windows=bool(given.g), notes=_notes(given), devices=devices, only=only,
         masters=not given.no_masters,
-        base_frames=given.base_frames, haptic_rate=given.d, haptic_forces=given.e, allow_plugins=given.allow_plugins,
+        base_frames=given.base_frames, haptic_rate=given.d, haptic_fixed=bool(given.f), haptic_forces=given.e,
+        allow_plugins=given.allow_plugins,
     )  # fmt: skip
 
 
