@@ -327,14 +327,18 @@ def test_ratios_out_of_range_change_nothing(psm: Any, listen: Callable[..., Any]
     assert ratio.messages[-1].data == 1.0
 
 
-def test_a_master_sinks_in_effort_modes_unless_gravity_compensation_carries_it(arms: dict[str, Any]) -> None:
+def test_a_master_sinks_in_effort_modes_unless_gravity_compensation_carries_it(
+    arms: dict[str, Any], listen: Callable[..., Any]
+) -> None:
     from geometry_msgs.msg import WrenchStamped
+    from sensor_msgs.msg import JointState
     from std_msgs.msg import Bool
 
     master = arms["MTMR"]
     assert master.move_jp([0.0] * 7).wait()
     steady(master.measured_jp, within=1e-4)
-    carried = np.array(master.hear("gravity_compensation/setpoint_js").effort)
+    gravity = listen("/MTMR/gravity_compensation/setpoint_js", JointState)
+    carried = np.array(gravity.wait().effort)
     assert carried[[0, 3, 4, 5, 6]] == pytest.approx(np.zeros(5)) and (np.abs(carried[1:3]) > 0.1).all()
     master.send("use_gravity_compensation", Bool(True))
     master.send("body/servo_cf", WrenchStamped())

@@ -75,7 +75,7 @@ def test_with_a_fixed_step_forces_do_not_depend_on_when_readings_come() -> None:
     assert (felt(2e-3, late) == felt(2e-3, even)).all()
     assert felt(2e-3, even) == pytest.approx(felt(0.0, even), abs=1e-9), "on time both are the same"
     assert np.abs(felt(0.0, late) - felt(0.0, even)).max() > 0.05
-    assert abs(felt(1e-3, even)[-1]) == pytest.approx(2.0 * abs(felt(2e-3, even)[-1]), rel=0.01), "twice as fast"
+    assert abs(felt(1e-3, even)[-1]) == pytest.approx(2.0 * abs(felt(2e-3, even)[-1]), rel=0.03), "twice as fast"
 
 
 @pytest.mark.parametrize("asked", [None, "soon", 0.0, -1.0, float("nan"), float("inf")])
