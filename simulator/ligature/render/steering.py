@@ -28,7 +28,7 @@ back in the state."""
 
 
 @dataclass
-class _Grip:
+class _Drag:
     """A camera that the mouse has, and the transforms from the viewpoint to all cameras that go along."""
 
     camera: int
@@ -45,7 +45,7 @@ class Steering:
         self._send = send
         pairs = stereo_partners(scene)
         self._partners = pairs | {right: left for left, right in pairs.items()}
-        self._grip: _Grip | None = None
+        self._drag: _Drag | None = None
 
     def move(
         self,
@@ -57,14 +57,14 @@ class Steering:
         up: float,
     ) -> None:
         """Move a camera that looks at something ``distance()`` metres away; ``right`` and ``up`` are in its picture."""
-        grip = self._grip
-        if grip is None or grip.camera != camera:
-            grip = self._grip = self._take(state, camera, distance())
-        axis = grip.offsets[camera][1:3, 1]  # image right in the viewpoint's picture: cameras may be rolled
+        drag = self._drag
+        if drag is None or drag.camera != camera:
+            drag = self._drag = self._take(state, camera, distance())
+        axis = drag.offsets[camera][1:3, 1]  # image right in the viewpoint's picture: cameras may be rolled
         x, y = np.array([[axis[0], -axis[1]], [axis[1], axis[0]]]) @ (right, up)
-        grip.viewpoint = motion(grip.viewpoint, float(x), float(y))
-        grip.idle, grip.sim_time = 0, float(state["sim_time"][0])
-        for index, pose in self._poses(grip).items():
+        drag.viewpoint = motion(drag.viewpoint, float(x), float(y))
+        drag.idle, drag.sim_time = 0, float(state["sim_time"][0])
+        for index, pose in self._poses(drag).items():
             T_world_camera, T_parent_camera = (
                 pose7_matrix(state[f][0, index]) for f in ("camera_world", "camera_pose")
             )
@@ -74,29 +74,29 @@ class Steering:
     def shown(self, state: NDArray[np.void]) -> Array:
         """Poses (n, 7) of all cameras: of the state, and of what the mouse has where it was put."""
         poses = state["camera_world"][0]
-        grip = self._grip
-        if grip is not None and grip.idle > HELD and state["sim_time"][0] != grip.sim_time:
-            grip = self._grip = None  # while the run is paused, the state does not show what was commanded
-        if grip is None:
+        drag = self._drag
+        if drag is not None and drag.idle > HELD and state["sim_time"][0] != drag.sim_time:
+            drag = self._drag = None  # while the run is paused, the state does not show what was commanded
+        if drag is None:
             return poses  # type: ignore[no-any-return]
-        grip.idle += 1
+        drag.idle += 1
         poses = poses.copy()
-        for index, T in self._poses(grip).items():
+        for index, T in self._poses(drag).items():
             poses[index] = matrix_pose7(T)
         return poses  # type: ignore[no-any-return]
 
     def let_go(self) -> None:
         """From now on cameras are where the state has them."""
-        self._grip = None
+        self._drag = None
 
-    def _take(self, state: NDArray[np.void], camera: int, distance: float) -> _Grip:
+    def _take(self, state: NDArray[np.void], camera: int, distance: float) -> _Drag:
         poses = state["camera_world"][0]
         viewpoint = Viewpoint.at(poses[camera], distance)
         T_view_world = inverse(pose7_matrix(viewpoint.pose))
         taken = [camera, *([self._partners[camera]] if camera in self._partners else [])]
-        return _Grip(camera, viewpoint, {index: T_view_world @ pose7_matrix(poses[index]) for index in taken})
+        return _Drag(camera, viewpoint, {index: T_view_world @ pose7_matrix(poses[index]) for index in taken})
 
     @staticmethod
-    def _poses(grip: _Grip) -> dict[int, Array]:
-        T_world_view = pose7_matrix(grip.viewpoint.pose)
-        return {index: T_world_view @ offset for index, offset in grip.offsets.items()}
+    def _poses(drag: _Drag) -> dict[int, Array]:
+        T_world_view = pose7_matrix(drag.viewpoint.pose)
+        return {index: T_world_view @ offset for index, offset in drag.offsets.items()}
