@@ -20,6 +20,7 @@ from ligature.adf import Resolver, read_any
 from ligature.model.scene import Scene
 from ligature.model.shapes import ShaderFiles
 from ligature.render import CameraView, Renderer, view_of
+from ligature.render.controls import Controls
 from ligature.render.lights import LIGHT_AMBIENT
 from ligature.render.target import saturated_share
 from ligature.render.viewer import Figures, Viewer
@@ -86,7 +87,7 @@ def view_into(scene: Scene, simulation: Simulation, renderer: Renderer) -> Camer
         view = view_of(camera, simulation.state["camera_world"][0, camera.index], SIZE)
         if (renderer.render(simulation.state, view, ("ids",)).ids > 0).mean() > 0.02:
             return view
-    viewer = Viewer(replace(scene, cameras=()), lambda message: None)
+    viewer = Viewer(Controls(replace(scene, cameras=()), lambda message: None), None)
     viewer.picture(simulation.state, SIZE, Figures())
     assert viewer._view is not None
     return viewer._view

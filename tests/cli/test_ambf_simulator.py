@@ -38,8 +38,9 @@ def test_input_devices_are_taken_with_their_proxies() -> None:
 
 
 def test_haptic_flags_are_left_to_teleoperation() -> None:
-    run = options("-d 500 -e 0")
-    assert (run.haptic_rate, run.haptic_forces) == (500.0, False)
+    run = options("-d 500 -e 0 -f 1")
+    assert (run.haptic_rate, run.haptic_forces, run.haptic_fixed) == (500.0, False, True)
+    assert not options("-f 0").haptic_fixed and not options("").haptic_fixed
     assert (
         options("-e 1").haptic_forces is True and options("").haptic_forces is None and options("").haptic_rate == 0.0
     )
@@ -64,9 +65,8 @@ def test_a_prefix_and_a_speed_are_taken() -> None:
 
 
 def test_flags_without_effect_are_accepted_and_reported() -> None:
-    run = options("-t 0 -g 1 -f 1 --plugins 'a.so, b.so'")
+    run = options("-t 0 -g 1 --plugins 'a.so, b.so'")
     assert run.notes == (
-        "-f (fixed haptic step) has no effect here",
         "--plugins (AMBF's plug-ins in C++) has no effect here",
         "-t 0: the step is fixed here anyway; simulated time falls behind on a machine that is too slow",
     )

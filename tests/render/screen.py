@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 SIZE = (1024, 700)
-_KEYSYMS = {" ": 0x20, ".": 0x2E, "Control": 0xFFE3, "Shift": 0xFFE1}
+_KEYSYMS = {" ": 0x20, ".": 0x2E, "Control": 0xFFE3, "Shift": 0xFFE1, "F11": 0xFFC8}
 
 
 class Screen:

@@ -36,6 +36,7 @@ import gc, os, sys
 import ligature
 from ligature import Simulation
 from ligature.render import Renderer, view_of
+from ligature.render.controls import Controls
 from ligature.render.viewer import Figures, Viewer
 
 def held():
@@ -65,8 +66,9 @@ def drawn(i):
     Renderer(scene).render(kept.state, view)
 
 def viewed(i):
-    viewer = Viewer(scene, lambda message: None)
-    viewer.shown.add("collision")
+    controls = Controls(scene, lambda message: None)
+    controls.shown.add("collision")
+    viewer = Viewer(controls, 0)
     viewer.picture(kept.state, (320, 240), Figures())
 
 def kept_sizes(i):

@@ -9,10 +9,15 @@ from typing import Any
 import ligature
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from ligature import Simulation
 from ligature.bus.pacing import Throttle
 from ligature.model.commands import BodyCommand, PlaceCommand, Release, Reset
-from ligature.render import RenderUnavailable
+from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7, pose7_matrix
+from ligature.model.mounted import camera_frame
+from ligature.render import RenderUnavailable, view_of
+from ligature.render.controls import Controls
 from ligature.render.viewer import Figures, Viewer
 
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -34,7 +39,7 @@ def sent() -> list[Any]:
 @pytest.fixture
 def viewer(small: Simulation, sent: list[Any]) -> Viewer:
     try:
-        return Viewer(small.scene, sent.append)
+        return Viewer(Controls(small.scene, sent.append), 0)
     except RenderUnavailable as error:
         pytest.skip(str(error))
 
@@ -99,10 +104,9 @@ def test_contact_forces_are_asked_for_and_carry_the_weight_of_what_lies_there(tm
     )
     simulation = Simulation(ligature.load(path))
     try:
-        viewer = Viewer(simulation.scene, simulation.apply)
+        viewer = Viewer(Controls(simulation.scene, simulation.apply), None)
     except RenderUnavailable as error:
         pytest.skip(str(error))
-    viewer.camera = None
     simulation.step(300)
     assert simulation.state["touch_count"][0] == 0
     before = viewer.picture(simulation.state, SIZE, Figures())
@@ -150,7 +154,9 @@ def test_a_body_follows_the_mouse_against_its_weight_and_is_let_go(tmp_path: Pat
     )
     simulation, sent = Simulation(ligature.load(path)), []
     try:
-        viewer = Viewer(simulation.scene, lambda message: (sent.append(message), simulation.apply(message)))
+        viewer = Viewer(
+            Controls(simulation.scene, lambda message: (sent.append(message), simulation.apply(message))), 0
+        )
     except RenderUnavailable as error:
         pytest.skip(str(error))
     viewer.picture(simulation.state, SIZE, Figures())
@@ -176,7 +182,9 @@ def test_an_arm_goes_where_the_mouse_goes(view: str) -> None:
     """Whichever way the view looks: the tip's pixel moves as the mouse did, the wheel takes it away, a turn turns it."""
     simulation, sent = Simulation(ligature.load(SMALL)), []
     try:
-        viewer = Viewer(simulation.scene, lambda message: (sent.append(message), simulation.apply(message)))
+        viewer = Viewer(
+            Controls(simulation.scene, lambda message: (sent.append(message), simulation.apply(message))), 0
+        )
     except RenderUnavailable as error:
         pytest.skip(str(error))
     viewer.picture(simulation.state, SIZE, Figures())
@@ -195,7 +203,9 @@ def test_an_arm_goes_where_the_mouse_goes(view: str) -> None:
     def seen() -> np.ndarray:
         """The tip by the eye: right, down, away."""
         viewer.picture(simulation.state, SIZE, Figures())
-        return ((viewer._view.view @ np.append(viewer._arm._tip(simulation.state)[:3, 3], 1.0)) * [1, -1, -1, 1])[:3]
+        return (
+            (viewer._view.view @ np.append(viewer._controls.arm._tip(simulation.state)[:3, 3], 1.0)) * [1, -1, -1, 1]
+        )[:3]
 
     def steps(act: Callable[[], None], count: int) -> None:
         for _ in range(count):
@@ -226,3 +236,103 @@ def test_an_arm_goes_where_the_mouse_goes(view: str) -> None:
     viewer.key("A")
     viewer.key("A")
     assert viewer.arm == ""
+
+
+SIGHT = """
+bodies: [Ball, Carrier]
+cameras: [Eye]
+namespace: /ambf/env/
+Ball: {name: Ball, mass: 0, shape: SPHERE, geometry: {radius: 0.01}}
+Carrier: {name: Carrier, mass: 0, location: {position: {x: 0.3, y: -0.2, z: 0.1}, orientation: {r: 0.7, p: -0.4, y: 2.0}}}
+Eye: {name: Eye, parent: Carrier, location: {x: 0.1, y: 0, z: 0}, look at: {x: 0, y: 0, z: 0}, mouse control multipliers: {pan: 1, rotate: 1, scroll: 1, arcball: 1}}
+"""
+
+
+@pytest.fixture(scope="module")
+def sight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Simulation, Controls]:
+    path = tmp_path_factory.mktemp("sight") / "m.yaml"
+    path.write_text(SIGHT)
+    simulation = Simulation(ligature.load(path))
+    try:
+        controls = Controls(simulation.scene, simulation.apply)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    controls.key("M", False, None)
+    return simulation, controls
+
+
+@settings(deadline=None, max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_scene_follows_a_mouse_that_moves_the_camera(sight: tuple[Simulation, Controls], seed: int) -> None:
+    """From wherever the camera looks at the ball, rolled too: what is seen goes where the mouse went, the camera with it."""
+    simulation, controls = sight
+    rng = np.random.default_rng(seed)
+    T_world_carrier = pose7_matrix(simulation.bodies["Carrier"].pose)
+    back, roll, reach = rng.normal(size=3), rng.uniform(-np.pi, np.pi), rng.uniform(0.2, 0.8)
+    back /= np.linalg.norm(back)
+    if abs(back[2]) > 0.9:
+        back = np.array([0.6, 0.0, 0.8])
+    T = camera_frame(reach * back, np.zeros(3), np.array([0.0, 0.0, 1.0])) @ frame(
+        axis_rotation((1, 0, 0), roll), np.zeros(3)
+    )
+    simulation.apply(PlaceCommand("camera", 0, tuple(matrix_pose7(inverse(T_world_carrier) @ T))))
+    simulation.step()
+    viewer = Viewer(controls, 0)
+    viewer.picture(simulation.state, SIZE, Figures())
+    middle = np.array([(SIZE[0] - 1) / 2, (SIZE[1] - 1) / 2])
+
+    def pixel(point: np.ndarray) -> np.ndarray:
+        simulation.step()
+        viewer.picture(simulation.state, SIZE, Figures())
+        view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0], SIZE)
+        x, y, z, _ = view.view @ np.append(point, 1.0)
+        K = view.intrinsics
+        return np.array([K[0, 2] + K[0, 0] * x / -z, K[1, 2] - K[1, 1] * y / -z])
+
+    assert pixel(np.zeros(3)) == pytest.approx(middle, abs=0.6)
+    drag = np.array([9.0, -6.0]) * rng.choice([-1.0, 1.0], 2)
+    for act in (viewer.pan, viewer.look):
+        act(*drag)
+        moved = pixel(np.zeros(3)) - middle
+        assert moved @ drag / np.linalg.norm(moved) / np.linalg.norm(drag) > 0.95, f"{act.__name__}: {moved} for {drag}"
+        act(*-drag)
+        assert pixel(np.zeros(3)) == pytest.approx(middle, abs=1.5)
+    viewer.orbit(*drag)
+    assert pixel(np.zeros(3)) == pytest.approx(middle, abs=1.5), "it turns about what it shows"
+    assert np.linalg.norm(simulation.state["camera_world"][0, 0, :3]) == pytest.approx(reach, abs=0.02)
+    viewer.zoom(3.0)
+    simulation.step()
+    assert np.linalg.norm(simulation.state["camera_world"][0, 0, :3]) < reach - 0.04
+    assert viewer.camera == 0, "no free view"
+
+
+def test_a_camera_that_is_moved_while_the_run_is_paused_is_shown_so(small: Simulation, sent: list[Any]) -> None:
+    """The state does not change then; once it does, the camera is where the state has it."""
+    try:
+        viewer = Viewer(Controls(small.scene, sent.append), 0)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    viewer.key("M")
+    before = viewer.picture(small.state, SIZE, Figures())
+    viewer.pan(60.0, 0.0)
+    assert [command.index for command in sent] == [0, 1], "both of the pair"
+    for _ in range(40):
+        after = viewer.picture(small.state, SIZE, Figures())
+    assert (after[60:] != before[60:]).any(axis=2).mean() > 0.2
+    later = small.state.copy()
+    later["sim_time"] += 0.1
+    assert (viewer.picture(later, SIZE, Figures())[60:] == before[60:]).all()
+
+
+def test_cameras_that_the_mouse_moved_go_back(small: Simulation, sent: list[Any]) -> None:
+    try:
+        viewer = Viewer(Controls(small.scene, sent.append), 0)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    viewer.key("M")
+    before = viewer.picture(small.state, SIZE, Figures())
+    viewer.orbit(60.0, 0.0)
+    assert (viewer.picture(small.state, SIZE, Figures()) != before).any()
+    viewer.key("V", control=True)
+    assert (viewer.picture(small.state, SIZE, Figures()) == before).all()
+    assert sent[-2].pose == pytest.approx(small.state["camera_pose"][0, 0])

@@ -325,3 +325,39 @@ def test_ratios_out_of_range_change_nothing(psm: Any, listen: Callable[..., Any]
     psm.send("trajectory_j/set_ratio", Float64(value))
     until(lambda: len(warning.messages) > before, f"a warning about {value}", 5.0)
     assert ratio.messages[-1].data == 1.0
+
+
+def test_a_master_sinks_in_effort_modes_unless_gravity_compensation_carries_it(
+    arms: dict[str, Any], listen: Callable[..., Any]
+) -> None:
+    from geometry_msgs.msg import WrenchStamped
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Bool
+
+    master = arms["MTMR"]
+    assert master.move_jp([0.0] * 7).wait()
+    steady(master.measured_jp, within=1e-4)
+    gravity = listen("/MTMR/gravity_compensation/setpoint_js", JointState)
+    carried = np.array(gravity.wait().effort)
+    assert carried[[0, 3, 4, 5, 6]] == pytest.approx(np.zeros(5)) and (np.abs(carried[1:3]) > 0.1).all()
+    master.send("use_gravity_compensation", Bool(True))
+    master.send("body/servo_cf", WrenchStamped())
+    until(lambda: np.abs(master.measured_js()[2] - carried).max() < 1e-3, "the motors carry the weight", 10.0)
+    at = master.measured_jp()
+    stays(
+        lambda: np.abs(master.measured_jp() - at).max() < 1e-4,
+        "where it is; not carried, it would sink by centimetres",
+        0.5,
+    )
+    master.send("use_gravity_compensation", Bool(False))
+    until(lambda: np.abs(master.measured_jp() - at).max() > 0.01, "it sinks", 10.0)
+    master.hold()
+
+
+def test_efforts_beyond_those_of_the_motors_are_cut(arms: dict[str, Any]) -> None:
+    from ligature.robots.mtm_weight import MAX_EFFORT
+
+    master = arms["MTMR"]
+    master.servo_jf([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0])
+    until(lambda: master.measured_js()[2][6] == pytest.approx(MAX_EFFORT[6]), "the roll's motor gives all it can", 10.0)
+    master.hold()

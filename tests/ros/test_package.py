@@ -34,7 +34,7 @@ def make(workspace: Path, *words: str, timeout: float = 400.0) -> subprocess.Com
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A catkin workspace with our packages, built and installed."""
+    """A catkin workspace with our packages and one of a stranger's, built and installed."""
     folder = tmp_path_factory.mktemp("workspace")
     source = folder / "src"
     (source / "ligature").mkdir(parents=True)
@@ -44,7 +44,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("package.xml", "CMakeLists.txt", "setup.py", "pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, source / "ligature" / name)
     for name in ("simulator", "launch", "scenes", "examples", "tests/ros"):
-        shutil.copytree(ROOT / name, source / "ligature" / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, source / "ligature" / name, ignore=shutil.ignore_patterns("__pycache__", "my_lab"))
+    shutil.copytree(ROOT / "examples" / "rostest" / "my_lab", source / "my_lab")
     done = make(folder, "install")
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     return folder
@@ -117,9 +118,10 @@ def test_run_tests_runs_the_rostests(workspace: Path) -> None:
     # configured anew, since the first configuration writes down an environment without the packages that it builds
     done = make(workspace, "--force-cmake", "run_tests", timeout=2600.0)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    results = sorted((workspace / "build" / "test_results" / "ligature").glob("rosunit-*.xml"))
-    assert [path.stem for path in results] == [
-        f"rosunit-{name}" for name in ("arms", "objects", "score", "teleoperation")
+    results = sorted((workspace / "build" / "test_results").glob("*/rosunit-*.xml"))
+    assert [(path.parent.name, path.stem) for path in results] == [
+        *(("ligature", f"rosunit-{name}") for name in ("arms", "objects", "score", "teleoperation")),
+        ("my_lab", "rosunit-fall"),
     ]
     for path in results:
         suite = ET.parse(path).getroot()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +21,17 @@ def test_an_example_passes(name: str, ros_env: dict[str, str], tmp_path: Path) -
     env = dict(ros_env, ROS_PACKAGE_PATH=f"{ROOT}:{ROOT / 'ros_msgs'}", ROS_HOME=str(tmp_path))
     done = subprocess.run(
         ["/usr/bin/rostest", EXAMPLES / f"{name}.test"], env=env, capture_output=True, text=True, timeout=280
+    )
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert "RESULT: SUCCESS" in done.stdout and " * TESTS: 1" in done.stdout
+
+
+def test_a_package_of_a_stranger_tests_its_own_scene(ros_env: dict[str, str], tmp_path: Path) -> None:
+    """The package to copy, where it is none of ours: its folder alone is known besides ours."""
+    shutil.copytree(EXAMPLES / "my_lab", tmp_path / "my_lab")
+    env = dict(ros_env, ROS_PACKAGE_PATH=f"{ROOT}:{ROOT / 'ros_msgs'}:{tmp_path}", ROS_HOME=str(tmp_path / "ros"))
+    done = subprocess.run(
+        ["/usr/bin/rostest", "my_lab", "fall.test"], env=env, capture_output=True, text=True, timeout=280
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     assert "RESULT: SUCCESS" in done.stdout and " * TESTS: 1" in done.stdout

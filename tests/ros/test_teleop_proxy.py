@@ -71,12 +71,12 @@ def test_a_proxy_presses_the_hand_that_is_ahead_of_it_unless_forces_are_off(
     devices.write_text(text.replace("arm1:\n", "arm1:\n" + gains, 1))
     assert gains in devices.read_text()
     command = [BIN / "ambf_simulator", "--launch_file", launch, "-l", "0", "-n", "1", "-p", "500"]
-    begin(*command, "-e", int(forces), "-d", "500").wait_for("first state published")
+    begin(*command, "-e", int(forces), "-d", "500", "-f", "1", "-s", "0.9").wait_for("first state published")
     hand = subprocess.Popen([sys.executable, "-c", HAND], env=env, stdout=subprocess.PIPE, text=True)
     begin(BIN / "ligature", "teleop", launch, "-i", "0").wait_for("driving: arm1 → Proxy0")
     output, _ = hand.communicate(timeout=120)
-    devices_there, most, rate = (float(word) for word in output.split())
-    assert devices_there == 1.0
+    devices_there, most, rate, step = (float(word) for word in output.split())
+    assert devices_there == 1.0 and step == pytest.approx(0.9 / 500)
     if forces:
         assert 0.1 < most < 3.01, f"{most} N against a hand that moves on"
         assert rate < 550.0
@@ -111,5 +111,5 @@ for k in range(500):  # 0.2 m/s to the right, then still
     pose.publish(message)
     time.sleep(0.002)
 seconds = time.monotonic() - start
-print(world[-1], max([-x for _, x in felt], default=0.0), len(felt) / seconds)
+print(world[-1], max([-x for _, x in felt], default=0.0), len(felt) / seconds, rospy.get_param("/ligature/haptics")["step"])
 """

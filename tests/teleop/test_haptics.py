@@ -8,7 +8,7 @@ from ligature.model.frames import frame
 from ligature.teleop.calibration import Calibration, axes_of_words
 from ligature.teleop.devices.device import Device
 from ligature.teleop.feedback import Feedback, FeedbackSettings
-from ligature.teleop.haptics import Haptics
+from ligature.teleop.haptics import Haptics, step_of
 from ligature.teleop.pairing import Hand
 
 
@@ -57,3 +57,27 @@ def test_contacts_below_the_deadband_are_not_felt() -> None:
     feedback = Feedback(FeedbackSettings(deadband=0.5, damping=0.0))
     assert feedback.force(np.array([0.4, 0, 0]), np.zeros(3), 0.0) == pytest.approx(np.zeros(3))
     assert feedback.force(np.array([0.6, 0, 0]), np.zeros(3), 0.002) == pytest.approx([0.6, 0, 0])
+
+
+def felt(step: float, late: np.ndarray) -> np.ndarray:
+    """Damping forces of a hand that moves by one millimetre a reading; the readings are ``late`` by seconds."""
+    motors = Motors()
+    haptics = Haptics(FeedbackSettings(gain=0.0, limit=100.0, damping=2.0), motors, Calibration(), step=step)
+    for k, after in enumerate(late):
+        pose = frame(np.eye(3), (1e-3 * k, 0.0, 0.0))
+        haptics.press(Hand(2e-3 * k + after, pose), np.zeros(6), np.zeros(6))
+    return np.array(motors.forces)[:, 0]
+
+
+def test_with_a_fixed_step_forces_do_not_depend_on_when_readings_come() -> None:
+    """AMBF's -f: the velocity that is damped is that of the nominal rate, here 500 Hz."""
+    even, late = np.zeros(40), np.random.default_rng(3).uniform(0.0, 9e-4, 40)
+    assert (felt(2e-3, late) == felt(2e-3, even)).all()
+    assert felt(2e-3, even) == pytest.approx(felt(0.0, even), abs=1e-9), "on time both are the same"
+    assert np.abs(felt(0.0, late) - felt(0.0, even)).max() > 0.05
+    assert abs(felt(1e-3, even)[-1]) == pytest.approx(2.0 * abs(felt(2e-3, even)[-1]), rel=0.03), "twice as fast"
+
+
+@pytest.mark.parametrize("asked", [None, "soon", 0.0, -1.0, float("nan"), float("inf")])
+def test_a_step_that_is_none_is_the_one_that_has_gone_by(asked: object) -> None:
+    assert step_of(asked) == 0.0

@@ -16,6 +16,7 @@ from ligature.model.subsystem import Subsystem
 from ligature.physics import World
 from ligature.robots.arm import Arm
 from ligature.robots.commands import ArmCommand
+from ligature.robots.mtm_arm import MtmArm
 from ligature.robots.operating_state import Rejected
 
 _BUILDERS = {ArmKind.PSM: build_psm, ArmKind.ECM: build_ecm, ArmKind.MTM: build_mtm}
@@ -34,6 +35,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         for description in scene.arms:
             self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
         self._by_name = {arm.name: arm for arm in self._arms}
+        self._masters = [(m, arm) for m, arm in enumerate(self._arms) if isinstance(arm, MtmArm)]
         self._records = ArmRecords(self._arms)
 
     def __getitem__(self, name: str) -> Arm:
@@ -97,6 +99,8 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
             motions = self._world.engine.motions
             motions.prepare()
             self._records.write(motions.handle, motions.table)
+            for m, master in self._masters:
+                state["arm"]["gravity_jf"][0, m] = master.gravity_jf()
 
     def take_problems(self) -> list[Diagnostic]:
         """What was found since the last call."""

@@ -12,7 +12,6 @@ MAX_UPDATE_RATE = 1000.0
 """Updates per second of one tick each: no update can be shorter."""
 
 _WITHOUT_EFFECT = {
-    ("-f", "--fixed_htx_timestep"): "fixed haptic step",
     ("--plugins",): "AMBF's plug-ins in C++",
 }
 
@@ -30,7 +29,11 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument("-t", "--fixed_phx_timestep", dest="t", type=_switch, help="the step is always fixed here")
     flags.add_argument("-s", "--sim_speed_factor", dest="s", type=float, default=1.0, help="simulated over wall time")
     flags.add_argument(
-        "-g", "--show_gui", dest="g", type=_switch, help="1 shows a window; without this flag there is none"
+        "-g",
+        "--show_gui",
+        dest="g",
+        type=_switch,
+        help="1 shows a window for each camera; without this flag there is none",
     )
     flags.add_argument("--ns", default="", help="prefix of every namespace")
     flags.add_argument("--override_max_comm_freq", type=int, help="publishing rate with commands")
@@ -52,6 +55,10 @@ def parser() -> argparse.ArgumentParser:
     flags.add_argument(
         "-d", "--htx_frequency", dest="d", type=float, default=0.0,
         help="most forces per second that `ligature teleop` sends to a device",
+    )  # fmt: skip
+    flags.add_argument(
+        "-f", "--fixed_htx_timestep", dest="f", type=_switch,
+        help="1: damping in `ligature teleop` reckons with one period of -d (1000 Hz) between readings",
     )  # fmt: skip
     flags.add_argument("-e", "--enableforces", dest="e", type=_switch, help="0: `ligature teleop` sends no forces")
     flags.add_argument("-n", "--ndevs", dest="n", type=int, help="the first N input devices, where there is no -i")
@@ -103,8 +110,10 @@ def options_of(arguments: list[str]) -> RunOptions:
         min(given.p, MAX_UPDATE_RATE), given.s,
         min_hz=given.override_min_comm_freq, max_hz=given.override_max_comm_freq,
         names=given.names, arms=tuple(given.arm), src_crtk=given.src_crtk, cameras=given.cameras,
-        window=bool(given.g), notes=_notes(given), devices=devices, only=only, masters=not given.no_masters,
-        base_frames=given.base_frames, haptic_rate=given.d, haptic_forces=given.e, allow_plugins=given.allow_plugins,
+        window=bool(given.g), camera_windows=bool(given.g), notes=_notes(given), devices=devices, only=only,
+        masters=not given.no_masters,
+        base_frames=given.base_frames, haptic_rate=given.d, haptic_fixed=bool(given.f), haptic_forces=given.e,
+        allow_plugins=given.allow_plugins,
     )  # fmt: skip
 
 

@@ -151,6 +151,9 @@ def run(
         ),
     ] = None,
     window: Annotated[bool, typer.Option("--window", help="Show the scene in a window.")] = False,
+    camera_windows: Annotated[
+        bool, typer.Option("--camera-windows", help="Show each camera in a window of its own, as AMBF does.")
+    ] = False,
     task: Annotated[
         str, typer.Option(help="Judge a task on ROS: pose_estimation, insertion or suture.", callback=task_name)
     ] = "",
@@ -180,8 +183,8 @@ def run(
         raise typer.BadParameter(str(error)) from error
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
-        min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras, window=window,
-        task=task, record=str(record) if record else "",
+        min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras,
+        window=window or camera_windows, camera_windows=camera_windows, task=task, record=str(record) if record else "",
         cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
         devices=indices(devices) or (), soft=tuple(soft or ()), only=names_of_arms, masters=masters,
         base_frames=base_frames, allow_plugins=allow_plugins,

@@ -19,19 +19,20 @@ if TYPE_CHECKING:
 class RunOptions:
     """Options of a run.
 
-    ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second,
-    ``speed`` simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and
-    ``max_hz`` replace the publishing rates of all objects, ``names`` is the name policy,
-    ``arms`` are arms as `arm_entry` reads them instead of those of the scene, ``src_crtk``
-    whether arms also have the names of the suturing challenge's CRTK node, ``cameras``
-    whether pictures are published (None: of those cameras for which the scene asks for it), ``window`` whether
-    one is shown, ``task`` is a task that is judged, ``record`` a file that all commands are written to, ``cockpit`` is
-    the address of the web page (empty: none), ``ros`` whether ROS is served, ``notes`` are lines for the user at
-    the start, ``devices`` are indices of the input devices whose proxies are there, ``soft`` bodies
-    that are soft tissue, ``only`` the names of the arms that are there (empty: all), ``masters`` whether
-    master arms are, ``base_frames`` the arm in the frame of whose tip the others give their poses (empty: each in its
-    base). ``haptic_rate`` in Hz (0: that of the device) and ``haptic_forces`` (None: as teleoperation has them) are
-    left to teleoperation as parameters. ``allow_plugins``: the plug-ins that the scene's files name are run.
+    ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second, ``speed``
+    simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and ``max_hz`` replace the
+    publishing rates of all objects, ``names`` is the name policy, ``arms`` are arms as `arm_entry` reads them instead
+    of those of the scene, ``src_crtk`` whether arms also have the names of the suturing challenge's CRTK node,
+    ``cameras`` whether pictures are published (None: of those cameras for which the scene asks for it), ``window``
+    whether one is shown, ``camera_windows`` whether there is one for each camera, ``task`` is a task that is judged,
+    ``record`` a file that all commands are written to, ``cockpit`` is the address of the web page (empty: none),
+    ``ros`` whether ROS is served, ``notes`` are lines for the user at the start, ``devices`` are indices of the input
+    devices whose proxies are there, ``soft`` bodies that are soft tissue, ``only`` the names of the arms that are
+    there (empty: all), ``masters`` whether master arms are, ``base_frames`` the arm in the frame of whose tip the
+    others give their poses (empty: each in its base). ``haptic_rate`` in Hz (0: that of the device), ``haptic_fixed``
+    (one of its periods goes by between two forces, however long it was) and ``haptic_forces`` (None: as teleoperation
+    has them) are left to teleoperation as parameters. ``allow_plugins``: the plug-ins that the scene's files name are
+    run.
     """
 
     scene: str
@@ -49,6 +50,7 @@ class RunOptions:
     src_crtk: bool = False
     cameras: bool | None = None
     window: bool = False
+    camera_windows: bool = False
     task: str = ""
     record: str = ""
     cockpit: str = ""
@@ -60,6 +62,7 @@ class RunOptions:
     masters: bool = True
     base_frames: str = ""
     haptic_rate: float = 0.0
+    haptic_fixed: bool = False
     haptic_forces: bool | None = None
     allow_plugins: bool = False
 

@@ -16,6 +16,9 @@ from ligature.ros.node import Node
 from ligature.ros.registrations import NameTaken
 
 MASTER_NAP = 0.02
+HAPTIC_RATE = 1000.0
+"""Forces per second that AMBF reckons with where ``-d`` gives none."""
+
 """Seconds between two questions to a master that does not answer yet."""
 
 
@@ -45,6 +48,8 @@ def _serve(run: Run) -> None:
 def _haptics(options: RunOptions) -> dict[str, object]:
     """What teleoperation is to know of forces."""
     found: dict[str, object] = {"rate": options.haptic_rate} if options.haptic_rate else {}
+    if options.haptic_fixed:
+        found["step"] = options.speed / (options.haptic_rate or HAPTIC_RATE)
     return found if options.haptic_forces is None else {**found, "forces": options.haptic_forces}
 
 

@@ -9,8 +9,8 @@ from ligature.cli.process import Run, run_process
 from ligature.model.state import new_state
 from ligature.process import report
 from ligature.render import RenderUnavailable
-from ligature.render.viewer import Figures, Viewer
-from ligature.render.window import Window
+from ligature.render.viewer import Figures
+from ligature.render.windows import Windows
 
 MIN_FRAME_PERIOD = 1.0 / 60.0
 """Shortest time in seconds that a picture is shown."""
@@ -26,26 +26,22 @@ def main() -> None:
 
 def _show(run: Run) -> None:
     scene, block = run.scene, run.block
+    outbox, ring, state = Outbox(block.rings["window"]), block.rings["window"], new_state(scene)
     try:
-        window = Window(f"Ligature: {scene.name}")
+        windows = Windows(scene, outbox.push, run.options.camera_windows)
     except RenderUnavailable as error:
         run.decline("window", error)
-    outbox, ring, state = Outbox(block.rings["window"]), block.rings["window"], new_state(scene)
-    viewer = Viewer(scene, outbox.push, window.context)
-    window.listen(viewer)
     report("ready", "H in the window shows its keys")
     period = MIN_FRAME_PERIOD
-    while run.active and not window.closed:
+    while run.active and windows.open:
         begin = time.monotonic()
         ring.beat()
         block.read(state)
-        figures = Figures(1.0 / period, float(block.figures["real_time_factor"][0]))
-        window.show(viewer.picture(state, window.size, figures))
-        viewer.pull()
+        windows.show(state, Figures(1.0 / period, float(block.figures["real_time_factor"][0])))
         outbox.flush()
         time.sleep(max(MIN_FRAME_PERIOD - (time.monotonic() - begin), 0.0))
         period += SMOOTHING * (time.monotonic() - begin - period)
-    window.close()
+    windows.close()
 
 
 if __name__ == "__main__":

@@ -108,6 +108,8 @@ def camera_of(element: Element, folder: Path) -> Callable[..., Camera]:
         multipass=element.flag("multipass"),
         visible=element.flag("visible"),
         monitor=element.integer("monitor"),
+        window_size=_size(element, "window resolution"),
+        controlling_devices=tuple(element.texts("controlling devices")),
         preprocessing_shaders=shader_files(element, "preprocessing shaders", folder),
         depth_shaders=shader_files(element, "depth compute shaders", folder),
         mouse_multipliers={
@@ -182,10 +184,11 @@ def _fan_rays(element: Element, reach: float) -> Array:
 
 
 def _resolution(element: Element) -> tuple[int, int]:
-    for block in ("publish image resolution", "window resolution"):
-        if element.has(block):
-            return element.integer(f"{block}.width"), element.integer(f"{block}.height")
-    return 640, 480
+    return _size(element, "publish image resolution") or _size(element, "window resolution") or (640, 480)
+
+
+def _size(element: Element, block: str) -> tuple[int, int] | None:
+    return (element.integer(f"{block}.width"), element.integer(f"{block}.height")) if element.has(block) else None
 
 
 def _noise(element: Element) -> tuple[float, float, float] | None:

@@ -316,6 +316,8 @@ class Camera:
     multipass: bool = False
     visible: bool = True
     monitor: int = 0
+    window_size: tuple[int, int] | None = None
+    controlling_devices: tuple[str, ...] = ()
     preprocessing_shaders: ShaderFiles | None = None
     depth_shaders: ShaderFiles | None = None
     mouse_multipliers: dict[str, float] = field(default_factory=dict)

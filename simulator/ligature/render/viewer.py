@@ -1,30 +1,25 @@
-"""What the window shows and does, without a window: views, toggles, picking and dragging, pause and resets.
+"""What one window shows and does, without a window: views, picking and dragging, cameras that the mouse moves.
 
-World axes, metres; mouse positions in pixels from the top left corner of the picture. Commands go out through a
-callable, as every front end's do.
+World axes, metres; mouse positions in pixels from the top left corner of the picture. Commands go out through the
+`Controls`, which all windows share.
 """
 
 from __future__ import annotations
 
-import colorsys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.bus.codec import Message
-from ligature.bus.pacing import Throttle
-from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release, Reset, WatchContacts
+from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release
 from ligature.model.frames import matrix_pose7, pose7_matrix
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Scene
-from ligature.model.shapes import Collider, Colour, TriMesh, Visual
 from ligature.render import overlay
-from ligature.render.arm_drive import ArmDrive
 from ligature.render.camera import CameraView, perspective, view_matrix, view_of
-from ligature.render.renderer import Renderer
+from ligature.render.controls import TOGGLES, Controls
+from ligature.render.steering import Motion, Steering
 from ligature.render.viewpoint import Viewpoint
 
 Array = NDArray[np.float64]
@@ -38,8 +33,11 @@ EYE_SHARE = 0.03
 MARK_SHARE = 0.06
 """Length of drawn axes, as a part of the distance to what is looked at."""
 
-ORBIT_RATE, PAN_RATE = 0.008, 0.0015
-"""Radians, and parts of the distance, per pixel of the mouse."""
+ORBIT_RATE, PAN_RATE, LOOK_RATE = 0.008, 0.0015, 0.004
+"""Radians, parts of the distance, and radians, per pixel of the mouse."""
+
+USUAL_DISTANCE = 0.2
+"""Metres from a camera to what it looks at where its picture shows nothing in the middle."""
 
 PULL_RATE = 2 * np.pi * 1.5
 """Natural frequency in rad/s of the spring between a dragged body and the mouse."""
@@ -47,21 +45,11 @@ PULL_RATE = 2 * np.pi * 1.5
 MOST_PULL = 50.0
 """Largest force on a dragged body, in units of its mass: m/s²."""
 
-TOGGLES = {
-    "C": ("collision", "collision shapes"),
-    "F": ("frames", "frames"),
-    "J": ("joints", "joint axes"),
-    "N": ("contacts", "contact forces"),
-    "T": ("tension", "thread tension"),
-    "S": ("stereo", "stereo side by side"),
-    "H": ("help", "this help"),
-}
-"""Key, name and meaning of what can be switched on and off."""
-
 HELP = (
-    "drag: turn   right drag: move   wheel: nearer   Ctrl+drag: pull a body",
+    "drag: turn   right drag: move   middle drag: look around   wheel: nearer   Ctrl+drag: pull a body",
     "A: drive the next arm, then none   G: its jaw   Shift+drag: move   Shift+right drag: turn   Shift+wheel: away",
-    "Space: pause   .: one update   Ctrl+R: reset bodies   Ctrl+V: reset cameras   V: next camera",
+    "Space: pause   .: one update   Ctrl+R: reset bodies   Ctrl+V: reset cameras   V: next camera   F11: full screen",
+    "M: the mouse moves the scene's camera, or leaves it for a free view   S: stereo side by side",
     "   ".join(f"{key}: {meaning}" for key, (_, meaning) in TOGGLES.items()),
 )
 
@@ -85,24 +73,19 @@ class _Hold:
 
 
 class Viewer:
-    """Draws a scene for people; ``send`` takes the commands that they give."""
+    """Draws a scene for people, of ``camera`` at first; None is the free view."""
 
-    def __init__(self, scene: Scene, send: Callable[[Message], None], context: moderngl.Context | None = None) -> None:
-        self.scene = scene
-        self._send = send
-        self._context = context
-        self._renderer = Renderer(scene, context=context)
-        self._shapes: Renderer | None = None
-        self._partners = stereo_partners(scene)
-        self.shown: set[str] = set()
-        self.paused = False
-        self._clock = False
-        self._cameras = [camera.index for camera in scene.cameras if camera.visible]
-        self.camera: int | None = self._cameras[0] if self._cameras else None
-        self._viewpoint, self._angle = Viewpoint(_middle(scene), 1.0), FREE_ANGLE
+    def __init__(self, controls: Controls, camera: int | None) -> None:
+        self._controls = controls
+        self.scene = controls.scene
+        self.camera = self._first = camera
+        self.stereo = camera is not None and self.scene.cameras[camera].stereo is not None
+        self._partners = stereo_partners(self.scene)
+        self._cameras = visible_cameras(self.scene)
+        self._steering = Steering(self.scene, controls.send)
+        self._viewpoint, self._angle = Viewpoint(_middle(self.scene), 1.0), FREE_ANGLE
         self._mouse: Mapping[str, float] = {}
         self._hold: _Hold | None = None
-        self._arm = ArmDrive(scene, send)
         self._view: CameraView | None = None
         self._state: NDArray[np.void] | None = None
 
@@ -111,30 +94,34 @@ class Viewer:
     def picture(self, state: NDArray[np.void], size: tuple[int, int], figures: Figures) -> NDArray[np.uint8]:
         """What the window shows of ``state`` (1,): (height, width, 3) for ``size`` (width, height)."""
         self._state = state
-        if "stereo" in self.shown:
+        self._places = self._steering.shown(state)
+        if self.stereo:
             half = (size[0] // 2, size[1])
-            eyes = [self._draw(state, view) for view in self._eyes(state, half)]
-            rgb = np.concatenate([*eyes, np.zeros((size[1], size[0] % 2, 3), np.uint8)], axis=1)
+            left, right = self._eyes(half)
+            self._view = left  # bodies are taken in the left half
+            rgb = np.concatenate(
+                [self._draw(state, left), self._draw(state, right), np.zeros((size[1], size[0] % 2, 3), np.uint8)],
+                axis=1,
+            )
         else:
-            self._view = self._mono(state, size)
+            self._view = self._mono(size)
             rgb = self._draw(state, self._view)
         return overlay.draw_words(rgb, self._words(state, figures))
 
     def _draw(self, state: NDArray[np.void], view: CameraView) -> NDArray[np.uint8]:
-        renderer = self._collision_renderer() if "collision" in self.shown else self._renderer
-        rgb = renderer.render(state, view, ("rgb",)).rgb
-        return overlay.draw_segments(rgb, self._segments(state), view)
+        return overlay.draw_segments(self._controls.colours(state, view), self._segments(state), view)
 
     def _segments(self, state: NDArray[np.void]) -> list[overlay.Segment]:
+        shown = self._controls.shown
         size = MARK_SHARE * self._reach(state)
         found = overlay.senses(self.scene, state, PAN_RATE * self._reach(state)) + overlay.plugin_lines(state)
-        if "frames" in self.shown:
+        if "frames" in shown:
             found += overlay.frames(self.scene, state, size)
-        if "joints" in self.shown:
+        if "joints" in shown:
             found += overlay.joint_axes(self.scene, state, size)
-        if "contacts" in self.shown:
+        if "contacts" in shown:
             found += overlay.contacts(state, 2.0 * size)[0]
-        if "tension" in self.shown:
+        if "tension" in shown:
             found += overlay.tension(self.scene, state)[0]
         if self._hold is not None:
             T = pose7_matrix(state["body_pose"][0, self._hold.body])
@@ -142,45 +129,28 @@ class Viewer:
         return found
 
     def _words(self, state: NDArray[np.void], figures: Figures) -> list[str]:
+        shown, arm = self._controls.shown, self._controls.arm.name
         view = "free view" if self.camera is None else self.scene.cameras[self.camera].identity.name
-        pace = "paused" if self.paused else f"real-time factor {figures.real_time_factor:.2f}"
-        view += f"   {self._arm.name}" if self._arm.name else ""
+        view += ", moved by the mouse" if self._moves_camera else ""
+        pace = "paused" if self._controls.paused else f"real-time factor {figures.real_time_factor:.2f}"
+        view += f"   {arm}" if arm else ""
         words = [f"{view}   {figures.frame_rate:.0f} frames/s   {pace}   {float(state['sim_time'][0]):.2f} s"]
-        if "tension" in self.shown:
+        if "tension" in shown:
             words.append(f"largest thread tension {overlay.tension(self.scene, state)[1]:.3g} N")
-        if "contacts" in self.shown:
+        if "contacts" in shown:
             words.append(f"largest contact force {overlay.contacts(state, 1.0)[1]:.3g} N")
-        return words + (list(HELP) if "help" in self.shown else ["H: help"])
-
-    def _collision_renderer(self) -> Renderer:
-        """Draws collision shapes in place of visual meshes; made when it is wanted first."""
-        if self._shapes is None:
-            grids = {tissue.body: tissue.form for tissue in self.scene.tissues}
-            surfaces = {
-                body: (Collider(TriMesh(form.grid.nodes, form.triangles.astype(np.int32)), np.eye(4)),)
-                for body, form in grids.items()
-            }
-            bodies = tuple(
-                replace(
-                    body,
-                    visual=Visual(shapes=surfaces.get(body.index, body.colliders), colour=_tint(body.index)),
-                )
-                for body in self.scene.bodies
-            )
-            self._shapes = Renderer(replace(self.scene, bodies=bodies), context=self._context)
-        return self._shapes
+        return words + (list(HELP) if "help" in shown else ["H: help"])
 
     # --- views ------------------------------------------------------------------------------
 
-    def _mono(self, state: NDArray[np.void], size: tuple[int, int]) -> CameraView:
+    def _mono(self, size: tuple[int, int]) -> CameraView:
         if self.camera is None:
             return self._free(self._viewpoint.pose, size)
-        return view_of(self.scene.cameras[self.camera], state["camera_world"][0, self.camera], size)
+        return view_of(self.scene.cameras[self.camera], self._places[self.camera], size)
 
-    def _eyes(self, state: NDArray[np.void], size: tuple[int, int]) -> tuple[CameraView, CameraView]:
+    def _eyes(self, size: tuple[int, int]) -> tuple[CameraView, CameraView]:
         """Left and right: a pair of cameras, the eyes of a stereo camera, or two eyes at the free viewpoint."""
-        cameras, index = self.scene.cameras, self.camera
-        poses = state["camera_world"][0]
+        cameras, index, poses = self.scene.cameras, self.camera, self._places
         if index is not None:
             for left, right in self._partners.items():
                 if index in (left, right):
@@ -189,7 +159,8 @@ class Viewer:
                 left_eye, right_eye = (view_of(cameras[index], poses[index], size, eye) for eye in ("left", "right"))
                 return left_eye, right_eye
         T = pose7_matrix(self._viewpoint.pose if index is None else poses[index])
-        aside = 0.5 * EYE_SHARE * self._reach(state) * T[:3, 1]
+        assert self._state is not None
+        aside = 0.5 * EYE_SHARE * self._reach(self._state) * T[:3, 1]
         views = []
         for sign in (-1.0, 1.0):
             stand = T.copy()
@@ -206,8 +177,7 @@ class Viewer:
         """Metres from the eye to what is looked at."""
         if self.camera is None:
             return self._viewpoint.distance
-        eye = state["camera_world"][0, self.camera, :3]
-        return float(np.clip(np.linalg.norm(eye - _middle(self.scene, state)), 0.05, 5.0))
+        return float(np.clip(np.linalg.norm(self._places[self.camera, :3] - _middle(self.scene, state)), 0.05, 5.0))
 
     def next_camera(self) -> None:
         """Show the next visible camera of the scene, and after the last one the free view."""
@@ -216,32 +186,56 @@ class Viewer:
 
     def _leave_camera(self) -> None:
         """Take the free viewpoint to where the shown camera stands, turning about what it looks at."""
-        if self.camera is not None and self._state is not None and self._view is not None:
-            found = self._at(self._view.width // 2, self._view.height // 2)
-            distance = 0.2 if found is None else found[2]
-            self._viewpoint = Viewpoint.at(self._state["camera_world"][0, self.camera], distance)
+        if self.camera is not None and self._state is not None:
+            self._viewpoint = Viewpoint.at(self._places[self.camera], self._ahead())
             self._angle = self.scene.cameras[self.camera].field_of_view
             self._mouse = self.scene.cameras[self.camera].mouse_multipliers
         self.camera = None
 
+    def _ahead(self) -> float:
+        """Metres to what is shown in the middle of the picture."""
+        found = None if self._view is None else self._at(self._view.width // 2, self._view.height // 2)
+        return USUAL_DISTANCE if found is None else found[2]
+
     # --- mouse ------------------------------------------------------------------------------
 
+    @property
+    def _moves_camera(self) -> bool:
+        """Whether the mouse moves the camera of the scene that is shown, and no free view."""
+        return self._controls.moves_cameras and self.camera is not None
+
     def orbit(self, right: float, down: float) -> None:
-        """Turn the view by a mouse movement in pixels."""
-        self._leave_camera()
-        rate = ORBIT_RATE * self._mouse.get("arcball", 1.0)
-        self._viewpoint = self._viewpoint.orbit(rate * right, -rate * down)
+        """Turn the view about what it shows by a mouse movement in pixels."""
+        rate = ORBIT_RATE * self._multiplier("arcball")
+        self._move(Viewpoint.orbit, rate * right, -rate * down)
 
     def pan(self, right: float, down: float) -> None:
         """Move the view by a mouse movement in pixels."""
-        self._leave_camera()
-        rate = PAN_RATE * self._mouse.get("pan", 1.0)
-        self._viewpoint = self._viewpoint.pan(rate * right, -rate * down)
+        rate = PAN_RATE * self._multiplier("pan")
+        self._move(Viewpoint.pan, rate * right, -rate * down)
+
+    def look(self, right: float, down: float) -> None:
+        """Turn the view where it stands by a mouse movement in pixels."""
+        rate = LOOK_RATE * self._multiplier("rotate")
+        self._move(Viewpoint.look, rate * right, -rate * down)
 
     def zoom(self, steps: float) -> None:
         """Go nearer by steps of the wheel."""
-        self._leave_camera()
-        self._viewpoint = self._viewpoint.zoom(steps * self._mouse.get("scroll", 1.0))
+        nearer = steps * self._multiplier("scroll")
+        self._move(lambda viewpoint, _right, _up: viewpoint.zoom(nearer), 0.0, 0.0)
+
+    def _multiplier(self, name: str) -> float:
+        """Factor of a motion of the mouse, of the camera that is shown or was left last."""
+        found = self._mouse if self.camera is None else self.scene.cameras[self.camera].mouse_multipliers
+        return found.get(name, 1.0)
+
+    def _move(self, motion: Motion, right: float, up: float) -> None:
+        """Move the camera of the scene, or leave it for the free view and move that."""
+        if not self._moves_camera:
+            self._leave_camera()
+            self._viewpoint = motion(self._viewpoint, right, up)
+        elif self._state is not None and self.camera is not None:
+            self._steering.move(self._state, self.camera, self._ahead, motion, right, up)
 
     @property
     def holds(self) -> bool:
@@ -280,12 +274,12 @@ class Viewer:
         acceleration *= min(1.0, MOST_PULL / max(float(np.linalg.norm(acceleration)), 1e-12))
         force = body.mass * acceleration
         wrench = (*(force - body.mass * body.gravity).tolist(), *np.cross(arm, force).tolist())
-        self._send(BodyCommand(body.index, CommandType.FORCE, wrench))
+        self._controls.send(BodyCommand(body.index, CommandType.FORCE, wrench))
 
     def let_go(self) -> None:
         """Release what is held."""
         if self._hold is not None:
-            self._send(Release("body", self._hold.body))
+            self._controls.send(Release("body", self._hold.body))
         self._hold = None
 
     def _at(self, x: int, y: int) -> tuple[int, Array, float] | None:
@@ -293,7 +287,7 @@ class Viewer:
         view, state = self._view, self._state
         if view is None or state is None or not (0 <= x < view.width and 0 <= y < view.height):
             return None
-        frame = self._renderer.render(state, view, ("depth", "ids"))
+        frame = self._controls.distances(state, view)
         if frame.ids[y, x] == 0:
             return None
         depth = float(frame.depth[y, x])
@@ -304,65 +298,49 @@ class Viewer:
     @property
     def arm(self) -> str:
         """Name of the arm that the mouse drives; empty for none."""
-        return self._arm.name
+        return self._controls.arm.name
 
     def move_arm(self, right: float, down: float) -> None:
         """Move the arm's tip by a mouse movement in pixels."""
         if self._state is not None and self._view is not None:
-            self._arm.move(self._state, self._view, right, down)
+            self._controls.arm.move(self._state, self._view, right, down)
 
     def turn_arm(self, right: float, down: float) -> None:
         """Turn the arm's tip by a mouse movement in pixels."""
         if self._state is not None and self._view is not None:
-            self._arm.turn(self._state, self._view, right, down)
+            self._controls.arm.turn(self._state, self._view, right, down)
 
     def advance_arm(self, notches: float) -> None:
         """Move the arm's tip away by notches of the wheel."""
         if self._state is not None and self._view is not None:
-            self._arm.advance(self._state, self._view, notches)
+            self._controls.arm.advance(self._state, self._view, notches)
 
     # --- keys -------------------------------------------------------------------------------
 
     def key(self, key: str, control: bool = False) -> None:
         """A key: a letter, ``" "`` or ``"."``."""
-        if control and key == "R":
-            self._send(Reset(bodies_only=True))
-        elif control and key == "V":
+        if control and key == "V":
             self._reset_cameras()
-        elif control:
-            return
-        elif key == " ":
-            self.paused = not self.paused
-            self._send(Throttle(self.paused, self._clock, 1 if self.paused else 0))
-        elif key == "." and self.paused:
-            self._clock = not self._clock
-            self._send(Throttle(True, self._clock, 1))
         elif key == "V":
             self.next_camera()
-        elif key == "A":
-            self._arm.next()
-            if self._state is not None:
-                self._arm.make_ready(self._state)
-        elif key == "G" and self._state is not None:
-            self._arm.toggle_jaw(self._state)
-        elif key in TOGGLES:
-            self.shown ^= {TOGGLES[key][0]}
-            if key == "N":
-                self._send(WatchContacts("contacts" in self.shown))
+        elif key == "S" and not control:
+            self.stereo = not self.stereo
+        else:
+            self._controls.key(key, control, self._state)
 
     def _reset_cameras(self) -> None:
         """Put the cameras, and the free view, back to where they were at the start."""
         for camera in self.scene.cameras:
             pose = matrix_pose7(camera.attachment.T_parent_object)
-            self._send(PlaceCommand("camera", camera.index, tuple(pose.tolist())))
-        self.camera = self._cameras[0] if self._cameras else None
+            self._controls.send(PlaceCommand("camera", camera.index, tuple(pose.tolist())))
+        self._steering.let_go()
+        self.camera = self._first
         self._viewpoint, self._angle = Viewpoint(_middle(self.scene), 1.0), FREE_ANGLE
 
 
-def _tint(index: int) -> Colour:
-    """A colour that distinguishes one body's collision shapes from its neighbours'; hues a golden angle apart."""
-    r, g, b = colorsys.hsv_to_rgb(0.618034 * index % 1.0, 0.55, 0.9)
-    return Colour(diffuse=(r, g, b), ambient=(0.5 * r, 0.5 * g, 0.5 * b), specular=(0.2, 0.2, 0.2))
+def visible_cameras(scene: Scene) -> list[int]:
+    """Indices of the cameras that windows show."""
+    return [camera.index for camera in scene.cameras if camera.visible]
 
 
 def _middle(scene: Scene, state: NDArray[np.void] | None = None) -> tuple[float, float, float]:

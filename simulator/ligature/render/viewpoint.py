@@ -62,3 +62,10 @@ class Viewpoint:
     def zoom(self, steps: float) -> Viewpoint:
         """Go nearer by 10 % a step."""
         return replace(self, distance=float(np.clip(self.distance * 0.9**steps, CLOSEST, FARTHEST)))
+
+    def look(self, right: float, up: float) -> Viewpoint:
+        """Turn where it stands by radians, as if the scene were dragged right and up."""
+        elevation = float(np.clip(self.elevation + up, -STEEPEST, STEEPEST))
+        turned = replace(self, azimuth=self.azimuth + right, elevation=elevation)
+        x, y, z = self.pose[:3] - self.distance * turned._axes[:, 0]
+        return replace(turned, focus=(x, y, z))

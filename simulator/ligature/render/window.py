@@ -1,4 +1,7 @@
-"""The window: shows pictures and hands mouse and keys to a `Viewer`."""
+"""Windows: each shows pictures and hands mouse and keys to a `Viewer`.
+
+Sizes and places are in the display's units, from the top left corner of all monitors.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,10 @@ from ligature.render.context import RenderUnavailable, tidy
 from ligature.render.viewer import Viewer
 
 SIZE = (960, 600)
-"""Width and height at start."""
+"""Width and height at start, where the scene asks for none."""
+
+CASCADE = 32
+"""Pixels between the corners of windows that open on one monitor, so that each shows its title."""
 
 _VERTEX = """#version 330 core
 out vec2 vAt;
@@ -29,13 +35,33 @@ in vec2 vAt;
 out vec4 fColour;
 void main() { fColour = texture(uPicture, vec2(vAt.x, 1.0 - vAt.y)); }
 """
-_KEYS = {glfw.KEY_SPACE: " ", glfw.KEY_PERIOD: "."} | {getattr(glfw, f"KEY_{c}"): c for c in "ACFGHJNRSTV"}
+_KEYS = {glfw.KEY_SPACE: " ", glfw.KEY_PERIOD: "."} | {getattr(glfw, f"KEY_{c}"): c for c in "ACFGHJMNRSTV"}
+
+Box = tuple[int, int, int, int]
+"""Left, top, width and height."""
+
+
+def placed(monitor: Box, size: tuple[int, int], number: int) -> Box:
+    """Where the window ``number`` of a monitor opens: in its middle, lower than the last one, no larger than it."""
+    left, top, wide, high = monitor
+    width, height = min(size[0], wide), min(size[1], high)
+    step = CASCADE * number
+    return (
+        left + min((wide - width) // 2 + step, wide - width),
+        top + min((high - height) // 2 + step, high - height),
+        width,
+        height,
+    )
 
 
 class Window:
-    """One window with its OpenGL context; raises `RenderUnavailable` without a display."""
+    """One window with its OpenGL context; raises `RenderUnavailable` without a display.
 
-    def __init__(self, title: str) -> None:
+    It opens at ``size`` on the monitor of index ``monitor``, the first one where there are fewer; ``number`` windows
+    are there already.
+    """
+
+    def __init__(self, title: str, size: tuple[int, int] = SIZE, monitor: int = 0, number: int = 0) -> None:
         if not os.environ.get("DISPLAY"):
             raise RenderUnavailable("no window: there is no display; set DISPLAY, or run without '--window'")
         glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_X11)  # as DISPLAY says; Wayland offers it too
@@ -47,17 +73,60 @@ class Window:
             (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
         ):
             glfw.window_hint(hint, value)
-        self._window = glfw.create_window(*SIZE, title, None, None)
+        self._monitor = monitor
+        left, top, width, height = placed(self._monitor_area(), size, number)
+        glfw.window_hint(glfw.VISIBLE, glfw.FALSE)  # it appears where it belongs
+        self._window = glfw.create_window(width, height, title, None, None)
         if not self._window:
-            glfw.terminate()
             raise RenderUnavailable("no window: the display has no OpenGL 3.3")
+        glfw.set_window_pos(self._window, left, top)
+        glfw.show_window(self._window)
         glfw.make_context_current(self._window)
-        glfw.swap_interval(1)
+        glfw.swap_interval(0)  # several windows would wait for the monitor one after the other; the run bounds the rate
         self.context = tidy(moderngl.create_context(require=330, context=_Functions()))  # type: ignore[arg-type]
         self._program = self.context.program(_VERTEX, _FRAGMENT)
         self._quad = self.context.vertex_array(self._program, [])
         self._texture: moderngl.Texture | None = None
         self._last = (0.0, 0.0)
+        self._windowed: Box | None = None
+
+    @property
+    def title(self) -> str:
+        """What stands above it."""
+        return str(glfw.get_window_title(self._window))
+
+    @property
+    def box(self) -> Box:
+        """Where it is, and how large."""
+        return (*glfw.get_window_pos(self._window), *glfw.get_window_size(self._window))
+
+    @property
+    def full_screen(self) -> bool:
+        """Whether it fills its monitor."""
+        return self._windowed is not None
+
+    def toggle_full_screen(self) -> None:
+        """Fill the monitor that the window was made for, or go back to where it was."""
+        if self._windowed is not None:
+            glfw.set_window_monitor(self._window, None, *self._windowed, glfw.DONT_CARE)
+            self._windowed = None
+            return
+        monitor = self._its_monitor()
+        if monitor is not None:
+            self._windowed = self.box
+            mode = glfw.get_video_mode(monitor)
+            glfw.set_window_monitor(self._window, monitor, 0, 0, *mode.size, mode.refresh_rate)
+            glfw.focus_window(self._window)  # above the others, also where no window manager does it
+
+    def _its_monitor(self) -> Any:
+        """The monitor that it opens on; None without any."""
+        monitors = glfw.get_monitors()
+        return monitors[self._monitor if self._monitor < len(monitors) else 0] if monitors else None
+
+    def _monitor_area(self) -> Box:
+        """The part of its monitor that windows may cover; any place without a monitor."""
+        monitor = self._its_monitor()
+        return (0, 0, *SIZE) if monitor is None else tuple(glfw.get_monitor_workarea(monitor))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -78,8 +147,13 @@ class Window:
         glfw.set_cursor_pos_callback(self._window, self._on_move)
         glfw.set_scroll_callback(self._window, self._on_wheel)
 
+    def activate(self) -> None:
+        """Make its OpenGL context the one that is drawn with."""
+        glfw.make_context_current(self._window)
+
     def show(self, rgb: NDArray[np.uint8]) -> None:
-        """Show a picture (h, w, 3) and take what mouse and keys have done meanwhile."""
+        """Show a picture (h, w, 3); its OpenGL context is then the one that is drawn with."""
+        self.activate()
         height, width = rgb.shape[:2]
         if self._texture is None or self._texture.size != (width, height):
             self._texture = self.context.texture((width, height), 3, alignment=1)
@@ -89,15 +163,17 @@ class Window:
         self.context.enable_only(moderngl.NOTHING)
         self._texture.use(0)
         self._quad.render(moderngl.TRIANGLES, vertices=3)
+        self.context.gc()
         glfw.swap_buffers(self._window)
-        glfw.poll_events()
 
-    def close(self) -> None:
-        """Give the window back."""
-        glfw.terminate()
+    def hide(self) -> None:
+        """Take it off the screen; its OpenGL context stays."""
+        glfw.hide_window(self._window)
 
     def _on_key(self, _window: Any, key: int, _code: int, action: int, modifiers: int) -> None:
-        if action != glfw.RELEASE and key in _KEYS:
+        if key == glfw.KEY_F11 and action == glfw.PRESS:
+            self.toggle_full_screen()
+        elif action != glfw.RELEASE and key in _KEYS:
             self._viewer.key(_KEYS[key], bool(modifiers & glfw.MOD_CONTROL))
 
     def _on_button(self, _window: Any, button: int, action: int, modifiers: int) -> None:
@@ -119,8 +195,10 @@ class Window:
                 self._viewer.drag(*self._pixel())
             else:
                 self._viewer.orbit(right, down)
-        elif self._pressed(glfw.MOUSE_BUTTON_RIGHT) or self._pressed(glfw.MOUSE_BUTTON_MIDDLE):
+        elif self._pressed(glfw.MOUSE_BUTTON_RIGHT):
             self._viewer.pan(right, down)
+        elif self._pressed(glfw.MOUSE_BUTTON_MIDDLE):
+            self._viewer.look(right, down)
 
     def _on_wheel(self, _window: Any, _x: float, y: float) -> None:
         if self._drives_arm():

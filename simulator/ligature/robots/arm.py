@@ -434,7 +434,7 @@ class Arm(Device):
         return self._T_reference_base
 
     def use_gravity_compensation(self, flag: bool) -> None:
-        """Whether effort modes carry the arm's own weight; arms without weight need none."""
+        """Whether effort modes carry the arm's own weight; arms without weight, all but masters, need none."""
         self.gravity_compensation = bool(flag)
 
     def body_set_cf_orientation_absolute(self, flag: bool) -> None:

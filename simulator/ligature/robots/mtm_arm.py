@@ -1,6 +1,6 @@
 """A master tool manipulator as a CRTK arm: gripper and locked orientation. Metres, radians.
 
-It has no bodies: it goes where it is commanded, and yields to efforts as a damped inertia.
+It has no bodies: it goes where it is commanded, and yields to efforts and to its weight as a damped inertia.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ligature.model.frames import quaternion_matrix
 from ligature.robots.arm import Arm, JointState
-from ligature.robots.axes import Axes
+from ligature.robots.axes import Axes, Mode
 from ligature.robots.mtm import Mtm
+from ligature.robots.mtm_weight import MAX_EFFORT, weight
 from ligature.robots.operating_state import Rejected
 from ligature.robots.plant import IdealPlant
 from ligature.robots.poses import rotation_vector
@@ -88,8 +89,9 @@ class MtmArm(Arm):
         self.emit("orientation_locked", False)
 
     def free(self) -> None:
-        """Let the joints move freely; a locked orientation is kept."""
+        """Let the joints move freely, their weight carried; a locked orientation is kept."""
         super().free()
+        self.gravity_compensation = True
         self._pushing = "body/servo_cf", np.zeros(6)
 
     def _wrench_on_tip(self, T: Array, what: str, push: Any) -> Array:
@@ -100,8 +102,16 @@ class MtmArm(Arm):
             wrench[3:] += T[:3, :3].T @ torque
         return wrench
 
+    def gravity_jf(self) -> Array:
+        """Efforts (7,) that carry the arm's weight where it is."""
+        return weight(self.joints.measured()[0])
+
     def _advance(self, dt: float) -> None:
         super()._advance(dt)
         plant = self.joints.plant
         assert isinstance(plant, IdealPlant)
-        plant.step(dt)
+        if self.joints.mode is Mode.EFFORT:
+            load = self.gravity_jf()
+            effort = self.joints.setpoint[2] + load if self.gravity_compensation else self.joints.setpoint[2]
+            plant.push(np.clip(effort, -MAX_EFFORT, MAX_EFFORT))
+            plant.step(dt, load)

@@ -113,12 +113,12 @@ class IdealPlant:
         self._pushed = snapshot[0]
         self._state[:] = snapshot[1]
 
-    def step(self, dt: float) -> None:
-        """Advance by ``dt`` seconds: implicit in the damping, stopped at the ends of travel."""
+    def step(self, dt: float, load: Array | float = 0.0) -> None:
+        """Advance by ``dt`` seconds against a ``load`` (n,): implicit in the damping, stopped at the ends of travel."""
         if not self._pushed:
             return
         q, qd, effort = self._state
-        qd[:] = (qd + dt * effort / self._inertia) / (1.0 + dt * self._damping / self._inertia)
+        qd[:] = (qd + dt * (effort - load) / self._inertia) / (1.0 + dt * self._damping / self._inertia)
         q += dt * qd
         ended = (q < self._lower) | (q > self._upper)
         qd[ended] = 0.0

@@ -47,10 +47,14 @@ class FeedbackSettings:
 
 
 class Feedback:
-    """Forces for the hand; ``energy`` is what the forces gave it so far, in J, negative when it spent some."""
+    """Forces for the hand; ``energy`` is what the forces gave it so far, in J, negative when it spent some.
 
-    def __init__(self, settings: FeedbackSettings | None = None) -> None:
+    ``step`` are the seconds that count as gone by between two forces; 0: those that have gone by.
+    """
+
+    def __init__(self, settings: FeedbackSettings | None = None, step: float = 0.0) -> None:
         self.settings = settings or FeedbackSettings()
+        self._step = step
         self.reset()
 
     def reset(self) -> None:
@@ -92,7 +96,7 @@ class Feedback:
         last, self._last = self._last, (now, place.copy())
         if last is None or now <= last[0]:
             return np.zeros(3), 0.0
-        dt, moved = now - last[0], place - last[1]
+        dt, moved = self._step or now - last[0], place - last[1]
         self.energy += float(self._force @ moved)
         velocity = moved / dt
         self._smooth += (velocity - self._smooth) * min(dt / SMOOTHING, 1.0)

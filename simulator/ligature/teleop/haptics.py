@@ -5,6 +5,8 @@ Newtons, newton metres, seconds.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,15 +29,25 @@ def period_of(rate: object) -> float:
     return 0.95 / rate  # a reading that is a little early counts
 
 
+def step_of(seconds: object) -> float:
+    """The fixed step that is asked for; 0, as measured, for none or one that is no length of time."""
+    return float(seconds) if isinstance(seconds, (int, float)) and 0.0 < seconds < math.inf else 0.0
+
+
 class Haptics:
-    """What one hand feels, every ``period`` seconds at most."""
+    """What one hand feels, every ``period`` seconds at most; ``step`` as for `Feedback`."""
 
     def __init__(
-        self, settings: FeedbackSettings, device: Device, calibration: Calibration, period: float = PERIOD
+        self,
+        settings: FeedbackSettings,
+        device: Device,
+        calibration: Calibration,
+        period: float = PERIOD,
+        step: float = 0.0,
     ) -> None:
         self._period = period
-        self._feedback = Feedback(settings)
-        self._twisting = Feedback(settings.of_torques()) if settings.torque_gain > 0.0 else None
+        self._feedback = Feedback(settings, step)
+        self._twisting = Feedback(settings.of_torques(), step) if settings.torque_gain > 0.0 else None
         self._turned, self._R = np.zeros(3), np.eye(3)
         self._device, self._calibration = device, calibration
         self._pressed: float | None = None

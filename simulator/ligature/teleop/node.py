@@ -30,7 +30,7 @@ from ligature.teleop.devices.device import Device, Reading
 from ligature.teleop.follower import Arm
 from ligature.teleop.frames import Frames
 from ligature.teleop.handset import Handset
-from ligature.teleop.haptics import Haptics, period_of
+from ligature.teleop.haptics import Haptics, period_of, step_of
 from ligature.teleop.messages import pose_numbers
 from ligature.teleop.pair import MOST_SCALE, Pair
 from ligature.teleop.pairing import HOLDING, Status, Tip
@@ -60,7 +60,7 @@ def begin_node() -> None:
 
 
 def _asked_of_haptics(prefix: str) -> dict[str, Any]:
-    """What the simulator was started with, ``-d`` and ``-e`` of `ambf_simulator`; empty where that is nothing."""
+    """What the simulator was started with, ``-d``, ``-e``, ``-f`` of `ambf_simulator`; empty for none."""
     try:
         found = rospy.get_param(f"{prefix}ligature/haptics", {})
     except OSError:
@@ -100,7 +100,13 @@ class Teleop:
             self.seat.change(name, **vars(spec.settings))
         asked = _asked_of_haptics(config.prefix)
         self._haptics = {
-            name: Haptics(spec.force, self._devices[name], spec.calibration, period_of(asked.get("rate")))
+            name: Haptics(
+                spec.force,
+                self._devices[name],
+                spec.calibration,
+                period_of(asked.get("rate")),
+                step_of(asked.get("step")),
+            )
             for name, spec in specs.items()
             if spec.force is not None and name in self._devices and asked.get("forces") is not False
         }

@@ -82,14 +82,10 @@ CAMERA = (
     *unused((Key("stereo.mode", T, doc="any text", required=True),)),
     Key("stereo.eye separation", N, 0.2, "m", "distance of the eyes", required=True),
     Key("stereo.focal length", N, 0.5, "m", "distance of the common plane", required=True),
-    *unused((Key("monitor", U, 0, doc="monitor of the window"),)),
+    Key("monitor", U, 0, doc="monitor of the camera's own window; the first where there are fewer"),
     Key("visible", F, True, doc="false: no window; images are published all the same"),
-    *unused(
-        (
-            Key("multipass", F, False, doc="draw transparent things in several passes; they are sorted here"),
-            Key("controlling devices", Type.TEXTS, (), doc="title of the window, which shows all cameras in turn here"),
-        )
-    ),
+    *unused((Key("multipass", F, False, doc="draw transparent things in several passes; they are sorted here"),)),
+    Key("controlling devices", Type.TEXTS, (), doc="in the title of the camera's own window"),
     Key("publish image", F, False, doc="publish colour images"),
     Key("publish image interval", U, 1, "frames", "publish every n-th image"),
     *_resolution("publish image resolution", (640, 480), "size of the published images"),
@@ -104,11 +100,8 @@ CAMERA = (
     *shaders("preprocessing shaders", "shader program of the published image"),
     *shaders("depth compute shaders", "shader program that makes points of depths"),
     Key("mouse control multipliers", MAP, doc="factors on the mouse's gains"),
-    *each(("pan", "scroll", "arcball"), N, "mouse control multipliers.{}", 1.0, doc="factor of {}"),
-    *unused(
-        each(("rotate",), N, "mouse control multipliers.{}", 1.0, doc="factor of {}, which the mouse has no button for")
-    ),
-    *_resolution("window resolution", None, "size of the window, and of images unless they have their own"),
+    *each(("pan", "rotate", "scroll", "arcball"), N, "mouse control multipliers.{}", 1.0, doc="factor of {}"),
+    *_resolution("window resolution", None, "size of the camera's own window, and of images unless they have theirs"),
     Key("camera intrinsics", MAP, doc="pinhole parameters; come before the field of view"),
     *each(("fx", "fy", "f"), N, "camera intrinsics.{}", unit="px", doc="focal length {}; 100 when absent"),
     *each(("cx", "cy", "s"), N, "camera intrinsics.{}", unit="px", doc="{}; 0 when absent"),
