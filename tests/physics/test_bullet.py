@@ -10,7 +10,7 @@ import pybullet
 import pytest
 from ligature import Simulation
 from ligature.model.scene import Scene
-from ligature.physics import bullet
+from ligature.physics import bullet, engine
 
 from tests.conftest import ROOT
 from tests.driving import Driver
@@ -67,3 +67,85 @@ def test_no_address_without_a_client_passes_for_one(address: int) -> None:
     assert not bullet._is_client(address)
     words = np.arange(4)
     assert not bullet._is_client(words.ctypes.data)
+
+
+@pytest.mark.parametrize("name", ["suturing_small", "needle_pick", "peg_transfer"])
+def test_boxes_that_touch_nothing_are_left_out_and_change_no_bit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = ligature.load(ROOT / "scenes" / name / "launch.yaml")
+    runs = []
+    for left_out in (False, True):
+        with monkeypatch.context() as patch:
+            if not left_out:
+                patch.setattr(engine, "exclude_void", lambda boxes: 0)
+            simulation = Simulation(scene)
+            places, hashes = simulation._world.engine, []
+            for moment in range(3):
+                assert places._boxes, "the broad phase is where this version of PyBullet keeps it"
+                boxes = bullet._boxes(places._boxes)
+                void = (boxes["group"] == 0) & (boxes["mask"] == 0)
+                assert void.any() and not void.all()
+                assert (boxes["owner"] == 0).tolist() == (void.tolist() if left_out else [False] * len(boxes))
+                Driver(scene, 20 + moment).run(simulation, 0, 100)
+                hashes.append(simulation.state_hash())
+                if moment == 0:
+                    simulation.restore(simulation.snapshot())
+                else:
+                    simulation.reset()
+            runs.append(hashes)
+            simulation.close()
+    assert runs[0] == runs[1]
+
+
+@pytest.fixture
+def two_balls() -> Iterator[tuple[int, int, list[int]]]:
+    """Client, handle and the two balls in it, one in the other, where all boxes are compared."""
+    client, handle = bullet.connect()
+    pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=client)
+    balls = []
+    for x in (0.0, 0.1):
+        shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.1, physicsClientId=client)
+        balls.append(pybullet.createMultiBody(1.0, shape, basePosition=[x, 0, 0], physicsClientId=client))
+    yield client, handle, balls
+    pybullet.disconnect(client)
+
+
+def test_a_body_touches_again_once_its_mask_is_set(two_balls: tuple[int, int, list[int]]) -> None:
+    client, handle, (one, other) = two_balls
+    found = bullet.find_boxes(handle)
+    assert found and bullet.exclude_void(found) == 0
+
+    def touching() -> int:
+        pybullet.stepSimulation(physicsClientId=client)
+        return len(pybullet.getContactPoints(one, other, physicsClientId=client))
+
+    assert touching()
+    pybullet.setCollisionFilterGroupMask(other, -1, 0, 0, physicsClientId=client)
+    assert bullet.exclude_void(found) == 1 and not touching() and not touching()
+    pybullet.setCollisionFilterGroupMask(other, -1, 1, -1, physicsClientId=client)
+    assert bullet.exclude_void(found) == 0 and touching()
+    pybullet.setCollisionFilterGroupMask(other, -1, 0, 0, physicsClientId=client)
+    bullet.exclude_void(found)
+    pybullet.stepSimulation(physicsClientId=client)
+    pybullet.removeBody(other, physicsClientId=client)
+    shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.1, physicsClientId=client)
+    other = pybullet.createMultiBody(1.0, shape, basePosition=[0, 0.1, 0], physicsClientId=client)
+    assert touching(), "a new body in the place of one that was left out"
+
+
+def test_nothing_is_left_out_where_the_broad_phase_is_not_found(
+    two_balls: tuple[int, int, list[int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, handle, _ = two_balls
+    trees, other = bullet.connect()
+    shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.1, physicsClientId=trees)
+    pybullet.createMultiBody(1.0, shape, physicsClientId=trees)
+    assert bullet.find_boxes(other) == 0, "trees of boxes"
+    pybullet.disconnect(trees)
+    assert bullet.find_boxes(0) == 0
+    known = bullet._TO_BROAD_PHASE
+    for place in range(len(known)):
+        for shift in (-0x1000, -64, -8, 8, 16, 64, 0x100, 0x10000):
+            offsets = [offset + shift * (k == place) for k, offset in enumerate(known)]
+            monkeypatch.setattr(bullet, "_TO_BROAD_PHASE", offsets)
+            assert bullet.find_boxes(handle) == 0, f"{offsets}: another version of PyBullet"
+    assert bullet.exclude_void(0) == 0

@@ -7,6 +7,9 @@ the same order, so that Bullet gets the same numbers. Handles of Bullet are whol
 PyBullet lists its clients at an address that it tells nobody. The first `connect` finds it: the word of PyBullet's
 memory that holds a client afterwards and was 0 before. Where it is not found, handles are 0, and the callers use
 PyBullet.
+
+Bullet makes a box for every link, one without a shape too, and compares each with all others in every tick.
+`exclude_void` takes those that can never touch anything out of that; Bullet skips boxes without an owner.
 """
 
 from __future__ import annotations
@@ -157,6 +160,73 @@ def _handle(client: int) -> int:
         return 0
     handle = ctypes.c_int64.from_address(_Clients.begin + 8 * client).value
     return handle if _is_client(handle) else 0
+
+
+# --- boxes --------------------------------------------------------------------------------------
+
+_TO_BROAD_PHASE = (8, 0x812628, 8, 0x1060)
+"""Where in a client of PyBullet 3.2.7, and in each object that is found there, the address of the next one is: what
+the client keeps, the processor of its commands, what that keeps, and the broad phase, `btSimpleBroadphase`."""
+
+_MOST_BOXES = 65536
+"""Boxes for which PyBullet gives its broad phase room."""
+
+_BOX = np.dtype(
+    {
+        "names": ["owner", "group", "mask", "number"],
+        "formats": [np.int64, np.int32, np.int32, np.int32],
+        "offsets": [0, 8, 12, 16],
+        "itemsize": 96,
+    }
+)
+"""A box of Bullet, `btSimpleBroadphaseProxy`; the k-th has the number k + 2."""
+
+
+def find_boxes(handle: int) -> int:
+    """Address of the broad phase of a client that compares all pairs of boxes.
+
+    It is 0 where the client has another broad phase, or where this version of PyBullet keeps it elsewhere.
+    """
+    at: int | None = handle
+    for offset in _TO_BROAD_PHASE:
+        at = _word(at + offset) if at else None
+    if not at or any(_word(at + 8 * k) is None for k in range(4)):
+        return 0
+    count, most, last, first = _head(at)
+    known = most == _MOST_BOXES and 0 < count <= most and last < most and _word(first) is not None
+    if not known or _word(first + _BOX.itemsize * _MOST_BOXES - 8) is None:
+        return 0
+    boxes = _boxes(at)
+    return at if (boxes["number"] == np.arange(len(boxes)) + 2).all() else 0
+
+
+def exclude_void(boxes: int) -> int:
+    """Have Bullet no longer compare the boxes with neither group nor mask; returns how many there are.
+
+    ``boxes`` is an address from `find_boxes`. Bullet compares a box again as soon as its group or mask is set.
+    """
+    if not boxes:
+        return 0
+    found = _boxes(boxes)
+    void = (found["group"] == 0) & (found["mask"] == 0)
+    found["owner"][void] = 0
+    return int(void.sum())
+
+
+def _boxes(at: int) -> NDArray[Any]:
+    """The boxes of a broad phase; those that are free have no owner."""
+    count, _, last, first = _head(at)
+    size = max(count, last + 1) * _BOX.itemsize
+    return np.ctypeslib.as_array((ctypes.c_uint8 * size).from_address(first)).view(_BOX)
+
+
+def _head(at: int) -> tuple[int, int, int, int]:
+    """Boxes in use, room, place of the last and address of the first in a broad phase."""
+    count, most, last = (ctypes.c_int32 * 3).from_address(at + 8)
+    return count, most, last, ctypes.c_int64.from_address(at + 24).value
+
+
+# --- memory -------------------------------------------------------------------------------------
 
 
 def _segments() -> Iterator[Integers]:

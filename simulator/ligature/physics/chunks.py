@@ -97,7 +97,7 @@ class Chunks:
             restitution=stated.restitution, collisionMargin=stated.collision_margin, physicsClientId=client,
         )  # fmt: skip
         filters = VOID if surface is None else STANDS
-        pybullet.setCollisionFilterGroupMask(uid, -1, *filters, physicsClientId=client)
+        self._engine.collide(uid, *filters)
         self._engine.body_at[uid, -1] = body
         return uid, -1, *filters
 

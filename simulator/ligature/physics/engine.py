@@ -18,7 +18,7 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
-from ligature.physics.bullet import connect
+from ligature.physics.bullet import connect, exclude_void, find_boxes
 from ligature.physics.motions import Motions
 from ligature.physics.trees import Places
 from ligature.tables import table_of
@@ -122,6 +122,7 @@ class Engine:
         self.place_table = table_of(self.places)
         self.body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
         self._colliders = [collider for tree in self.trees for collider in _colliders(self.client, tree)]
+        self._boxes = find_boxes(handle) if self.forgets else 0
         self.chunks: dict[int, list[tuple[int, int, int, int]]] = {}
         self.start = self.snapshot()
         self.restore(self.start)  # as every later start: Bullet turns what it makes by a last bit
@@ -139,7 +140,13 @@ class Engine:
         """
         for uid, link, group, mask in [*self._colliders, *(chunk for found in self.chunks.values() for chunk in found)]:
             pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)
+        exclude_void(self._boxes)
         self.motions.begin()
+
+    def collide(self, uid: int, group: int, mask: int) -> None:
+        """Set group and mask of the base of a multibody that was added to the scene's own."""
+        pybullet.setCollisionFilterGroupMask(uid, -1, group, mask, physicsClientId=self.client)
+        exclude_void(self._boxes)
 
     def shapes_of(self, body: int) -> list[tuple[int, int]]:
         """Multibodies and links that hold the shapes of a body."""

@@ -56,7 +56,7 @@ class BulletQueries:
         client = self._engine.client
         shape = shapes.create(client, self._engine.cache, colliders, np.eye(4), True, margin)
         uid = pybullet.createMultiBody(0, shape, basePosition=_FAR, physicsClientId=client)
-        pybullet.setCollisionFilterGroupMask(uid, -1, *VOID, physicsClientId=client)
+        self._engine.collide(uid, *VOID)
         self._probe_shapes.append((colliders, margin))
         self._probes.append(uid)
         return len(self._probes) - 1
