@@ -20,6 +20,7 @@ CACHES: dict[str, str] = {
     "Rod._arrays": "what of it lasts are attributes of the rod, too",
     "Joints._table": "addresses of arrays",
     "Motions.table": "addresses of arrays",
+    "Engine._boxes": "an address in Bullet's memory",
     "Readout._table": "addresses of arrays",
     "Readout._state_table": "addresses of arrays",
     "Rod._touch_tables": "addresses of arrays",
