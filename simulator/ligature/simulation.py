@@ -63,7 +63,7 @@ REST = 1000
 """Ticks for which a subsystem that failed is left out, and for which another failure of its kind is not reported."""
 
 GUARD_TICKS = 10
-"""Fewest ticks between two looks at bodies that are too fast: one takes 5 µs."""
+"""Fewest ticks between two checks for bodies that are too fast: one takes 5 µs."""
 
 
 class Stopwatch:
