@@ -189,7 +189,7 @@ def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
 def packed(picture: NDArray[np.uint8], eyes: int) -> bytes:
     """A picture (height, width, 3) of ``eyes`` side by side: a byte that counts them, then a JPEG.
 
-    What a browser was told last may be of another picture than the one that it shows.
+    The newest facts that a browser has may belong to another picture than the one that it shows.
     """
     stream = io.BytesIO(bytes([eyes]))
     stream.seek(1)
