@@ -109,7 +109,7 @@ class ADF_OT_fetch_coacd(Waits, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if packages():
-            cls.poll_message_set("CoACD is there already")
+            cls.poll_message_set("CoACD is already installed")
             return False
         if not compat.is_online():
             cls.poll_message_set(f"Go online in Preferences > System > Network, or run {' '.join(fetch_command())}")

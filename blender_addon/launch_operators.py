@@ -76,7 +76,7 @@ class ADF_OT_remove_from_launch(bpy.types.Operator):
     def execute(self, context):
         models = context.scene.adf.models
         if self.index >= len(models):
-            self.report({"ERROR"}, f"the launch file lists {len(models)} models; there is none of index {self.index}")
+            self.report({"ERROR"}, f"the launch file lists {len(models)} models; index {self.index} is out of range")
             return {"CANCELLED"}
         models.remove(self.index)
         return {"FINISHED"}

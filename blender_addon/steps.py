@@ -1,7 +1,7 @@
-"""Work in steps: a generator yields words and the share that is done after each step, and returns the result.
+"""Work in steps: a generator yields a status text and the share done after each step, and returns the result.
 
-Scripts take all steps at once, `finished`. An operator that a user started takes a slice of them at a time, `InSteps`:
-the status bar says what goes on, the share is shown at the pointer, and Esc ends it.
+Scripts take all steps at once (`finished`). An operator that a user started takes some of them at a time (`InSteps`):
+the status bar shows the text, the pointer the share, and Esc ends the work.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import bpy
 
 T = TypeVar("T")
 Steps = Generator[tuple[str, float], None, T]
-"""Yields words and a share, 0 to 1."""
+"""Yields a status text and a share, 0 to 1."""
 
 FIRST, SLICE = 0.3, 0.1
-"""Seconds of work before an operator lets the window live, and between looks at the keyboard."""
+"""Seconds of work before an operator first yields to the window, and between later yields."""
 
 MADE = ("collections", "objects", "meshes", "materials", "images", "cameras", "lights", "curves", "scenes", "texts")
-"""What is taken back of work that was ended."""
+"""Kinds of data that are removed when work is ended early."""
 
 
 def finished(steps: Steps[T]) -> T:
@@ -69,9 +69,9 @@ def _existing() -> set[bpy.types.ID]:
 
 
 class InSteps:
-    """An operator whose work is ``steps(context)``; in slices when a user started it, which `started` tells.
+    """An operator whose work is ``steps(context)``; when a user started it, the work is done in slices.
 
-    What is worked on in slices is not edited meanwhile: all events but Esc are ignored while it ``blocks``.
+    While it ``blocks``, all events but Esc are ignored, so that nobody edits what it works on.
     """
 
     can_end = True

@@ -184,7 +184,7 @@ class ADF_OT_add_layer(OnTissue, bpy.types.Operator):
             top = surface_of(body)[0][:, 2].max() - sum(layer.thickness for layer in layers)
             thick = float(top - points[:, 2].mean())
             if not thick > LEAST:
-                self.report({"ERROR"}, "The selected vertices lie in a layer that is there already; select lower ones")
+                self.report({"ERROR"}, "The selected vertices are in an existing layer; select vertices below it")
                 return {"CANCELLED"}
         layer = layers.add()
         layer.thickness, layer.material = round(thick, 6), self.material

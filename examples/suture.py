@@ -339,7 +339,7 @@ def perform(
     lines = [
         *score.lines(),
         *measures.lines(),
-        f"computed in {took:.1f} s, {simulation.time / took:.1f} times real time",
+        f"computed in {took:.1f} s, {simulation.time / took:.2g} times real time",
     ]
     print("\n".join([f"stopped: {stopped}", *lines] if stopped else lines))
     if film is not None:

@@ -58,7 +58,7 @@ def test_the_corpus_scene_repeats_bit_for_bit(corpus: Path) -> None:
 
 def test_bodies_are_found_by_topic_identifier_or_part(sim: Simulation) -> None:
     assert sim.bodies["/ambf/env/phantom/Needle"].body is sim.bodies["BODY Needle"].body
-    with pytest.raises(KeyError, match="no body is called 'Thread_', or several are"):
+    with pytest.raises(KeyError, match="'Thread_' does not name exactly one body"):
         sim.bodies["Thread_"]
 
 
@@ -163,7 +163,7 @@ def test_an_actuator_holds_the_needle_and_lets_it_go(sim: Simulation) -> None:
 
 def test_an_actuator_that_cannot_find_its_body_reports_it(sim: Simulation) -> None:
     sim.apply(ActuatorCommand(0, True, "BODY Nothing"))
-    assert "no body is called 'BODY Nothing', or several are" in str(sim.problems[-1])
+    assert "'BODY Nothing' does not name exactly one body" in str(sim.problems[-1])
     assert not sim.state["actuator_active"][0, 0]
 
 

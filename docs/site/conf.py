@@ -7,6 +7,7 @@ import types
 from typing import Any
 
 import ligature
+from sphinx.ext.napoleon.docstring import NumpyDocstring
 
 project = "Ligature"
 author = "The Ligature developers"
@@ -67,6 +68,15 @@ def _skip(app: Any, what: str, name: str, object: Any, skip: bool, options: Any)
     """Leave out names for types of others: their documentation is numpy's."""
     ours = getattr(object, "__module__", "").startswith("ligature")
     return True if isinstance(object, types.GenericAlias) and not ours else None
+
+
+def _whole_text(docstring: Any) -> tuple[str, list[str]]:
+    """No type, and all lines of an attribute's docstring: Napoleon takes what stands before a colon for a type."""
+    lines = docstring._dedent(docstring._consume_to_end())
+    return "", NumpyDocstring(lines, docstring._config).lines()
+
+
+NumpyDocstring._consume_inline_attribute = _whole_text
 
 
 def setup(app: Any) -> None:

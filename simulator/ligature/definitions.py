@@ -28,7 +28,9 @@ class DefinitionError(ValueError):
 def plain(definition: str) -> str:
     """The fields of a definition and of its parts: all that the bytes of a message depend on."""
     if len(definition) > MOST_CHARACTERS:
-        raise DefinitionError(f"a definition of {len(definition)} characters; at most {MOST_CHARACTERS} are read")
+        raise DefinitionError(
+            f"the message definition has {len(definition)} characters; the maximum is {MOST_CHARACTERS}"
+        )
     lines = (" ".join(line.partition("#")[0].split()) for line in definition.splitlines())
     return "\n".join(line for line in lines if any(kind.fullmatch(line) for kind in (_FIELD, _PART, _LINE)))
 

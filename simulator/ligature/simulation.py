@@ -63,7 +63,7 @@ REST = 1000
 """Ticks for which a subsystem that failed is left out, and for which another failure of its kind is not reported."""
 
 GUARD_TICKS = 10
-"""Fewest ticks between two looks at bodies that are too fast: one takes 5 µs."""
+"""Fewest ticks between two checks for bodies that are too fast: one takes 5 µs."""
 
 
 class Stopwatch:
@@ -109,7 +109,7 @@ class Handles(Mapping[str, Handle], Generic[Handle]):
             found = find_by_text(names, text)
             if found is not None:
                 return self._handles[found]
-        raise KeyError(f"no {self._kind} is called '{text}', or several are; there are {', '.join(self._names[0])}")
+        raise KeyError(f"'{text}' does not name exactly one {self._kind}; there are {', '.join(self._names[0])}")
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names[0])

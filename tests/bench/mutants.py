@@ -51,6 +51,7 @@ PARTS = {
     "bus.pacing": "bus/test_pacing.py",
     "bus.record": "bus/test_record.py",
     "bus.ring": "bus/test_outbox.py,bus/test_mailbox.py,bus/test_block.py",
+    "robots.instruments": "robots/test_instruments.py",
     "robots.operating_state": "robots/test_operating_state.py",
     "robots.trajectory": "robots/test_arm.py,robots/test_operating_state.py",
     "robots.device": "robots/test_operating_state.py,robots/test_arm.py",

@@ -148,7 +148,7 @@ def test_a_run_that_would_be_replayed_for_ever_is_refused(updates: int) -> None:
         path = Path(folder, "run.record")
         writer = RecordWriter(path, HEADER)
         writer.finish(updates, "cd" * 32)
-        with pytest.raises(RecordError, match=f"a run of {updates} updates; at most {MOST_UPDATES} are replayed"):
+        with pytest.raises(RecordError, match=f"a run has {updates} updates; the maximum is {MOST_UPDATES}"):
             Record.read(path)
 
 

@@ -130,7 +130,7 @@ def test_render_writes_pictures_calibration_and_annotations(tmp_path: Path) -> N
 def test_render_names_the_cameras_there_are(tmp_path: Path) -> None:
     done = ligature("render", SMALL, "--camera", "cameraX", "--out", tmp_path)
     assert done.returncode == 1
-    assert "no camera is called 'cameraX', or several are" in done.stdout and "cameras/cameraL" in done.stdout
+    assert "'cameraX' does not name exactly one camera" in done.stdout and "cameras/cameraL" in done.stdout
 
 
 def test_render_refuses_what_it_cannot_write(tmp_path: Path) -> None:

@@ -142,7 +142,9 @@ def test_many_joints_take_one_value_each_or_read_a_full_list_by_index() -> None:
     assert body._cmd.joint_cmds == [1, 0, 3] and body._cmd.joint_cmds_types == [VELOCITY, FORCE, VELOCITY]
     body.set_multiple_joint_effort([7], [1])
     assert body._cmd.joint_cmds == [1, 7, 3]
-    with pytest.raises(ValueError, match=r"/ambf/env/arm: 1 values for the joints \[0, 2\]"):
+    with pytest.raises(
+        ValueError, match=r"/ambf/env/arm: 1 values cannot command the joints \[0, 2\]; give one for each"
+    ):
         body.set_multiple_joint_pos([1], [0, 2])
 
 

@@ -88,7 +88,7 @@ def test_an_arm_that_is_disabled_ends_it_with_words() -> None:
     page.simulation.step(1)
     page.turn()
     assert not page.assist.busy and not page.pursuits[page.arm].active
-    assert page.assist.note == "PSM2 stopped: it is not enabled and homed any more."
+    assert page.assist.note == "PSM2 stopped: it is no longer enabled and homed."
 
 
 def test_a_needle_out_of_reach_is_reported() -> None:

@@ -280,8 +280,8 @@ def test_the_command_exports_and_says_what_is_wrong(source: Path, tmp_path: Path
     again = run(app, ["dataset", "export", str(source), str(tmp_path / "out")])
     assert again.exit_code == 1 and "exists already" in again.output
     for words, message in (
-        (["--format", "lerobot-9"], "format is one of lerobot-3.0, lerobot-2.1, not 'lerobot-9'"),
-        (["--codec", "gif"], "codec is one of h264, av1, not 'gif'"),
+        (["--format", "lerobot-9"], "format must be one of lerobot-3.0, lerobot-2.1, not 'lerobot-9'"),
+        (["--codec", "gif"], "codec must be one of h264, av1, not 'gif'"),
     ):
         done = run(app, ["dataset", "export", str(source), str(tmp_path / "other"), *words])
         assert done.exit_code == 1 and message in done.output

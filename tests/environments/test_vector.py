@@ -160,7 +160,7 @@ def test_no_worker_outlives_who_made_it_however_that_ends() -> None:
     ("wrong", "message"),
     [
         ({"n": 0}, "n is a number of environments, at least 1, not 0"),
-        ({"n": 1, "autoreset": "never"}, "autoreset is one of 'next step', 'same step', 'off', not 'never'"),
+        ({"n": 1, "autoreset": "never"}, "autoreset must be one of 'next step', 'same step', 'off', not 'never'"),
         ({"n": 1, "action": "torque"}, "action must be one of cartesian, joint"),
     ],
 )

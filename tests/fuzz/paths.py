@@ -25,8 +25,8 @@ NEAR, END = 3e-4, 2e-3
 SAMPLES = 5e-4
 """Distance between the places of the wire that are looked at, m."""
 
-LOOK = 10
-"""Ticks between two looks at the whole wire."""
+CHECK_INTERVAL = 10
+"""Ticks between two checks of the whole wire."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class Trial:
             self.fault = f"the tip leaps by {1e3 * leap:.2f} mm"
         elif most > LEAP:
             self.fault = f"the tissue leaps by {1e3 * most:.2f} mm a tick"
-        elif tick % LOOK == 0:
+        elif tick % CHECK_INTERVAL == 0:
             held = needle.needle.engaged.copy()
             if held.any():
                 self._held = held

@@ -102,7 +102,7 @@ def test_errors_of_a_3ds(read, cut: int, text: str) -> None:
 
 
 def test_another_format_is_refused_by_name(read) -> None:
-    with pytest.raises(MeshError, match=r"'part.ply' is not a mesh format that is read; use .obj, .stl, .3ds"):
+    with pytest.raises(MeshError, match=r"the mesh format of 'part.ply' is not supported; use .obj, .stl, .3ds"):
         read("part.ply", "ply")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import ligature
@@ -19,10 +21,21 @@ def xyz(*values: float) -> dict[str, float]:
     return dict(zip("xyz", values, strict=True))
 
 
-def thread(folder: Path, shifts: dict[int, list[float]]) -> ligature.Scene:
-    """A straight thread along x, elements of it ``shifts`` metres off."""
+def thread(
+    folder: Path,
+    shifts: dict[int, list[float]],
+    bodies: Sequence[int] = range(N),
+    joints: Sequence[int] = range(N - 1),
+    left_out: Sequence[int] = (),
+    turned: frozenset[int] = frozenset(),
+) -> ligature.Scene:
+    """A straight thread along x, elements of it ``shifts`` metres off.
+
+    The file lists ``bodies`` and ``joints`` in these orders, those ``left_out`` of the joints not at all; in the joints
+    ``turned`` parent and child change places.
+    """
     model: dict[str, object] = {
-        "bodies": [f"BODY {i}" for i in range(N)], "joints": [f"JOINT {i}" for i in range(N - 1)],
+        "bodies": [f"BODY {i}" for i in bodies], "joints": [f"JOINT {i}" for i in joints if i not in left_out],
     }  # fmt: skip
     for i in range(N):
         place = np.array([LENGTH * i, 0.0, 1.0]) + shifts.get(i, [0.0, 0.0, 0.0])
@@ -32,9 +45,10 @@ def thread(folder: Path, shifts: dict[int, list[float]]) -> ligature.Scene:
             "location": {"position": xyz(*place.tolist()), "orientation": {"r": 0.0, "p": 0.0, "y": 0.0}},
         }  # fmt: skip
     for i in range(N - 1):
+        ends, half = ((i + 1, i), -LENGTH / 2) if i in turned else ((i, i + 1), LENGTH / 2)
         model[f"JOINT {i}"] = {
-            "name": str(i), "type": "six dof spring", "parent": f"BODY {i}", "child": f"BODY {i + 1}",
-            "parent pivot": xyz(LENGTH / 2, 0, 0), "child pivot": xyz(-LENGTH / 2, 0, 0),
+            "name": str(i), "type": "six dof spring", "parent": f"BODY {ends[0]}", "child": f"BODY {ends[1]}",
+            "parent pivot": xyz(half, 0, 0), "child pivot": xyz(-half, 0, 0),
             "parent axis": xyz(1, 0, 0), "child axis": xyz(1, 0, 0),
             "joint limits": {
                 "linear": {end: xyz(0, 0, 0) for end in ("low", "high")},
@@ -46,6 +60,36 @@ def thread(folder: Path, shifts: dict[int, list[float]]) -> ligature.Scene:
     path = folder / "model.yaml"
     path.write_text(yaml.safe_dump(model, sort_keys=False))
     return ligature.load(path)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    bodies=st.permutations(range(N)),
+    joints=st.permutations(range(N - 1)),
+    left_out=st.sets(st.integers(0, N - 2), max_size=3),
+    turned=st.frozensets(st.integers(0, N - 2)),
+)
+def test_a_thread_is_found_whole_whatever_the_order_of_its_file(
+    tmp_path_factory: pytest.TempPathFactory,
+    bodies: list[int],
+    joints: list[int],
+    left_out: set[int],
+    turned: frozenset[int],
+) -> None:
+    scene = thread(tmp_path_factory.mktemp("thread"), {}, bodies, joints, sorted(left_out), turned)
+    cuts = [-1, *sorted(left_out), N - 1]
+    pieces = [range(a + 1, b + 1) for a, b in pairwise(cuts)]
+    found = []
+    for chain in scene.rods:
+        places = [round(float(scene.bodies[b].T_world_body[0, 3]) / LENGTH) for b in chain.bodies]
+        found.append(sorted(places))
+        assert chain.bodies[0] < chain.bodies[-1], "a rod begins with the end that its file lists first"
+        assert set(np.diff(places)) in ({1}, {-1}), "elements that follow each other are neighbours"
+        for joint, ends in zip(chain.joints, pairwise(chain.bodies), strict=True):
+            assert {scene.joints[joint].parent, scene.joints[joint].child} == set(ends)
+        assert chain.anchors == ()
+        assert np.allclose(chain.lengths, LENGTH) and chain.radius == 5e-4
+    assert sorted(found) == [list(piece) for piece in pieces if len(piece) >= 4]
 
 
 shift = st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=3)

@@ -325,7 +325,7 @@ def test_a_bone_that_is_drilled_away_is_not_drawn() -> None:
 @pytest.mark.parametrize(
     ("call", "reason"),
     [
-        (lambda host: host.volume("Table"), "no volume is called 'Table'"),
+        (lambda host: host.volume("Table"), "'Table' does not name exactly one volume"),
         (lambda host: host.volume("Bone").cut([0, 0, 0], [0, 0], 1e-3), "three finite numbers"),
         (lambda host: host.volume("Bone").cut([0, 0, 0], [0, 0, np.nan], 1e-3), "three finite numbers"),
         (lambda host: host.volume("Bone").cut([0, 0, 0], [0, 0, 0], 0.0), "above 0"),

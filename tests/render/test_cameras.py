@@ -57,7 +57,7 @@ def test_a_resolution_given_with_the_capture_goes_before_the_cameras_own(simulat
 def test_a_camera_is_found_by_its_name_though_another_name_contains_it(simulate: Make) -> None:
     cameras = simulate(cameraL=camera("cameraL"), cameraL2=camera("cameraL2", 0.1)).cameras
     assert cameras["cameraL"].camera.index == 0 and cameras["cameraL2"].camera.index == 1
-    with pytest.raises(KeyError, match="no camera is called 'cameraX', or several are"):
+    with pytest.raises(KeyError, match="'cameraX' does not name exactly one camera"):
         cameras["cameraX"]
 
 

@@ -1,7 +1,7 @@
-"""The front end's side of its ring: what does not fit now waits, the newest of each object.
+"""The front end's side of its ring: commands that do not fit wait, the newest for each object.
 
-A physics process that is held up for a moment must not cost a front end its last word: the release of an
-arm whose client is gone, or a reset, is sent once.
+A physics process that is held up for a moment must not lose a front end's last command: the release of
+an arm whose client is gone, or a reset, is sent only once.
 """
 
 from __future__ import annotations

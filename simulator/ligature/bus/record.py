@@ -271,7 +271,7 @@ def _frames(data: bytes, at: int, path: Path) -> Iterator[tuple[int, int, int]]:
         if size > MOST_BYTES or update < before:
             raise RecordError(f"{path}: at byte {at}: invalid frame")
         if update > MOST_UPDATES:
-            raise RecordError(f"{path}: at byte {at}: a run of {update} updates; at most {MOST_UPDATES} are replayed")
+            raise RecordError(f"{path}: at byte {at}: a run has {update} updates; the maximum is {MOST_UPDATES}")
         if at + size > len(data):
             return
         yield update, length, at

@@ -301,7 +301,7 @@ def render(
     from ligature.render.files import FORMATS
 
     if format not in FORMATS:
-        raise typer.BadParameter(f"--format is one of {', '.join(FORMATS)}, not '{format}'")
+        raise typer.BadParameter(f"--format must be one of {', '.join(FORMATS)}, not '{format}'")
     kinds = [kind for kind in annotations.split(",") if kind]
     if not set(kinds) <= set(ANNOTATIONS):
         raise typer.BadParameter(f"--annotations is any of {', '.join(ANNOTATIONS)}, not '{annotations}'")

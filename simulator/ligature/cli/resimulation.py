@@ -12,8 +12,8 @@ from ligature.cli.options import RunOptions
 
 TICK = 1e-3
 
-LOOK = 0.005
-"""Simulated seconds between two looks of a task at a run."""
+CHECK_INTERVAL = 0.005
+"""Simulated seconds between two evaluations of a task."""
 
 
 class Differs(ValueError):
@@ -66,4 +66,4 @@ def resimulate(
 
 def looks(simulation: ligature.Simulation) -> bool:
     """Whether a task looks at the simulation after this update."""
-    return round(simulation.time / simulation.dt) % round(LOOK / simulation.dt) < simulation.ticks_per_update
+    return round(simulation.time / simulation.dt) % round(CHECK_INTERVAL / simulation.dt) < simulation.ticks_per_update

@@ -135,7 +135,9 @@ class RigidBody(JointedObject):
         if len(values) != len(joints):
             # AMBF's own client reads the values of all joints by index
             if any(joint >= len(values) for joint in joints):
-                raise ValueError(f"{self._name}: {len(values)} values for the joints {list(joints)}")
+                raise ValueError(
+                    f"{self._name}: {len(values)} values cannot command the joints {list(joints)}; give one for each"
+                )
             values = [values[joint] for joint in joints]
         with self._lock:
             for joint, value in zip(joints, values, strict=True):

@@ -54,7 +54,7 @@ class World(BaseObject):
     def set_num_step_skips(self, num: int) -> None:
         """How many updates of the simulator one `update` releases; ValueError outside 1..100."""
         if not 1 <= num <= 100:
-            raise ValueError(f"{num} steps an update: must be 1 to 100")
+            raise ValueError(f"the number of steps per update must be 1 to 100, not {num}")
         self._cmd.n_skip_steps = int(num)
 
     def update(self) -> None:

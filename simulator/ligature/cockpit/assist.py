@@ -158,7 +158,7 @@ class Assist:
         if self._steps is None:
             return
         if not self._arms[self._arm].ready(state):
-            self.stop(f"{self._arms[self._arm].name} stopped: it is not enabled and homed any more.")
+            self.stop(f"{self._arms[self._arm].name} stopped: it is no longer enabled and homed.")
             return
         if self._pressure > PRESSED:
             self.stop(f"{self._arms[self._arm].name} stopped: it presses on something. Lead it away by hand.")

@@ -1,7 +1,7 @@
 """Whether the operator's browser still answers while an arm follows it: pings on a connection of its page.
 
 A closed browser closes its connection at once. One that is frozen, or behind a cut network, is noticed only because it
-stops to answer. Pings go over the connection of the page's script, on which little waits to be read: a browser that is
+stops answering. Pings go over the connection of the page's script, on which little waits to be read: a browser that is
 slow to draw what viser sends it leaves that unread, and with it the pings of that connection.
 """
 

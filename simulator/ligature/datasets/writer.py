@@ -316,11 +316,11 @@ class DatasetWriter:
 def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: Mapping[str, str]) -> None:
     """Raise ValueError for what no dataset can have."""
     if not 0.0 < rate <= 1000.0:
-        raise ValueError(f"rate is samples per simulated second, above 0 and at most 1000, not {rate:g}")
+        raise ValueError(f"rate must be above 0 and at most 1000 samples per simulated second, not {rate:g}")
     if min(size) < 1:
         raise ValueError(f"size is a width and a height in pixels, at least 1 each, not {size}")
     if len(phases) > 255:
-        raise ValueError(f"there can be 255 phases, not {len(phases)}")
+        raise ValueError(f"a dataset has at most 255 phases, not {len(phases)}")
     for phase, gesture in gestures.items():
         if phase not in phases or gesture not in GESTURES:
             raise ValueError(f"'{phase}' is no phase, or '{gesture}' none of the gestures {', '.join(GESTURES)}")

@@ -238,8 +238,8 @@ def _checked(name: str, value: Any, bound: Bound) -> Range:
     for number in value:
         real = isinstance(number, int | float | np.number) and not isinstance(number, bool)
         if not real or not math.isfinite(number) or (bound.whole and number != int(number)):
-            hint = "; YAML wants a point in it, as in 1.0e-3" if isinstance(number, str) else ""
-            raise ValueError(f"{wanted}, but {number!r} is none{hint}")
+            hint = "; YAML reads it as text: write a decimal point, as in 1.0e-3" if isinstance(number, str) else ""
+            raise ValueError(f"{wanted}, but {number!r} is not{hint}")
     low, high = float(value[0]), float(value[1])
     if low > high:
         raise ValueError(f"{wanted}, but {low:g} is above {high:g}: write the lower one first")

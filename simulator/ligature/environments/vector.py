@@ -61,7 +61,7 @@ class SuturingVectorEnv(AsyncVectorEnv):
         if n < 1:
             raise ValueError(f"n is a number of environments, at least 1, not {n}")
         if autoreset not in AUTORESET:
-            raise ValueError(f"autoreset is one of {', '.join(map(repr, AUTORESET))}, not {autoreset!r}")
+            raise ValueError(f"autoreset must be one of {', '.join(map(repr, AUTORESET))}, not {autoreset!r}")
         made = _Made(task, options, os.getpid())
         super().__init__([made] * n, shared_memory=True, autoreset_mode=AUTORESET[autoreset])
 
@@ -132,7 +132,9 @@ class SuturingVectorEnv(AsyncVectorEnv):
         ]
         self._state = AsyncState.DEFAULT
         self.close(terminate=True)
-        raise RuntimeError(f"{'; '.join(ended) or 'an environment'}: the vector is closed, make another") from error
+        raise RuntimeError(
+            f"{'; '.join(ended) or 'an environment'}: the vector environment is closed; make a new one"
+        ) from error
 
     def _raise_if_errors(self, successes: list[bool] | tuple[bool]) -> None:
         """Raise RuntimeError for what an environment raised, and end all."""

@@ -20,7 +20,7 @@ def load_mesh(path: Path, resolver: Resolver) -> Mesh:
     """
     extension = path.suffix.lower()
     if extension not in EXTENSIONS:
-        raise failure(path, f"'{path.name}' is not a mesh format that is read", hint=f"use {', '.join(EXTENSIONS)}")
+        raise failure(path, f"the mesh format of '{path.name}' is not supported", hint=f"use {', '.join(EXTENSIONS)}")
     data = resolver.read_bytes(path)
     if extension == ".obj":
         return read_obj(data, path, resolver)

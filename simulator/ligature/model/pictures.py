@@ -28,7 +28,7 @@ def read_picture(path: Path) -> Image.Image:
             with Image.open(path, formats=FORMATS) as picture:
                 width, height = picture.size
                 if width * height > MOST_PIXELS:
-                    raise PictureError(f"has {width} × {height} pixels; at most {MOST_PIXELS} are read")
+                    raise PictureError(f"has {width} × {height} pixels; the maximum is {MOST_PIXELS}")
                 picture.load()
                 whole: Image.Image = picture.copy()
                 return whole

@@ -1,4 +1,4 @@
-"""How far the joints of loops can go: where the limits of other joints of their loop stop them.
+"""How far joints of closed loops can move before the limits of other joints in the loop stop them.
 
 Kinematic: a joint is moved along its range while the other joints of its mechanism follow within their limits, as in
 `ligature.model.assembly`. Metres, radians.
@@ -37,7 +37,7 @@ MAX_COORDINATES = 64
 
 @dataclass(frozen=True)
 class Reach:
-    """Where a joint starts and stops on both ways, and the joints that stop it there; none for a stretched loop."""
+    """Where a joint starts, where it stops in each direction, and the joints that stop it, if any."""
 
     joint: int
     start: float

@@ -25,7 +25,7 @@ def slice_files(folder: Path, prefix: str, suffix: str, last: int, resolver: Res
     A number may have leading zeros, up to as many digits as the last one has.
     """
     if last > MOST_SLICES:
-        raise PictureError(f"'count' is {last}; at most {MOST_SLICES} slices are read")
+        raise PictureError(f"'count' is {last}; the maximum is {MOST_SLICES} slices")
     found = []
     for number in range(last + 1):
         for digits in range(len(str(number)), len(str(last)) + 1):

@@ -7,8 +7,8 @@ import pybullet
 from ligature.physics.engine import Engine
 from ligature.physics.overlaps import held_overlaps, overlap
 
-LOOK = 50
-"""Ticks between two looks at whether bodies that started overlapped have parted."""
+CHECK_INTERVAL = 50
+"""Ticks between two checks whether bodies that started overlapped have parted."""
 
 
 class Collisions:
@@ -30,7 +30,7 @@ class Collisions:
 
     def step(self, tick: int) -> None:
         """Let those that started overlapped collide once they have parted."""
-        if not self._overlapped or tick % LOOK:
+        if not self._overlapped or tick % CHECK_INTERVAL:
             return
         parted = {pair for pair in self._overlapped if overlap(self._engine, *pair) == 0.0}
         self._change(self._disabled_pairs, self._overlapped - parted)

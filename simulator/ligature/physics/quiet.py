@@ -9,7 +9,7 @@ import sys
 
 
 def import_quietly(name: str) -> None:
-    """Import ``name`` with standard error closed; PyBullet announces its build date there."""
+    """Import ``name`` with standard error closed; PyBullet prints its build date there."""
     if name in sys.modules:
         return
     sys.stderr.flush()

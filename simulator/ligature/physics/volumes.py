@@ -1,4 +1,4 @@
-"""Volumes that plug-ins cut: the voxels as they are now, what overlaps them, and what of them collides.
+"""Volumes that plug-ins cut: their current voxels, the overlap with a ball, and their collision surface.
 
 Points are in the frame of a volume, whose origin is in the middle of its box; metres.
 """
@@ -20,11 +20,11 @@ from ligature.physics.world import World
 
 Array = NDArray[np.float64]
 
-LOOK = 20
-"""Ticks between two looks at what was cut; in each, one chunk that collides may be replaced, which takes 2 to 4 ms."""
+CHECK_INTERVAL = 20
+"""Ticks between two checks for cuts; at each, at most one colliding chunk is replaced, which takes 2 to 4 ms."""
 
-QUIET, LATEST = 100, 500
-"""Ticks for which nothing cuts a chunk before it is replaced, and from the first cut at which it is in any case."""
+SETTLE_TICKS, MAX_DELAY = 100, 500
+"""A chunk is replaced this many ticks after its last cut, at the latest this many after its first one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class Voxels:
 
 
 class Volumes(Subsystem):
-    """All volumes of a scene that plug-ins may cut, and in ``world`` what of them collides.
+    """All volumes of a scene that plug-ins may cut, with their collision surfaces in ``world``.
 
     ``of_body`` are the volumes by their bodies.
     """
@@ -159,12 +159,12 @@ class Volumes(Subsystem):
         return view
 
     def step(self, tick: int) -> None:
-        """Have what collides follow what was cut, chunk by chunk."""
-        if tick % LOOK:
+        """Update the collision surface where voxels were cut, chunk by chunk."""
+        if tick % CHECK_INTERVAL:
             return
         self._note(tick)
         for place, (first, last) in self._due.items():
-            if tick - last >= QUIET or tick - first >= LATEST:
+            if tick - last >= SETTLE_TICKS or tick - first >= MAX_DELAY:
                 del self._due[place]
                 self._replace(*place)
                 self._replaced += 1
@@ -191,7 +191,7 @@ class Volumes(Subsystem):
         self._world.chunks.replace(body, chunk, *form.surface(self._view(self._values, index), chunk))
 
     def _replace_all(self) -> None:
-        """Have all that collides be as the voxels are."""
+        """Bring the whole collision surface up to date with the voxels."""
         self._note(0)
         for index, chunk in sorted(self._due):
             self._replace(index, chunk)

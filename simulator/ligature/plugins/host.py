@@ -25,8 +25,8 @@ MAX_FORCE = 1e6
 """Largest force in newtons with which a plug-in may push."""
 
 
-ALIKE = 0.02
-"""Radii of a ball by which voxels misplace the middle of what it shares with them, about."""
+CENTROID_ERROR = 0.02
+"""Approximate error of the centroid of an overlap, in radii of the ball, that voxels cause."""
 
 
 class Bodies(Protocol):
@@ -62,11 +62,11 @@ class Voxels(Protocol):
     def cut(self, start: Array, end: Array, radius: float) -> int:
         """Remove what a ball meets on its way; returns how many voxels."""
 
-    def overlap(self, centre: Array, radius: float) -> Shared:
+    def overlap(self, centre: Array, radius: float) -> Overlap:
         """What a ball shares with the inside."""
 
 
-class Shared(Protocol):
+class Overlap(Protocol):
     """`ligature.physics.volumes.Overlap`."""
 
     @property
@@ -134,12 +134,12 @@ class Volume:
         """What a ball shares with the inside: m³, and the direction (3,) out of it, of unit length or 0.
 
         The direction is that from the middle of what they share to ``centre``, in world axes; there is none where
-        these two are one to `ALIKE` radii, as deep inside.
+        these two are one to `CENTROID_ERROR` radii, as deep inside.
         """
         T = self._pose()
         found = self._voxels.overlap(_local(T, _point(centre)), _radius(radius))
         length = float(np.linalg.norm(found.moment))
-        away = np.zeros(3) if length <= ALIKE * radius * found.volume else -found.moment / length
+        away = np.zeros(3) if length <= CENTROID_ERROR * radius * found.volume else -found.moment / length
         return found.volume, T[:3, :3] @ away
 
     def _pose(self) -> Array:
@@ -284,5 +284,5 @@ class Host:
 def _found(kind: str, names: Sequence[str], text: str) -> int:
     index = find_by_text(names, text)
     if index is None:
-        raise LookupError(f"no {kind} is called '{text}', or several are")
+        raise LookupError(f"'{text}' does not name exactly one {kind}")
     return index

@@ -26,12 +26,12 @@ def plugin_class(entry: PluginEntry, number: int) -> type[Plugin]:
     if entry.entry_point not in offered:
         known = ", ".join(sorted(offered)) or "none"
         raise LookupError(
-            f"no installed package offers '{entry.entry_point}' in the group '{GROUP}' (there are: {known}); "
+            f"no installed package offers '{entry.entry_point}' in the group '{GROUP}' (available: {known}); "
             "a file's name ends with .py"
         )
     loaded = offered[entry.entry_point].load()
     if not (isinstance(loaded, type) and issubclass(loaded, Plugin)):
-        raise TypeError(f"'{entry.entry_point}' is no class that derives from ligature.plugins.Plugin")
+        raise TypeError(f"'{entry.entry_point}' is not a subclass of ligature.plugins.Plugin")
     return loaded
 
 
@@ -52,5 +52,5 @@ def _only_class(module: ModuleType) -> type[Plugin]:
     ]
     if len(found) != 1:
         names = ", ".join(cls.__name__ for cls in found) or "none"
-        raise TypeError(f"the file must have one class that derives from ligature.plugins.Plugin; it has {names}")
+        raise TypeError(f"the file must define one subclass of ligature.plugins.Plugin; it defines {names}")
     return found[0]

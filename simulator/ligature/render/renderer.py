@@ -310,7 +310,7 @@ class Renderer:
                 self._targets[key] = Target(self._context, key[:2], passes, samples)
             except (moderngl.Error, MemoryError) as error:
                 raise ValueError(
-                    f"a picture of {view.width} x {view.height} does not fit the memory: {error}"
+                    f"not enough memory for a picture of {view.width} x {view.height} pixels: {error}"
                 ) from None
             if len(self._targets) > MAX_TARGETS:
                 del self._targets[next(iter(self._targets))]

@@ -1,4 +1,4 @@
-"""Pause, single updates and speed of a run as ROS services; AMBF's way, the edges of a clock, is in `reception`."""
+"""Pause, single updates and speed of a run as ROS services; AMBF's stepping by clock edges is in `reception`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PaceServices:
         rospy.Subscriber(f"{root}/set_speed", Float64, self._set_speed, queue_size=1)
 
     def _pause(self, request: SetBool) -> SetBoolResponse:
-        """Pause, or go on; answers when nothing moves any more."""
+        """Pause or resume; answers when the run has stopped or goes on."""
         with self._lock:
             self._push(Throttle(request.data, self._clock, 1 if request.data else 0))
             self._paused = request.data

@@ -113,7 +113,7 @@ class Actuators(Subsystem):
         found = find_by_text(self._identifiers, command.body)
         if found is None:
             raise LookupError(
-                f"actuator {name}: no body is called '{command.body}', or several are; "
+                f"actuator {name}: '{command.body}' does not name exactly one body; "
                 "give the identifier or a part of it that only one body has"
             )
         return found

@@ -17,8 +17,8 @@ Flags = NDArray[np.bool_]
 DEEP = 0.005
 """Depth of an element's axis in metres from which contact does not push an attached rod out."""
 
-LOOK = 50
-"""Ticks between two looks at whether elements that started inside bodies have left them."""
+CHECK_INTERVAL = 50
+"""Ticks between two checks whether elements that started inside bodies have left them."""
 
 SAMPLES = (0.0, 0.5, 1.0)
 """Places along an element at which its depth is measured."""
@@ -54,7 +54,7 @@ class Exclusions:
         tick, self._tick = self._tick, self._tick + 1
         if tick == 0 and self._rod.description.attachments:
             return self._begin()
-        if tick % LOOK == 0 and self._inside.any():
+        if tick % CHECK_INTERVAL == 0 and self._inside.any():
             for c, e in np.argwhere(self._inside).tolist():
                 self._inside[c, e] = self._depth(c, e) > -self._rod.description.radius[e]
             self._write()

@@ -39,7 +39,7 @@ CAMERA = "CameraFrame"
 class Attempt:
     """Watches ``task`` in ``scene``, of a suture ``pairs`` of holes; begins anew when the scene is reset.
 
-    Raises ValueError for a task that there is not, `MissingBodies` for a scene in which it cannot be done.
+    Raises ValueError for an unknown task, `MissingBodies` for a scene in which it cannot be done.
     """
 
     def __init__(self, scene: Scene, task: str, pairs: int = SUTURE_PAIRS) -> None:
@@ -83,7 +83,7 @@ class Attempt:
         return max(passed_in_order(passages, wanted) / len(wanted) for wanted in map(holes_of, throws))
 
     def observe(self, state: Any) -> None:
-        """Take a state record (`ligature.model.state`), one element of it; 100 Hz and more will do."""
+        """Take a state record (`ligature.model.state`), one element of it; call it at 100 Hz or more."""
         resets, now = int(state["resets"]), float(state["sim_time"])
         if self._resets is not None and resets != self._resets:
             self.restart()

@@ -1,4 +1,4 @@
-"""Teleoperations that need no file: one for each device, and what several of them make together."""
+"""Teleoperation without a file: one configuration for each device, and the combination of several."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def of_devices(wanted: Sequence[str]) -> TeleopConfig:
 
 
 def _one(text: str) -> tuple[TeleopConfig, str]:
-    """The teleoperation of one device, and the topic that it is given."""
+    """The teleoperation of one device, with the topic that the user named."""
     name, equals, topic = text.partition("=")
     if name not in names() or (equals and not topic):
         raise ValueError(f"no device '{text}' is ready; there are {', '.join(names())}, each also as touch=/arm1/")

@@ -131,7 +131,7 @@ def test_in_edit_mode_slit_and_layer_go_to_the_selected_vertices():
     bmesh.update_edit_mesh(obj.data)
     assert bpy.ops.adf.add_layer(material="skin") == {"FINISHED"}
     assert obj.adf.body.ligature_tissue_layers[0].thickness == pytest.approx(0.01, abs=1e-6)
-    with pytest.raises(RuntimeError, match="lie in a layer that is there already"):
+    with pytest.raises(RuntimeError, match="are in an existing layer"):
         bpy.ops.adf.add_layer(material="skin")
     bpy.ops.object.mode_set(mode="OBJECT")
 

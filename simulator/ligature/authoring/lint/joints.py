@@ -41,7 +41,7 @@ def reference_unresolved(subject: Subject) -> Iterator[Finding]:
                 hint = "that file must come earlier in the launch file, under that namespace"
                 yield Finding("reference-elsewhere", Severity.INFO, element.key, message, hint)
             else:
-                message = f"its {name} '{text}' is no body of this file, or several are meant"
+                message = f"its {name} '{text}' does not name exactly one body of this file"
                 yield Finding("reference-unresolved", Severity.ERROR, element.key, message, "give a body's identifier")
 
 

@@ -214,9 +214,9 @@ def _limit(element: Element, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        refuse(element, f"a limit is '{text[:60]}'; give a number")
+        refuse(element, f"the limit '{text[:60]}' is not a number")
     if np.isnan(value):
-        refuse(element, "a limit is no number; give one")
+        refuse(element, "the limit is nan; give a number or inf")
     return value
 
 

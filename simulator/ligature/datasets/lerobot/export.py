@@ -74,11 +74,11 @@ def export(source: Path, target: Path, format: str, codec: str = "h264", license
     DatasetError
         For a dataset that cannot be read, or that the format cannot hold.
     ValueError
-        For a format or a codec that there is not.
+        For an unknown format or codec.
     """
     for what, value, known in (("format", format, FORMATS), ("codec", codec, tuple(CODECS))):
         if value not in known:
-            raise ValueError(f"{what} is one of {', '.join(known)}, not '{value}'")
+            raise ValueError(f"{what} must be one of {', '.join(known)}, not '{value}'")
     if target.exists():
         raise DatasetError(f"'{target}' exists already; choose another name")
     part = target.with_name(f"{target.name}.part")
@@ -99,7 +99,9 @@ def export(source: Path, target: Path, format: str, codec: str = "h264", license
 def _check(file: h5py.File, source: Path) -> None:
     """Raise for what LeRobot's formats cannot hold."""
     if file.attrs["format"] != "ligature dataset 2":
-        raise DatasetError(f"'{source}' is a '{file.attrs['format']}'; this version exports 'ligature dataset 2'")
+        raise DatasetError(
+            f"'{source}' has the format '{file.attrs['format']}'; only 'ligature dataset 2' can be exported"
+        )
     rate, names = float(file.attrs["rate"]), episode_names(file)
     if rate != round(rate):
         raise DatasetError(f"'{source}' has {rate:g} samples a second; LeRobot takes whole numbers")
