@@ -55,7 +55,9 @@ def test_a_round_thread_twists_more_easily_than_it_bends_by_one_plus_the_poisson
 
 
 @pytest.mark.parametrize("strain", [0.01, 0.05])
-def test_a_bend_stays_from_the_moment_that_stretches_the_skin_by_the_yield_strain(tmp_path: Path, strain: float) -> None:
+def test_a_bend_stays_from_the_moment_that_stretches_the_skin_by_the_yield_strain(
+    tmp_path: Path, strain: float
+) -> None:
     """M = E I ε / r of a round section (Euler, Bernoulli)."""
     elastic = load(tmp_path, NEEDLE + SILK).joints
     assert {joint.six_dof.yield_moment for joint in elastic if joint.six_dof} == {np.inf}

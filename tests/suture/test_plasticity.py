@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from ligature.suture import layout
 from ligature.suture.plasticity import set_bends
 
-from tests.suture.tied import KnotOverWound
+from tests.suture.throws import KnotOverWound
 
 YIELD = 0.02
 """Stretch of the skin from which a bend stays."""
@@ -44,31 +44,34 @@ def test_no_joint_bears_more_than_its_yield_moment_and_the_moment_keeps_its_dire
     assert (joints.rest[joints.low == joints.high] == rest[joints.low == joints.high]).all()
 
 
-def _arc(kit, strain, thick=0.8e-3, n=30, step=1e-3):
-    """A straight thread bent to an arc whose skin is stretched by ``strain``, in a medium that hardly lets it move."""
+def _arc(kit, strain, thick=0.8e-3, n=20, step=1e-3):
+    """A straight thread, held for a tick in an arc that stretches its skin by ``strain``, and the elements' length."""
     turn = step * strain / (0.5 * thick) * np.arange(n)
     way = step * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
     points = np.vstack([np.zeros(3), np.cumsum(way, axis=0)])
-    made = kit.from_material(points, thick, 1e7, 1100.0, gravity=(0, 0, 0), damping=0.1, yield_strain=YIELD)
-    return kit.Bench([]).add(kit.damped(made, 0.9999)), step
+    made = kit.from_material(points, thick, 1e7, 1100.0, gravity=(0, 0, 0), damping=0.02, yield_strain=YIELD)
+    rod = kit.Bench([]).add(kit.damped(made, 0.9))
+    for held in (True, False):
+        for element in range(n):
+            rod.hold_element(element, held)
+        if held:
+            rod.step()
+    return rod, step
 
 
-@pytest.mark.parametrize("strain", [0.5, 0.9, 1.5, 3.0, 6.0])
+@pytest.mark.parametrize("strain", [0.5, 0.9, 1.5, 3.0, 4.0])
 def test_a_bent_thread_springs_back_by_its_yield_strain_and_no_further(kit, strain):
     """Of perfect plasticity: what is left of a bend is what went beyond the elastic limit."""
     rod, step = _arc(kit, strain * YIELD)
-    for _ in range(4000):
+    for _ in range(400):
         rod.step()
     bent = np.linalg.norm(rod.joints.angle, axis=1) * 0.4e-3 / step
-    assert bent.mean() == pytest.approx(YIELD * max(strain - 1.0, 0.0), abs=0.02 * YIELD * max(strain, 1.0))
+    assert bent.mean() == pytest.approx(YIELD * max(strain - 1.0, 0.0), abs=1e-6 * YIELD)
 
 
 def test_bends_that_stay_are_part_of_snapshots_and_vanish_at_a_reset(kit):
     rod, _ = _arc(kit, 3.0 * YIELD)
-    rest = rod.joints.rest.copy()
-    for _ in range(3):
-        rod.step()
-    assert np.abs(rod.joints.rest - rest).max() > 0.01
+    assert np.abs(rod.joints.rest).max() > 0.01
     held = {name: np.copy(value) if isinstance(value, np.ndarray) else value for name, value in rod.snapshot().items()}
     ways = []
     for _ in range(2):
@@ -78,11 +81,11 @@ def test_bends_that_stay_are_part_of_snapshots_and_vanish_at_a_reset(kit):
         ways.append((rod.positions.tobytes(), rod.joints.rest.tobytes()))
     assert ways[0] == ways[1]
     rod.reset()
-    assert (rod.joints.rest == rest).all()
+    assert not rod.joints.rest.any()
 
 
 def _held(knot, ticks):
-    knot.tie()
+    knot.draw()
     knot.let_go()
     knot.rest(ticks)
     return knot.gap
@@ -90,9 +93,9 @@ def _held(knot, ticks):
 
 @pytest.mark.slow
 def test_three_throws_hold_the_lips_of_a_wound_for_ten_seconds():
-    knot = KnotOverWound((1, -1, 1), YIELD, friction=0.5)
+    knot = KnotOverWound((1, -1, 1), YIELD, friction=0.55)
     assert knot.determinant() == 27
-    knot.tie()
+    knot.draw()
     assert knot.loop > 0.3
     knot.let_go()
     for _ in range(100):
@@ -106,4 +109,4 @@ def test_three_throws_hold_the_lips_of_a_wound_for_ten_seconds():
 
 @pytest.mark.slow
 def test_the_same_knot_in_a_thread_that_springs_back_lets_the_wound_gape():
-    assert _held(KnotOverWound((1, -1, 1), np.inf, friction=0.5), 300) > 1e-3
+    assert _held(KnotOverWound((1, -1, 1), np.inf, friction=0.55), 300) > 1e-3

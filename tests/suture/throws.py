@@ -168,7 +168,7 @@ class KnotOverWound:
         for hand, _, _ in pulls:
             twist[hand][:] = 0.0
 
-    def tie(self) -> None:
+    def draw(self) -> None:
         """Draw the throws tight one after the other, from the wound up; the hands then hold the ends."""
         for tips in self._tips:
             left, right = (int(np.argmin(np.linalg.norm(self._laid - tip, axis=1))) for tip in tips)
