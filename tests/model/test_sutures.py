@@ -10,6 +10,7 @@ import pytest
 from ligature import Scene, Simulation
 from ligature.adf import Severity
 from ligature.model.sutures import USP_MILLIMETRES
+from ligature.suture.description import from_chain
 
 NEEDLE = (
     "bodies: [BODY Needle]\nsutures: [SUTURE silk]\nnamespace: /ambf/env/\n"
@@ -51,6 +52,40 @@ def test_a_round_thread_twists_more_easily_than_it_bends_by_one_plus_the_poisson
     assert six is not None
     assert six.stiffness[5] == pytest.approx(six.stiffness[3] / (1.0 + poisson))
     assert six.stiffness[4] == six.stiffness[3]
+
+
+@pytest.mark.parametrize("strain", [0.01, 0.05])
+def test_a_bend_stays_from_the_moment_that_stretches_the_skin_by_the_yield_strain(
+    tmp_path: Path, strain: float
+) -> None:
+    """M = E I ε / r of a round section (Euler, Bernoulli)."""
+    elastic = load(tmp_path, NEEDLE + SILK).joints
+    assert {joint.six_dof.yield_moment for joint in elastic if joint.six_dof} == {np.inf}
+    scene = load(tmp_path, NEEDLE + SILK.replace("density:", f"yield strain: {strain}, density:"))
+    radius = scene.rods[0].radius
+    assert from_chain(scene, scene.rods[0]).yield_moment == pytest.approx(1e8 * np.pi * radius**3 / 4 * strain)
+
+
+def test_a_joint_of_a_thread_states_the_moment_from_which_a_bend_stays(tmp_path: Path) -> None:
+    names = [f"BODY b{i}" for i in range(6)]
+    bodies = [
+        f"{name}: {{name: b{i}, mass: 1.0e-5, collision shape: CAPSULE, "
+        f"collision geometry: {{radius: 0.0004, height: 0.002, axis: Z}}, "
+        f"location: {{position: {{x: 0, y: 0, z: {0.002 * i}}}}}}}"
+        for i, name in enumerate(names)
+    ]
+    joints = [
+        f"JOINT j{i}: {{name: j{i}, parent: {a}, child: {b}, type: six dof spring, "
+        "parent pivot: {x: 0, y: 0, z: 0.001}, child pivot: {x: 0, y: 0, z: -0.001}, "
+        "parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}, ligature yield moment: 2.0e-5, "
+        "joint limits: {linear: {low: {x: 0, y: 0, z: 0}, high: {x: 0, y: 0, z: 0}}, "
+        "angular: {low: {x: -3, y: -3, z: -3}, high: {x: 3, y: 3, z: 3}}}, "
+        "stiffness: {angular: {x: 0.001, y: 0.001, z: 0.001}}}"
+        for i, (a, b) in enumerate(zip(names[:-1], names[1:], strict=True))
+    ]
+    head = f"bodies: [{', '.join(names)}]\njoints: [{', '.join(f'JOINT j{i}' for i in range(5))}]\n"
+    scene = load(tmp_path, head + "\n".join([*bodies, *joints]) + "\n")
+    assert from_chain(scene, scene.rods[0]).yield_moment.tolist() == [2e-5] * 5
 
 
 USP_LIMITS = {

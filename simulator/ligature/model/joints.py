@@ -5,6 +5,8 @@ Frames and units as in `ligature.model.scene`.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ligature.adf import Element
@@ -95,7 +97,8 @@ def _six_dof(element: Element, kind: JointType) -> SixDof | None:
     low[3:], high[3:] = wrapped[0][3:], wrapped[1][3:]
     if kind is JointType.SIX_DOF:
         return SixDof(low, high, np.zeros(6), np.zeros(6), np.zeros(6))
-    return SixDof(low, high, six("stiffness"), six("damping"), six("equilibrium point"))
+    yields = element.number("ligature yield moment") if element.has("ligature yield moment") else math.inf
+    return SixDof(low, high, six("stiffness"), six("damping"), six("equilibrium point"), yields)
 
 
 def _cone_twist(element: Element, kind: JointType) -> tuple[float, float, float] | None:

@@ -9,6 +9,7 @@ immutable and knows nothing of Bullet; objects refer to each other by their inde
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -145,7 +146,8 @@ class JointType(enum.Enum):
 class SixDof:
     """Limits and springs of a six-DOF joint, each (6,): linear xyz then angular xyz, in frame A.
 
-    ``low == high`` locks an axis, ``low > high`` frees it. Springs are zero for plain ``six dof``.
+    ``low == high`` locks an axis, ``low > high`` frees it. Springs are zero for plain ``six dof``. In a
+    thread, a rotation that needs more than ``yield_moment`` (N m) stays.
     """
 
     low: Array
@@ -153,6 +155,7 @@ class SixDof:
     stiffness: Array
     damping: Array
     equilibrium: Array
+    yield_moment: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)

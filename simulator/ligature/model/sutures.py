@@ -6,6 +6,7 @@ The thread starts at its ``location`` and leaves along +z of it. SI units; frame
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -92,6 +93,11 @@ def _diameter(element: Element) -> float:
     )
 
 
+def _yield_strain(element: Element) -> float:
+    """Stretch of the skin from which a bend stays; infinite where none does."""
+    return element.number("yield strain") if element.has("yield strain") else math.inf
+
+
 def _bend(
     element: Element, identity: Identity, index: int, before: Body, after: Body, length: float, radius: float
 ) -> Joint:
@@ -107,6 +113,7 @@ def _bend(
         stiffness=stiffness,
         damping=stiffness * element.number("damping time"),
         equilibrium=np.zeros(6),
+        yield_moment=bending * _yield_strain(element) / radius * length,
     )
     return Joint(
         index=index,

@@ -68,6 +68,8 @@ class RodDescription:
         (n - 1,) compliance of the joint's translation in m/N.
     joint_stiffness, joint_damping, rest, low, high
         (n - 1, 3) about the axes of the joint frame: N m/rad, N m s/rad, rad. ``low > high`` is free.
+    yield_moment
+        (n - 1,) moment in N m from which a bend stays; infinite for an elastic joint.
     attachments
         Attachments of the rod to bodies.
     bodies
@@ -92,6 +94,7 @@ class RodDescription:
     rest: Array
     low: Array
     high: Array
+    yield_moment: Array
     attachments: tuple[Attachment, ...] = ()
     bodies: tuple[int, ...] = ()
 
@@ -122,6 +125,7 @@ def from_material(
     friction: float = 0.5,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     damping: float = 0.0,
+    yield_strain: float = np.inf,
     straight: bool = True,
     attachments: Sequence[Attachment] = (),
     name: str = "rod",
@@ -131,6 +135,7 @@ def from_material(
     Bending stiffness of a joint is E I over the length between element centres, twist G J over it,
     stretch E A (Kirchhoff rod). The rod is stress-free when ``straight``, or else in the shape of the
     points. ``damping`` is the internal one, in seconds: moment per stiffness and rate of bending.
+    Bends stay that stretch the skin by more than ``yield_strain``.
 
     Raises ValueError for fewer than three points, coinciding points, or material data that are not positive.
     """
@@ -180,8 +185,14 @@ def from_material(
         rest=np.zeros((n - 1, 3)),
         low=free[0],
         high=free[1],
+        yield_moment=bend * yield_angle(yield_strain, radius, between),
         attachments=tuple(attachments),
     )
+
+
+def yield_angle(strain: float, radius: float, length: Array) -> Array:
+    """Angle in radians, over a ``length``, at which the skin of a round thread is stretched by ``strain``."""
+    return strain / radius * length
 
 
 def from_chain(scene: Scene, chain: RodChain) -> RodDescription:
@@ -213,6 +224,7 @@ def from_chain(scene: Scene, chain: RodChain) -> RodDescription:
         rest=np.array([s[2] for s in springs]),
         low=np.array([s[3] for s in springs]),
         high=np.array([s[4] for s in springs]),
+        yield_moment=np.array([j.six_dof.yield_moment if j.six_dof else np.inf for j in joints]),
         attachments=attachments,
         bodies=chain.bodies,
     )

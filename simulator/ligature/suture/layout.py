@@ -57,6 +57,7 @@ class Joints(NamedTuple):
     low: Array  # (n - 1, 3) rad
     high: Array  # (n - 1, 3) rad
     stop: Array  # (n - 1,) stiffness beyond the limits, N m/rad
+    yields: Array  # (n - 1,) moment from which a bend stays, N m; infinite where none does
     angle: Array  # (n - 1, 3) rotation vector of the joint, rad
     load: Array  # (n - 1, 6) force and moment on node j, times dt²
 
@@ -199,7 +200,7 @@ def joints(n: int) -> Joints:
     z = np.zeros
     return Joints(
         pivot=z((n, 2, 3)), frame=z((n, 2, 4)), compliance=z(n), stiffness=z((n, 3)), damping=z((n, 3)), rest=z((n, 3)),
-        low=z((n, 3)), high=z((n, 3)), stop=z(n), angle=z((n, 3)), load=z((n, 6)),
+        low=z((n, 3)), high=z((n, 3)), stop=z(n), yields=np.full(n, np.inf), angle=z((n, 3)), load=z((n, 6)),
     )  # fmt: skip
 
 

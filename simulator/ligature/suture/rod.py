@@ -136,6 +136,7 @@ class Rod:
         self.node_of = {**ends, **{p.body: self._chain + k for k, p in enumerate(rest)}}
         self._total = self._chain + len(rest)
         self.joints = _joints(description, head, tail)
+        self._unbent = self.joints.rest.copy()
         self._nodes = self._new_nodes()
         self.shapes = shapes or layout.no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
@@ -212,7 +213,7 @@ class Rod:
         nodes.v[:], nodes.w[:] = 0.0, 0.0
         for partner in self.partners:
             nodes.fixed[self.node_of[partner.body]] = partner.fixed
-        self.joints.load[:], self.joints.angle[:] = 0.0, 0.0
+        self.joints.load[:], self.joints.angle[:], self.joints.rest[:] = 0.0, 0.0, self._unbent
         self.constraints, self._pads, self._near = [], (), None
         self._external.clear()
         self._constraint_rows = self._gather_constraints()
@@ -527,7 +528,7 @@ class Rod:
 
 
 NODES_KEPT = ("x", "q", "v", "w", "mass", "inertia", "gravity", "fixed")
-JOINTS_KEPT = ("angle", "load")
+JOINTS_KEPT = ("angle", "load", "rest")
 TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "normal", "force", "start")
 """Arrays of nodes, joints and contact points that last from tick to tick."""
 
@@ -569,12 +570,14 @@ def _joints(description: RodDescription, head: Attachment | None, tail: Attachme
         "stiffness": list(description.joint_stiffness), "damping": list(description.joint_damping),
         "rest": list(description.rest), "low": list(description.low), "high": list(description.high),
     }  # fmt: skip
+    yields = description.yield_moment.tolist()
     stiffest = float(min(description.compliance))
     if head is not None:
         a, b = head.T_body_b, head.T_element_a
         pivots.insert(0, np.array([a[:3, 3], b[:3, 3]]))
         frames.insert(0, np.array([a[:3, :3], b[:3, :3]]))
         compliance.insert(0, stiffest)
+        yields.insert(0, np.inf)
         seen = {"stiffness": head.stiffness, "damping": head.damping, "rest": -head.rest,
                 "low": -head.high, "high": -head.low}  # fmt: skip
         for name, values in rows.items():
@@ -584,6 +587,7 @@ def _joints(description: RodDescription, head: Attachment | None, tail: Attachme
         pivots.append(np.array([a[:3, 3], b[:3, 3]]))
         frames.append(np.array([a[:3, :3], b[:3, :3]]))
         compliance.append(stiffest)
+        yields.append(np.inf)
         for name, values in rows.items():
             values.append(getattr(tail, name))
     n = len(pivots)
@@ -597,5 +601,6 @@ def _joints(description: RodDescription, head: Attachment | None, tail: Attachme
     return layout.Joints(
         pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), compliance=np.array(compliance),
         **arrays, stop=np.maximum(100.0 * bending, 100.0 * weight * span),
+        yields=np.array(yields),
         angle=np.zeros((n, 3)), load=np.zeros((n, 6)),
     )  # fmt: skip

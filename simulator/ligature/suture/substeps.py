@@ -17,6 +17,7 @@ from ligature.suture.crossing import free_share, shorten
 from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
 from ligature.suture.passages import Passages
 from ligature.suture.placing import sound
+from ligature.suture.plasticity import set_bends
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
@@ -179,6 +180,7 @@ def run_tick(
         new = c if in_c else b
         while done % (REFINEMENT * size) == 0:
             size *= REFINEMENT
+    set_bends(joints)
     _copy2(rod.shape_poses, shapes.pose)
     _scale_loads(joints, (MAX_PARTS / scale) ** 2)
     find_tension(first, n, joints, work, rod.tension, dt)

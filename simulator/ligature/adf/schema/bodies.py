@@ -235,6 +235,14 @@ JOINT = (
     *ignored(("controller gains",), "not the controller's key, which is `controller`"),
     *ignored(("origin", "axis"), "of AMBF 1.0; pivots and axes replaced it"),
     ROD,
+    Key(
+        "ligature yield moment",
+        N,
+        unit="N·m",
+        doc="of a thread's joint: moment from which a bend stays; none when absent",
+        status=Status.OURS,
+        least=0.0,
+    ),
 )
 GHOST = (
     *IDENTITY,
@@ -339,6 +347,7 @@ SUTURE = (
     Key("youngs modulus", N, 2.0e9, "Pa", "Young's modulus"),
     Key("poisson ratio", N, 0.4, doc="ratio that gives the shear modulus"),
     Key("damping time", N, 0.002, "s", "bending damping over bending stiffness"),
+    Key("yield strain", N, doc="stretch of the skin from which a bend stays; none does when absent", least=0.0),
     Key("elements", U, 40, doc="number of elements"),
     Key("friction", N, 0.3, doc="friction coefficient"),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose of the start; the thread leaves along +z"),
