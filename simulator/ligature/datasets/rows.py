@@ -64,7 +64,7 @@ class Rows:
 
 
 def packed(picture: NDArray[Any]) -> bytes:
-    """``picture`` as HDF5's filters shuffle and gzip leave it: first bytes of all numbers, then second ones; deflated."""
+    """``picture`` as HDF5's filters leave it: first bytes of all numbers, then the second ones; deflated."""
     flat = np.ascontiguousarray(picture).reshape(-1).view(np.uint8)
     planes = flat.reshape(-1, picture.itemsize).T
     return bytes(isal_zlib.compress(np.ascontiguousarray(planes), EFFORT))

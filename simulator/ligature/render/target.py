@@ -20,8 +20,8 @@ PASSES = {
 }
 """What a picture can hold: channels and type of the texture of each.
 
-Numbers of bodies and pieces are floats, which hold them exactly up to 2^24: OpenGL clears such textures together with the
-others, where integers would have to be written, which waits for all that is still being drawn.
+Numbers of bodies and pieces are floats, which hold them exactly up to 2^24: OpenGL clears such textures together with
+the others, where integers would have to be written, which waits for all that is still being drawn.
 """
 
 
