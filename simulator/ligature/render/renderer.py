@@ -172,7 +172,10 @@ class Renderer:
         passes: Sequence[str] = ("rgb", "depth", "ids", "normals"),
         shaders: ShaderFiles | None = None,
     ) -> Exposure:
-        """Begin a picture as `render` gives it; what happens to state and scene from now on does not change it."""
+        """Begin the picture that `render` gives of ``state``, as seen by ``view``, with ``passes`` and ``shaders``.
+
+        What happens to state and scene from now on does not change it.
+        """
         with self._context:  # several renderers may live in one process; leaving it hands the work to the driver
             self._context.gc()
             target, finish = self._drawn(state, view, passes, shaders)
