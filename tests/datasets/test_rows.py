@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ligature.datasets.rows import GATHERED, Rows
+from ligature.datasets.rows import GATHERED, EpisodeRows
 
 
 @settings(max_examples=30, deadline=None)
@@ -25,7 +25,7 @@ def test_pictures_are_read_as_they_were_written(
 ) -> None:
     drawn = np.random.default_rng(seed).integers(0, levels, (count, *shape)).astype(dtype)
     with h5py.File("x", "w", driver="core", backing_store=False) as file:
-        rows = Rows(file)
+        rows = EpisodeRows(file)
         for picture in drawn:
             rows.append("a/rgb", np.asfortranarray(picture), dtype, picture=True, units="depth_unit")
         rows.finish()
@@ -39,7 +39,7 @@ def test_pictures_are_read_as_they_were_written(
 def test_rows_that_wait_are_written_by_the_end(tmp_path: Path, count: int) -> None:
     state = np.zeros(3)
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        rows = Rows(file)
+        rows = EpisodeRows(file)
         for k in range(count):
             state[:] = k, -k, 0.5  # one array, as a simulation's state is
             rows.append("needle/pose", state, "f4", units="m")

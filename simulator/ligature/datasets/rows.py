@@ -23,7 +23,7 @@ EFFORT = 2
 """Level of ISA-L's deflate: a fifth of the time of zlib's first level, 4 % larger."""
 
 
-class Rows:
+class EpisodeRows:
     """Arrays of ``file``, each of which gets row after row."""
 
     def __init__(self, file: h5py.File) -> None:

@@ -19,7 +19,7 @@ import ligature
 from ligature.camera_simulation import Simulation
 from ligature.datasets.interrupts import uninterrupted
 from ligature.datasets.labels import ACTIVITIES, GESTURES, ActivityWatch
-from ligature.datasets.rows import Rows
+from ligature.datasets.rows import EpisodeRows
 from ligature.datasets.store import DatasetError, EpisodeStore
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
@@ -37,7 +37,7 @@ EARLY = 1e-6
 JOINT_ROWS, POSE, TWIST, WRENCH = "position, velocity, effort", "x y z qx qy qz qw", "v w", "f t"
 
 Value = tuple[str, Any, dict[str, Any]]
-"""Name and value of what one sample has, and how `Rows.append` keeps it."""
+"""Name and value of what one sample has, and how `EpisodeRows.append` keeps it."""
 
 
 class DatasetWriter:
@@ -92,7 +92,7 @@ class DatasetWriter:
         self._gestures, self._remarks = dict(gestures or {}), dict(remarks or {})
         self._watch = ActivityWatch(simulation.scene)
         self._episode: h5py.File | None = None
-        self._rows: Rows | None = None
+        self._rows: EpisodeRows | None = None
         self._exposures: dict[str, Exposure] = {}
         self._samples, self._due, self._ended = 0, 0.0, False
         try:
@@ -161,7 +161,7 @@ class DatasetWriter:
 
     def _begin(self, time: float) -> None:
         self._episode = self._store.begin()
-        self._rows, self._exposures = Rows(self._episode), {}
+        self._rows, self._exposures = EpisodeRows(self._episode), {}
         self._samples, self._due = 0, time
 
     def end_episode(self, success: bool, **remarks: float | int | str) -> None:
