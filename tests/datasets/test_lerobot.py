@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -23,6 +20,7 @@ from ligature.datasets.lerobot import FORMATS, export
 from ligature.model.frames import axis_rotation, frame, matrix_pose7, pose7_matrix
 from typer.testing import CliRunner
 
+from tests.datasets.doctor import examined
 from tests.datasets.lerobot_rules import broken, broken_for_open_h
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -338,11 +336,6 @@ def test_the_doctor_has_nothing_to_say(source: Path, tmp_path: Path) -> None:
     """`lerobot-doctor` reads the format with code of others."""
     target = tmp_path / "out"
     export(source, target, "lerobot-3.0", log=lambda _: None)
-    done = subprocess.run(
-        [Path(sys.executable).with_name("lerobot-doctor"), target, "--json"], capture_output=True, text=True, timeout=120,
-        env={**os.environ, "HF_HUB_OFFLINE": "1"},
-    )  # fmt: skip
-    report = json.loads(done.stdout)
-    findings = [m["message"] for check in report["checks"] for m in check["messages"] if m["severity"] != "PASS"]
+    report, findings = examined(target)
     assert findings == [] and report["overall_severity"] == "PASS"
     assert report["total_frames"] == sum(SAMPLES)

@@ -144,6 +144,24 @@ def test_a_closed_simulation_states_that_it_takes_no_more_pictures(scene: Path) 
     never.close()  # without a picture
 
 
+def test_exposures_show_the_moment_they_began_in_whatever_comes_before_they_are_read(scene: Path) -> None:
+    simulation = Simulation(ligature.load(scene))
+    camera, ball = simulation.cameras["C"], simulation.bodies["Ball"]
+    truth, begun = [], []
+    for height in (0.0, 0.1, 0.2):
+        ball.set_pose([-1.4, 0.0, height, 0.0, 0.0, 0.0, 1.0])
+        simulation.step()
+        truth.append(camera.capture())
+        begun.append(camera.expose())
+    camera.capture((64, 48))
+    simulation.close()  # finishes what has been begun
+    assert (truth[0].rgb != truth[2].rgb).any()
+    for wanted, exposure in zip(truth, begun, strict=True):
+        for name in ("rgb", "depth", "ids"):
+            assert (getattr(exposure.frame(), name) == getattr(wanted, name)).all(), name
+        assert exposure.frame() is exposure.frame()
+
+
 def test_pictures_of_many_sizes_keep_a_bounded_number_of_frame_buffers(scene: Path) -> None:
     simulation = Simulation(ligature.load(scene))
     renderer, camera = Renderer(simulation.scene), simulation.scene.cameras[0]

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -19,9 +19,13 @@ import ligature
 from ligature.camera_simulation import Simulation
 from ligature.datasets.interrupts import uninterrupted
 from ligature.datasets.labels import ACTIVITIES, GESTURES, ActivityWatch
+from ligature.datasets.rows import EpisodeRows
 from ligature.datasets.store import DatasetError, EpisodeStore
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
+
+if TYPE_CHECKING:  # datasets of motion need no OpenGL
+    from ligature.render.target import Exposure
 
 FORMAT = "ligature dataset 2"
 DEPTH_UNIT = 1e-4
@@ -31,10 +35,9 @@ EARLY = 1e-6
 """Seconds before its time at which a sample is taken, for the rounding of simulated time."""
 
 JOINT_ROWS, POSE, TWIST, WRENCH = "position, velocity, effort", "x y z qx qy qz qw", "v w", "f t"
-_PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 Value = tuple[str, Any, dict[str, Any]]
-"""Name, value and storage of what one sample has; ``units`` and ``axes`` of the storage become attributes."""
+"""Name and value of what one sample has, and how `EpisodeRows.append` keeps it."""
 
 
 class DatasetWriter:
@@ -89,6 +92,8 @@ class DatasetWriter:
         self._gestures, self._remarks = dict(gestures or {}), dict(remarks or {})
         self._watch = ActivityWatch(simulation.scene)
         self._episode: h5py.File | None = None
+        self._rows: EpisodeRows | None = None
+        self._exposures: dict[str, Exposure] = {}
         self._samples, self._due, self._ended = 0, 0.0, False
         try:
             self._store = EpisodeStore(path, self._describe)
@@ -141,16 +146,23 @@ class DatasetWriter:
             return False
         with self._writing():
             if self._episode is None:
-                self._episode = self._store.begin()
-                self._samples, self._due = 0, time
+                self._begin(time)
+            assert self._rows is not None
+            self._develop()
             for name, value, options in self._values(phase, arms):
-                self._append(name, value, options)
+                self._rows.append(name, value, **options)
             for name, value in (extra or {}).items():
-                self._append(f"extra/{name}", np.asarray(value, dtype=float), {"dtype": "f4", "units": "the caller's"})
+                self._rows.append(f"extra/{name}", np.asarray(value, dtype=float), "f4", units="the caller's")
+            self._exposures = {name: camera.expose(self._size) for name, camera in self._cameras.items()}
             self._store.check()
         self._samples += 1
         self._due += self._period
         return True
+
+    def _begin(self, time: float) -> None:
+        self._episode = self._store.begin()
+        self._rows, self._exposures = EpisodeRows(self._episode), {}
+        self._samples, self._due = 0, time
 
     def end_episode(self, success: bool, **remarks: float | int | str) -> None:
         """End the episode, with ``success`` and ``remarks`` as its attributes; from now on it is on the disk.
@@ -160,18 +172,24 @@ class DatasetWriter:
         if self._episode is None:
             return
         with self._writing():
+            assert self._rows is not None
+            self._develop()
+            self._rows.finish()
             attributes = self._episode.attrs
             attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
             for name, value in remarks.items():
                 attributes[name] = value
             self._add_actions()
-            self._episode = None
+            self._forget()
             self._store.finish()
 
     def drop_episode(self) -> None:
         """Forget the episode that goes on."""
-        self._episode = None
+        self._forget()
         self._store.drop()
+
+    def _forget(self) -> None:
+        self._episode, self._rows, self._exposures = None, None, {}
 
     def _add_actions(self) -> None:
         """The action of a sample is the set-point of the next one; that of the last is its own."""
@@ -220,7 +238,8 @@ class DatasetWriter:
         for tissue in scene.tissues:
             yield from _tissue(scene, tissue, state)
         for name, camera in self._cameras.items():
-            yield from self._pictures(name, camera)
+            yield f"cameras/{name}/pose", camera.pose, {"dtype": "f8", "units": "m", "axes": POSE}
+            yield f"cameras/{name}/intrinsics", camera.view(self._size).intrinsics, {"dtype": "f8", "units": "px"}
 
     def _motion(self, arm: ArmDescription, record: Any) -> Iterator[Value]:
         """Joints (position, velocity, effort by joint), tip and its wrench in the arm's base, and jaw of an arm."""
@@ -236,35 +255,17 @@ class DatasetWriter:
         wrench = {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
         yield f"arms/{arm.name}/spatial_measured_cf", record["spatial_measured_cf"], wrench
 
-    def _pictures(self, name: str, camera: Any) -> Iterator[Value]:
-        """Colour, depth and ids of a camera, each picture compressed alone so that readers take any."""
-        picture = camera.capture(self._size)
-        steps = np.where(np.isfinite(picture.depth), picture.depth / DEPTH_UNIT, 0.0)
-        yield f"cameras/{name}/rgb", picture.rgb, {"dtype": "u1", **_PACKED}
-        yield (
-            f"cameras/{name}/depth",
-            np.minimum(steps.round(), 65535.0),
-            {"dtype": "u2", "units": "depth_unit", **_PACKED},
-        )
-        yield f"cameras/{name}/ids", picture.ids, {"dtype": "u2", **_PACKED}
-        yield f"cameras/{name}/pose", camera.pose, {"dtype": "f8", "units": "m", "axes": POSE}
-        yield f"cameras/{name}/intrinsics", camera.view(self._size).intrinsics, {"dtype": "f8", "units": "px"}
-
-    def _append(self, name: str, value: Any, options: dict[str, Any]) -> None:
-        """Add a row to a dataset of the episode."""
-        assert self._episode is not None
-        shape = np.shape(value)
-        if name not in self._episode:
-            rows = 1 if len(shape) > 1 and "compression" in options else 256
-            notes = {key: options[key] for key in ("units", "axes") if key in options}
-            storage = {key: value for key, value in options.items() if key not in notes}
-            made = self._episode.create_dataset(
-                name, (0, *shape), maxshape=(None, *shape), chunks=(rows, *shape), **storage
-            )
-            made.attrs.update(notes)
-        data = self._episode[name]
-        data.resize(self._samples + 1, axis=0)
-        data[self._samples] = value
+    def _develop(self) -> None:
+        """Add the pictures of the last sample, which were drawn while the simulation went on."""
+        assert self._rows is not None
+        exposures, self._exposures = self._exposures, {}
+        for name, exposure in exposures.items():
+            picture = exposure.frame()
+            steps = np.where(np.isfinite(picture.depth), picture.depth / DEPTH_UNIT, 0.0)
+            depth = np.minimum(steps.round(), 65535.0)
+            self._rows.append(f"cameras/{name}/rgb", picture.rgb, "u1", picture=True)
+            self._rows.append(f"cameras/{name}/depth", depth, "u2", picture=True, units="depth_unit")
+            self._rows.append(f"cameras/{name}/ids", picture.ids, "u2", picture=True)
 
     # --- the end ----------------------------------------------------------------------------
 
@@ -283,7 +284,8 @@ class DatasetWriter:
     def abandon(self) -> None:
         """End the dataset without the episode that goes on; without any other, nothing stays."""
         if not self._ended:
-            self._ended, self._episode = True, None
+            self._ended = True
+            self._forget()
             self._store.close(empty=False)
 
     @contextmanager
@@ -293,7 +295,8 @@ class DatasetWriter:
             with uninterrupted():
                 yield
         except (OSError, RuntimeError) as error:
-            self._ended, self._episode = True, None
+            self._ended = True
+            self._forget()
             kept = f"; {self.count} episodes are whole" if self.count else ""
             try:
                 self._store.close(empty=False)

@@ -19,7 +19,7 @@ from ligature.render.camera import CameraView, view_of
 from ligature.render.look import Look
 from ligature.render.renderer import Renderer
 from ligature.render.sensor import IDEAL, ImageSensor
-from ligature.render.target import Frame
+from ligature.render.target import Exposure, Frame
 from ligature.simulation import Handles, Simulation
 
 Array = NDArray[np.float64]
@@ -116,11 +116,22 @@ class CameraHandle:
         RenderUnavailable
             When the machine has no OpenGL.
         """
+        return self.expose(resolution, passes=passes, eye=eye, sensor=sensor).frame()
+
+    def expose(
+        self,
+        resolution: tuple[int, int] | None = None,
+        *,
+        passes: Sequence[str] = ("rgb", "depth", "ids"),
+        eye: str = "",
+        sensor: ImageSensor = IDEAL,
+    ) -> Exposure:
+        """Begin the picture that `capture` takes: where a processor draws, it is drawn while the simulation goes on."""
         state = self._simulation.state
-        view = self.view(resolution, eye)
+        view, moment = self.view(resolution, eye), (self.camera.index, int(state["tick"][0]))
         shaders = self.camera.preprocessing_shaders
-        frame = self._studio.renderer.render(state, sensor.view(view), passes, shaders)
-        return sensor.expose(frame, view, (self.camera.index, int(state["tick"][0])))
+        drawn = self._studio.renderer.expose(state, sensor.view(view), passes, shaders)
+        return Exposure(lambda: sensor.expose(drawn.frame(), view, moment))
 
     def calibration(
         self, resolution: tuple[int, int] | None = None, *, eye: str = "", sensor: ImageSensor = IDEAL

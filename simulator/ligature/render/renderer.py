@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import gc
 import weakref
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import moderngl
 import numpy as np
@@ -30,7 +31,7 @@ from ligature.render.points import computed_points
 from ligature.render.programs import Programs
 from ligature.render.sky import Sky
 from ligature.render.surface import Physical, Surface, surface_of
-from ligature.render.target import PASSES, Frame, Target
+from ligature.render.target import PASSES, Exposure, Frame, Target
 from ligature.render.textures import Textures
 from ligature.render.thread import Tube
 from ligature.render.tissue import Marks, tissue_surfaces
@@ -90,7 +91,8 @@ class Renderer:
         loader = VisualLoader()
         self.problems: list[AdfError] = loader.problems
         self._textures = Textures(self._context, self.problems)
-        self._targets: dict[tuple[int, int, tuple[str, ...], int], Target] = {}
+        self._targets: list[Target] = []
+        self._exposures: weakref.WeakSet[Exposure] = weakref.WeakSet()
         self._lights = Lights(self._context, scene)
         pieces = loader.of_scene(scene)
         self._tissues = tissue_surfaces(scene, pieces)
@@ -161,13 +163,38 @@ class Renderer:
         such a picture is not smoothed, since its colours may be labels. ``flow`` counts from the last picture
         of the same size that had this pass.
         """
-        with self._context:  # several renderers may live in one process
+        return self.expose(state, view, passes, shaders).frame()
+
+    def expose(
+        self,
+        state: NDArray[np.void],
+        view: CameraView,
+        passes: Sequence[str] = ("rgb", "depth", "ids", "normals"),
+        shaders: ShaderFiles | None = None,
+    ) -> Exposure:
+        """Begin the picture that `render` gives of ``state``, as seen by ``view``, with ``passes`` and ``shaders``.
+
+        What happens to state and scene from now on does not change it.
+        """
+        with self._context:  # several renderers may live in one process; leaving it hands the work to the driver
             self._context.gc()
-            return self._drawn(state, view, passes, shaders)
+            target, finish = self._drawn(state, view, passes, shaders)
+        exposure = Exposure(partial(self._read, target, finish))
+        self._exposures.add(exposure)
+        return exposure
+
+    def _read(self, target: Target, finish: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Frame:
+        """The picture in ``target``, which is free for another one then."""
+        with self._context:
+            frame = target.read(finish)
+            self._targets.append(target)  # the newest come last
+            del self._targets[:-MAX_TARGETS]
+        return frame
 
     def _drawn(
         self, state: NDArray[np.void], view: CameraView, passes: Sequence[str], shaders: ShaderFiles | None
-    ) -> Frame:
+    ) -> tuple[Target, Callable[[NDArray[np.uint8]], NDArray[np.uint8]]]:
+        """Where the picture is being drawn, and what is to be done with its colours and alpha."""
         self._place(state, view.view)
         target = self._target(view, passes, 0 if shaders else self._samples)
         seen = self._instances.seen(view.view, view.projection, view.height, COARSE_BELOW)
@@ -189,9 +216,8 @@ class Renderer:
             if sky is not None and target.behind is not None:
                 sky.draw(target.behind, view)
         if not self._smoothed or shaders:
-            return target.read()
-        keyed = not painter.has_own_shaders
-        return target.read(lambda rgba: smoothed(rgba, keyed))
+            return target, _colours
+        return target, partial(smoothed, keyed=not painter.has_own_shaders)
 
     def points(self, depth: NDArray[np.float32], view: CameraView, shaders: ShaderFiles) -> NDArray[np.float32] | None:
         """What ``depth compute shaders`` make of linear ``depth`` (h, w): the x, y, z (h, w, 3) that they write.
@@ -204,7 +230,12 @@ class Renderer:
             return None if program is None else computed_points(self._context, program, depth, view)
 
     def release(self) -> None:
-        """Give the OpenGL context back, unless it is a window's; nothing can be drawn any more."""
+        """Give the OpenGL context back, unless it is a window's; nothing can be drawn any more.
+
+        Pictures that are being drawn are finished.
+        """
+        for exposure in list(self._exposures):
+            exposure.frame()
         if self._end is not None:
             self._end()
         _alive.discard(self)
@@ -299,19 +330,20 @@ class Renderer:
         unknown = set(passes) - set(PASSES)
         if unknown or not passes:
             raise ValueError(f"{sorted(unknown) or 'no pass'} cannot be drawn; there are {', '.join(PASSES)}")
-        key = (view.width, view.height, tuple(passes), samples)
-        if key in self._targets:
-            self._targets[key] = self._targets.pop(key)  # the newest come last
-        else:
-            most = self._context.info["GL_MAX_TEXTURE_SIZE"]
-            if not (0 < view.width <= most and 0 < view.height <= most):
-                raise ValueError(f"a picture cannot be {view.width} x {view.height}: each is 1 to {most} pixels here")
-            try:
-                self._targets[key] = Target(self._context, key[:2], passes, samples)
-            except (moderngl.Error, MemoryError) as error:
-                raise ValueError(
-                    f"not enough memory for a picture of {view.width} x {view.height} pixels: {error}"
-                ) from None
-            if len(self._targets) > MAX_TARGETS:
-                del self._targets[next(iter(self._targets))]
-        return self._targets[key]
+        size, wanted = (view.width, view.height), [name for name in PASSES if name in passes]
+        for target in reversed(self._targets):
+            if (target.size, target.passes, target.samples) == (size, wanted, samples):
+                self._targets.remove(target)
+                return target
+        most = self._context.info["GL_MAX_TEXTURE_SIZE"]
+        if not (0 < view.width <= most and 0 < view.height <= most):
+            raise ValueError(f"a picture cannot be {view.width} x {view.height}: each is 1 to {most} pixels here")
+        try:
+            return Target(self._context, size, passes, samples)
+        except (moderngl.Error, MemoryError) as error:
+            words = f"not enough memory for a picture of {view.width} x {view.height} pixels: {error}"
+            raise ValueError(words) from None
+
+
+def _colours(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return rgba[..., :3]

@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 PASSES = {
     "rgb": (4, "f1"),
     "depth": (1, "f4"),
-    "ids": (1, "i4"),
-    "parts": (1, "i4"),
+    "ids": (1, "f4"),
+    "parts": (1, "f4"),
     "normals": (4, "f4"),
     "flow": (2, "f4"),
 }
-"""What a picture can hold: channels and type of the texture of each."""
+"""What a picture can hold: channels and type of the texture of each.
+
+Numbers of bodies and pieces are floats, which hold them exactly up to 2^24: OpenGL clears such textures together with
+the others, where integers would have to be written, which waits for all that is still being drawn.
+"""
 
 
 SATURATED = 255
@@ -60,7 +64,7 @@ class Target:
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], passes: Sequence[str], samples: int) -> None:
         self._context = context
-        self.size = size
+        self.size, self.samples = size, samples
         self.passes = [name for name in PASSES if name in passes]
         self._textures = {name: context.texture(size, n, dtype=t) for name in self.passes for n, t in [PASSES[name]]}
         depth = context.depth_renderbuffer(size)
@@ -77,20 +81,16 @@ class Target:
                 self._resolved = self.colour
                 many = context.renderbuffer(size, 4, samples=samples)
                 self.colour = context.framebuffer([many], context.depth_renderbuffer(size, samples=samples))
-        empty = {"ids": np.int32(0), "parts": np.int32(0), "depth": np.float32(np.inf)}
-        self._empty = {name: np.full(size, empty[name]).tobytes() for name in self.passes if name in empty}
 
     def clear(self, background: tuple[float, float, float, float]) -> None:
         """Empty what will be drawn into."""
-        self.whole.clear(*background)
         if self.geometry is not None:
             self.geometry.clear()
-        if self.colour is not None:
-            self.colour.clear(*background)
-        for name, data in self._empty.items():  # what OpenGL's clear colour cannot express
-            self._textures[name].write(data)
+        for buffer in (self.behind, self.colour):
+            if buffer is not None:
+                buffer.clear(*background)
 
-    def read(self, finish: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda rgba: rgba[..., :3]) -> Frame:
+    def read(self, finish: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Frame:
         """Copy the picture out, top row first; ``finish`` makes (h, w, 3) of the colours and alpha (h, w, 4)."""
         if self._resolved is not None and self.colour is not None:
             self._context.copy_framebuffer(self._resolved, self.colour)
@@ -104,4 +104,27 @@ class Target:
         channels, dtype = PASSES[name]
         data = np.frombuffer(self._textures[name].read(), dtype="u1" if dtype == "f1" else dtype)
         rows = data.reshape(height, width, channels)[::-1]
-        return rows[..., 0] if channels == 1 else rows[..., : 3 if name == "normals" else channels]
+        if name == "depth":
+            return np.where(rows[..., 0] == 0.0, np.float32(np.inf), rows[..., 0])  # where nothing was drawn
+        if name in ("ids", "parts"):
+            return rows[..., 0].astype(np.int32)
+        return rows[..., : 3 if name == "normals" else channels]
+
+
+class Exposure:
+    """A picture that is being drawn.
+
+    On a software rasteriser it is drawn by other threads, beside what its caller does until it asks for the `frame`.
+    ``read`` waits for it and gives it.
+    """
+
+    def __init__(self, read: Callable[[], Frame]) -> None:
+        self._read: Callable[[], Frame] | None = read
+        self._frame: Frame | None = None
+
+    def frame(self) -> Frame:
+        """The picture, which is the same each time."""
+        if self._read is not None:
+            self._frame, self._read = self._read(), None
+        assert self._frame is not None
+        return self._frame

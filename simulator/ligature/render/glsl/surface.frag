@@ -56,10 +56,10 @@ layout(location = PASS_RGB) out vec4 fColour;
 layout(location = PASS_DEPTH) out float fDepth;
 #endif
 #ifdef PASS_IDS
-layout(location = PASS_IDS) out int fId;
+layout(location = PASS_IDS) out float fId;
 #endif
 #ifdef PASS_PARTS
-layout(location = PASS_PARTS) out int fPart;
+layout(location = PASS_PARTS) out float fPart;
 #endif
 #ifdef PASS_NORMALS
 layout(location = PASS_NORMALS) out vec4 fNormal;
@@ -150,10 +150,10 @@ void main() {
     fDepth = -eye.z;
 #endif
 #ifdef PASS_IDS
-    fId = vIds.x;
+    fId = float(vIds.x);
 #endif
 #ifdef PASS_PARTS
-    fPart = vIds.y;
+    fPart = float(vIds.y);
 #endif
 #ifdef PASS_NORMALS
     fNormal = vec4(normal, 1.0);
