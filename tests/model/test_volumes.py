@@ -106,7 +106,7 @@ def test_a_volume_on_a_moving_body_goes_along(folder: Path) -> None:
         (("path: ./slices", "path: ./nowhere"), "has no file plane00.png"),
         (("path: ./slices", "path: ../../.."), "lies outside|has no file"),
         (("color rgba", "iso-surface value: 0\n  color rgba"), "'iso-surface value' is 0"),
-        (("count: 99", "count: 99999999"), "at most 4096 slices"),
+        (("count: 99", "count: 99999999"), "the maximum is 4096 slices"),
         (("x: 0.2, y: 0.2, z: 0.2", "x: 0.2, y: -0.2, z: 0.2"), "must be above 0"),
     ],
 )

@@ -278,7 +278,7 @@ def test_what_a_plugin_may_not_do_is_reported(simulate: Make, code: str, reason:
 
 def test_a_file_needs_one_class_and_an_entry_point_a_package(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("x = 1\n")
-    for name, reason in (("mine.py", "must have one class"), ("nobodys_plugin", "no installed package offers")):
+    for name, reason in (("mine.py", "must define one subclass"), ("nobodys_plugin", "no installed package offers")):
         (tmp_path / "m.yaml").write_text(SCENE % (f"{{name: mine, filename: {name}}}", ""))
         sim = Simulation(ligature.load(tmp_path / "m.yaml"), allow_plugins=True)
         sim.step(1)
