@@ -28,8 +28,7 @@ class World:
         self.state = message
 
     def throttle(self, on=True):
-        """Hold the world, or let it run."""
-        self._clock = not self._clock
+        """Hold the world, which runs on by itself when it hears nothing for half a second, or let it run."""
         message = WorldCmd(enable_step_throttling=on, step_clock=self._clock, n_skip_steps=STEPS)
         while self._command.get_num_connections() == 0:
             rospy.sleep(0.01)
@@ -38,9 +37,20 @@ class World:
     def step(self):
         """Advance by `STEPS` updates, and wait until that was done."""
         before = self.state.sim_step
+        self._clock = not self._clock
         self.throttle()
         while self.state.sim_step < before + STEPS:
             rospy.sleep(0.001)
+
+    def rest(self):
+        """Wait until nothing is simulated any more; the step at which the world rests."""
+        step = None
+        while self.state is None or self.state.sim_step != step:
+            step = None if self.state is None else self.state.sim_step
+            for _ in range(10):
+                self.throttle()
+                rospy.sleep(0.1)
+        return step
 
 
 class Objects(unittest.TestCase):
@@ -52,18 +62,13 @@ class Objects(unittest.TestCase):
         pose = rospy.wait_for_message(f"{NEEDLE}/State", RigidBodyState, TIMEOUT).pose
         goal = RigidBodyCmd(cartesian_cmd_type=RigidBodyCmd.TYPE_POSITION, pose=pose)
         goal.pose.position.z += 0.03
-        world.throttle()
-        while world.state is None:
-            rospy.sleep(0.01)
-        rospy.sleep(0.2)  # the edge that began it has been simulated
-        start = world.state.sim_step
+        start = world.rest()
         for _ in range(100):
             command.publish(goal)
             world.step()
         held = rospy.wait_for_message(f"{NEEDLE}/State", RigidBodyState, TIMEOUT)
         self.assertAlmostEqual(held.pose.position.z, goal.pose.position.z, delta=2e-3)
-        rospy.sleep(0.2)
-        self.assertEqual(world.state.sim_step, start + 100 * STEPS, "nobody else steps")
+        self.assertEqual(world.rest(), start + 100 * STEPS, "nobody else steps")
         world.throttle(False)
 
 

@@ -162,15 +162,18 @@ rospy.Subscriber("/MTMR/measured_cp", PoseStamped, lambda m: keep("hand", m.pose
 rospy.Subscriber("/PSM1/setpoint_cp", PoseStamped, lambda m: keep("tip", m.pose), tcp_nodelay=True)
 enable = rospy.Publisher("/console/teleop/enable", Bool, queue_size=1)
 hand = rospy.Publisher("/MTMR/hand", PoseStamped, queue_size=1, tcp_nodelay=True)
-def until(condition, what):
+def until(condition, what, every=0.01):
     end = time.monotonic() + 40
     while not condition():
         if time.monotonic() > end:
             sys.exit(f"{what}: {seen.get('status')}")
-        time.sleep(0.01)
-until(lambda: enable.get_num_connections() >= 2 and hand.get_num_connections(), "connections")
-enable.publish(True)
-until(lambda: seen.get("following"), "following")
+        time.sleep(every)
+until(hand.get_num_connections, "connections")
+def follows():
+    # again until it does: how many others hear it does not say whether teleoperation is among them
+    enable.publish(True)
+    return seen.get("following")
+until(follows, "following", 0.2)
 time.sleep(0.5)
 p = lambda pose: np.array([pose.position.x, pose.position.y, pose.position.z])
 start, tip, pose = p(seen["hand"]), p(seen["tip"]), seen["hand"]
