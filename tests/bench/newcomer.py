@@ -52,8 +52,9 @@ def main() -> int:
     served = Served(scene=ROOT / "scenes" / "needle_insertion" / "launch.yaml")
     try:
         with somebody() as person:
-            size = {"width": DESK[0], "height": DESK[1], "deviceScaleFactor": 1, "mobile": False}
-            person.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            person.driver.set_window_size(*DESK)
+            frame = DESK[1] - person.driver.execute_script("return innerHeight")
+            person.driver.set_window_size(DESK[0], DESK[1] + frame)
             person.opens(served.url, 0.6)
             one = Newcomer(served, person)
             album = Album(one, given.to, given.docs)
