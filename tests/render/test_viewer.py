@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,15 @@ SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "lau
 SIZE = (320, 200)
 
 
+@contextmanager
+def opengl() -> Iterator[None]:
+    """Skips the test where the machine has no OpenGL."""
+    try:
+        yield
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+
+
 @pytest.fixture(scope="module")
 def small() -> Simulation:
     simulation = Simulation(ligature.load(SMALL))
@@ -38,10 +48,8 @@ def sent() -> list[Any]:
 
 @pytest.fixture
 def viewer(small: Simulation, sent: list[Any]) -> Viewer:
-    try:
+    with opengl():
         return Viewer(Controls(small.scene, sent.append), 0)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture
@@ -103,10 +111,8 @@ def test_contact_forces_are_asked_for_and_carry_the_weight_of_what_lies_there(tm
         "Floor: {name: Floor, mass: 0, shape: BOX, geometry: {x: 1, y: 1, z: 0.1}, collision shape: BOX, collision geometry: {x: 1, y: 1, z: 0.1}, location: {position: {x: 0, y: 0, z: -0.05}}}\n"
     )
     simulation = Simulation(ligature.load(path))
-    try:
+    with opengl():
         viewer = Viewer(Controls(simulation.scene, simulation.apply), None)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     simulation.step(300)
     assert simulation.state["touch_count"][0] == 0
     before = viewer.picture(simulation.state, SIZE, Figures())
@@ -153,12 +159,10 @@ def test_a_body_follows_the_mouse_against_its_weight_and_is_let_go(tmp_path: Pat
         "C: {name: C, location: {x: 2, y: 0, z: 0}, look at: {x: 0, y: 0, z: 0}, up: {x: 0, y: 0, z: 1}, field view angle: 0.9}\n"
     )
     simulation, sent = Simulation(ligature.load(path)), []
-    try:
+    with opengl():
         viewer = Viewer(
             Controls(simulation.scene, lambda message: (sent.append(message), simulation.apply(message))), 0
         )
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     viewer.picture(simulation.state, SIZE, Figures())
     assert viewer.grab(5, 5) is None, "a wall does not move"
     assert viewer.grab(160, 100) == "/ambf/env/Ball"
@@ -181,12 +185,10 @@ def test_a_body_follows_the_mouse_against_its_weight_and_is_let_go(tmp_path: Pat
 def test_an_arm_goes_where_the_mouse_goes(view: str) -> None:
     """Whichever way the view looks: the tip's pixel moves as the mouse did, the wheel takes it away, a turn turns it."""
     simulation, sent = Simulation(ligature.load(SMALL)), []
-    try:
+    with opengl():
         viewer = Viewer(
             Controls(simulation.scene, lambda message: (sent.append(message), simulation.apply(message))), 0
         )
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     viewer.picture(simulation.state, SIZE, Figures())
     viewer.move_arm(10, 0)
     assert viewer.arm == "" and sent == [], "no arm is chosen"
@@ -253,10 +255,8 @@ def sight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Simulation, Control
     path = tmp_path_factory.mktemp("sight") / "m.yaml"
     path.write_text(SIGHT)
     simulation = Simulation(ligature.load(path))
-    try:
+    with opengl():
         controls = Controls(simulation.scene, simulation.apply)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     controls.key("M", False, None)
     return simulation, controls
 
@@ -306,12 +306,10 @@ def test_the_scene_follows_a_mouse_that_moves_the_camera(sight: tuple[Simulation
     assert viewer.camera == 0, "no free view"
 
 
-def test_a_camera_that_is_moved_while_the_run_is_paused_is_shown_so(small: Simulation, sent: list[Any]) -> None:
+def test_a_camera_that_is_moved_while_the_run_is_paused_is_shown_so(
+    viewer: Viewer, small: Simulation, sent: list[Any]
+) -> None:
     """The state does not change then; once it does, the camera is where the state has it."""
-    try:
-        viewer = Viewer(Controls(small.scene, sent.append), 0)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     viewer.key("M")
     before = viewer.picture(small.state, SIZE, Figures())
     viewer.pan(60.0, 0.0)
@@ -324,11 +322,7 @@ def test_a_camera_that_is_moved_while_the_run_is_paused_is_shown_so(small: Simul
     assert (viewer.picture(later, SIZE, Figures())[60:] == before[60:]).all()
 
 
-def test_cameras_that_the_mouse_moved_go_back(small: Simulation, sent: list[Any]) -> None:
-    try:
-        viewer = Viewer(Controls(small.scene, sent.append), 0)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
+def test_cameras_that_the_mouse_moved_go_back(viewer: Viewer, small: Simulation, sent: list[Any]) -> None:
     viewer.key("M")
     before = viewer.picture(small.state, SIZE, Figures())
     viewer.orbit(60.0, 0.0)

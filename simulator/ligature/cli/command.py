@@ -8,7 +8,6 @@ import what they need when they need it, so this holds as long as they run.
 from __future__ import annotations
 
 import importlib
-import os
 import signal
 from types import FrameType
 
@@ -36,6 +35,6 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     while frame is not None:
         if frame.f_code.co_filename == _IMPORT_SYSTEM:
             signal.signal(number, signal.SIG_DFL)
-            os.kill(os.getpid(), number)
+            signal.raise_signal(number)
         frame = frame.f_back
     raise KeyboardInterrupt
