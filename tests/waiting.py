@@ -11,7 +11,7 @@ import numpy as np
 Value = TypeVar("Value")
 
 
-def until(condition: Callable[[], Value], what: Any = "", seconds: float = 20.0, every: float = 0.01) -> Value:
+def until(condition: Callable[[], Value], what: Any = "", seconds: float = 40.0, every: float = 0.01) -> Value:
     """Wait for ``condition`` to hold; returns what it returned.
 
     ``what`` names it for who reads the failure, or returns what is to be read then.

@@ -19,7 +19,7 @@ from tests.waiting import until
 Array = NDArray[np.float64]
 
 PERIOD = 0.005
-TIMEOUT = 20.0
+TIMEOUT = 40.0
 """Seconds that a test waits for what takes a moment when nothing else runs."""
 
 SEPARATOR = "=" * 80

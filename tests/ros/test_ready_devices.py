@@ -171,7 +171,7 @@ def test_an_instrument_goes_to_the_right_with_its_user(
     topic = f"={driver.topic}" if isinstance(driver, Terminal) else ""
     status = listen(f"/{name}_PSM1/status", String)
     following = listen(f"/{name}_PSM1/following", Bool)
-    program = Program([str(BIN / "ligature"), "teleop", "--device", f"{device}{topic}"], ros_env)
+    program = Program([str(BIN / "ligature"), "teleop", "--device", f"{device}{topic}", "--timeout", "2"], ros_env)
 
     def follows() -> bool:
         driver.step(0.0)

@@ -200,7 +200,7 @@ def test_teleoperation_by_the_steps_of_the_docs(
     simulator(begin, arms_scene, "--no-masters")
     file = tmp_path / "teleop.yaml"
     file.write_text(CONFIG)
-    teleop = begin(BIN / "ligature", "teleop", file)
+    teleop = begin(BIN / "ligature", "teleop", file, "--timeout", 2)  # a busy machine keeps messages waiting
     teleop.wait_for("driving:")
     operator = begin(sys.executable, "-c", TELEOPERATE)
     until(lambda: operator.process.poll() is not None, "the operator is done", 90.0)

@@ -26,7 +26,8 @@ def test_a_pen_drives_its_proxy_which_holds_when_the_pen_falls_silent(
 
     launch = write_scene(tmp_path)
     start(BIN / "ligature", "run", launch, "-i", "0", "-p", "500", "--no-cameras").wait_for("first state published")
-    start(BIN / "ligature", "teleop", launch, "-i", "0").wait_for("driving: arm1 → Proxy0")
+    patient = ("--timeout", "2.0")  # a busy machine keeps the pen waiting for longer than 0.1 s
+    start(BIN / "ligature", "teleop", launch, "-i", "0", *patient).wait_for("driving: arm1 → Proxy0")
     state = listen("/ambf/env/simulated_device/palm/State", RigidBodyState)
     follows, status = listen("/arm1_Proxy0/following", Bool), listen("/arm1_Proxy0/status", String)
     pen = Pen(node)
@@ -44,7 +45,10 @@ def test_a_pen_drives_its_proxy_which_holds_when_the_pen_falls_silent(
         until(lambda: apart(pose(), before) == pytest.approx(wanted, abs=0.5), lambda: apart(pose(), before))
         pen.press(white=1)
         joints = np.array([-0.3, 0.0])
-        until(lambda: np.abs(np.array(state.messages[-1].joint_positions) - joints).max() < 0.03, "the grip closes")
+        until(
+            lambda: np.abs(np.array(state.messages[-1].joint_positions) - joints).max() < 0.03,
+            lambda: f"the grip closes: {state.messages[-1].joint_positions}, {status.messages[-1].data}",
+        )
         pen.muted = True
         status.wait(lambda m: "silent" in m.data, TIMEOUT)
         held = pose()
@@ -73,7 +77,7 @@ def test_a_proxy_presses_the_hand_that_is_ahead_of_it_unless_forces_are_off(
     command = [BIN / "ambf_simulator", "--launch_file", launch, "-l", "0", "-n", "1", "-p", "500"]
     begin(*command, "-e", int(forces), "-d", "500", "-f", "1", "-s", "0.9").wait_for("first state published")
     hand = subprocess.Popen([sys.executable, "-c", HAND], env=env, stdout=subprocess.PIPE, text=True)
-    begin(BIN / "ligature", "teleop", launch, "-i", "0").wait_for("driving: arm1 → Proxy0")
+    begin(BIN / "ligature", "teleop", launch, "-i", "0", "--timeout", 2).wait_for("driving: arm1 → Proxy0")
     output, _ = hand.communicate(timeout=120)
     devices_there, most, rate, step = (float(word) for word in output.split())
     assert devices_there == 1.0 and step == pytest.approx(0.9 / 500)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import os
 import pty
 import select
 import tty
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.cli.main import app
+from ligature.teleop.config import with_timeout
 from ligature.teleop.devices import mouse
 from ligature.teleop.devices.device import Reading
 from ligature.teleop.ready import names, of_devices
@@ -44,6 +47,25 @@ def test_what_is_not_ready_is_named(words: list[str]) -> None:
     result = CliRunner().invoke(app, ["teleop", *words, "--check"])
     assert result.exit_code == 1
     assert "touch" in result.output or "--device" in result.output
+
+
+@given(seconds=st.floats(allow_nan=True, allow_infinity=True))
+def test_all_devices_are_trusted_for_the_timeout_that_is_asked(seconds: float) -> None:
+    ready = of_devices(["touch", "gamepad"])
+    if 0.0 < seconds < math.inf:
+        found = with_timeout(ready, seconds)
+        assert {spec.settings for spec in found.devices.values()} == {
+            replace(spec.settings, timeout=seconds) for spec in ready.devices.values()
+        }
+        assert found.pairs == ready.pairs
+    else:
+        with pytest.raises(ValueError, match="timeout must be above 0 s"):
+            with_timeout(ready, seconds)
+
+
+def test_a_timeout_of_nothing_is_refused() -> None:
+    result = CliRunner().invoke(app, ["teleop", "--device", "touch", "--check", "--timeout", "0"])
+    assert (result.exit_code, result.output) == (1, "the timeout must be above 0 s, not 0\n")
 
 
 def drive(chunks: Sequence[bytes], **options: float) -> list[Reading]:

@@ -565,13 +565,19 @@ def teleop(
     check: Annotated[
         bool, typer.Option("--check", help="Only read the file and print which device drives which arm.")
     ] = False,
+    timeout: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(help="Seconds of silence after which a device is not trusted, instead of the file's or 0.1."),
+    ] = None,
     devices: Annotated[Optional[str], typer.Option("-i", help="Indices of a launch file's input devices.")] = None,  # noqa: UP045
 ) -> None:
     """Drive arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""
     from ligature.cli.teleop import teleop as run_teleop
 
     console = Console(highlight=False, soft_wrap=True)
-    raise typer.Exit(run_teleop(config, device or (), record, replay, calibrate, check, indices(devices), console))
+    raise typer.Exit(
+        run_teleop(config, device or (), record, replay, calibrate, check, timeout, indices(devices), console)
+    )
 
 
 DatasetFile = Annotated[Path, typer.Argument(help="HDF5 dataset of demo, replay or DatasetWriter.")]

@@ -24,11 +24,13 @@ END_TIMEOUT = 10.0
 
 def teleop(
     file: Path | None, ready: Sequence[str], record: Path | None, replay: Path | None, calibrate: str | None,
-    check: bool, devices: tuple[int, ...] | None, console: Console,
+    check: bool, timeout: float | None, devices: tuple[int, ...] | None, console: Console,
 ) -> int:  # fmt: skip
     """Drive until Ctrl-C; returns the exit status."""
     try:
         wanted = _configuration(file, ready, devices)
+        if timeout is not None:
+            wanted = config.with_timeout(wanted, timeout)
     except (AdfError, OSError, ValueError) as error:
         console.print(str(error), style="red", markup=False)
         return 1

@@ -6,7 +6,7 @@ Metres, radians, newtons, seconds. `docs/teleoperation.md` shows a file.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +94,16 @@ class TeleopConfig:
     def begins_with(self, leader: str) -> str:
         """The follower of ``leader`` at the start; empty when it waits, or drives the camera alone."""
         return next(iter(self.pairs[leader]), "") if leader not in self.waiting else ""
+
+
+def with_timeout(config: TeleopConfig, seconds: float) -> TeleopConfig:
+    """The same with another `Settings.timeout` for all devices; raises `ValueError` for one that is not positive."""
+    if not 0.0 < seconds < np.inf:
+        raise ValueError(f"the timeout must be above 0 s, not {seconds:g}")
+    devices = {
+        name: replace(spec, settings=replace(spec.settings, timeout=seconds)) for name, spec in config.devices.items()
+    }
+    return replace(config, devices=devices)
 
 
 def read(path: Path) -> TeleopConfig:
