@@ -77,7 +77,7 @@ IN_REAL_TIME := tests/ros tests/cockpit \
 unit: developers blender-module
 	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python $(PYTHON) -m pytest -m "not slow" -n 2 --dist loadfile \
 		tests $(IN_REAL_TIME:%=--ignore=%); first=$$?; \
-	$(PYTHON) -m pytest -m "not slow" $(IN_REAL_TIME) && exit $$first
+	sh .ci/real_time_tests.sh $(PYTHON) $(IN_REAL_TIME) && exit $$first
 
 # the newest Blender as a Python module, beside the binary; without network the rest is tested without it
 blender-module: developers
