@@ -190,6 +190,7 @@ BESIDE: list[tuple[str, dict[str, Any]]] = [
     ("controller.linear", {"controller": {half: {"P": 10, "D": 1} for half in ("linear", "angular")}}),
     ("controller.angular", {"controller": {half: {"P": 10, "D": 1} for half in ("linear", "angular")}}),
     ("skybox", {"skybox": {"path": "./", "shaders": SHADERS, **{s: f"{s}.png" for s in ("right", "left", "top", "bottom", "front", "back")}}}),
+    ("ligature transfer function", {"ligature transfer function": [{"value": 0.5, "opacity": 0.5}]}),
     ("attenuation", {"attenuation": {"constant": 1.0, "linear": 0.0, "quadratic": 0.0}}),
 ]  # fmt: skip
 """The same for all keys that begin so."""

@@ -113,6 +113,14 @@ def test_without_a_sky_box_all_around_is_white(tmp_path: Path) -> None:
     assert inside.any() and (frame.rgb[inside] == 255).all()
 
 
+def test_the_sky_shines_through_what_is_transparent(tmp_path: Path) -> None:
+    black = "shape: SPHERE, geometry: {radius: 0.5}, color components: {transparency: 0.5, diffuse: {r: 0, g: 0, b: 0}"
+    frame, *_ = drawn(tmp_path, black + ", ambient: {level: 0}, specular: {r: 0, g: 0, b: 0}}", sky=True)
+    sky, through = frame.rgb[30, 4].astype(int), frame.rgb[30, 40].astype(int)
+    assert sky.max() > 100
+    assert np.abs(through - sky / 2).max() <= 2
+
+
 def quad(folder: Path, material: str) -> str:
     (folder / "quad.obj").write_text(QUAD)
     (folder / "quad.mtl").write_text(f"newmtl own\n{material}")

@@ -17,7 +17,10 @@ from ligature.model.pictures import PictureError
 from ligature.model.scene import Body, Identity
 from ligature.model.shapes import Collider, TriMesh, Visual
 from ligature.model.slices import read_field, slice_files
-from ligature.model.voxels import FULL, VolumeForm
+from ligature.model.voxels import FULL, Rendering, VolumeForm, VolumeLook
+
+SAMPLES, FEWEST_MOST_SAMPLES = 4.0, (1.0, 20.0)
+"""Samples of a ray for each voxel at quality 1, and their bounds: coarser ones step over thin walls."""
 
 CARRIED_MASS, LEAST_MASS = 1e-3, 1e-6
 """Mass of a volume on a moving body, in masses of that body, and at least, kg: AMBF's have none."""
@@ -80,4 +83,24 @@ def _form(element: Element, context: FileContext) -> VolumeForm:
     size = element.number("scale") * np.array(element.vector("dimensions"))
     if not (size > 0.0).all():
         raise error("'dimensions' and 'scale' must be above 0", "give metres")
-    return VolumeForm(values, FULL * level, size)
+    return VolumeForm(values, FULL * level, size, _look(element, level))
+
+
+def _look(element: Element, level: float) -> VolumeLook:
+    """How a volume is drawn whose surface is at ``level``, 0 to 1."""
+    rendering = Rendering(element.text("ligature rendering"))
+    samples = float(np.clip(SAMPLES * element.number("quality"), *FEWEST_MOST_SAMPLES))
+    points = [
+        [point.number("value"), *(point.number(colour) for colour in "rgb"), point.number("opacity")]
+        for point in element.children("ligature transfer function")
+    ]
+    if not points:
+        points = [[0.5 * level, 1.0, 1.0, 1.0, 0.0], [level, 1.0, 1.0, 1.0, 1.0]]
+    for before, after, child in zip(
+        points, points[1:], element.children("ligature transfer function")[1:], strict=False
+    ):
+        if after[0] <= before[0]:
+            message = f"volume '{element.key}': value {after[0]:g} of its transfer function follows {before[0]:g}"
+            mark = child.mark_of("value")
+            raise GeometryError(Diagnostic(Severity.ERROR, message, mark, "let values rise", "volume"))
+    return VolumeLook(rendering, samples, 1e3 * element.number("optical density"), np.array(points))

@@ -5,7 +5,8 @@ The frame of a volume has its origin in the middle of its box; voxels fill the b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import enum
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 
@@ -24,6 +25,37 @@ CHUNK, MOST_CHUNKS = 16, 64
 """Least edge of a chunk in voxels, and most chunks of a volume; those of larger volumes have longer edges."""
 
 
+class Rendering(enum.Enum):
+    """How a volume is drawn: its surface as triangles or by rays, or all of it by a transfer function."""
+
+    MESH = "MESH"
+    RAYS = "RAYS"
+    TRANSFER_FUNCTION = "TRANSFER FUNCTION"
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeLook:
+    """How a volume is drawn.
+
+    Parameters
+    ----------
+    rendering
+        By which method.
+    sampling
+        Samples of a ray for each voxel where there may be something.
+    extinction
+        Of a place with opacity 1, in 1/m: light falls by a factor e on a way of its inverse.
+    transfer
+        Points of the transfer function (k, 5), by rising value: value of voxels, 0 to 1, factors on red, green and blue
+        of the volume's colour, opacity 0 to 1. Linear between them, level beyond.
+    """
+
+    rendering: Rendering = Rendering.RAYS
+    sampling: float = 2.0
+    extinction: float = 1e3
+    transfer: Array = field(default_factory=lambda: np.array([[0.0, 1, 1, 1, 0], [1.0, 1, 1, 1, 1]]))
+
+
 @dataclass(frozen=True, eq=False)
 class VolumeForm:
     """What a volume is at the start of its scene.
@@ -36,11 +68,14 @@ class VolumeForm:
         Voxels of at least this value are inside, above 0 up to `FULL`.
     size
         Edges of the box, (3,) m.
+    look
+        How it is drawn.
     """
 
     values: Values
     level: float
     size: Array
+    look: VolumeLook = field(default_factory=VolumeLook)
 
     @property
     def spacing(self) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ligature.render.geometry import Triangles
 from ligature.render.legacy import LegacyBuffers
 from ligature.render.programs import Program
+from ligature.render.rays import VolumeRays
 from ligature.render.surface import Surface
 from ligature.render.visuals import Piece
 
@@ -38,6 +39,8 @@ class Batch:
         self.deforms = pieces[0].deforms
         self.marks: Array | None = None
         """Dark places of the surface in world axes, (n, 8) as `Marks.of` has them; None where there never are any."""
+        self.rays: VolumeRays | None = None
+        """Voxels through which rays draw it; the triangles then only say which pixels to try."""
         self.rows = slice(first, first + len(pieces))
         self._tangents = surface.normal_map is not None
         self._instances = context.buffer(reserve=len(pieces) * INSTANCE.itemsize, dynamic=True)
@@ -65,6 +68,11 @@ class Batch:
                 self._legacy.load(triangles)
 
     @property
+    def opaque(self) -> bool:
+        """Whether nothing behind shines through."""
+        return self.surface.opaque and (self.rays is None or self.rays.opaque)
+
+    @property
     def triangles(self) -> Triangles:
         """What is in the buffers."""
         assert self._loaded is not None
@@ -87,8 +95,9 @@ class Batch:
 
     def legacy(self, program: Program) -> moderngl.VertexArray:
         """The buffers bound to the attributes of a scene file's ``program``, which draws one piece at a time."""
-        if self._legacy is None:
-            self._legacy = LegacyBuffers(self._context, self.triangles)
+        triangles = self.triangles if self.rays is None else self.rays.facets()
+        if self._legacy is None or self._legacy.triangles.faces is not triangles.faces:
+            self._legacy = LegacyBuffers(self._context, triangles)
         return self._legacy.array(program)
 
     def array(self, program: Program) -> moderngl.VertexArray:

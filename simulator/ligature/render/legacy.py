@@ -114,14 +114,14 @@ class LegacyBuffers:
 
     def __init__(self, context: moderngl.Context, triangles: Triangles) -> None:
         self._context = context
-        self._triangles = triangles
+        self.triangles = triangles
         self._buffers: dict[str, moderngl.Buffer] = {}
         self._indices = context.buffer(np.ascontiguousarray(triangles.faces, dtype="i4").tobytes())
         self._arrays: dict[Program, moderngl.VertexArray] = {}
 
     def load(self, triangles: Triangles) -> None:
         """Take the same number of new vertices."""
-        self._triangles = triangles
+        self.triangles = triangles
         for name, buffer in self._buffers.items():
             buffer.write(self._values(name))
 
@@ -138,7 +138,7 @@ class LegacyBuffers:
         return self._buffers[name]
 
     def _values(self, name: str) -> bytes:
-        t = self._triangles
+        t = self.triangles
         n = len(t.positions)
         if name == "colours":
             values = np.ones((n, 4))

@@ -16,6 +16,7 @@ from ligature.render.batches import Batch, Seen
 from ligature.render.camera import CameraView
 from ligature.render.lights import Lights
 from ligature.render.programs import Program, Programs
+from ligature.render.sky import Sky
 from ligature.render.surface import Surface
 from ligature.render.textures import Textures
 
@@ -63,6 +64,8 @@ class Brushes:
                 defines["MARKS"] = MAX_PUNCTURES
         if batch.deforms and "flow" in passes:
             defines["DEFORMS"] = 1
+        if batch.rays is not None:
+            defines |= batch.rays.defines
         if batch.primitive is not None and list(passes) != ["rgb"]:
             defines["ANALYTIC"] = batch.primitive[0]
         return self._programs.get("surface", defines)
@@ -82,6 +85,8 @@ class Painter:
     ) -> None:
         self._context, self._brushes, self._seen, self._view = context, brushes, seen, view
         self._before = before
+        self.behind: moderngl.Texture | None = None
+        """Depth of all that is opaque, for the colours of volumes with a transfer function."""
         self._ready: set[Program] = set()
         self._calls = [(batch, rows) for batch in batches if len(rows := seen.rows(batch))]
 
@@ -93,31 +98,50 @@ class Painter:
     def needs_colour_apart(self, shaders: ShaderFiles | None) -> bool:
         """Whether colour cannot be written together with the rest: by blending, or by scene files' programs."""
         own = self._brushes.own
-        return any(not b.surface.opaque or own(shaders) or own(b.shaders) for b, _ in self._calls)
+        return any(not b.opaque or own(shaders) or own(b.shaders) for b, _ in self._calls)
+
+    @property
+    def needs_depth_behind(self) -> bool:
+        """Whether the colour of something depends on how far away lies what is behind it."""
+        return any(batch.rays is not None and not batch.rays.opaque for batch, _ in self._calls)
 
     @property
     def has_own_shaders(self) -> bool:
         """Whether programs of scene files draw something."""
         return any(self._brushes.own(batch.shaders) for batch, _ in self._calls)
 
-    def paint(self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None) -> None:
-        """Draw ``passes``: the opaque from near to far, then the transparent from far to near.
+    def paint(
+        self,
+        buffer: moderngl.Framebuffer,
+        passes: Sequence[str],
+        shaders: ShaderFiles | None = None,
+        sky: Sky | None = None,
+    ) -> None:
+        """Draw ``passes``: the opaque from near to far, ``sky``, then the transparent from far to near.
 
         Middles decide what is near: a table's nearest point is often nearer than all that lies on it.
         """
         context, seen = self._context, self._seen
-        context.enable_only(moderngl.DEPTH_TEST)
-        buffer.use()
-        opaque = [(batch, rows) for batch, rows in self._calls if batch.surface.opaque]
-        for batch, rows in sorted(opaque, key=lambda call: float(seen.depth[call[1]].min())):
-            self._draw(batch, passes, rows, shaders)
-        clear = [(batch, row) for batch, rows in self._calls if not batch.surface.opaque for row in rows]
+        self.paint_opaque(buffer, passes, shaders)
+        if sky is not None:
+            sky.draw(buffer, self._view)
+        clear = [(batch, row) for batch, rows in self._calls if not batch.opaque for row in rows]
         if clear and "rgb" in passes:
             context.enable(moderngl.BLEND)
             buffer.depth_mask = False
         for batch, row in sorted(clear, key=lambda call: -float(seen.depth[call[1]])):
             self._draw(batch, passes, np.array([row]), shaders)
         buffer.depth_mask = True
+
+    def paint_opaque(
+        self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None
+    ) -> None:
+        """Draw ``passes`` of the opaque, from near to far."""
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        buffer.use()
+        opaque = [(batch, rows) for batch, rows in self._calls if batch.opaque]
+        for batch, rows in sorted(opaque, key=lambda call: float(self._seen.depth[call[1]].min())):
+            self._draw(batch, passes, rows, shaders)
 
     def _draw(self, batch: Batch, passes: Sequence[str], rows: NDArray[np.int64], shaders: ShaderFiles | None) -> None:
         (self._context.enable if batch.closed else self._context.disable)(moderngl.CULL_FACE)
@@ -130,6 +154,8 @@ class Painter:
         if program not in self._ready:
             self._bind_picture(program, passes)
             self._ready.add(program)
+        if batch.rays is not None:
+            batch.rays.bind(program, self.behind)
         if batch.primitive is not None:
             program.set("uShape", batch.primitive[1:])
         if "rgb" in passes:

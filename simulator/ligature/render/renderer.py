@@ -29,6 +29,7 @@ from ligature.render.outlines import smoothed
 from ligature.render.painter import Brushes, Painter
 from ligature.render.points import computed_points
 from ligature.render.programs import Programs
+from ligature.render.rays import volume_rays
 from ligature.render.sky import Sky
 from ligature.render.surface import Physical, Surface, surface_of
 from ligature.render.target import PASSES, Exposure, Frame, Target
@@ -96,18 +97,24 @@ class Renderer:
         self._lights = Lights(self._context, scene)
         pieces = loader.of_scene(scene)
         self._tissues = tissue_surfaces(scene, pieces)
-        self._volumes = volume_surfaces(scene, pieces)
+        self._rays = volume_rays(self._context, scene, pieces, self.problems)
+        marched = {rays.piece.owner for rays in self._rays}
+        self._volumes = volume_surfaces(scene, [piece for piece in pieces if piece.owner not in marched])
         self._marks = [Marks(scene, tissue) for tissue in scene.tissues]
         self._tubes = [Tube(scene, rod) for rod in scene.rods]
         self._in_world = [t.body for t in scene.tissues] + [rod.bodies[0] for rod in scene.rods]
-        soft = {tissue.body for tissue in scene.tissues} | {volume.body for volume in scene.volumes}
-        rigid = [piece for piece in pieces if piece.owner not in soft]
-        rigid += [surface.piece for surface in self._volumes]
+        replaced = [s.piece for s in self._volumes] + [r.piece for r in self._rays]
+        apart = {tissue.body for tissue in scene.tissues} | {piece.owner for piece in replaced}
+        rigid = [piece for piece in pieces if piece.owner not in apart] + replaced
         deforming = [*(surface.piece for surface in self._tissues), *self._rod_pieces(loader)]
         self._batches, ordered = self._batched([*rigid, *deforming])
         self._surfaces = [batch.surface for batch in self._batches]
         first = len(self._batches) - len(deforming)
-        self._cut, self._deforming = self._batches[first - len(self._volumes) : first], self._batches[first:]
+        self._deforming = self._batches[first:]
+        replacing = self._batches[first - len(replaced) : first]
+        self._cut = replacing[: len(self._volumes)]
+        for batch, rays in zip(replacing[len(self._volumes) :], self._rays, strict=True):
+            batch.rays = rays
         for batch in self._deforming[: len(self._tissues)]:
             batch.marks = np.zeros((0, 8))
         self._instances = Instances(ordered)
@@ -204,11 +211,15 @@ class Renderer:
         before = self._movement.before(self._instances, view, self._deforming) if "flow" in target.passes else None
         painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
         self.drawn_triangles = painter.triangles
+        if "rgb" in target.passes and painter.needs_depth_behind:
+            opaque = self._target(view, ["depth"], 0)
+            opaque.clear(BACKGROUND)
+            painter.paint_opaque(opaque.whole, ["depth"])
+            painter.behind = opaque.texture("depth")
+            self._targets.append(opaque)
         sky = self._sky if shaders is None else None
         if target.colour is not None and (self._samples or painter.needs_colour_apart(shaders)):
-            painter.paint(target.colour, ["rgb"], shaders)
-            if sky is not None:
-                sky.draw(target.colour, view)
+            painter.paint(target.colour, ["rgb"], shaders, sky)
             if target.geometry is not None:
                 painter.paint(target.geometry, [name for name in target.passes if name != "rgb"])
         else:
@@ -296,10 +307,12 @@ class Renderer:
                 batch.load(surface)
                 self._instances.reach(batch.rows.start, surface)
         for batch, volume in zip(self._cut, self._volumes, strict=True):
-            cut = volume.triangles(state["volume_value"][0])
+            cut = volume.update(state["volume_value"][0])
             if cut is not batch.triangles:
                 batch.load(cut)
                 self._instances.reach(batch.rows.start, cut)
+        for rays in self._rays:
+            rays.update(state["volume_value"][0])
         for batch, drawn in zip(self._deforming, self._tissues, strict=False):
             batch.marks = self._marks[drawn.index].of(state)
         self._lights.place(pose7_matrices(state["light_world"][0]), view)
@@ -318,13 +331,17 @@ class Renderer:
         context.polygon_offset = (0.0, 0.0)
 
     def _draw_shadow(self, view: Array, projection: Array, size: int) -> None:
-        program = self._programs.get("shadow", {})
-        program.write("uProjection", projection)
         seen = self._instances.seen(view, projection, size, COARSE_BELOW)
         for batch in self._batches:
             rows = seen.rows(batch)
             if len(rows) and batch.surface.opaque:
+                program = self._programs.get("shadow", {} if batch.rays is None else batch.rays.defines)
+                program.write("uProjection", projection)
+                if batch.rays is not None:
+                    batch.rays.bind(program)
+                    self._context.enable(moderngl.CULL_FACE)
                 batch.draw(program, seen.instances[rows])
+                self._context.disable(moderngl.CULL_FACE)
 
     def _target(self, view: CameraView, passes: Sequence[str], samples: int) -> Target:
         unknown = set(passes) - set(PASSES)

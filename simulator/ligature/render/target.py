@@ -90,6 +90,10 @@ class Target:
             if buffer is not None:
                 buffer.clear(*background)
 
+    def texture(self, name: str) -> moderngl.Texture:
+        """Where the pass of that name is drawn."""
+        return self._textures[name]
+
     def read(self, finish: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Frame:
         """Copy the picture out, top row first; ``finish`` makes (h, w, 3) of the colours and alpha (h, w, 4)."""
         if self._resolved is not None and self.colour is not None:

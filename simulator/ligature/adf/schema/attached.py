@@ -11,6 +11,7 @@ C, MAP, POSE = Type.CHOICE, Type.MAP, Type.POSE
 
 SENSOR_TYPES = spellings("proximity", "resistance", "contact")
 ACTUATOR_TYPES = spellings("constraint")
+RENDERINGS = spellings("mesh", "rays", "transfer function")
 
 SENSOR = (
     *IDENTITY,
@@ -135,10 +136,31 @@ VOLUME = (
     Key("images.count", Type.UNSIGNED, doc="last number", required=True, fault=Fault.OBJECT),
     Key("dimensions", V, (1.0, 1.0, 1.0), "m", "full size of the box, centred"),
     Key("iso-surface value", N, 0.5, doc="level of the surface, above 0 to 1"),
-    *unused(
-        (
-            Key("optical density", N, 1.0, doc="of a drawing without surface; the surface is drawn"),
-            Key("quality", N, 0.5, doc="samples along a line of sight; the surface is exact"),
-        )
+    Key("optical density", N, 1.0, "1/mm", "extinction where opacity is 1; with a transfer function", least=0.0),
+    Key("quality", N, 0.5, doc="samples a voxel of rays, divided by 4"),
+    Key(
+        "ligature rendering",
+        C,
+        "RAYS",
+        doc="surface by rays or as a mesh, or all values by a transfer function",
+        choices=RENDERINGS,
+        status=Status.OURS,
+    ),
+    Key("ligature transfer function", Type.MAPS, doc="opacity and colour by value, low to high", status=Status.OURS),
+    Key(
+        "ligature transfer function[].value", N, doc="of voxels", required=True, status=Status.OURS, least=0.0, most=1.0
+    ),
+    Key(
+        "ligature transfer function[].opacity", N, doc="0 to 1", required=True, status=Status.OURS, least=0.0, most=1.0
+    ),
+    *each(
+        "rgb",
+        N,
+        "ligature transfer function[].{}",
+        1.0,
+        doc="factor on the material's {}",
+        status=Status.OURS,
+        least=0.0,
+        most=1.0,
     ),
 )

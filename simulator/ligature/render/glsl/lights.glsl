@@ -18,8 +18,12 @@ uniform sampler2DShadow uShadowMap0;
 #if SHADOWS > 1
 uniform sampler2DShadow uShadowMap1;
 #endif
-in vec4 vShadow[SHADOWS];  // where this point is in the shadow maps
-uniform vec2 uShadowTexel[SHADOWS];  // edge of a texel: of the map; in metres at one metre (or everywhere)
+#ifdef MARCHED
+vec4 vShadow[SHADOWS];  // where the place that is lit is in the shadow maps
+#else
+in vec4 vShadow[SHADOWS];
+#endif
+#include "shadows.glsl"
 #endif
 
 bool isPerspective() { return uProjection[3][3] == 0.0; }

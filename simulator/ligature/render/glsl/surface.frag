@@ -32,6 +32,13 @@ flat in ivec2 vIds;
 
 #include "lights.glsl"
 
+#ifdef MARCHED
+#include "march.glsl"
+#if MARCHED == 2 && defined(PASS_RGB)
+#define GATHERED
+#endif
+#endif
+
 float ambientShare() {
 #ifdef OCCLUSION_MAP
     return texture(uOcclusionMap, vTexCoord).r;
@@ -45,8 +52,13 @@ float ambientShare() {
 #endif
 
 #ifdef PASS_FLOW
+#ifdef MARCHED
+flat in mat4 vModelBefore;
+vec4 vNow, vBefore;
+#else
 in vec4 vNow;
 in vec4 vBefore;
+#endif
 #endif
 
 #ifdef PASS_RGB
@@ -110,6 +122,56 @@ vec3 phong(vec3 texel, vec3 eye, vec3 n, vec3 toEye) {
 }
 #endif
 
+#ifdef MARCHED
+// Look a place of a volume up in the shadow maps.
+void shade(vec3 eye, vec3 n) {
+#ifdef SHADOWS
+    for (int i = 0; i < SHADOWS; ++i) vShadow[i] = inShadowMap(uShadowFromEye[i], uShadowTexel[i].y, eye, n);
+#endif
+}
+#endif
+
+#ifdef GATHERED
+uniform sampler2D uBehind;  // depth in metres of what is opaque; 0 where nothing is
+
+const float SPENT = 0.004;  // light that is left when a ray may end: one step of the picture's colours
+const float SHARE = 0.15;   // of the light that a ray gathers: as much is lit at one place
+
+// What a ray gathers on its way to what is opaque, and how much of that it hides.
+vec4 gathered(Ray ray, vec3 toEye) {
+    float behind = texelFetch(uBehind, ivec2(gl_FragCoord.xy), 0).r;
+    float last = behind > 0.0 ? min(ray.last, (-behind - ray.start.z) / ray.way.z) : ray.last;
+    float left = 1.0, t = ray.first, span, to;
+    vec3 colour = vec3(0.0), n = toEye;
+    vec4 share = vec4(0.0);  // not yet lit
+    float place = 0.0;       // of that, times its amount
+    bool on = t < last;
+    for (int i = 0; on; ) {
+        // an inner loop, since processors that draw skip the light of a pixel only where a loop ends
+        for (; on && share.a <= SHARE; ++i) {
+            vec4 matter = matterAt(ray, t, last, span, to);
+            float part = left * (1.0 - exp(-matter.a * span));
+            share += part * vec4(matter.rgb, 1.0);
+            place += part * (t + 0.5 * span);
+            left -= part;
+            t = to;
+            on = t < last && left > SPENT && i < uMost;
+        }
+        if (share.a > 0.0) {
+            float middle = place / share.a;
+            vec3 eye = ray.start + middle * ray.way;
+            n = slope(ray, middle, n);
+            n = faceforward(n, -toEye, n);
+            shade(eye, n);
+            colour += share.a * phong(share.rgb / share.a, eye, n, toEye);
+        }
+        share = vec4(0.0);
+        place = 0.0;
+    }
+    return vec4(colour / max(1.0 - left, 1e-6), 1.0 - left);
+}
+#endif
+
 void main() {
     vec3 toEye = isPerspective() ? normalize(-vEye) : vec3(0.0, 0.0, 1.0);
 #ifdef ANALYTIC
@@ -120,6 +182,28 @@ void main() {
     vec3 normal = normalize(vTurn * outward);
     vec4 clip = uProjection * vec4(eye, 1.0);
     gl_FragDepth = 0.5 + 0.5 * clip.z / clip.w;
+#elif defined(MARCHED)
+    Ray ray = rayThrough(vEye, isPerspective());
+    toEye = -ray.way;
+#ifdef GATHERED
+    fColour = gathered(ray, toEye);
+    fColour.a *= uAlpha;
+    if (fColour.a <= 0.0) discard;
+    gl_FragDepth = 0.0;  // what is opaque has ended the ray already
+    return;
+#endif
+    float t;
+    if (!meetVolume(ray, t)) discard;
+    vec3 eye = ray.start + t * ray.way;
+    vec3 normal = slope(ray, t, toEye);
+    gl_FragDepth = depthOf(eye);
+#ifdef PASS_RGB
+    shade(eye, normal);
+#endif
+#ifdef PASS_FLOW
+    vNow = uProjection * vec4(eye, 1.0);
+    vBefore = vModelBefore * vec4((eye - vModelView[3].xyz) * mat3(vModelView), 1.0);
+#endif
 #else
     vec3 eye = vEye;
     vec3 normal = normalize(vNormal);

@@ -18,6 +18,13 @@ in vec3 aBefore;  // place of the vertex then
 #endif
 #endif
 
+#ifdef MARCHED
+flat out mat4 vModelView;
+#ifdef PASS_FLOW
+flat out mat4 vModelBefore;
+#endif
+#endif
+
 #ifdef ANALYTIC
 const float COVER = 1.02;  // facets of 32 to the circle cover the shape when they are this much larger
 out vec3 vLocal;
@@ -31,22 +38,15 @@ flat out ivec2 vIds;
 #ifdef NORMAL_MAP
 out vec4 vTangent;
 #endif
-#ifdef PASS_FLOW
+#if defined(PASS_FLOW) && !defined(MARCHED)
 out vec4 vNow;
 out vec4 vBefore;
 #endif
 
-#ifdef SHADOWS
-uniform mat4 uShadowFromEye[SHADOWS];  // to texture coordinates and depth of the shadow map
-uniform vec2 uShadowTexel[SHADOWS];    // edge of a texel: as in lights.glsl
-uniform int uClosed;                   // 1: back faces are never seen
+#if defined(SHADOWS) && !defined(MARCHED)
+#include "shadows.glsl"
+uniform int uClosed;  // 1: back faces are never seen
 out vec4 vShadow[SHADOWS];
-
-// Where `eye` is looked up in a shadow map: off the surface by a texel and a half.
-vec4 inShadowMap(mat4 fromEye, float texel, vec3 eye, vec3 n) {
-    float away = abs(dot(vec4(fromEye[0].w, fromEye[1].w, fromEye[2].w, fromEye[3].w), vec4(eye, 1.0)));
-    return fromEye * vec4(eye + n * (1.5 * texel * away), 1.0);
-}
 #endif
 
 void main() {
@@ -67,12 +67,19 @@ void main() {
     vTangent = vec4(turn * aTangent.xyz, aTangent.w);
 #endif
     gl_Position = uProjection * eye;
-#ifdef SHADOWS
+#ifdef MARCHED
+    vModelView = iModelView;
+    gl_Position.z = 0.0;  // near and far planes cut the ray, not the box
+#ifdef PASS_FLOW
+    vModelBefore = iBefore;
+#endif
+#endif
+#if defined(SHADOWS) && !defined(MARCHED)
     vec3 n = vNormal / max(length(vNormal), 1e-9);
     if (uClosed == 0 && dot(n, eye.xyz) > 0.0) n = -n;
     for (int i = 0; i < SHADOWS; ++i) vShadow[i] = inShadowMap(uShadowFromEye[i], uShadowTexel[i].y, eye.xyz, n);
 #endif
-#ifdef PASS_FLOW
+#if defined(PASS_FLOW) && !defined(MARCHED)
     vNow = gl_Position;
 #ifdef DEFORMS
     vBefore = iBefore * vec4(aBefore, 1.0);
