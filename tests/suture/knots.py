@@ -45,12 +45,19 @@ def wound(around: int, waves: int, lifts: int, hand: int = 1) -> Array:
 
 
 def wander(rng: np.random.Generator) -> Array:
-    """A random curve (n, 3) in a box, knotted or not, whose ends part along y."""
+    """A random curve (n, 3), knotted or not, whose ends part along y.
+
+    They lead out of it: a curve that ends among its own loops has no knot, as these slip off its end.
+    """
     u = np.linspace(0.0, 1.0, 1500)
     points = np.column_stack([np.zeros_like(u), 10.0 * (u - 0.5), np.zeros_like(u)])
     for k in range(1, 5):
         points += np.sin(np.pi * k * u)[:, None] * rng.normal(scale=4.0 / k**0.5, size=3)
-    return points
+    low, high = points[:, 1].min() - 1.0, points[:, 1].max() + 1.0
+    away = np.linspace(1.0, 0.0, 60)[:-1, None] * [0.0, 1.0, 0.0]
+    return np.vstack([
+        points[0] - (points[0, 1] - low) * away, points, points[-1] + (high - points[-1, 1]) * away[::-1],
+    ])  # fmt: skip
 
 
 def room(points: Array) -> float:

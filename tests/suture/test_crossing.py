@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from ligature.model.frames import axis_rotation
+from ligature.model.shapes import Cylinder
 from ligature.suture import layout
 from ligature.suture.crossing import NEAREST, _share_of_pair
 from ligature.suture.description import FREE, Attachment, from_material
@@ -24,6 +26,8 @@ KNOTS = {
     "wandering": lambda rng: _wandering(rng),
 }
 LEFT, RIGHT = 0, 1
+SHAFT, APART = 0.05, 1.2
+"""Length of the shafts of the hands, and how far off the thread's end they begin, in its radii."""
 
 
 def _wandering(rng):
@@ -36,7 +40,11 @@ def _wandering(rng):
 
 @dataclass
 class Drawn:
-    """A knot in a thread that two hands hold by its ends."""
+    """A knot in a thread that two hands hold by its ends.
+
+    Each hand is a shaft as thick as the thread that goes on from its end, outwards: a loop that snaps over an end would
+    be another knot.
+    """
 
     seed: int
 
@@ -50,16 +58,21 @@ class Drawn:
         n = round(at[-1] / (rng.uniform(1.0, 1.8) * self.diameter))
         even = np.linspace(0.0, at[-1], n + 1)
         points = np.column_stack([np.interp(even, at, column) for column in points.T])
-        self.bench = Bench([body(LEFT, None, at=points[0]), body(RIGHT, None, at=points[-1])])
+        lengthwise = axis_rotation((1.0, 0.0, 0.0), -np.pi / 2)
+        shaft, off = Cylinder(self.diameter / 2, SHAFT), SHAFT / 2 + APART * self.diameter / 2
+        self.bench = Bench([
+            body(hand, shaft, at=points[end] + [0.0, side * off, 0.0], friction=0.0, R=lengthwise)
+            for hand, end, side in ((LEFT, 0, -1.0), (RIGHT, -1, 1.0))
+        ])  # fmt: skip
         made = from_material(
             points, self.diameter, 10.0 ** rng.uniform(5.0, 8.0), 1100.0, friction=rng.uniform(0.3, 0.95),
             gravity=(0, 0, 0), damping=10.0 ** rng.uniform(-3.0, -1.5), straight=bool(rng.integers(2)),
         )  # fmt: skip
         none, ends = np.zeros(3), []
         for element, hand, end in ((0, LEFT, 0), (n - 1, RIGHT, 1)):
-            T = np.eye(4)
-            T[:3, 3] = made.ends[element, end]
-            ends.append(Attachment(element, hand, T, np.eye(4), none, none, none, *FREE))
+            T, tip = np.eye(4), np.eye(4)
+            T[:3, 3], tip[2, 3] = made.ends[element, end], (off, -off)[end]
+            ends.append(Attachment(element, hand, T, tip, none, none, none, *FREE))
         made = replace(made, compliance=np.full(n - 1, at[-1] / n / 4000.0), attachments=tuple(ends))
         self.rod = self.bench.add(damped(made, rng.choice([0.9, 1.0])))
 
