@@ -17,6 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from tests.fuzz import learning
 from tests.fuzz.mutate import mutate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,6 +34,9 @@ class Reader:
     text: bool = False
     named: bool = True
     """Whether errors name the file; where they do not, the caller does."""
+
+    change: Callable[[bytes, random.Random], bytes] | None = None
+    """What makes a mutant; by default bytes are changed."""
 
 
 class Refused(Exception):
@@ -66,6 +70,11 @@ def sealed(data: bytes) -> bytes:
     import hashlib
 
     return data[:-16] + hashlib.blake2b(data[:-16], digest_size=16).digest()
+
+
+def sealed_mutant(data: bytes, rng: random.Random) -> bytes:
+    """A changed record with the digest that fits."""
+    return sealed(mutate(data, rng, binary=True))
 
 
 def read_record(path: Path) -> None:
@@ -152,13 +161,29 @@ def read_input(path: Path) -> None:
 
 
 def read_teleop(path: Path) -> None:
-    from ligature.adf import AdfError
-    from ligature.teleop.config import read
+    from ligature.cli.teleop import teleop
+    from rich.console import Console
 
-    try:
-        read(path)
-    except AdfError as error:
-        raise Refused(str(error)) from error
+    console = Console(file=io.StringIO(), width=10_000)
+    if teleop(path, (), None, None, None, True, None, None, console) != 0:
+        raise Refused(console.file.getvalue())  # type: ignore[attr-defined]
+
+
+def read_devices(path: Path) -> None:
+    """The input devices of a launch file, which stands beside them."""
+    from tests.fuzz.seeds import write_scene
+
+    devices = path.read_bytes()
+    folder = path.parent / "devices"
+    if not folder.exists():
+        folder.mkdir()
+        write_scene(folder)
+    (folder / path.name).write_bytes(devices)
+    read_teleop(folder / "launch.yaml")
+
+
+def devices_text() -> bytes:
+    return (ROOT / "tests" / "fuzz" / "scene" / "devices.yaml").read_bytes()
 
 
 # --- robots -----------------------------------------------------------------------------------
@@ -261,7 +286,7 @@ def read_any_picture(path: Path) -> None:
 
 READERS = (
     Reader("record", "a.record", record_bytes, read_record, named=False),
-    Reader("sealed record", "b.record", record_bytes, read_record, named=False),
+    Reader("sealed record", "b.record", record_bytes, read_record, named=False, change=sealed_mutant),
     Reader("bag", "a.bag", bag_bytes, read_bag),
     Reader("packed bag", "b.bag", lambda: bag_bytes("bz2"), read_bag),
     Reader("recorded input", "a.jsonl", INPUT.encode, read_input, text=True),
@@ -275,6 +300,11 @@ READERS = (
         )
         for format in ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "PPM", "WEBP")
     ),
+    Reader("input devices", "devices.yaml", devices_text, read_devices, text=True, named=False),
+    Reader("dataset", "a.h5", learning.dataset_bytes, learning.read_dataset),
+    Reader("rebuilt dataset", "b.h5", learning.dataset_bytes, learning.read_dataset, change=learning.rebuilt),
+    Reader("ranges", "ranges.yaml", learning.RANGES.encode, learning.read_ranges, text=True),
+    Reader("network", "policy.onnx", learning.network_bytes, learning.read_network, named=False),
 )
 
 
@@ -285,9 +315,10 @@ def _seed(reader: Reader) -> bytes:
 
 def mutant(number: int) -> tuple[Reader, bytes]:
     """The reader and the content of a mutant."""
-    reader = READERS[number % len(READERS)]
-    data = mutate(_seed(reader), random.Random(number), not reader.text, reader.name.endswith(".yaml"))
-    return reader, sealed(data) if reader.kind == "sealed record" else data
+    reader, rng = READERS[number % len(READERS)], random.Random(number)
+    if reader.change is not None:
+        return reader, reader.change(_seed(reader), rng)
+    return reader, mutate(_seed(reader), rng, not reader.text, reader.name.endswith(".yaml"))
 
 
 def attempt(reader: Reader, path: Path) -> str:
@@ -313,3 +344,14 @@ def try_reader(folder: Path, number: int, _: object) -> str:
     path = folder / reader.name
     path.write_bytes(data)
     return attempt(reader, path)
+
+
+def read_seeds(folder: Path) -> None:
+    """Read every valid file once: what readers import and compile is loaded then."""
+    from tests.fuzz.seeds import OBJ
+
+    (folder / "part.obj").write_text(OBJ)
+    for reader in READERS:
+        path = folder / reader.name
+        path.write_bytes(_seed(reader))
+        attempt(reader, path)

@@ -141,6 +141,8 @@ class Campaign:
     files: Callable[[int], dict[str, bytes]]
     noun: str
     group: Callable[[int], str]
+    warm: Callable[[Path], object] = os.fspath
+    """Loads in a worker what its first cases would wait for; by default nothing."""
 
 
 MUTANTS = Campaign(try_mutant, mutant_files, "mutant", lambda number: Path(mutant(number)[0].name).suffix[1:])
@@ -149,12 +151,15 @@ READERS = Campaign(
     lambda number: {readers.mutant(number)[0].name: readers.mutant(number)[1]},
     "file",
     lambda number: readers.mutant(number)[0].kind,
+    readers.read_seeds,
 )
 SCENES = Campaign(try_scene, scene_files, "scene", lambda number: "scene")
 PATHS = Campaign(try_path, path_files, "path", lambda number: "path")
 
 
-def work(connection: Connection, folder: str, trial: Trial, attempt: Attempt | None) -> None:
+def work(
+    connection: Connection, folder: str, trial: Trial, warm: Callable[[Path], object], attempt: Attempt | None
+) -> None:
     """Run the cases of each received range; reports the number of each before it starts, then how it ended."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     quiet = os.open(os.devnull, os.O_WRONLY)
@@ -162,6 +167,7 @@ def work(connection: Connection, folder: str, trial: Trial, attempt: Attempt | N
     os.dup2(quiet, 2)
     place = Path(folder, "scene")
     place.mkdir(exist_ok=True)
+    warm(place)
     connection.send(("ready", 0, ""))
     while True:
         first, end = connection.recv()
@@ -178,12 +184,12 @@ def work(connection: Connection, folder: str, trial: Trial, attempt: Attempt | N
 class _Worker:
     """A worker process as its parent sees it."""
 
-    def __init__(self, folder: Path, trial: Trial, attempt: Attempt | None) -> None:
+    def __init__(self, folder: Path, campaign: Campaign, attempt: Attempt | None) -> None:
         context = multiprocessing.get_context("spawn")
         folder.mkdir(exist_ok=True)
         self.connection, theirs = context.Pipe()
         self.process: BaseProcess = context.Process(
-            target=work, args=(theirs, str(folder), trial, attempt), daemon=True
+            target=work, args=(theirs, str(folder), campaign.trial, campaign.warm, attempt), daemon=True
         )
         self.process.start()
         theirs.close()
@@ -224,7 +230,7 @@ def run(
     todo = [(a, min(a + chunk, first + cases)) for a in range(first, first + cases, chunk)][::-1]
     with tempfile.TemporaryDirectory(prefix="ligature-fuzz-") as folder:
         count = min(jobs, len(todo))
-        workers = {slot: _Worker(Path(folder, str(slot)), campaign.trial, attempt) for slot in range(count)}
+        workers = {slot: _Worker(Path(folder, str(slot)), campaign, attempt) for slot in range(count)}
         while workers:
             wait([worker.connection for worker in workers.values()], timeout=0.2)
             for failure in outcome.failures[known:]:
@@ -241,7 +247,7 @@ def run(
                 elif reason:
                     worker.stop()
                     _fail(worker, reason, todo, outcome, campaign)
-                    workers[slot] = _Worker(Path(folder, str(slot)), campaign.trial, attempt)
+                    workers[slot] = _Worker(Path(folder, str(slot)), campaign, attempt)
     return outcome
 
 

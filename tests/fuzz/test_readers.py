@@ -5,14 +5,16 @@ from __future__ import annotations
 import bz2
 import json
 import os
+import signal
 import struct
 import time
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 
-from tests.fuzz import readers
+from tests.fuzz import learning, readers
 from tests.fuzz.readers import READERS, Reader, Refused, attempt
 from tests.fuzz.run import READERS as CAMPAIGN
 from tests.fuzz.run import run
@@ -166,3 +168,92 @@ def test_no_picture_starts_another_program(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
     path.write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 100 100\n%%EndComments\nshowpage\n")
     assert "none of PNG" in refusal(readers.read_any_picture, path)
+
+
+# --- datasets ---------------------------------------------------------------------------------
+
+
+def hostile_dataset(path: Path, change: Any) -> str:
+    """What is said of a dataset after ``change``."""
+    path.write_bytes(learning.dataset_bytes())
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return refusal(learning.read_dataset, path, 30.0)
+
+
+def replaced(name: str, **what: Any) -> Any:
+    """A change that puts another array in the place of one."""
+
+    def change(file: Any) -> None:
+        del file[name]
+        file.create_dataset(name, **what)
+
+    return change
+
+
+def linked(name: str, link: Any) -> Any:
+    """A change that puts a link in the place of what was there."""
+
+    def change(file: Any) -> None:
+        del file[name]
+        file[name] = link
+
+    return change
+
+
+PHASE = "episode_0000/phase"
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (replaced(PHASE, shape=(1 << 44,), dtype="u1", chunks=True), "claims 17592186044416 bytes and has 0"),
+        (
+            replaced(PHASE, shape=(3,), dtype="u1", external=[("/etc/passwd", 0, 3)]),
+            "takes its numbers from another file",
+        ),
+        (linked("episode_0001", h5py.ExternalLink("/etc/other.h5", "/")), "is a link to '/etc/other.h5'"),
+        (linked("episode_0001", h5py.ExternalLink("../a.h5.episodes/episode_0001.h5", "/")), "is a link to '../a.h5"),
+        (linked("arms/PSM1", h5py.SoftLink("/arms")), "'arms/PSM1' is a link"),
+        (lambda file: file.__setitem__("episode_0000/again", file["episode_0000"]), "is there twice"),
+        (replaced(PHASE, data=[7, 7, 7]), "has phase 7; there are 3"),
+        (replaced(PHASE, data=[0.5, 0.5, 0.5]), "must be 3 numbers"),
+        (replaced("episode_0000/arms/PSM1/measured_js", data=[[0.0] * 6] * 3), "it must be 3 × 3 × 6 numbers"),
+        (lambda file: file.attrs.pop("rate"), "attribute 'rate' of '/' is missing; it is a number above 0"),
+        (lambda file: file["episode_0001"].attrs.__setitem__("samples", "three"), "must be a whole number"),
+    ],
+)
+def test_a_dataset_that_claims_leads_away_or_lacks_something_is_refused(change: Any, why: str, tmp_path: Path) -> None:
+    assert why in (said := hostile_dataset(tmp_path / "a.h5", change)), said
+
+
+def test_a_file_on_which_hdf5_crashes_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library reads some damaged files beyond their ends; the look at them happens in another process."""
+    from ligature.datasets import probe
+
+    monkeypatch.setattr(probe, "opened", lambda path: os.kill(os.getpid(), signal.SIGKILL))
+    path = tmp_path / "a.h5"
+    path.write_bytes(learning.dataset_bytes())
+    assert "is damaged: reading it crashes (SIGKILL)" in refusal(learning.read_dataset, path)
+
+
+# --- what else is text ------------------------------------------------------------------------
+
+
+def test_ranges_that_multiply_are_refused_before_they_do(tmp_path: Path) -> None:
+    path = tmp_path / "ranges.yaml"
+    for text, why in (
+        ("a: &a [1]\nmass: [*a, *a]\n", "line 2: write the range out, without an alias"),
+        (f"mass: {'[' * 20_000}", "without lists in it"),
+        ("mass: [1, 2]\n" * 10_000, "more than 64 KiB"),
+        ("mass: [1.2, 0.8]", "write the lower one first"),
+    ):
+        path.write_text(text)
+        said = refusal(learning.read_ranges, path, 2.0)
+        assert why in said and "ranges.yaml" in said
+
+
+def test_a_teleoperation_file_that_is_no_text_is_named_with_the_place(tmp_path: Path) -> None:
+    path = tmp_path / "teleop.yaml"
+    path.write_bytes(b"camera: ECM\nprefix: \xff\n")
+    assert f"{path}:2:9: error: byte 0xff is no UTF-8" in refusal(readers.read_teleop, path)

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from ligature.datasets.store import DatasetError, episode_names, join, opened
+from ligature.datasets.probe import probe
+from ligature.datasets.store import DatasetError, damaged, episode_names, join, opened
 
 
 def info(file: Path, console: Console) -> int:
@@ -27,7 +28,7 @@ def info(file: Path, console: Console) -> int:
                 write(f"{name}: {_episode(found[name], list(map(str, attributes['phases'])))}")
 
     write = _printer(console)
-    return _reported(report, console)
+    return _reported(report, file, console)
 
 
 def _episode(episode: Any, phases: list[str]) -> str:
@@ -40,7 +41,7 @@ def _episode(episode: Any, phases: list[str]) -> str:
 
 def join_episodes(file: Path, console: Console) -> int:
     """Make one file of a dataset whose writer was killed."""
-    return _reported(lambda: _printer(console)(f"{file}: {join(file)} episodes in one file"), console)
+    return _reported(lambda: _printer(console)(f"{file}: {join(file)} episodes in one file"), file, console)
 
 
 def export(source: Path, target: Path, format: str, codec: str, license: str, console: Console) -> int:
@@ -57,16 +58,18 @@ def export(source: Path, target: Path, format: str, codec: str, license: str, co
             f"{target}: {format}, {size / 1e6:.1f} MB in {seconds:.1f} s ({source.stat().st_size / 1e6:.1f} MB before)"
         )
 
-    return _reported(write, console)
+    return _reported(write, source, console)
 
 
 def _printer(console: Console) -> Callable[[str], None]:
     return lambda text: console.print(text, markup=False)
 
 
-def _reported(work: Callable[[], None], console: Console) -> int:
+def _reported(work: Callable[[], None], file: Path, console: Console) -> int:
     try:
-        work()
+        probe(file)
+        with damaged(file):
+            work()
     except (DatasetError, ValueError) as error:
         console.print(str(error), style="red", markup=False)
         return 1

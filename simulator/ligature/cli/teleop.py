@@ -13,7 +13,6 @@ from rich.console import Console
 from ligature.adf.diagnostics import AdfError
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
-from ligature.paths import regular_file
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
 from ligature.teleop.ready import of_devices
@@ -55,7 +54,7 @@ def _configuration(file: Path | None, ready: Sequence[str], devices: tuple[int, 
         raise ValueError("write either a file or --device, such as 'ligature teleop --device keyboard'")
     if file is None:
         return of_devices(ready)
-    text = regular_file(file).read_text("utf-8")
+    text = config.text_of(file)
     if "multibody configs" in text:
         from ligature.teleop.launch import of_launch_file
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 import io
 import os
 import shutil
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import h5py
 
+from ligature.datasets.soundness import Unsound, check
 from ligature.paths import regular_file
 
 Describe = Callable[[h5py.File], None]
@@ -178,15 +179,35 @@ def join(path: Path) -> int:
 
 
 def opened(path: Path) -> h5py.File:
-    """A dataset for reading; raises `DatasetError` for a file that is none."""
+    """A dataset for reading; raises `DatasetError` for a file that is none, or that no reader could read."""
     try:
         file = h5py.File(regular_file(path), "r")
     except OSError as error:
         raise DatasetError(f"cannot read the dataset '{path}': {error}") from error
-    if not str(file.attrs.get("format", "")).startswith("ligature dataset"):
+    try:
+        if not str(file.attrs.get("format", "")).startswith("ligature dataset"):
+            raise DatasetError(f"'{path}' is an HDF5 file, but not a Ligature dataset")
+        with damaged(path):
+            check(file, path)
+    except BaseException:
         file.close()
-        raise DatasetError(f"'{path}' is an HDF5 file, but not a Ligature dataset")
+        raise
     return file
+
+
+@contextmanager
+def damaged(path: Path) -> Iterator[None]:
+    """Reports in one way what HDF5 finds wrong with bytes of the dataset ``path``, wherever they are read."""
+    try:
+        yield
+    except (DatasetError, MemoryError):
+        raise
+    except Unsound as error:
+        raise DatasetError(f"'{path}' is no sound dataset: {error}") from error
+    except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
+        raise DatasetError(f"'{path}' is damaged: {error.args[0] if error.args else error}") from error
 
 
 def episode_names(file: h5py.File) -> list[str]:

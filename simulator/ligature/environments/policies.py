@@ -92,8 +92,10 @@ def _network(path: Path) -> Policy:
     try:
         session = onnxruntime.InferenceSession(path.read_bytes(), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime has a class of its own for each way in which a file can be wrong
-        raise PolicyError(f"{path} is no network in ONNX: {str(error).splitlines()[0]}") from error
+        raise PolicyError(f"{path} is no network in ONNX: {_first_line(error)}") from error
     inputs = session.get_inputs()
+    if not inputs:
+        raise PolicyError(f"{path} has no input; a policy takes an observation")
     types = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(uint8)": np.uint8}
     for wanted in inputs:
         if wanted.type not in types:
@@ -109,9 +111,14 @@ def _network(path: Path) -> Policy:
             return np.asarray(session.run(None, fed)[0])[0]
         except Exception as error:  # as above
             shapes = ", ".join(f"{name} {value.shape}" for name, value in fed.items())
-            raise PolicyError(f"{path} does not take {shapes}: {str(error).splitlines()[0]}") from error
+            raise PolicyError(f"{path} does not take {shapes}: {_first_line(error)}") from error
 
     return lambda env, seed: act
+
+
+def _first_line(error: Exception) -> str:
+    """What onnxruntime says, which may be nothing."""
+    return next(iter(str(error).splitlines()), type(error).__name__)
 
 
 def _function(place: str, name: str) -> Policy:

@@ -15,7 +15,10 @@ import numpy as np
 import yaml
 
 from ligature.model.scene import Scene
-from ligature.paths import real_path
+from ligature.paths import regular_file
+
+MOST_BYTES, MOST_LEVELS = 1 << 16, 3
+"""Of a file of ranges."""
 
 Range = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -120,7 +123,10 @@ class Randomisation:
         if given is None or isinstance(given, Randomisation):
             return given
         if isinstance(given, str | Path):
-            return cls.of(_read(Path(given)))
+            try:
+                return cls.of(_read(Path(given)))
+            except ValueError as error:
+                raise ValueError(str(error) if str(given) in str(error) else f"{given}: {error}") from error
         if not isinstance(given, Mapping):
             raise ValueError(f"randomise must be ranges by name or a YAML file of them, not {type(given).__name__}")
         unknown = [str(name) for name in given if name not in BOUNDS]
@@ -251,9 +257,24 @@ def _checked(name: str, value: Any, bound: Bound) -> Range:
 def _read(path: Path) -> Any:
     """The mapping in a YAML file."""
     try:
-        found = yaml.safe_load(real_path(path).read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        if regular_file(path).stat().st_size > MOST_BYTES:
+            raise ValueError(f"it has more than {MOST_BYTES >> 10} KiB")
+        text = path.read_text("utf-8")
+        _check_flat(text)
+        found = yaml.safe_load(text)
+    except (OSError, ValueError, yaml.YAMLError) as error:
         raise ValueError(f"randomise: {path} cannot be read: {' '.join(str(error).split())}") from error
     if not isinstance(found, Mapping):
         raise ValueError(f"randomise: {path} must hold ranges by name, such as 'mass: [0.8, 1.2]'")
     return found
+
+
+def _check_flat(text: str) -> None:
+    """Raise ValueError for aliases and deep nesting, by which a short file becomes a long one; ranges need neither."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise ValueError(f"line {event.start_mark.line + 1}: write the range out, without an alias")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MOST_LEVELS:
+            raise ValueError(f"line {event.start_mark.line + 1}: a range is a pair of numbers, without lists in it")

@@ -108,16 +108,20 @@ def with_timeout(config: TeleopConfig, seconds: float) -> TeleopConfig:
 
 def read(path: Path) -> TeleopConfig:
     """The configuration in a file; raises `AdfError`, whose diagnostics name file, line and what would be right."""
+    return from_text(text_of(path), path)
+
+
+def text_of(path: Path) -> str:
+    """What is in a text file; raises `AdfError` with the place of what is no text."""
     data = regular_file(path).read_bytes()
     try:
-        text = data.decode("utf-8")
+        return data.decode("utf-8")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         mark = Mark(path, line, error.start - (data.rfind(b"\n", 0, error.start) + 1) + 1)
         raise AdfError(
             Diagnostic(Severity.ERROR, f"byte {data[error.start]:#04x} is no UTF-8", mark, "", "teleop")
         ) from None
-    return from_text(text, path)
 
 
 def from_text(text: str, path: Path) -> TeleopConfig:

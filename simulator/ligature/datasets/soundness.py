@@ -1,0 +1,232 @@
+"""Whether a file of a stranger is a dataset: what it must hold, with types and shapes, before anybody reads it.
+
+A well-formed HDF5 file may claim arrays of terabytes, lead around in circles, take its numbers from other files of the
+machine, or lack what every reader counts on. Arrays are described by the number ``n`` of samples of their episode and
+``j`` of joints of their arm; another letter is any length, equal in all arrays of an episode that name it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+MOST_LEVELS = 6
+MOST_ITEMS = 1_000_000
+MOST_CHUNK = 1 << 28
+"""Bytes of a piece that HDF5 unpacks at a time; a picture of 8192 by 8192 has 192 MiB."""
+
+MOST_PACKED = 2_000
+"""How many times as large as on the disk an array may be: deflate packs at most 1032 bytes into one."""
+
+SMALL = 1 << 20
+"""Bytes that an array may have however it is stored."""
+
+NUMBERS, WHOLE, TEXTS = "iufb", "iub", "OSU"
+
+ARRAYS: dict[str, str] = {"time": "n", "phase": "n"}
+"""Of an episode, in every format."""
+
+ARM_ARRAYS: dict[str, str] = {
+    "measured_js": "n 3 j", "setpoint_js": "n 3 j", "action_js": "n j", "local_measured_cp": "n 7",
+    "local_setpoint_cp": "n 7", "local_action_cp": "n 7", "spatial_measured_cf": "n 6", "phase": "n", "activity": "n",
+}  # fmt: skip
+
+JAW_ARRAYS: dict[str, str] = {
+    "jaw/measured_js": "n 3", "jaw/setpoint_js": "n 3", "jaw/action_js": "n", "jaw/force": "n"
+}  # fmt: skip
+"""Of an instrument."""
+
+OTHER_ARRAYS: dict[str, str] = {
+    "needle/pose": "n 7", "needle/twist": "n 6", "needle/tissue_force": "n 3", "thread/points": "n e 3",
+    "thread/tension": "n e",
+}  # fmt: skip
+"""Where the episode has the group that the name begins with."""
+
+CAMERA_ARRAYS: dict[str, str] = {"pose": "n 7", "intrinsics": "n 3 3", "rgb": "n h w 3"}
+
+PHASES = frozenset({"phase"})
+"""Arrays of numbers of phases."""
+
+
+class Unsound(ValueError):
+    """What a dataset lacks, or has and must not have."""
+
+
+def check(file: h5py.File, path: Path) -> None:
+    """Raise `Unsound` unless every reader can read the dataset ``file``, which is the file ``path``."""
+    _Walk(f"{path.name}.episodes").walk(file, "", 0)
+    phases = _described(file)
+    arms = {name: _arm(arm, name) for name, arm in file.get("arms", {}).items()}
+    whole = file.attrs["format"] == "ligature dataset 2"
+    for name in file:
+        if name.startswith("episode_"):
+            _Episode(_group(file, name), name, phases).check(arms if whole else {})
+
+
+class _Walk:
+    """Everything in a file, once: no circles, no bytes of other files, no array that is mostly a claim."""
+
+    def __init__(self, episodes: str) -> None:
+        self._episodes, self._seen, self._count = episodes, set[tuple[int, int]](), 0
+
+    def walk(self, group: Any, name: str, level: int) -> None:
+        if level > MOST_LEVELS:
+            raise Unsound(f"'{name}' is nested in more than {MOST_LEVELS} groups")
+        for key in group:
+            inner = f"{name}/{key}" if name else key
+            self._count += 1
+            if self._count > MOST_ITEMS:
+                raise Unsound(f"it has more than {MOST_ITEMS} items")
+            item = self._item(group, key, inner, level)
+            if isinstance(item, h5py.Group):
+                self.walk(item, inner, level + 1)
+            elif isinstance(item, h5py.Dataset):
+                _check_stored(item, inner)
+            else:
+                raise Unsound(f"'{inner}' is neither a group nor an array")
+
+    def _item(self, group: Any, key: str, name: str, level: int) -> Any:
+        link = group.get(key, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            if level or link.path != "/" or link.filename != f"{self._episodes}/{key}.h5":
+                raise Unsound(f"'{name}' is a link to '{link.filename}'; an episode lies in '{self._episodes}'")
+        elif not isinstance(link, h5py.HardLink):
+            raise Unsound(f"'{name}' is a link")
+        item = group[key]
+        info = h5py.h5o.get_info(item.id)
+        if (place := (info.fileno, info.addr)) in self._seen:
+            raise Unsound(f"'{name}' is there twice")
+        self._seen.add(place)
+        return item
+
+
+def _check_stored(array: Any, name: str) -> None:
+    """Its bytes are in this file, and about as many as it claims."""
+    if array.external or array.is_virtual:
+        raise Unsound(f"'{name}' takes its numbers from another file")
+    size = math.prod(array.shape or (0,)) * array.dtype.itemsize
+    if size > SMALL and size > MOST_PACKED * array.id.get_storage_size():
+        raise Unsound(f"'{name}' claims {size} bytes and has {array.id.get_storage_size()}")
+    if array.chunks and math.prod(array.chunks) * array.dtype.itemsize > MOST_CHUNK:
+        raise Unsound(f"'{name}' has pieces of more than {MOST_CHUNK >> 20} MiB")
+
+
+def _described(file: Any) -> int:
+    """Check what holds for all episodes; returns how many phases there are."""
+    for key in ("format", "version", "scene"):
+        _attribute(file, key, "a text", _is_text)
+    _attribute(file, "rate", "a number above 0 and at most 1000", lambda v: _is_number(v) and 0.0 < float(v) <= 1000.0)
+    for key in ("phases", *(("gestures", "activities") if "gestures" in file.attrs else ())):
+        _attribute(file, key, "a list of texts", _are_texts)
+    if not isinstance(file.get("arms", file), h5py.Group):
+        raise Unsound("'arms' is no group")
+    if "id_names" in file and (file["id_names"].dtype.kind not in TEXTS or file["id_names"].ndim != 1):
+        raise Unsound("'id_names' is no list of texts")
+    return len(file.attrs["phases"])
+
+
+def _arm(arm: Any, name: str) -> tuple[int, bool]:
+    """How many joints an arm has, and whether it has a jaw."""
+    if not isinstance(arm, h5py.Group):
+        raise Unsound(f"'arms/{name}' is no group")
+    for key in ("kind", "tool"):
+        _attribute(arm, key, "a text", _is_text)
+    for key in ("joint_names", "joint_units"):
+        _attribute(arm, key, "a list of texts", _are_texts)
+    if "base_pose" in arm.attrs:
+        _attribute(arm, "base_pose", "seven numbers", lambda v: _numbers(v) and np.shape(v) == (7,))
+    names, units = len(arm.attrs["joint_names"]), len(arm.attrs["joint_units"])
+    if names != units or names == 0:
+        raise Unsound(f"'arms/{name}' has {names} names of joints and {units} units")
+    return names, str(arm.attrs["kind"]) == "psm"
+
+
+class _Episode:
+    """An episode: its attributes, and arrays of as many rows as it has samples."""
+
+    def __init__(self, group: Any, name: str, phases: int) -> None:
+        self._group, self._name, self._phases, self._lengths = group, name, phases, dict[str, int]()
+
+    def check(self, arms: dict[str, tuple[int, bool]]) -> None:
+        """Check all that the format asks for; ``arms`` are joints and jaw of each arm."""
+        group = self._group
+        _attribute(group, "samples", "a whole number", lambda v: _is_number(v, WHOLE) and v >= 0)
+        for key in ("success", "judged") if "judged" in group.attrs else ("success",):
+            _attribute(group, key, "true or false", lambda v: _is_number(v, WHOLE))
+        if "task" in group.attrs or arms:
+            _attribute(group, "task", "a text", _is_text)
+        self._lengths["n"] = int(group.attrs["samples"])
+        for name, shape in ARRAYS.items():
+            self._array(name, shape)
+        for arm, (joints, jaw) in arms.items():
+            self._lengths["j"] = joints
+            for name, shape in {**ARM_ARRAYS, **(JAW_ARRAYS if jaw else {})}.items():
+                self._array(f"arms/{arm}/{name}", shape)
+        for name, shape in OTHER_ARRAYS.items():
+            if name.partition("/")[0] in group:
+                self._array(name, shape)
+        for camera in self._inner("cameras"):
+            for size in "hw":
+                self._lengths.pop(size, None)
+            for name, shape in CAMERA_ARRAYS.items():
+                self._array(f"cameras/{camera}/{name}", shape)
+        for name in self._inner("extra"):
+            self._array(f"extra/{name}", "n …")
+
+    def _inner(self, name: str) -> Iterator[str]:
+        if name in self._group:
+            yield from _group(self._group, name)
+
+    def _array(self, name: str, shape: str) -> None:
+        place = f"{self._name}/{name}"
+        array = self._group.get(name)
+        if not isinstance(array, h5py.Dataset):
+            raise Unsound(f"'{place}' is missing or no array")
+        wanted, found = shape.split(), array.shape or ()
+        free = wanted[-1] == "…"
+        kinds = WHOLE if name.rpartition("/")[2] in ("phase", "activity") else NUMBERS
+        fits = len(found) >= 1 if free else len(found) == len(wanted)
+        for letter, length in zip(wanted, found, strict=False):
+            if not letter.isdigit() and letter != "…":
+                self._lengths.setdefault(letter, length)
+            fits = fits and (letter == "…" or length == (int(letter) if letter.isdigit() else self._lengths[letter]))
+        if not fits or array.dtype.kind not in kinds:
+            means = " × ".join(str(self._lengths.get(letter, letter)) for letter in wanted)
+            raise Unsound(f"'{place}' is {found} of {array.dtype}; it must be {means} numbers")
+        if name.rpartition("/")[2] in PHASES and len(array) and not 0 <= int(array[:].max()) < self._phases:
+            raise Unsound(f"'{place}' has phase {int(array[:].max())}; there are {self._phases}")
+
+
+def _group(file: Any, name: str) -> Any:
+    if not isinstance(file[name], h5py.Group):
+        raise Unsound(f"'{name}' is no group")
+    return file[name]
+
+
+def _attribute(item: Any, key: str, what: str, holds: Callable[[Any], bool]) -> None:
+    place = f"attribute '{key}' of '{item.name}'"
+    if key not in item.attrs:
+        raise Unsound(f"{place} is missing; it is {what}")
+    if not holds(item.attrs[key]):
+        raise Unsound(f"{place} must be {what}")
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim == 1 and all(isinstance(text, str) for text in value)
+
+
+def _numbers(value: Any, kinds: str = NUMBERS) -> bool:
+    return isinstance(value, np.ndarray | np.generic) and value.dtype.kind in kinds and bool(np.isfinite(value).all())
+
+
+def _is_number(value: Any, kinds: str = NUMBERS) -> bool:
+    return _numbers(value, kinds) and np.shape(value) == ()
