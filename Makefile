@@ -116,9 +116,10 @@ curves: developers
 contact-sheet: setup
 	$(PYTHON) -m tests.bench.contact_sheet
 
-# two simulated hours of servo on both arms, as fast as the machine allows
+# two simulated hours of servo on both arms, and a simulated day of a whole run with its page, as fast as the machine allows
 soak: developers
 	$(PYTHON) -m tests.bench.soak
+	$(PYTHON) -m tests.bench.soak_served
 
 demo: setup
 	.venv/bin/ligature demo
