@@ -147,14 +147,14 @@ def test_a_page_over_a_bad_network_is_slower_and_safe(monkeypatch: pytest.Monkey
             operator.starts(120.0)
             begin = np.asarray(steady(lambda: tip(served, ARM).copy(), 0.5, 1e-6, "the arm stands"))
             operator.holds(UP, 1.0)
-            until(lambda: np.linalg.norm((tip(served, ARM) - begin)[:3, 3]) > 0.01, "the tip moves", 30.0)
+            until(lambda: np.linalg.norm((tip(served, ARM) - begin)[:3, 3]) > 0.01, "the tip moves")
             moved = tip(served, ARM) - begin
             operator.holds(UP, 0.0)
             stood = np.asarray(steady(lambda: tip(served, ARM).copy(), 1.0, 1e-6, "it stands when the key is up"))
             assert np.linalg.norm((stood - begin - moved)[:3, 3]) < 0.04, "soon"
-            until(lambda: operator.pictures > 3, "pictures come", 30.0)
+            until(lambda: operator.pictures > 3, "pictures come")
             operator.holds(UP, -1.0)
-            until(lambda: np.linalg.norm((tip(served, ARM) - stood)[:3, 3]) > 0.003, "it moves again", 30.0)
+            until(lambda: np.linalg.norm((tip(served, ARM) - stood)[:3, 3]) > 0.003, "it moves again")
             os.kill(far.link, signal.SIGSTOP)  # the network is gone
             steady(lambda: tip(served, ARM).copy(), 0.5, 1e-6, "the arm stands without its operator")
             assert served.arm(ARM)["operating"] == 1
