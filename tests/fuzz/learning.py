@@ -64,8 +64,8 @@ def _copy(source: Any, target: Any) -> None:
 
 def rebuilt(data: bytes, rng: random.Random) -> bytes:
     """A dataset after a few changes of what is in it: a well-formed file that holds something else."""
-    memory = io.BytesIO(data)
-    with h5py.File(memory, "r+") as file:
+    changed = io.BytesIO(data)
+    with h5py.File(changed, "r+") as file:
         for _ in range(rng.choice((1, 1, 2, 4))):
             names: list[str] = []
             file.visit(names.append)
@@ -74,7 +74,7 @@ def rebuilt(data: bytes, rng: random.Random) -> bytes:
                 rng.choice(CHANGES)(file, name, rng)
             except (KeyError, TypeError, ValueError, OSError, RuntimeError):
                 continue  # what an earlier change took away, or what HDF5 does not write
-    return memory.getvalue()
+    return changed.getvalue()
 
 
 def _odd(rng: random.Random) -> Any:

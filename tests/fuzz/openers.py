@@ -2,7 +2,7 @@
 
 A place is a module and a function. Those that read what strangers write name campaigns of `tests.fuzz.run`: kinds of
 `tests.fuzz.readers.READERS`, or ends of the names of scene files in `tests.fuzz.seeds`. The others read what Ligature
-itself wrote or ships, or what runs as a program because its user says so.
+itself wrote or ships, or what runs as a program by the wish of its user.
 """
 
 from __future__ import annotations

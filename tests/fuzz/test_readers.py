@@ -174,7 +174,7 @@ def test_no_picture_starts_another_program(tmp_path: Path) -> None:
 
 
 def hostile_dataset(path: Path, change: Any) -> str:
-    """What is said of a dataset after ``change``."""
+    """What is reported of a dataset after ``change``."""
     path.write_bytes(learning.dataset_bytes())
     with h5py.File(path, "r+") as file:
         change(file)
@@ -219,12 +219,16 @@ PHASE = "episode_0000/phase"
         (replaced(PHASE, data=[7, 7, 7]), "has phase 7; there are 3"),
         (replaced(PHASE, data=[0.5, 0.5, 0.5]), "must be 3 numbers"),
         (replaced("episode_0000/arms/PSM1/measured_js", data=[[0.0] * 6] * 3), "it must be 3 × 3 × 6 numbers"),
+        (
+            replaced("episode_0000/arms/PSM1/local_action_cp", data=[[float("nan")] * 7] * 3),
+            "has numbers that no pose has",
+        ),
         (lambda file: file.attrs.pop("rate"), "attribute 'rate' of '/' is missing; it is a number above 0"),
         (lambda file: file["episode_0001"].attrs.__setitem__("samples", "three"), "must be a whole number"),
     ],
 )
 def test_a_dataset_that_claims_leads_away_or_lacks_something_is_refused(change: Any, why: str, tmp_path: Path) -> None:
-    assert why in (said := hostile_dataset(tmp_path / "a.h5", change)), said
+    assert why in (words := hostile_dataset(tmp_path / "a.h5", change)), words
 
 
 def test_a_file_on_which_hdf5_crashes_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,8 +253,8 @@ def test_ranges_that_multiply_are_refused_before_they_do(tmp_path: Path) -> None
         ("mass: [1.2, 0.8]", "write the lower one first"),
     ):
         path.write_text(text)
-        said = refusal(learning.read_ranges, path, 2.0)
-        assert why in said and "ranges.yaml" in said
+        words = refusal(learning.read_ranges, path, 2.0)
+        assert why in words and "ranges.yaml" in words
 
 
 def test_a_teleoperation_file_that_is_no_text_is_named_with_the_place(tmp_path: Path) -> None:

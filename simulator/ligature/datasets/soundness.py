@@ -52,6 +52,9 @@ CAMERA_ARRAYS: dict[str, str] = {"pose": "n 7", "intrinsics": "n 3 3", "rgb": "n
 PHASES = frozenset({"phase"})
 """Arrays of numbers of phases."""
 
+POSES, FARTHEST = frozenset({"local_measured_cp", "local_setpoint_cp", "local_action_cp", "pose"}), 1e6
+"""Arrays of poses, and the largest number in one."""
+
 
 class Unsound(ValueError):
     """What a dataset lacks, or has and must not have."""
@@ -198,6 +201,8 @@ class _Episode:
         if not fits or array.dtype.kind not in kinds:
             means = " × ".join(str(self._lengths.get(letter, letter)) for letter in wanted)
             raise Unsound(f"'{place}' is {found} of {array.dtype}; it must be {means} numbers")
+        if name.rpartition("/")[2] in POSES and not (np.abs(array[:]) <= FARTHEST).all():
+            raise Unsound(f"'{place}' has numbers that no pose has")
         if name.rpartition("/")[2] in PHASES and len(array) and not 0 <= int(array[:].max()) < self._phases:
             raise Unsound(f"'{place}' has phase {int(array[:].max())}; there are {self._phases}")
 
