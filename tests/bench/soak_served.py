@@ -3,8 +3,8 @@
 ``python -m tests.bench.soak_served [HOURS [FOLDER]]`` (24 simulated hours of PSM1 alone; part of `make soak`). The run is
 that of a user, with its processes. A ROS node sends the arm from goal to goal and checks what it hears. A browser's
 connections come, take control, hold keys, move a slider, pause, record, watch the endoscope, ask for the curves, and go,
-every third time without a farewell. Once a minute each process is measured; a line fitted to its memory after the first
-quarter says by how much it grows in a simulated hour. Samples are written to ``samples.csv`` in FOLDER. Exit status 1 when
+every third time without a farewell. Once a minute each process is measured; a line fitted to its memory over the second
+half says by how much it grows in a simulated hour. Samples are written to ``samples.csv`` in FOLDER. Exit status 1 when
 something grew, died, stood still, was not finite, or had a wrong time.
 """
 
@@ -55,7 +55,7 @@ LOOK = 0.05
 """Seconds between two looks at the state."""
 
 MOST_GROWTH = 0.02
-"""Share of its memory by which a process may grow over the run, by the line that is fitted."""
+"""Share of its memory by which a process may grow over the second half, by the line that is fitted."""
 
 MOST_MORE = {"threads": 2, "files": 3}
 """What a process may have more of in the end than after the first quarter, by medians."""
@@ -87,12 +87,12 @@ class Findings:
 class Sample:
     """One process at one moment: simulated hours, megabytes, threads, open files, seconds of processor time.
 
-    ``memory`` is its own; of shared memory pages count when they are first touched, up to the size of the block.
+    ``own`` is what it shares with nobody; of shared memory pages count when they are first touched, up to the size of the block.
     """
 
     hours: float
     process: str
-    memory: float
+    own: float
     resident: float
     threads: int
     files: int
@@ -341,13 +341,13 @@ class Visits(threading.Thread):
 
 
 def slope(rows: list[Sample]) -> tuple[float, float]:
-    """Megabytes an hour by a line fitted to all but the first quarter, and the share of growth over that time."""
-    rows = rows[len(rows) // 4 :]
+    """Megabytes an hour by a line fitted to the second half, and the share of growth over that time."""
+    rows = rows[len(rows) // 2 :]
     if len(rows) < 3:
         return 0.0, 0.0
-    hours, memory = np.array([r.hours for r in rows]), np.array([r.memory for r in rows])
-    rate = float(np.polyfit(hours, memory, 1)[0])
-    return rate, rate * float(hours[-1] - hours[0]) / float(memory[0])
+    hours, sizes = np.array([r.hours for r in rows]), np.array([r.own for r in rows])
+    rate = float(np.polyfit(hours, sizes, 1)[0])
+    return rate, rate * float(hours[-1] - hours[0]) / float(sizes[0])
 
 
 def verdict(samples: list[Sample], findings: Findings) -> list[str]:
@@ -360,7 +360,7 @@ def verdict(samples: list[Sample], findings: Findings) -> list[str]:
         rows = [row for row in samples if row.process == name]
         rate, share = slope(rows)
         quarter = max(1, len(rows) // 4)
-        line = f"{name}: own memory {rows[0].memory:.1f} MB at first, {rows[-1].memory:.1f} in the end, {rate:+.3f} an hour"
+        line = f"{name}: own memory {rows[0].own:.1f} MB at first, {rows[-1].own:.1f} in the end, {rate:+.3f} an hour"
         line += f"; resident {rows[0].resident:.1f} to {rows[-1].resident:.1f}"
         for what, most in MOST_MORE.items():
             before, after = (
@@ -412,11 +412,11 @@ class Soak:
 
     def run(self, hours: float) -> None:
         """Soak for so many simulated hours."""
-        commander, spare = Commander(self.findings), self._block.rings["spare"]
+        commander, ring = Commander(self.findings), self._block.rings["spare"]
         for word, flag in (("enable", "operating"), ("home", "homed")):
             commander.orders(word)
             until(lambda flag=flag: self._ready(flag), f"the arm is ready after '{word}'", 60.0)
-        visits = Visits(self._url, self._folder, self._block.figures, Outbox(spare), self.findings)
+        visits = Visits(self._url, self._folder, self._block.figures, Outbox(ring), self.findings)
         visits.start()
         begun, due, before, last = self._watch.seconds, 0.0, time.monotonic(), self._watch.seconds
         with (self._folder / "samples.csv").open("w", newline="", encoding="utf-8") as file:
@@ -436,7 +436,7 @@ class Soak:
                 ]
             )
             while self._watch.seconds - begun < 3600.0 * hours and self._alive():
-                spare.beat()
+                ring.beat()
                 self._watch.look()
                 if not visits.busy and not self._watch.arm["busy"]:
                     commander.send()
@@ -470,10 +470,10 @@ class Soak:
             row = sample(name, pid, hours)
             self.samples.append(row)
             table.writerow(
-                [f"{hours:.4f}", name, f"{row.memory:.2f}", f"{row.resident:.2f}", row.threads, row.files, f"{row.cpu:.1f}", f"{factor:.2f}",
+                [f"{hours:.4f}", name, f"{row.own:.2f}", f"{row.resident:.2f}", row.threads, row.files, f"{row.cpu:.1f}", f"{factor:.2f}",
                  f"{disk:.2f}", f"{self.findings.largest:.4f}"]
             )  # fmt: skip
-        words = ", ".join(f"{row.process} {row.memory:.1f}" for row in self.samples[-len(now) - 1 :])
+        words = ", ".join(f"{row.process} {row.own:.1f}" for row in self.samples[-len(now) - 1 :])
         sys.stdout.write(f"{hours:.3f} h, {factor:.1f} times real time; MB: {words}; on disk {disk:.1f} MB\n")
         if self.findings.problems:
             sys.stdout.write(f"  {dict(self.findings.problems)}\n")
