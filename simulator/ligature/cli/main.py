@@ -479,7 +479,9 @@ def replay(
     speed: Annotated[float, typer.Option("-s", help="For a bag: playback speed.", min=0.001)] = 1.0,
     dataset: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(help="For a record: HDF5 file to write pictures and motion to."),
+        typer.Option(
+            help="HDF5 file to write pictures and motion to: of a record simulated again, or as a bag has them."
+        ),
     ] = None,
     page: Annotated[
         bool, typer.Option("--page", help="For a record: show it on a web page, with a slider through its time.")

@@ -13,7 +13,7 @@ from ligature.bus.record import Record, is_record
 from ligature.cli.master import DEFAULT_MASTER, master_answers
 from ligature.cli.options import RunOptions
 from ligature.cli.resimulation import TICK, resimulate
-from ligature.cli.sampling import Sampled
+from ligature.cli.sampling import Sampled, Sampling
 
 
 def replay(
@@ -25,12 +25,12 @@ def replay(
     dataset: Sampled | None = None,
     allow_plugins: bool = False,
 ) -> int:
-    """Replay ``file``, a record into ``dataset`` too; the exit status is 1 when a run did not repeat bit for bit."""
+    """Replay ``file``, or write it into ``dataset``; the exit status is 1 when a run did not repeat bit for bit."""
     try:
         if is_record(file):
             return _again(Record.read(file), scene, dataset, console, allow_plugins)
         if dataset is not None:
-            raise ValueError(f"{file}: not a record of a run; a dataset needs one")
+            return _sampled_bag(file, scene, dataset, console)
         return _play(file, joints, speed, console)
     except ligature.SceneError as error:
         for diagnostic in error.diagnostics:
@@ -65,6 +65,26 @@ def _again(record: Record, scene: Path | None, dataset: Sampled | None, console:
         )
         return 1
     console.print(f"the same bits: {found}", markup=False)
+    return 0
+
+
+def _sampled_bag(file: Path, scene: Path | None, dataset: Sampled, console: Console) -> int:
+    """What a bag has, as a dataset: nothing is simulated."""
+    from ligature.datasets.bags import record_bag
+    from ligature.ros.bags import judge
+
+    success, why = dataset.success, "" if dataset.success is None else "as the operator found"
+    if success is None and dataset.task:
+        if scene is None:
+            raise ValueError("'--task' judges a bag in a scene: name its launch file with '--scene'")
+        score = judge(file, ligature.load(scene), dataset.task)[0].report()
+        success, why = bool(score["success"]), str(score.get("why", ""))
+    sampling = dataset.sampling
+    cameras = None if sampling.cameras == Sampling().cameras else sampling.cameras
+    text = dataset.text or dataset.task
+    count = record_bag(file, dataset.path, sampling.rate, cameras, sampling.size, text, success, why)
+    outcome = "not judged" if success is None else f"a {'success' if success else 'failure'}{why and f': {why}'}"
+    console.print(f"{count} samples at {sampling.rate:g} a second; the episode is {outcome}", markup=False)
     return 0
 
 

@@ -63,6 +63,20 @@ class EpisodeRows:
             self._write(name)
 
 
+def add_actions(episode: h5py.File) -> None:
+    """The action of a sample is the set-point of the next one; that of the last is its own."""
+    for arm in episode["arms"].values() if "arms" in episode else ():
+        for source, name in (("setpoint_js", "action_js"), ("local_setpoint_cp", "local_action_cp")):
+            values = arm[source][:]
+            _add_next(arm, name, values[:, 0] if source == "setpoint_js" else values, arm[source].attrs["units"])
+        if "jaw" in arm:
+            _add_next(arm, "jaw/action_js", arm["jaw/setpoint_js"][:, 0], "rad")
+
+
+def _add_next(arm: h5py.Group, name: str, values: NDArray[Any], units: str) -> None:
+    arm.create_dataset(name, data=np.concatenate([values[1:], values[-1:]])).attrs["units"] = units
+
+
 def packed(picture: NDArray[Any]) -> bytes:
     """``picture`` as HDF5's filters leave it: first bytes of all numbers, then the second ones; deflated."""
     flat = np.ascontiguousarray(picture).reshape(-1).view(np.uint8)

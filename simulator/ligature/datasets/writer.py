@@ -19,7 +19,7 @@ import ligature
 from ligature.camera_simulation import Simulation
 from ligature.datasets.interrupts import uninterrupted
 from ligature.datasets.labels import ACTIVITIES, GESTURES, ActivityWatch
-from ligature.datasets.rows import EpisodeRows
+from ligature.datasets.rows import EpisodeRows, add_actions
 from ligature.datasets.store import DatasetError, EpisodeStore
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
@@ -179,7 +179,7 @@ class DatasetWriter:
             attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
             for name, value in remarks.items():
                 attributes[name] = value
-            self._add_actions()
+            add_actions(self._episode)
             self._forget()
             self._store.finish()
 
@@ -190,22 +190,6 @@ class DatasetWriter:
 
     def _forget(self) -> None:
         self._episode, self._rows, self._exposures = None, None, {}
-
-    def _add_actions(self) -> None:
-        """The action of a sample is the set-point of the next one; that of the last is its own."""
-        assert self._episode is not None
-        for arm in self._episode["arms"].values() if "arms" in self._episode else ():
-            for source, name in (("setpoint_js", "action_js"), ("local_setpoint_cp", "local_action_cp")):
-                values = arm[source][:]
-                values = values[:, 0] if source == "setpoint_js" else values
-                arm.create_dataset(name, data=np.concatenate([values[1:], values[-1:]])).attrs["units"] = arm[
-                    source
-                ].attrs["units"]
-            if "jaw" in arm:
-                values = arm["jaw/setpoint_js"][:, 0]
-                arm.create_dataset("jaw/action_js", data=np.concatenate([values[1:], values[-1:]])).attrs["units"] = (
-                    "rad"
-                )
 
     def _values(self, phase: str, doers: Collection[str] | None) -> Iterator[Value]:
         """All of one sample."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -16,7 +16,7 @@ MEANING: Mapping[str, str] = {
     "observation.cartesian": "measured pose of the tool's tip in the base of its arm (m, quaternion)",
     "observation.meta.force_torque": "wrench that the world exerts on the tip, in axes of the arm's base (N, N m)",
     "observation.meta.jaw_force": "force that presses the fingers together on what they hold (N)",
-    "observation.meta.sim_time": "simulated seconds since the episode began",
+    "observation.meta.sim_time": "seconds since the episode began, simulated ones in a simulation",
     "observation.meta.tool": "instruments of the arms",
     "instruction.text": "the task and its phase, in words",
     "observation.environment_state": "the observation of the learning environment, as its class documents it",
@@ -42,7 +42,7 @@ def card(
     file: h5py.File, info: Mapping[str, Any], episodes: Sequence[str], constant: Sequence[str], license: str
 ) -> str:
     """The card in Markdown, with the front matter of the Hugging Face Hub; ``constant`` features are left out."""
-    attributes = file.attrs
+    attributes, origin = file.attrs, _origin(file)
     hours = info["total_frames"] / info["fps"] / 3600.0
     jitter = max(_jitter(file[name]["time"][:], info["fps"]) for name in episodes)
     tasks = sorted({str(file[name].attrs["task"]) for name in episodes})
@@ -50,19 +50,17 @@ def card(
     lines = [
         "---", f"license: {license or 'unknown'}", "task_categories:", "- robotics", "tags:", "- LeRobot", "- surgical",
         "- simulation", "configs:", "- config_name: default", "  data_files: data/*/*.parquet", "---", "",
-        f"# {attributes['scene']}: simulated suturing", "",
-        f"Made with Ligature {attributes['version']} in the scene `{attributes['scene']}`; format LeRobot "
-        f"{info['codebase_version']}.", "",
+        f"# {origin.title}", "",
+        f"Made with Ligature {attributes['version']} {origin.place}; format LeRobot {info['codebase_version']}.", "",
         "| | |", "|---|---|", f"| episodes | {info['total_episodes']}, {done} of them successful |",
-        f"| frames | {info['total_frames']} at {info['fps']} Hz, {hours:.2f} h |", "| data type | simulated |",
+        f"| frames | {info['total_frames']} at {info['fps']} Hz, {hours:.2f} h |", "| data type | {origin.kind} |",
         f"| collected by | {attributes.get('source', 'unknown')} |", f"| licence | {license or 'unknown'} |",
         f"| splits (episodes from:to) | {', '.join(f'{name} {ends}' for name, ends in info['splits'].items())} |", "",
         "## Tasks", "", *(f"- {text or 'without an instruction'}" for text in tasks), "",
         "## Robot", "", "| arm | instrument | base in the world (x y z qx qy qz qw) |", "|---|---|---|",
         *(f"| {name} | {arm.attrs['tool']} | {_pose(arm)} |" for name, arm in sorted(file["arms"].items())), "",
         "## Synchronisation", "",
-        "All of a sample is taken at one instant of simulated time: pictures and motion are synchronised without "
-        f"offset. `timestamp` is the number of the sample over {info['fps']} Hz; the simulated time is up to "
+        f"{origin.synchronised} `timestamp` is the number of the sample over {info['fps']} Hz; the time is up to "
         f"{1e3 * jitter:.1f} ms later (`observation.meta.sim_time`).", "",
         "## Features", "", "| name | shape | meaning |", "|---|---|---|",
         *(f"| `{name}` | {tuple(each['shape'])} | {_meaning(name)} |" for name, each in info["features"].items()), "",
@@ -74,10 +72,35 @@ def card(
         "| number | activity of an arm |", "|---|---|",
         *(f"| {k} | {name} |" for k, name in enumerate(map(str, attributes["activities"]))), "",
         "## Limits", "",
-        "Simulated robots, tissue and light: a policy trained on them alone is not one for a robot. The scripted "
-        "expert, where it is the source, is precise and does not hesitate, search or recover as people do.", "",
+        origin.limits, "",
     ]  # fmt: skip
     return "\n".join(lines)
+
+
+class _Origin(NamedTuple):
+    """What a card says of where the data come from."""
+
+    title: str
+    place: str
+    kind: str
+    synchronised: str
+    limits: str
+
+
+def _origin(file: h5py.File) -> _Origin:
+    scene = str(file.attrs["scene"])
+    if file.attrs.get("recorded", False):
+        return _Origin(
+            "arms recorded on ROS", "from a bag", "recorded on ROS",
+            "A sample has the newest message of each topic at its time: rows differ by up to a period of their topics.",
+            "What the bag has: nothing tells whether robot and tissue were real.",
+        )  # fmt: skip
+    return _Origin(
+        f"{scene}: simulated suturing", f"in the scene `{scene}`", "simulated",
+        "All of a sample is taken at one instant of simulated time: pictures and motion have no offset.",
+        "Simulated robots, tissue and light: a policy trained on them alone is not one for a robot. The scripted "
+        "expert, where it is the source, is precise and does not hesitate, search or recover as people do.",
+    )  # fmt: skip
 
 
 def _left_out(constant: Sequence[str]) -> list[str]:

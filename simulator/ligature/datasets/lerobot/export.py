@@ -303,7 +303,7 @@ class _Export:
         }  # fmt: skip
         cameras = [
             {
-                name: {"pose": camera["pose"][0].tolist(), "intrinsics": camera["intrinsics"][0].tolist()}
+                name: {key: camera[key][0].tolist() if key in camera else None for key in ("pose", "intrinsics")}
                 for name, camera in self._file[episode].get("cameras", {}).items()
             }
             for episode in _in_splits(self._file)[0]

@@ -101,25 +101,29 @@ def _core(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
 
 
 def _more(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
-    """What else an arm reports."""
+    """What else an arm reports; a bag may lack forces."""
     motors = robot.motors()
     yield Column("observation.setpoint", motors, _motors(arms, "setpoint_js", 0))
     yield Column("observation.velocity", motors, _motors(arms, "measured_js", 1))
     yield Column("observation.effort", motors, _motors(arms, "measured_js", 2))
     tips = [one_sign(arm["local_measured_cp"][:]) for arm in arms]
     yield Column("observation.cartesian", robot.each(POSE), np.concatenate(tips, axis=1))
-    forces = np.concatenate([arm["spatial_measured_cf"][:] for arm in arms], axis=1)
-    yield Column("observation.meta.force_torque", robot.each(WRENCH), forces)
-    pressed = np.stack([arm["jaw/force"][:] for arm in arms], axis=1)
-    yield Column("observation.meta.jaw_force", robot.arms, pressed)
+    if all("spatial_measured_cf" in arm for arm in arms):
+        forces = np.concatenate([arm["spatial_measured_cf"][:] for arm in arms], axis=1)
+        yield Column("observation.meta.force_torque", robot.each(WRENCH), forces)
+    if all("jaw/force" in arm for arm in arms):
+        pressed = np.stack([arm["jaw/force"][:] for arm in arms], axis=1)
+        yield Column("observation.meta.jaw_force", robot.arms, pressed)
 
 
 def _ground_truth(episode: h5py.Group) -> Iterator[Column]:
     if "needle" in episode:
         needle = episode["needle"]
         yield Column("ground_truth.needle_pose", POSE, one_sign(needle["pose"][:]))
-        yield Column("ground_truth.needle_twist", ("vx", "vy", "vz", "wx", "wy", "wz"), needle["twist"][:])
-        yield Column("ground_truth.needle_force", ("fx", "fy", "fz"), needle["tissue_force"][:])
+        if "twist" in needle:
+            yield Column("ground_truth.needle_twist", ("vx", "vy", "vz", "wx", "wy", "wz"), needle["twist"][:])
+        if "tissue_force" in needle:
+            yield Column("ground_truth.needle_force", ("fx", "fy", "fz"), needle["tissue_force"][:])
     if "thread" in episode:
         points, tension = episode["thread/points"][:], episode["thread/tension"][:]
         elements = range(points.shape[1])
