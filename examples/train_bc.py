@@ -16,77 +16,91 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import torch
+from ligature.environments.layout import ACTION, HELD
 from networks import Scale, ToolView, base_pose, save
 from torch import Tensor, nn
 
-OBSERVATION, ACTION = "observation.environment_state", "extra.expert_action"
+OBSERVATION, SHOWN = "observation.environment_state", "extra.expert_action"
 HIDDEN = 256
 BATCH = 256
 
 
 class Policy(nn.Module):
-    """Observations (n, 52) to actions (n, 7) within -1 and 1; steps are learnt along the axes of the tool."""
+    """Observations (n, 52) to actions (n, 7) within -1 and 1; steps are learnt along the axes of the tool.
+
+    What to do with something in hand is learnt apart from what to do without. One network for both lifts the jaws
+    before they are shut: where they close, all that tells the two apart is whether they hold.
+    """
 
     def __init__(self, view: ToolView, scale: Scale) -> None:
         super().__init__()
         self.view, self.scale = view, scale
-        self.body = nn.Sequential(
-            nn.Linear(len(scale.mean), HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, 7)
-        )
+        self.empty, self.holding = _layers(len(scale.mean)), _layers(len(scale.mean))
 
     def forward(self, observation: Tensor) -> Tensor:
         """Actions for observations, within -1 and 1."""
         features, R = self.view(observation)
-        return self.act(self.scale(features), R).clip(-1.0, 1.0)
+        features, held = self.scale(features), observation[:, HELD : HELD + 1] > 0.5
+        return turned(torch.where(held, self.holding(features), self.empty(features)), R).clip(-1.0, 1.0)
 
-    def act(self, features: Tensor, R: Tensor) -> Tensor:
-        """Actions for scaled features, with the step turned from the tool (n, 3, 3) to the base."""
-        found = self.body(features)
-        step = (R @ found[:, :3, None])[:, :, 0]
-        return torch.cat([step, found[:, 3:]], dim=1)
+
+def turned(found: Tensor, R: Tensor) -> Tensor:
+    """Actions (n, 7) with the step turned from the tool (n, 3, 3) to the base."""
+    step = (R @ found[:, :3, None])[:, :, 0]
+    return torch.cat([step, found[:, 3:]], dim=1)
+
+
+def _layers(features: int) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Linear(features, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, ACTION)
+    )
 
 
 def demonstrations(folder: Path) -> tuple[np.ndarray, np.ndarray, int]:
     """Observations (n, k), actions (n, 7) and the number of episodes of the split ``train``."""
     splits = json.loads((folder / "meta" / "info.json").read_text("utf-8"))["splits"]
     first, last = map(int, splits["train"].split(":"))
-    table = pq.read_table(folder / "data", columns=["episode_index", OBSERVATION, ACTION])
+    table = pq.read_table(folder / "data", columns=["episode_index", OBSERVATION, SHOWN])
     episode = table["episode_index"].to_numpy()
     taken = (episode >= first) & (episode < last)
-    columns = (np.stack(table[name].to_numpy()).astype(np.float32) for name in (OBSERVATION, ACTION))
+    columns = (np.stack(table[name].to_numpy()).astype(np.float32) for name in (OBSERVATION, SHOWN))
     observations, actions = (column[taken] for column in columns)
     return observations, np.clip(actions, -1.0, 1.0), last - first
 
 
 def train(observations: np.ndarray, actions: np.ndarray, epochs: int, seed: int) -> Policy:
-    """A policy, by Adam, with a learning rate that falls to zero (half a cosine).
+    """A policy, learnt from what was shown with empty jaws, and from what was shown with something in them."""
+    torch.manual_seed(seed)
+    torch.set_num_threads(1)
+    seen, wanted = torch.from_numpy(observations), torch.from_numpy(actions)
+    view = ToolView(*base_pose(observations))
+    raw, R = view(seen)
+    policy = Policy(view, Scale(raw))
+    features, held = policy.scale(raw), seen[:, HELD] > 0.5
+    for name, network, own in (("empty", policy.empty, ~held), ("holding", policy.holding, held)):
+        if own.any():
+            fit(network, features[own], R[own], wanted[own], epochs, f"{name}, {int(own.sum())} samples")
+    return policy
+
+
+def fit(network: nn.Sequential, features: Tensor, R: Tensor, wanted: Tensor, epochs: int, title: str) -> None:
+    """Adam, with a learning rate that falls to zero (half a cosine).
 
     Huber's loss: where the expert turns from one deed to the next, a network of finite slope is far off for one sample.
     """
-    torch.manual_seed(seed)
-    torch.set_num_threads(1)
-    view, wanted = ToolView(*base_pose(observations)), torch.from_numpy(actions)
-    raw, R = view(torch.from_numpy(observations))
-    policy = Policy(view, Scale(raw))
-    features = policy.scale(raw)
-    batches = -(-len(features) // BATCH)
-    optimiser = torch.optim.AdamW(policy.parameters(), lr=1e-3, weight_decay=1e-4)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, epochs * batches)
-    begin = time.perf_counter()
-    for epoch in range(epochs):
+    optimiser = torch.optim.AdamW(network.parameters(), lr=1e-3, weight_decay=1e-4)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, epochs * -(-len(features) // BATCH))
+    begin, total = time.perf_counter(), 0.0
+    for _ in range(epochs):
         total = 0.0
         for batch in torch.randperm(len(features)).split(BATCH):
-            loss = nn.functional.huber_loss(policy.act(features[batch], R[batch]), wanted[batch], delta=0.2)
+            loss = nn.functional.huber_loss(turned(network(features[batch]), R[batch]), wanted[batch], delta=0.2)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
             schedule.step()
             total += float(loss.detach()) * len(batch)
-        if epoch == epochs - 1 or epoch % max(1, epochs // 10) == 0:
-            print(
-                f"epoch {epoch + 1} of {epochs}: loss {total / len(features):.5f}, {time.perf_counter() - begin:.0f} s"
-            )
-    return policy
+    print(f"{title}: loss {total / len(features):.5f} after {epochs} epochs, {time.perf_counter() - begin:.0f} s")
 
 
 def main() -> int:

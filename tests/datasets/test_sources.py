@@ -58,7 +58,7 @@ def test_the_record_of_a_run_becomes_a_sound_dataset(tmp_path: Path) -> None:
     simulation.step(2)
     writer = RecordWriter(record, Header(options.to_text(), simulation.state_hash()))
 
-    def give(update: int, arm: int, verb: str, *values: object) -> None:
+    def send(update: int, arm: int, verb: str, *values: object) -> None:
         command = VERBS[verb](arm, *values)
         writer.write(update, command)
         simulation.apply(command)
@@ -67,12 +67,12 @@ def test_the_record_of_a_run_becomes_a_sound_dataset(tmp_path: Path) -> None:
     for update in range(1, n):
         for arm, q in enumerate(begin):
             if update == 1:
-                give(update, arm, "adopt")
+                send(update, arm, "adopt")
             elif update > 40 and update % 10 == 0:
                 wave = 0.05 * np.sin(0.01 * update + arm + np.arange(7)) * [1, 1, 0.1, 1, 1, 1, 4]
                 gently = min((update - 40) / 200, 1.0)  # nothing leaps
-                give(update, arm, "servo_jp", tuple(map(float, q + gently * (START + wave[:6] - q))))
-                give(update, arm, "jaw/servo_jp", (gently * (0.3 + float(wave[6])),))
+                send(update, arm, "servo_jp", tuple(map(float, q + gently * (START + wave[:6] - q))))
+                send(update, arm, "jaw/servo_jp", (gently * (0.3 + float(wave[6])),))
         simulation.step(2)
     writer.finish(n, simulation.state_hash())
     simulation.close()

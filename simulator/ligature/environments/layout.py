@@ -11,6 +11,9 @@ STATE, FURTHER = 52, 33
 PLACE, TURN, TARGET = slice(14, 17), slice(17, 21), slice(30, 33)
 """Place and quaternion of what is handled, and the target."""
 
+HELD = 49
+"""Whether the first arm's jaws hold what is handled."""
+
 _ANGLES = (0, 1, 3, 4, 5, 6)
 """Joints that turn, and the jaw, among the numbers of an arm."""
 
