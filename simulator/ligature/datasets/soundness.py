@@ -49,6 +49,9 @@ OTHER_ARRAYS: dict[str, str] = {
 
 CAMERA_ARRAYS: dict[str, str] = {"pose": "n 7", "intrinsics": "n 3 3", "rgb": "n h w 3"}
 
+NOT_REPORTED = frozenset({"spatial_measured_cf", "force", "twist", "tissue_force"})
+"""Arrays that a dataset of a recording may lack, as cameras the pose: what was recorded reports them to nobody."""
+
 PHASES = frozenset({"phase"})
 """Arrays of numbers of phases."""
 
@@ -68,7 +71,8 @@ def check(file: h5py.File, path: Path) -> None:
     whole = file.attrs["format"] == "ligature dataset 2"
     for name in file:
         if name.startswith("episode_"):
-            _Episode(_group(file, name), name, phases).check(arms if whole else {})
+            recorded = bool(file.attrs.get("recorded", False))
+            _Episode(_group(file, name), name, phases, recorded).check(arms if whole else {})
 
 
 class _Walk:
@@ -124,6 +128,8 @@ def _described(file: Any) -> int:
     for key in ("format", "version", "scene"):
         _attribute(file, key, "a text", _is_text)
     _attribute(file, "rate", "a number above 0 and at most 1000", lambda v: _is_number(v) and 0.0 < float(v) <= 1000.0)
+    if "recorded" in file.attrs:
+        _attribute(file, "recorded", "true or false", lambda v: _is_number(v, WHOLE))
     for key in ("phases", *(("gestures", "activities") if "gestures" in file.attrs else ())):
         _attribute(file, key, "a list of texts", _are_texts)
     if not isinstance(file.get("arms", file), h5py.Group):
@@ -152,8 +158,9 @@ def _arm(arm: Any, name: str) -> tuple[int, bool]:
 class _Episode:
     """An episode: its attributes, and arrays of as many rows as it has samples."""
 
-    def __init__(self, group: Any, name: str, phases: int) -> None:
+    def __init__(self, group: Any, name: str, phases: int, recorded: bool) -> None:
         self._group, self._name, self._phases, self._lengths = group, name, phases, dict[str, int]()
+        self._recorded = recorded
 
     def check(self, arms: dict[str, tuple[int, bool]]) -> None:
         """Check all that the format asks for; ``arms`` are joints and jaw of each arm."""
@@ -186,13 +193,19 @@ class _Episode:
             yield from _group(self._group, name)
 
     def _array(self, name: str, shape: str) -> None:
-        place = f"{self._name}/{name}"
+        place, last = f"{self._name}/{name}", name.rpartition("/")[2]
         array = self._group.get(name)
+        if (
+            array is None
+            and self._recorded
+            and (last in NOT_REPORTED or name.startswith("cameras/") and last == "pose")
+        ):
+            return
         if not isinstance(array, h5py.Dataset):
             raise Unsound(f"'{place}' is missing or no array")
         wanted, found = shape.split(), array.shape or ()
         free = wanted[-1] == "…"
-        kinds = WHOLE if name.rpartition("/")[2] in ("phase", "activity") else NUMBERS
+        kinds = WHOLE if last in ("phase", "activity") else NUMBERS
         fits = len(found) >= 1 if free else len(found) == len(wanted)
         for letter, length in zip(wanted, found, strict=False):
             if not letter.isdigit() and letter != "…":
@@ -201,9 +214,9 @@ class _Episode:
         if not fits or array.dtype.kind not in kinds:
             means = " × ".join(str(self._lengths.get(letter, letter)) for letter in wanted)
             raise Unsound(f"'{place}' is {found} of {array.dtype}; it must be {means} numbers")
-        if name.rpartition("/")[2] in POSES and not (np.abs(array[:]) <= FARTHEST).all():
+        if last in POSES and not (np.abs(array[:]) <= FARTHEST).all():
             raise Unsound(f"'{place}' has numbers that no pose has")
-        if name.rpartition("/")[2] in PHASES and len(array) and not 0 <= int(array[:].max()) < self._phases:
+        if last in PHASES and len(array) and not 0 <= int(array[:].max()) < self._phases:
             raise Unsound(f"'{place}' has phase {int(array[:].max())}; there are {self._phases}")
 
 

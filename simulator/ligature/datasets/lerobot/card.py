@@ -97,7 +97,7 @@ def _origin(file: h5py.File) -> _Origin:
         )  # fmt: skip
     return _Origin(
         f"{scene}: simulated suturing", f"in the scene `{scene}`", "simulated",
-        "All of a sample is taken at one instant of simulated time: pictures and motion have no offset.",
+        "All of a sample is taken at one instant of simulated time: pictures and motion are synchronised.",
         "Simulated robots, tissue and light: a policy trained on them alone is not one for a robot. The scripted "
         "expert, where it is the source, is precise and does not hesitate, search or recover as people do.",
     )  # fmt: skip
