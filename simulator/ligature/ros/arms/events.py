@@ -68,6 +68,24 @@ class Clock:
         return self._last
 
 
+class StateStamps:
+    """Stamps of states as they are read: those of the states, or of now while none comes, and none before the last."""
+
+    def __init__(self, stale: float) -> None:
+        self._stale = stale
+        self._last = rospy.Time()
+
+    def of(self, stamp: Any, now: Any) -> Any:
+        """The stamp to send for a state of ``stamp``; one that is older than ``stale`` seconds is that of a rest.
+
+        Physics may have been held up between the stamp of its first state after a rest and handing it on. After the
+        clock was set back stamps follow it.
+        """
+        found = now if (now - stamp).to_sec() > self._stale else stamp
+        self._last = max(found, self._last) if self._last <= now else found
+        return self._last
+
+
 class EventTopics:
     """The event topics of one arm, whose topics are below ``root``."""
 

@@ -28,6 +28,7 @@ from ligature.ros.arms.bases import CART, BaseFrames
 from ligature.ros.arms.challenge import ChallengeFace
 from ligature.ros.arms.commands import listeners
 from ligature.ros.arms.console import Console, SetupJoints, console_topics, setup_topics
+from ligature.ros.arms.events import StateStamps
 from ligature.ros.arms.outlet import ArmOutlet, published_topics
 from ligature.ros.arms.rivals import Rival, Rivals
 from ligature.ros.master import NO_ANSWER
@@ -71,6 +72,7 @@ class ArmsNode:
         self._outlets: dict[int, ArmOutlet] = {}
         self.rejected = 0
         self._count = 0
+        self._stamps = StateStamps(STALE)
         self._beat = 0.0
         self._due = -math.inf
         self._rivals = Rivals(_parts(scene, prefix))
@@ -171,7 +173,7 @@ class ArmsNode:
         if events:
             refresh()
         settled = {event.arm for event in events if event.name == "operating_state"}
-        stamp = self._stamp(state)
+        stamp = self._stamps.of(rospy.Time.from_sec(float(state["stamp"])), rospy.Time.now())
         if self._count % FOLLOW_PERIODS == 0:
             for outlet in outlets:
                 outlet.follow(state["arm"][outlet.index])
@@ -196,10 +198,6 @@ class ArmsNode:
                 self._bases.follow(state)
             self._publish_tf(state, stamp)
         return sent
-
-    def _stamp(self, state: Any) -> Any:
-        now, stamp = rospy.Time.now(), rospy.Time.from_sec(float(state["stamp"]))
-        return now if (now - stamp).to_sec() > STALE else stamp
 
     def _publish_tf(self, state: Any, stamp: Any) -> None:
         heard = [topic for topic in self._tf if topic.heard]
