@@ -88,7 +88,7 @@ class Wired:
                 if isinstance(message, str):
                     self.facts = json.loads(message)
                 else:
-                    self.pictures, self.picture = self.pictures + 1, message
+                    self.pictures, self.picture = self.pictures + 1, message[1:]  # a byte before it counts the eyes
                     self.orders("seen")
 
     def _hold(self) -> None:

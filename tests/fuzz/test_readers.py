@@ -223,12 +223,29 @@ PHASE = "episode_0000/phase"
             replaced("episode_0000/arms/PSM1/local_action_cp", data=[[float("nan")] * 7] * 3),
             "has numbers that no pose has",
         ),
+        (lambda file: file.attrs.__setitem__("gestures", ["a", "b"]), "it has 3 phases and 2 gestures of them"),
+        (lambda file: (file.pop("id_names", None), file.create_group("id_names")), "'id_names' is no list of texts"),
         (lambda file: file.attrs.pop("rate"), "attribute 'rate' of '/' is missing; it is a number above 0"),
         (lambda file: file["episode_0001"].attrs.__setitem__("samples", "three"), "must be a whole number"),
     ],
 )
 def test_a_dataset_that_claims_leads_away_or_lacks_something_is_refused(change: Any, why: str, tmp_path: Path) -> None:
     assert why in (words := hostile_dataset(tmp_path / "a.h5", change)), words
+
+
+@pytest.mark.parametrize("place", ["/", "/episode_0000", "/episode_0000/arms", "/arms"])
+@pytest.mark.parametrize("name", [b"episode_\xff", b"\xed\xa0\x80", b"a\x1b[2Jb", b"\xc3("])
+def test_names_in_a_dataset_that_are_no_text_do_no_harm(place: str, name: bytes, tmp_path: Path) -> None:
+    from ligature.cli.main import app
+    from typer.testing import CliRunner
+
+    path = tmp_path / "a.h5"
+    path.write_bytes(learning.dataset_bytes())
+    with h5py.File(path, "r+") as file:
+        h5py.h5g.create(file[place].id, name)
+    result = CliRunner().invoke(app, ["dataset", "info", str(path)])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code in (0, 1) and (result.exit_code == 0 or "a.h5" in result.output)
 
 
 def test_a_file_on_which_hdf5_crashes_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,7 +41,10 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
         check_xml(source)
         converted = _robot(source)
         written = save_all(_files(converted, real_path(out), namespace))
-    except (SaveError, PatchError, MeshWriteError, MissingReaderError, XmlError) as error:
+    except (SaveError, PatchError, MeshWriteError) as error:
+        console.print(f"{source}: it cannot be written as ADF: {error}", style="red", markup=False)
+        return 1
+    except (MissingReaderError, XmlError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
     except Exception as error:  # what a library raises for bad files is its own affair

@@ -6,6 +6,7 @@ meets the same bytes in the same memory first.
 
 from __future__ import annotations
 
+import math
 import os
 import resource
 import signal
@@ -14,9 +15,9 @@ from typing import NoReturn
 
 import h5py
 
-from ligature.datasets.store import DatasetError, damaged, opened
+from ligature.datasets.store import DatasetError, damaged, episode_folder, opened
 
-SECONDS = 60
+SECONDS, SECONDS_A_BYTE = 4.0, 2e-7
 """Of processor time that a look may take; a dataset of 1000 episodes takes 5."""
 
 WHOLE = 1 << 24
@@ -25,34 +26,36 @@ WHOLE = 1 << 24
 
 def probe(path: Path) -> None:
     """Raise `DatasetError` for a file that is no sound dataset, or on which HDF5 crashes."""
+    files = [path, *episode_folder(path).glob("*")]
+    seconds = math.ceil(SECONDS + SECONDS_A_BYTE * sum(file.stat().st_size for file in files if file.exists()))
     reads, writes = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(reads)
-        _look(path, writes)
+        _look(path, writes, seconds)
     os.close(writes)
     with os.fdopen(reads, "rb") as answer:
-        why = answer.read().decode()
+        why = answer.read().decode("utf-8", "replace")
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
-        end = f"takes more than {SECONDS} s" if number == signal.SIGXCPU else "crashes"
+        end = f"takes more than {seconds} s" if number == signal.SIGXCPU else "crashes"
         raise DatasetError(f"'{path}' is damaged: reading it {end} ({signal.Signals(number).name})")
     if why:
         raise DatasetError(why)
 
 
-def _look(path: Path, writes: int) -> NoReturn:
+def _look(path: Path, writes: int, seconds: int) -> NoReturn:
     """In the child: read everything that a reader reads, say what is wrong, and end."""
     try:
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         with damaged(path), opened(path) as file:
             file.visititems(_read)
             for name in file:  # episodes of a dataset that grows are files of their own, which a visit leaves out
                 file[name].visititems(_read)
     except DatasetError as error:
-        os.write(writes, str(error).encode()[:4096])
+        os.write(writes, str(error).encode("utf-8", "backslashreplace")[:4096])
     finally:
         os._exit(0)
 

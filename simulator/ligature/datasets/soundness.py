@@ -134,8 +134,11 @@ def _described(file: Any) -> int:
         _attribute(file, key, "a list of texts", _are_texts)
     if not isinstance(file.get("arms", file), h5py.Group):
         raise Unsound("'arms' is no group")
-    if "id_names" in file and (file["id_names"].dtype.kind not in TEXTS or file["id_names"].ndim != 1):
+    names = file.get("id_names")
+    if names is not None and (not isinstance(names, h5py.Dataset) or names.dtype.kind not in TEXTS or names.ndim != 1):
         raise Unsound("'id_names' is no list of texts")
+    if "gestures" in file.attrs and len(file.attrs["gestures"]) != len(file.attrs["phases"]):
+        raise Unsound(f"it has {len(file.attrs['phases'])} phases and {len(file.attrs['gestures'])} gestures of them")
     return len(file.attrs["phases"])
 
 

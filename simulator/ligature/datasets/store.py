@@ -203,11 +203,17 @@ def damaged(path: Path) -> Iterator[None]:
     except (DatasetError, MemoryError):
         raise
     except Unsound as error:
-        raise DatasetError(f"'{path}' is no sound dataset: {error}") from error
-    except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
+        raise DatasetError(f"'{path}' is no sound dataset: {_printable(error)}") from error
+    except (OSError, RuntimeError, KeyError, UnicodeError) as error:
         if isinstance(error, OSError) and error.filename is not None:
             raise
-        raise DatasetError(f"'{path}' is damaged: {error.args[0] if error.args else error}") from error
+        why = error.args[0] if error.args and not isinstance(error, UnicodeError) else error
+        raise DatasetError(f"'{path}' is damaged: {_printable(why)}") from error
+
+
+def _printable(text: object) -> str:
+    """Without the surrogates that stand for bytes of names that are no UTF-8, which no terminal takes."""
+    return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def episode_names(file: h5py.File) -> list[str]:
