@@ -36,10 +36,9 @@ from ligature.cli.options import RunOptions
 from ligature.model.state import new_state
 from ligature.process import end_with_parent
 from numpy.typing import NDArray
-from websockets.exceptions import ConnectionClosed
 
 from tests.bench.on_ros import ROOT, own_master
-from tests.cockpit.wired import Wired, _plain
+from tests.cockpit.wired import Wired
 from tests.waiting import until
 
 Array = NDArray[np.float64]
@@ -219,31 +218,13 @@ class Commander:
 class Visitor(Wired):
     """A browser's connections that press what is on the page."""
 
-    def __init__(self, url: str) -> None:
-        self._uuids: dict[str, str] = {}
-        self.heard = 0
-        super().__init__(url)
-
-    def _read_page(self) -> None:
-        with suppress(ConnectionClosed):
-            for message in self._page:
-                data = _plain(message)
-                self.heard += len(data)
-                if b"data-pass=" in data and not self._pass:
-                    self._pass = data.partition(b'data-pass="')[2].partition(b'"')[0].decode()
-                if b"Gui" in data:
-                    self._note(msgspec.msgpack.decode(data)["messages"])
-
-    def _note(self, messages: list[dict[str, Any]]) -> None:
-        for message in messages:
-            label = (message.get("props") or {}).get("label")
-            if label and str(message.get("type", "")).startswith("Gui"):
-                self._uuids[label] = message["uuid"]
-
     def sets(self, label: str, value: Any) -> None:
         """What a browser sends when a person gives a control a value."""
-        until(lambda: label in self._uuids, f"'{label}' is on the page", 60.0)
-        update = {"type": "GuiUpdateMessage", "uuid": self._uuids[label], "updates": {"value": value}}
+        uuid = until(
+            lambda: next((uuid for uuid, (_, props) in [*self.controls.items()] if props.get("label") == label), ""),
+            f"'{label}' is on the page", 60.0,
+        )  # fmt: skip
+        update = {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}
         self._page.send(msgspec.msgpack.encode(update))
 
     def vanishes(self) -> None:

@@ -55,7 +55,11 @@ def _cookie(url: str, token: str) -> str:
 
 
 class Wired:
-    """Connections of one page; `facts` and ``picture`` are the newest that came, ``pictures`` how many."""
+    """Connections of one page; `facts` and ``picture`` are the newest that came, ``pictures`` how many.
+
+    ``controls`` has kind and properties of what the page shows, by the names that messages give; ``nodes`` are the names
+    of what can be clicked or dragged in its 3D view.
+    """
 
     def __init__(self, url: str, token: str = "") -> None:
         address = url.replace("http", "ws").rstrip("/")
@@ -65,6 +69,7 @@ class Wired:
             f"{address}/", subprotocols=[protocol], max_size=None, additional_headers=headers, open_timeout=60
         )
         self._pass, self.facts, self.pictures, self.picture = "", dict[str, Any](), 0, b""
+        self.controls, self.nodes = dict[str, tuple[str, dict[str, Any]]](), set[str]()
         self._held: list[float] = [0.0] * MOTION
         self._over = False
         self._page.send(msgspec.msgpack.encode(CAMERA))
@@ -78,9 +83,20 @@ class Wired:
     def _read_page(self) -> None:
         with suppress(ConnectionClosed):
             for message in self._page:
-                found = re.search(rb'data-pass="([\w-]+)"', b"" if self._pass else _plain(message))
-                if found:
+                data = _plain(message)
+                if not self._pass and (found := re.search(rb'data-pass="([\w-]+)"', data)):
                     self._pass = found[1].decode()
+                if b"Gui" in data or b"TransformControls" in data:
+                    self._note(msgspec.msgpack.decode(data)["messages"])
+
+    def _note(self, messages: list[dict[str, Any]]) -> None:
+        """What a page would show."""
+        for message in messages:
+            kind = str(message.get("type", ""))
+            if kind.startswith("Gui") and message.get("props"):
+                self.controls[message["uuid"]] = kind.removeprefix("Gui").removesuffix("Message"), message["props"]
+            elif kind.startswith("TransformControls"):
+                self.nodes.add(str(message["name"]))
 
     def _read_wire(self) -> None:
         with suppress(ConnectionClosed):

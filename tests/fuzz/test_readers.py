@@ -248,6 +248,17 @@ def test_names_in_a_dataset_that_are_no_text_do_no_harm(place: str, name: bytes,
     assert result.exit_code in (0, 1) and (result.exit_code == 0 or "a.h5" in result.output)
 
 
+@pytest.mark.parametrize(
+    "error", [UnicodeEncodeError("utf-8", "\udcff", 0, 1, "no"), KeyError("\udcff"), OSError("\udcff")]
+)
+def test_what_hdf5_says_of_odd_bytes_names_the_file_and_can_be_printed(error: Exception, tmp_path: Path) -> None:
+    from ligature.datasets.store import DatasetError, damaged
+
+    with pytest.raises(DatasetError, match=r"a\.h5' is damaged") as found, damaged(tmp_path / "a.h5"):
+        raise error
+    assert str(found.value).encode("utf-8")
+
+
 def test_a_file_on_which_hdf5_crashes_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The library reads some damaged files beyond their ends; the look at them happens in another process."""
     from ligature.datasets import probe

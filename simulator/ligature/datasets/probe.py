@@ -17,7 +17,7 @@ import h5py
 
 from ligature.datasets.store import DatasetError, damaged, episode_folder, opened
 
-SECONDS, SECONDS_A_BYTE = 4.0, 2e-7
+SECONDS, SECONDS_A_BYTE = 4.0, 1e-6
 """Of processor time that a look may take; a dataset of 1000 episodes takes 5."""
 
 WHOLE = 1 << 24

@@ -331,17 +331,22 @@ class Renderer:
         context.polygon_offset = (0.0, 0.0)
 
     def _draw_shadow(self, view: Array, projection: Array, size: int) -> None:
+        meshes = self._programs.get("shadow", {})
+        meshes.write("uProjection", projection)
         seen = self._instances.seen(view, projection, size, COARSE_BELOW)
         for batch in self._batches:
             rows = seen.rows(batch)
-            if len(rows) and batch.surface.opaque:
-                program = self._programs.get("shadow", {} if batch.rays is None else batch.rays.defines)
-                program.write("uProjection", projection)
-                if batch.rays is not None:
-                    batch.rays.bind(program)
-                    self._context.enable(moderngl.CULL_FACE)
-                batch.draw(program, seen.instances[rows])
-                self._context.disable(moderngl.CULL_FACE)
+            if not len(rows) or not batch.surface.opaque:
+                continue
+            if batch.rays is None:
+                batch.draw(meshes, seen.instances[rows])
+                continue
+            program = self._programs.get("shadow", batch.rays.defines)
+            program.write("uProjection", projection)
+            batch.rays.bind(program)
+            self._context.enable(moderngl.CULL_FACE)
+            batch.draw(program, seen.instances[rows])
+            self._context.disable(moderngl.CULL_FACE)
 
     def _target(self, view: CameraView, passes: Sequence[str], samples: int) -> Target:
         unknown = set(passes) - set(PASSES)

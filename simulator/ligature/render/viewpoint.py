@@ -66,6 +66,8 @@ class Viewpoint:
     def look(self, right: float, up: float) -> Viewpoint:
         """Turn where it stands by radians, as if the scene were dragged right and up."""
         elevation = float(np.clip(self.elevation + up, -STEEPEST, STEEPEST))
-        turned = replace(self, azimuth=self.azimuth + right, elevation=elevation)
+        # what is seen moves by less than the azimuth does, to nothing at the vertical: up to tenfold the turn there
+        azimuth = self.azimuth + right / max(np.cos(self.elevation), 0.1)
+        turned = replace(self, azimuth=azimuth, elevation=elevation)
         x, y, z = self.pose[:3] - self.distance * turned._axes[:, 0]
         return replace(turned, focus=(x, y, z))
