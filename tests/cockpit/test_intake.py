@@ -6,6 +6,8 @@ import math
 import os
 import random
 import socket
+import threading
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,12 +17,14 @@ import pytest
 import viser
 from ligature.cockpit.address import Address
 from ligature.cockpit.gate import HEADERS, Gate
-from ligature.cockpit.intake import placeable, rejections
+from ligature.cockpit.intake import check_input, placeable, rejections
 from ligature.cockpit.page import serve
+from viser._messages import Message
 from websockets.exceptions import ConnectionClosed
 
 from tests.cockpit.conftest import until
 from tests.cockpit.test_gate import get, talk
+from tests.cockpit.wired import plain
 
 MESSAGES = 100_000 if os.environ.get("LIGATURE_EXAMPLES") == "new" else 3_000
 OPTIONS = ("Step 1", "Step 10", "Step 100")
@@ -75,6 +79,110 @@ def test_controls_keep_values_that_a_person_could_have_chosen(server: viser.Vise
     assert rejections.count - before > MESSAGES // 2
     assert sound(shown), {name: control.value for name, control in shown.items()}
     connection.close()
+
+
+CAMERA = {
+    "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.0, 0.0, 1.0), "fov": 0.8, "near": 0.01, "far": 10.0, "image_height": 8,
+    "image_width": 12, "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 1.0, 0.0),
+}  # fmt: skip
+UPLOAD = {"transfer_uuid": "t", "filename": "f", "mime_type": "m", "part_count": 10**6, "size_bytes": 10**12}
+
+
+def says(kind: str, **fields: Any) -> bytes:
+    return msgspec.msgpack.encode({"type": kind, **fields})
+
+
+def test_what_the_page_does_not_offer_has_no_effect_and_stays_nowhere(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown, asked = controls(server), list[str]()
+    text = shown["text"]._impl.uuid
+    monkeypatch.setattr(server, "request_share_url", lambda: asked.append("public"))
+    monkeypatch.setattr(server, "disconnect_share_url", lambda: asked.append("private"))
+    shown["button"].on_hold(lambda _: asked.append("held"), callback_hz=10.0)
+    connection = talk(server.get_port())
+    connection.send(says("ViewerCameraMessage", **CAMERA))
+    until(server.get_clients, "the browser is there")
+    (client,) = server.get_clients().values()
+    kept, before = len(server._websock_server._broadcast_buffer.message_from_id), rejections.count
+    messages = [
+        *(says("GuiFormDirtyMessage", uuid=f"{i}" + 1000 * "x") for i in range(20)),
+        says("FileTransferStartUpload", source_component_uuid=text, **UPLOAD),
+        *(
+            says("FileTransferPart", source_component_uuid=text, transfer_uuid="t", part_index=i, content=bytes(1000))
+            for i in range(20)
+        ),
+        says("ShareUrlRequest"),
+        says("ShareUrlDisconnect"),
+        says("GuiButtonHoldMessage", uuid=shown["button"]._impl.uuid, frequency=10.0),
+        says("GuiFormSubmitMessage", uuid=text),
+        says("CommandTriggerMessage", uuid=text),
+    ]
+    for message in messages:
+        connection.send(message)
+    connection.send(update(text, {"value": "the last one"}))
+    until(lambda: shown["text"].value == "the last one", "all messages are taken")
+    assert rejections.count - before == len(messages)
+    assert not server.gui._current_file_upload_states and not client.gui._current_file_upload_states
+    assert len(server._websock_server._broadcast_buffer.message_from_id) <= kept + 1  # the text's value
+    assert asked == []
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("wxyz", (1.0, 0.0, 0.0)), ("wxyz", "abc"), ("wxyz", (math.nan, 0.0, 0.0, 0.0)), ("wxyz", (0.0, 0.0, 0.0, 0.0)),
+        ("position", (0.0, math.inf, 0.0)), ("look_at", "ab"), ("up_direction", ()), ("fov", math.nan), ("near", -math.inf),
+    ],
+)  # fmt: skip
+def test_nobody_looks_as_nobody_can(server: viser.ViserServer, field: str, value: Any) -> None:
+    shown, connection = controls(server), talk(server.get_port())
+    connection.send(says("ViewerCameraMessage", **CAMERA))
+    until(server.get_clients, "the browser is there")
+    (client,) = server.get_clients().values()
+    connection.send(says("ViewerCameraMessage", **{**CAMERA, field: value}))
+    connection.send(update(shown["flag"]._impl.uuid, {"value": True}))
+    until(lambda: shown["flag"].value, "both are taken")
+    assert client.camera.wxyz.tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert client.camera.position.tolist() == [0.0, 0.0, 1.0]
+    assert client.camera.fov == 0.8 and client.camera.near == 0.01
+    connection.close()
+
+
+def test_odd_numbers_are_neither_written_to_the_terminal_nor_kept() -> None:
+    with warnings.catch_warnings(record=True) as written:
+        check_input()
+        Message.deserialize(says("ViewerCameraMessage", **{**CAMERA, "wxyz": "\x1b[31m" + 1000 * "x"}))
+    assert written == []
+
+
+@pytest.mark.parametrize("value", [5, ["key"], {"key": 1}, 300 * "x"])
+def test_a_browser_that_is_asked_for_a_key_gives_a_text_or_nothing(server: viser.ViserServer, value: Any) -> None:
+    connection, given = talk(server.get_port()), list[Any]()
+    connection.send(says("ViewerCameraMessage", **CAMERA))
+    until(server.get_clients, "the browser is there")
+    (client,) = server.get_clients().values()
+
+    def ask() -> None:
+        given.append(client.local_storage.get_item("key", timeout=60.0))
+
+    thread = threading.Thread(target=ask, daemon=True)
+    thread.start()
+    request = asked_for(connection)
+    for answer in (value, "a key"):
+        connection.send(says("LocalStorageGetItemResponseMessage", value=answer, error=None, request_uuid=request))
+    thread.join(60.0)
+    assert given == ["a key"]
+    connection.close()
+
+
+def asked_for(connection: Any) -> str:
+    """The name of the request for a key that a browser is sent."""
+    while True:
+        for message in msgspec.msgpack.decode(plain(connection.recv(timeout=60.0)))["messages"]:
+            if message["type"] == "LocalStorageGetItemRequestMessage":
+                return str(message["request_uuid"])
 
 
 @pytest.mark.parametrize("junk", [b"", b"\xc1", b"\xff" * 100, b"\x93\x01\x02\x03", b'{"type": 3}', b"x" * 2_000_000])

@@ -36,7 +36,7 @@ CAMERA = {
 """What a browser says first; viser takes it for one from then on."""
 
 
-def _plain(message: str | bytes) -> bytes:
+def plain(message: str | bytes) -> bytes:
     """What viser has packed."""
     data = message if isinstance(message, bytes) else b""
     at = data.find(ZSTD)
@@ -83,7 +83,7 @@ class Wired:
     def _read_page(self) -> None:
         with suppress(ConnectionClosed):
             for message in self._page:
-                data = _plain(message)
+                data = plain(message)
                 if not self._pass and (found := re.search(rb'data-pass="([\w-]+)"', data)):
                     self._pass = found[1].decode()
                 if b"Gui" in data or b"TransformControls" in data:

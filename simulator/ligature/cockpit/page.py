@@ -9,7 +9,6 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 from viser import ClientHandle, GuiApi, ViserServer
-from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 
 from ligature.cockpit.address import Address, AddressError, check_free
 from ligature.cockpit.gate import Gate, guarded
@@ -32,8 +31,6 @@ def serve(address: Address, gate: Gate, wire: Wire | None = None) -> ViserServer
     if address.port and server.get_port() != address.port:
         server.stop()
         raise AddressError(f"cannot serve the cockpit at {address.host}:{address.port}: another program took the port")
-    for message in (ShareUrlRequest, ShareUrlDisconnect):  # any visitor could make the page public with these
-        server._websock_server.unregister_handler(message)
     gui = server.gui
     paint(gui, True)
     gui.main_panel.dock_right()
