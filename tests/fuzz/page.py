@@ -1,13 +1,15 @@
 """Hostile messages to the page of a run, by the connections that a browser has: ``python -m tests.fuzz.page [COUNT]``.
 
 Every control that the page shows gets values that no person could have chosen, and, one in four, such as a person
-chooses; between them come updates of the gizmo, clicks, junk, and at the rate that the page allows orders of its own
-script. Then a browser comes and starts the arms. The run ends with status 1 when a process of the run was replaced or
-ended, or the arms do not start. Printed are the messages by kind of control.
+chooses; between them come cameras, gizmos, keys, messages of every other kind that viser can read, junk, and at the rate
+that the page allows orders of its own script. What the page cannot read ends its connection and no other; all else must be
+read to the end. Then a browser comes and starts the arms. The run ends with status 1 when a process of the run was replaced
+or ended, the arms do not start, or viser wrote to the terminal. Printed are the messages by kind of control.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import random
@@ -15,15 +17,17 @@ import subprocess
 import sys
 import tempfile
 import threading
+import warnings
 from collections import Counter
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args, get_origin, get_type_hints
 
-import msgspec.msgpack
+from ligature.cockpit.intake import OFFERED
 from ligature.cockpit.orders import ORDERS
 from ligature.cockpit.wire import MOST_RATE
 from ligature.process import end_with_parent
+from viser._messages import Message
 from websockets.exceptions import ConnectionClosed
 
 from tests.bench.on_ros import ROOT, own_master
@@ -33,13 +37,21 @@ from tests.cockpit.wired import Wired
 from tests.waiting import until
 
 SCENE = ROOT / "scenes" / "suturing_small" / "launch.yaml"
-JUNK = (b"", b"\xc1", b"\xff" * 100, b"\x93\x01\x02\x03", b'{"type": 3}', b"x" * 100_000)
-OTHERS = (
-    "TransformControlsUpdateMessage", "TransformControlsDragEndMessage", "SceneNodeClickMessage", "ScenePointerMessage",
-    "ViewerCameraMessage", "GuiModalMessage", "FileTransferStart", "FileTransferPart", "ResetSceneMessage", "NoMessage",
-)  # fmt: skip
+JUNK = (b"\xff" * 100, b"\x93\x01\x02\x03", b'{"type": 3}', b"x" * 100_000)
+KINDS = sorted(Message.get_subclasses(), key=lambda kind: kind.__name__)
+"""All that viser can read; few of them come from browsers, and fewer does the page ask for."""
+
+LAST = b"\xc1"
+"""What ends a connection, for a reason that nothing before it has: pongs would come before the page reads."""
+
+UNREADABLE = 1e-3
+"""How many of the messages that the page cannot read are sent: each ends its connection, whatever follows is not read."""
+
 ROUND = 4000
 """Messages after which all that were sent are waited for."""
+
+SHOWN = 16
+"""Kinds that are printed, the most frequent."""
 
 
 class Stranger(Wired):
@@ -52,6 +64,12 @@ class Stranger(Wired):
         except ConnectionClosed:
             return False
         return True
+
+    def end(self) -> str:
+        """Send what ends the connection, and return why the page, which has then read all before, ended it."""
+        self.sends(LAST)
+        until(lambda: self._page.close_code, "the page has read all and ends the connection", 120.0)
+        return f"{self._page.close_code} {self._page.close_reason}"
 
     def orders_of_a_page(self, over: threading.Event, rng: random.Random, done: Counter[str]) -> None:
         """Orders and odd ones, at half the rate that the page allows."""
@@ -73,24 +91,63 @@ def value(props: dict[str, Any], rng: random.Random) -> Any:
     return rng.choice([True, False, "a text"])
 
 
-def message(stranger: Stranger, rng: random.Random) -> tuple[str, bytes]:
+def field(hint: Any, texts: list[str], rng: random.Random) -> Any:
+    """What a field of a message may hold by its type, or something odd."""
+    if rng.random() < 0.2:
+        return rng.choice(test_intake.ODD)
+    if get_origin(hint) is tuple:
+        return tuple(field(inner, texts, rng) for inner in get_args(hint) if inner is not Ellipsis)
+    if get_args(hint):
+        return field(rng.choice(get_args(hint)), texts, rng)
+    plain = {float: rng.uniform(-1.0, 1.0), int: rng.randint(0, 3), str: rng.choice(texts), bytes: b"bytes", bool: True}
+    return plain[hint] if hint in plain else rng.choice(test_intake.ODD)
+
+
+def fields(kind: type[Message], texts: list[str], rng: random.Random) -> dict[str, Any]:
+    """All fields of a message."""
+    hints = get_type_hints(kind)
+    return {f.name: field(hints[f.name], texts, rng) for f in dataclasses.fields(cast(Any, kind)) if f.init}
+
+
+def readable(data: bytes) -> bool:
+    """Whether the page's decoder makes a message of this."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of odd numbers, as in the page
+        try:
+            Message.deserialize(data)
+        except Exception:  # as the page takes it
+            return False
+    return True
+
+
+def drawn(stranger: Stranger, rng: random.Random) -> tuple[str, bytes]:
     """One message and its kind."""
     chance = rng.random()
-    if chance < 0.85 and stranger.controls:
+    if chance < 0.6 and stranger.controls:
         uuid = rng.choice(sorted(stranger.controls))
         kind, props = stranger.controls[uuid]
         names = rng.sample(test_intake.PROPERTIES, 1 if rng.random() < 0.6 else 2)
         return kind, test_intake.update(uuid, {name: value(props, rng) for name in names})
-    if chance < 0.9995:
-        kind, odd = rng.choice(OTHERS), test_intake.ODD
-        name = rng.choice([*sorted(stranger.nodes), rng.choice(odd)])
-        words = {"type": kind, "name": name, "position": rng.choice([(0.1, 0.2, 0.3), rng.choice(odd)])}
-        return kind, msgspec.msgpack.encode({**words, "wxyz": rng.choice([(1.0, 0.0, 0.0, 0.0), rng.choice(odd)])})
+    if chance < 0.99:
+        message = rng.choice([*OFFERED] if chance < 0.8 else KINDS)
+        texts = [*sorted(stranger.controls), *sorted(stranger.nodes), "a text"]
+        return message.__name__, test_intake.says(message.__name__, **fields(message, texts, rng))
     return "junk", rng.choice(JUNK)
 
 
+def message(stranger: Stranger, rng: random.Random) -> tuple[str, bytes, bool]:
+    """One message, its kind, and whether the page can read it."""
+    while True:
+        kind, data = drawn(stranger, rng)
+        if (sound := readable(data)) or rng.random() < UNREADABLE:
+            return kind, data, sound
+
+
 def attack(url: str, count: int) -> Counter[str]:
-    """Send ``count`` messages; a connection that the page ends is followed by another."""
+    """Send ``count`` messages; a connection that the page ends is followed by another.
+
+    The page ends those that sent what it cannot read, and reads the others to their last message.
+    """
     rng, sent, over, rest = random.Random(17), Counter[str](), threading.Event(), count
     while rest > 0:
         stranger = Stranger(url)
@@ -106,13 +163,14 @@ def attack(url: str, count: int) -> Counter[str]:
         threading.Thread(target=stranger.orders_of_a_page, args=(over, rng, sent), daemon=True).start()
         for _ in range(min(ROUND, rest)):
             rest -= 1
-            kind, data = message(stranger, rng)
+            kind, data, sound = message(stranger, rng)
             sent[kind] += 1
-            if not stranger.sends(data):
+            if not stranger.sends(data) or not sound:
                 break
         over.set()
-        with suppress(Exception):  # it may be closed by the page
-            stranger._page.ping().wait(60.0)
+        why = stranger.end()
+        sent["connections read to the end"] += sound
+        assert not sound or why.endswith("DecodeError"), f"{why}, after {kind} {data[:200]!r}"
         stranger.goes()
         sys.stdout.write(f"{count - rest} of {count} messages, {sent['connections']} connections\n")
         sys.stdout.flush()
@@ -147,10 +205,13 @@ def main() -> int:
         finally:
             run.terminate()
             run.wait(30.0)
-    for kind, number in sent.most_common():
+    for kind, number in sent.most_common(SHOWN):
         sys.stdout.write(f"| {kind} | {number} |\n")
-    sys.stdout.write("the arms start afterwards; " + ("no process ended\n" if same else "A PROCESS ENDED\n"))
-    return 0 if same else 1
+    sys.stdout.write(f"| {len(sent) - SHOWN} other kinds | {sum(n for _, n in sent.most_common()[SHOWN:])} |\n")
+    quiet = not any("Traceback" in line or "does not match annotation" in line for line in lines)
+    sys.stdout.write("the arms start afterwards; " + ("no process ended; " if same else "A PROCESS ENDED; "))
+    sys.stdout.write("nothing on the terminal\n" if quiet else f"ON THE TERMINAL:\n{''.join(lines)}")
+    return 0 if same and quiet else 1
 
 
 if __name__ == "__main__":

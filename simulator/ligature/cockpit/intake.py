@@ -1,8 +1,8 @@
 """What browsers send, checked where it enters: only what the page offers, of the kind and in the range that it offers.
 
-viser takes more of a browser than this page offers: files, commands, forms, a tunnel to the internet. Parts of a file and
-marks of a form would stay in memory. It also writes any property of a control that a message names, with any value; the
-loop of the page would meet it later.
+viser takes more of a browser than this page offers: files, commands, forms, a tunnel to the internet. Parts of a file
+and marks of a form would stay in memory. It also writes any property of a control that a message names, with any value;
+the loop of the page would meet it later.
 """
 
 from __future__ import annotations
