@@ -16,9 +16,11 @@ import ast
 import copy
 import importlib.util
 import io
+import math
 import os
 import random
 import re
+import resource
 import signal
 import sys
 import time
@@ -61,7 +63,16 @@ PARTS = {
 """Modules and the tests that are theirs."""
 
 SECONDS = 60.0
-"""Time after which a mutant counts as noticed, for it hangs: on a quiet machine, else ``--seconds``."""
+"""Processor time after which a mutant counts as noticed, for it runs for ever; other work on the machine costs none."""
+
+MEMORY = 4 << 30
+"""Bytes of data above which a mutant counts as noticed, before it takes all of the machine."""
+
+IDLE = 10.0
+"""How many times that may pass on the clock: a mutant that waits for ever uses no processor."""
+
+MEMORY = 4 << 30
+"""Most bytes of a mutant: one that collects for ever counts as noticed before it takes the machine's memory."""
 
 KERNEL = re.compile(r"^@(compiled|kernel|inlined)\b", re.MULTILINE)
 
@@ -185,6 +196,9 @@ def survives(module: str, path: Path, text: str, tests: list[str], seconds: floa
     child = os.fork()
     if child == 0:
         os.setpgid(0, 0)
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds),) * 2)
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY,) * 2)
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY,) * 2)
         sys.meta_path.insert(0, Changed(module, path, text))
         code = 1
         try:
@@ -197,7 +211,7 @@ def survives(module: str, path: Path, text: str, tests: list[str], seconds: floa
                 code = pytest.main(["-x", "-q", "-m", "not slow and not ros and not corpus", "--no-header", *tests])
         finally:
             os._exit(0 if code == 0 else 1)
-    deadline = time.monotonic() + seconds
+    deadline = time.monotonic() + IDLE * seconds
     while time.monotonic() < deadline:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
@@ -220,7 +234,9 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", metavar="ROOM|MODULE[=TESTS]")
     parser.add_argument("--most", type=int, default=25, help="mutants of a module that are tried, drawn at random")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="time after which a mutant counts as noticed")
+    parser.add_argument(
+        "--seconds", type=float, default=SECONDS, help="processor time after which a mutant counts as noticed"
+    )
     given = parser.parse_args()
     os.chdir(ROOT)
     sys.path[:0] = [str(ROOT / "simulator"), str(ROOT)]
