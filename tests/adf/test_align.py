@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from ligature.adf import Resolver, read_any
 from ligature.adf.align import GAP, aligned
@@ -61,7 +61,11 @@ def least_cost(old: list, new: list) -> int:
 OPEN_ITEMS = st.lists(st.dictionaries(st.sampled_from("abc"), st.integers(0, 1), min_size=1), min_size=0, max_size=4)
 
 
+STEPS = [{"a": int(k > 0), "b": int(k > 1), "c": int(k > 2)} for k in range(4)]
+
+
 @given(OPEN_ITEMS, OPEN_ITEMS)
+@example(STEPS[:3], STEPS[1:])  # three items with one key of three cost 138, one that goes and a new one 140
 def test_no_other_alignment_changes_less(old: list, new: list) -> None:
     assert cost(old, new, aligned(old, new, same)) == least_cost(old, new)
 
@@ -78,6 +82,14 @@ def edited(draw: st.DrawFn) -> tuple[list, list]:
 @given(edited())
 def test_no_other_alignment_of_an_edited_list_changes_less(lists: tuple[list, list]) -> None:
     assert cost(*lists, aligned(*lists, same)) == least_cost(*lists)
+
+
+def test_no_other_alignment_of_any_short_lists_changes_less() -> None:
+    items = [{"a": 0, "b": 0}, {"a": 0, "b": 1}, {"a": 1, "b": 1}]
+    lists = [list(some) for length in range(5) for some in product(items, repeat=length)]
+    for old in (some for some in lists if len(some) < 4):
+        for new in lists:
+            assert cost(old, new, aligned(old, new, same)) == least_cost(old, new), (old, new)
 
 
 HEAD = "bodies: []\njoints: []\nvehicles: [V]\nV:\n  name: v\n  chassis: BODY c\n"

@@ -55,7 +55,7 @@ PARTS = {
     "bus.ring": "bus/test_outbox.py,bus/test_mailbox.py,bus/test_block.py",
     "robots.instruments": "robots/test_instruments.py",
     "robots.operating_state": "robots/test_operating_state.py",
-    "robots.trajectory": "robots/test_arm.py,robots/test_operating_state.py",
+    "robots.trajectory": "robots/test_trajectory.py,robots/test_operating_state.py",
     "robots.device": "robots/test_operating_state.py,robots/test_arm.py",
     "robots.axes": "robots/test_arm.py,robots/test_psm.py",
     "robots.poses": "robots",

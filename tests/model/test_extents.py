@@ -80,6 +80,18 @@ def test_a_cone_reaches_from_rim_to_apex_and_two_margins_beyond() -> None:
     assert np.allclose(estimate_size((lying,), np.eye(4), 0.0), (0.5, 0.2, 0.2))
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_a_cone_anywhere_spans_the_points_of_its_rim_and_its_apex(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    radius, height = rng.uniform(0.1, 1.0, 2)
+    angles = np.linspace(0.0, 2.0 * np.pi, 20_000)
+    rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(len(angles), -height / 2)])
+    T = frame(rpy_matrix(*rng.uniform(-np.pi, np.pi, 3)), rng.uniform(-2, 2, 3))
+    points = np.vstack([rim, (0.0, 0.0, height / 2)]) @ T[:3, :3].T
+    found = estimate_size((Collider(Cone(radius, height), T),), np.eye(4), 0.0)
+    assert found is not None and np.allclose(found, np.ptp(points, axis=0), atol=1e-6)
+
+
 @pytest.mark.parametrize("shapes", [(), (Collider(Plane(np.array([0.0, 0, 1]), 0.0), np.eye(4)),)])
 def test_nothing_finite_has_no_box(shapes: tuple[Collider, ...]) -> None:
     assert estimate_size(shapes, np.eye(4), 0.001) is None

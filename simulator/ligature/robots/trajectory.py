@@ -29,7 +29,7 @@ class JointTrajectory:
     Raises
     ------
     Rejected
-        When ruckig finds no trajectory: it calculates none of more than `LONGEST` seconds.
+        When ruckig finds no trajectory: for several joints it calculates none of more than `LONGEST` seconds.
     """
 
     def __init__(
