@@ -23,6 +23,9 @@ from tests.waiting import until
 
 TOKEN = "correct horse battery"
 
+AT_A_TIME = 100
+"""Tokens that are shown together: each that is looked at holds up whoever shows it for `LONGEST_PAUSE`."""
+
 
 @given(st.lists(st.floats(0.0, 3.0), min_size=10, max_size=300))
 def test_however_tokens_are_timed_few_are_looked_at(pauses: list[float]) -> None:
@@ -86,10 +89,10 @@ def test_two_hundred_wrong_tokens_are_slowed_down_and_reported(port: int, lines:
     begin = time.monotonic()
 
     def guess(first: int) -> None:
-        for number in range(first, 200, 20):
+        for number in range(first, 200, AT_A_TIME):
             found.append(status(port, f"guess{number}"))
 
-    threads = [threading.Thread(target=guess, args=(first,)) for first in range(20)]
+    threads = [threading.Thread(target=guess, args=(first,)) for first in range(AT_A_TIME)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -97,7 +100,7 @@ def test_two_hundred_wrong_tokens_are_slowed_down_and_reported(port: int, lines:
     took = time.monotonic() - begin
     looked_at = found.count(403)
     assert len(found) == 200 and set(found) == {403, 429}
-    assert looked_at <= 20 + took / FIRST_PAUSE, f"{looked_at} of 200 tokens were looked at in {took:.1f} s"
+    assert looked_at <= FREE + 1 + took / FIRST_PAUSE, f"{looked_at} of 200 tokens were looked at in {took:.1f} s"
     assert lines and all(line.startswith("cockpit: ") and "127.0.0.1" in line for line in lines)
     until(lambda: status(port, TOKEN.replace(" ", "+")) == 303, "the right token opens the page later", 60.0)
 

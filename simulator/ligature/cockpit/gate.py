@@ -77,7 +77,8 @@ class Gate:
             if wait is None:
                 self.rejected += 1
                 return _refusal(http.HTTPStatus.TOO_MANY_REQUESTS, "Too many wrong tokens. Wait, then try again.")
-            await asyncio.sleep(wait)
+            if wait:  # else nobody else is decided about before this token counts
+                await asyncio.sleep(wait)
         found = self.answer(request, who)
         if found is None and self.connections >= MOST_CONNECTIONS:
             self.complain()
