@@ -1,4 +1,4 @@
-"""Two thousand mutants, eighty scenes, and that the harness would report; `make fuzz` runs many more."""
+"""A thousand mutants, forty scenes, and that the harness would report; `make fuzz` runs a hundred times as many."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from tests.fuzz.seeds import Seed, seeds, write_scene
 
 
 def test_no_mutant_crashes_hangs_or_surprises() -> None:
-    outcome = run(2000, jobs=2)
+    outcome = run(1000, jobs=2)
     assert outcome.failures == []
-    assert sum(outcome.ended.values()) == 2000
-    assert min(outcome.total(verdict) for verdict in ("clean", "findings", "refused")) > 100
+    assert sum(outcome.ended.values()) == 1000
+    assert min(outcome.total(verdict) for verdict in ("clean", "findings", "refused")) > 50
 
 
 def test_what_check_passes_runs_a_second_finite_and_slow() -> None:
-    outcome = run(80, jobs=2, limit=SCENE_LIMIT, campaign=SCENES, chunk=40)
+    outcome = run(40, jobs=2, limit=SCENE_LIMIT, campaign=SCENES, chunk=20)
     assert outcome.failures == []
-    assert outcome.total("clean") > 60
+    assert outcome.total("clean") > 30
 
 
 @pytest.mark.parametrize("seed", seeds(), ids=lambda seed: seed.name)
