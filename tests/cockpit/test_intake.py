@@ -88,7 +88,7 @@ CAMERA = {
 UPLOAD = {"transfer_uuid": "t", "filename": "f", "mime_type": "m", "part_count": 10**6, "size_bytes": 10**12}
 
 
-def says(kind: str, **fields: Any) -> bytes:
+def packed(kind: str, **fields: Any) -> bytes:
     return msgspec.msgpack.encode({"type": kind, **fields})
 
 
@@ -101,22 +101,22 @@ def test_what_the_page_does_not_offer_has_no_effect_and_stays_nowhere(
     monkeypatch.setattr(server, "disconnect_share_url", lambda: asked.append("private"))
     shown["button"].on_hold(lambda _: asked.append("held"), callback_hz=10.0)
     connection = talk(server.get_port())
-    connection.send(says("ViewerCameraMessage", **CAMERA))
+    connection.send(packed("ViewerCameraMessage", **CAMERA))
     until(server.get_clients, "the browser is there")
     (client,) = server.get_clients().values()
     kept, before = len(server._websock_server._broadcast_buffer.message_from_id), rejections.count
     messages = [
-        *(says("GuiFormDirtyMessage", uuid=f"{i}" + 1000 * "x") for i in range(20)),
-        says("FileTransferStartUpload", source_component_uuid=text, **UPLOAD),
+        *(packed("GuiFormDirtyMessage", uuid=f"{i}" + 1000 * "x") for i in range(20)),
+        packed("FileTransferStartUpload", source_component_uuid=text, **UPLOAD),
         *(
-            says("FileTransferPart", source_component_uuid=text, transfer_uuid="t", part_index=i, content=bytes(1000))
+            packed("FileTransferPart", source_component_uuid=text, transfer_uuid="t", part_index=i, content=bytes(1000))
             for i in range(20)
         ),
-        says("ShareUrlRequest"),
-        says("ShareUrlDisconnect"),
-        says("GuiButtonHoldMessage", uuid=shown["button"]._impl.uuid, frequency=10.0),
-        says("GuiFormSubmitMessage", uuid=text),
-        says("CommandTriggerMessage", uuid=text),
+        packed("ShareUrlRequest"),
+        packed("ShareUrlDisconnect"),
+        packed("GuiButtonHoldMessage", uuid=shown["button"]._impl.uuid, frequency=10.0),
+        packed("GuiFormSubmitMessage", uuid=text),
+        packed("CommandTriggerMessage", uuid=text),
     ]
     for message in messages:
         connection.send(message)
@@ -138,10 +138,10 @@ def test_what_the_page_does_not_offer_has_no_effect_and_stays_nowhere(
 )  # fmt: skip
 def test_nobody_looks_as_nobody_can(server: viser.ViserServer, field: str, value: Any) -> None:
     shown, connection = controls(server), talk(server.get_port())
-    connection.send(says("ViewerCameraMessage", **CAMERA))
+    connection.send(packed("ViewerCameraMessage", **CAMERA))
     until(server.get_clients, "the browser is there")
     (client,) = server.get_clients().values()
-    connection.send(says("ViewerCameraMessage", **{**CAMERA, field: value}))
+    connection.send(packed("ViewerCameraMessage", **{**CAMERA, field: value}))
     connection.send(update(shown["flag"]._impl.uuid, {"value": True}))
     until(lambda: shown["flag"].value, "both are taken")
     assert client.camera.wxyz.tolist() == [1.0, 0.0, 0.0, 0.0]
@@ -153,14 +153,14 @@ def test_nobody_looks_as_nobody_can(server: viser.ViserServer, field: str, value
 def test_odd_numbers_are_neither_written_to_the_terminal_nor_kept() -> None:
     with warnings.catch_warnings(record=True) as written:
         check_input()
-        Message.deserialize(says("ViewerCameraMessage", **{**CAMERA, "wxyz": "\x1b[31m" + 1000 * "x"}))
+        Message.deserialize(packed("ViewerCameraMessage", **{**CAMERA, "wxyz": "\x1b[31m" + 1000 * "x"}))
     assert written == []
 
 
 @pytest.mark.parametrize("value", [5, ["key"], {"key": 1}, 300 * "x"])
 def test_a_browser_that_is_asked_for_a_key_gives_a_text_or_nothing(server: viser.ViserServer, value: Any) -> None:
     connection, given = talk(server.get_port()), list[Any]()
-    connection.send(says("ViewerCameraMessage", **CAMERA))
+    connection.send(packed("ViewerCameraMessage", **CAMERA))
     until(server.get_clients, "the browser is there")
     (client,) = server.get_clients().values()
 
@@ -171,7 +171,7 @@ def test_a_browser_that_is_asked_for_a_key_gives_a_text_or_nothing(server: viser
     thread.start()
     request = asked_for(connection)
     for answer in (value, "a key"):
-        connection.send(says("LocalStorageGetItemResponseMessage", value=answer, error=None, request_uuid=request))
+        connection.send(packed("LocalStorageGetItemResponseMessage", value=answer, error=None, request_uuid=request))
     thread.join(60.0)
     assert given == ["a key"]
     connection.close()

@@ -131,7 +131,7 @@ def drawn(stranger: Stranger, rng: random.Random) -> tuple[str, bytes]:
     if chance < 0.99:
         message = rng.choice([*OFFERED] if chance < 0.8 else KINDS)
         texts = [*sorted(stranger.controls), *sorted(stranger.nodes), "a text"]
-        return message.__name__, test_intake.says(message.__name__, **fields(message, texts, rng))
+        return message.__name__, test_intake.packed(message.__name__, **fields(message, texts, rng))
     return "junk", rng.choice(JUNK)
 
 
