@@ -35,7 +35,7 @@ def test_a_joint_at_rest_takes_as_long_as_the_trapezoid_of_its_limits(
 
 
 @given(moves())
-def test_a_move_starts_as_it_is_told_keeps_its_limits_and_ends_at_rest(move: tuple[np.ndarray, ...]) -> None:
+def test_a_move_starts_in_its_state_keeps_its_limits_and_ends_at_rest(move: tuple[np.ndarray, ...]) -> None:
     position, velocity, goal, max_velocity, max_acceleration = move
     found = JointTrajectory(*move)
     q, qd = (np.array(rows) for rows in zip(*map(found.at, np.linspace(0.0, found.duration, 200)), strict=True))
