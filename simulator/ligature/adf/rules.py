@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from ligature.adf.diagnostics import Diagnostic, Severity
 from ligature.adf.document import Element
 from ligature.adf.nodes import Mapping, Scalar, Sequence
-from ligature.adf.schema import SHAPE_KEYS
+from ligature.adf.schema import CLIPPING, SHAPE_KEYS
 
 Rule = Callable[[Element], Iterator[Diagnostic]]
 
@@ -183,7 +183,8 @@ def camera_view(element: Element) -> Iterator[Diagnostic]:
     near, far = element.number("clipping plane.near"), element.number("clipping plane.far")
     if not 0.0 < near < far:
         message = f"has its near clipping plane at {near:g} m and its far one at {far:g} m"
-        yield _finding(element, Severity.WARNING, "clipping plane", message, "0 < near < far")
+        hint = f"give 0 < near < far; {CLIPPING[0]:g} m and {CLIPPING[1]:g} m are taken"
+        yield _finding(element, Severity.WARNING, "clipping plane", message, hint)
     for path in ("publish image interval", "publish depth interval"):
         if element.integer(path) == 0:
             yield _finding(element, Severity.WARNING, path, f"has 0 as '{path}'; using 1", "count from 1")

@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from ligature.adf import scalars
 from ligature.adf.nodes import Mapping, Node, Scalar, Sequence, plain
 from ligature.adf.schema import Key, Type
@@ -113,6 +115,8 @@ def _matrix(key: Key, node: Node) -> tuple[tuple[float, ...], ...]:
     rows = tuple(tuple(_read(scalars.number, cell) for cell in _items(row)) for row in _items(node))
     if len(rows) != 4 or any(len(row) != 4 for row in rows):
         raise BadValue(node, "four rows of four numbers")
+    if np.linalg.matrix_rank(np.array(rows)) < 4:
+        raise BadValue(node, "four independent rows: this one has no inverse, so it shows nothing", unusable=True)
     return rows
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
+from ligature.adf.schema import CLIPPING
 from ligature.adf.schema.keys import FARTHEST
 from ligature.mesh import load_mesh
 from ligature.model.frames import Array, axis_rotation, frame, pose_matrix
@@ -20,8 +21,8 @@ from ligature.model.geometry import FileContext, GeometryError, colliders, shade
 from ligature.model.piercing import Tissue
 from ligature.model.scene import Actuator, Attachment, Body, Camera, Ghost, Identity, Light, SensorType, Slip
 
-STATIC_CUTOFF = np.pi / 2
-"""Largest half angle of a light; larger ones are clamped (§19)."""
+MIN_CUTOFF, MAX_CUTOFF = 1e-3, np.pi / 2
+"""Half angles in radians to which that of a light is clamped (§19); its shadow map needs one above 0."""
 
 
 def ghost_of(element: Element, context: FileContext) -> Callable[..., Ghost]:
@@ -72,7 +73,7 @@ def light_of(element: Element) -> Callable[..., Light]:
         Light,
         attachment=Attachment(None, light_frame(np.array(element.vector("location")), direction, rpy)),
         spot_exponent=element.number("spot exponent"),
-        cutoff=min(max(element.number("cutoff angle"), 0.0), STATIC_CUTOFF),
+        cutoff=min(max(element.number("cutoff angle"), MIN_CUTOFF), MAX_CUTOFF),
         shadow_quality=element.integer("shadow quality"),
         attenuation=(
             element.number("attenuation.constant"),
@@ -89,11 +90,13 @@ def camera_of(element: Element, folder: Path) -> Callable[..., Camera]:
     if element.has("stereo"):
         stereo = (element.number("stereo.eye separation"), element.number("stereo.focal length"))
     matrix = element.value("projection matrix")
+    near, far = element.number("clipping plane.near"), element.number("clipping plane.far")
+    near, far = (near, far) if 0.0 < near < far else CLIPPING
     return partial(
         Camera,
         attachment=Attachment(None, T),
-        near=element.number("clipping plane.near"),
-        far=element.number("clipping plane.far"),
+        near=near,
+        far=far,
         field_of_view=element.number("field view angle"),
         orthographic_width=element.value("orthographic view width"),
         stereo=stereo,

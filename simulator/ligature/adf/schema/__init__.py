@@ -4,7 +4,7 @@ Reader, checker, writer and the support table in ``docs/adf.md`` are generated f
 numbers are those of the ADF specification.
 """
 
-from ligature.adf.schema.attached import ACTUATOR, CAMERA, LIGHT, SENSOR, VOLUME
+from ligature.adf.schema.attached import ACTUATOR, CAMERA, CLIPPING, LIGHT, SENSOR, VOLUME
 from ligature.adf.schema.blocks import SHAPE_KEYS
 from ligature.adf.schema.bodies import BODY, GHOST, JOINT, SOFT_BODY, SUTURE, VEHICLE
 from ligature.adf.schema.files import DEVICES, INPUT_DEVICE, LAUNCH, LISTS, MODEL, PLURALS, WORLD
@@ -34,4 +34,4 @@ NOT_SIMULATED = {"vehicle"}
 BY_PATH: dict[str, dict[str, Key]] = {kind: {key.path: key for key in keys} for kind, keys in SCHEMA.items()}
 """The rows of `SCHEMA` by kind and path."""
 
-__all__ = ["BY_PATH", "LISTS", "NOT_SIMULATED", "PLURALS", "SCHEMA", "SHAPE_KEYS", "Fault", "Key", "Status", "Type"]
+__all__ = ["BY_PATH", "CLIPPING", "LISTS", "NOT_SIMULATED", "PLURALS", "SCHEMA", "SHAPE_KEYS", "Fault", "Key", "Status", "Type"]

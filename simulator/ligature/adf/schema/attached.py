@@ -13,6 +13,13 @@ SENSOR_TYPES = spellings("proximity", "resistance", "contact")
 ACTUATOR_TYPES = spellings("constraint")
 RENDERINGS = spellings("mesh", "rays", "transfer function")
 
+WIDEST = 16384
+"""Most pixels along an edge of a picture: the largest texture that OpenGL drivers commonly offer."""
+
+CLIPPING = (0.1, 1000.0)
+"""Nearest and farthest distance in metres of a camera whose own are not 0 < near < far: those that CHAI3D keeps then
+(``cCamera::setClippingPlanes``)."""
+
 SENSOR = (
     *IDENTITY,
     *PARENT,
@@ -63,8 +70,8 @@ def _resolution(block: str, default: tuple[int, int] | None, doc: str) -> tuple[
     width, height = default or (None, None)
     return (
         Key(block, MAP, doc=doc),
-        Key(f"{block}.width", U, width, "px", "width", required=True),
-        Key(f"{block}.height", U, height, "px", "height", required=True),
+        Key(f"{block}.width", U, width, "px", "width", required=True, least=1, most=WIDEST),
+        Key(f"{block}.height", U, height, "px", "height", required=True, least=1, most=WIDEST),
     )
 
 
@@ -77,12 +84,12 @@ CAMERA = (
     Key("clipping plane", MAP, doc="nearest and farthest distance seen"),
     Key("clipping plane.near", N, 0.1, "m", "nearest distance seen", required=True),
     Key("clipping plane.far", N, 10.0, "m", "farthest distance seen", required=True, most=math.inf),
-    Key("field view angle", N, 0.7, "rad", "vertical field of view"),
-    Key("orthographic view width", N, unit="m", doc="orthographic when present"),
+    Key("field view angle", N, 0.7, "rad", "vertical field of view", fault=Fault.VALUE, least=1e-3, most=3.14),
+    Key("orthographic view width", N, unit="m", doc="orthographic when present", fault=Fault.VALUE, least=1e-6),
     Key("stereo", MAP, doc="two eyes side by side"),
     *unused((Key("stereo.mode", T, doc="any text", required=True),)),
     Key("stereo.eye separation", N, 0.2, "m", "distance of the eyes", required=True),
-    Key("stereo.focal length", N, 0.5, "m", "distance of the common plane", required=True),
+    Key("stereo.focal length", N, 0.5, "m", "distance of the common plane", required=True, least=1e-6),
     Key("monitor", U, 0, doc="monitor of the camera's own window; the first where there are fewer"),
     Key("visible", F, True, doc="false: no window; images are published all the same"),
     *unused((Key("multipass", F, False, doc="draw transparent things in several passes; they are sorted here"),)),
@@ -104,7 +111,7 @@ CAMERA = (
     *each(("pan", "rotate", "scroll", "arcball"), N, "mouse control multipliers.{}", 1.0, doc="factor of {}"),
     *_resolution("window resolution", None, "size of the camera's own window, and of images unless they have theirs"),
     Key("camera intrinsics", MAP, doc="pinhole parameters; come before the field of view"),
-    *each(("fx", "fy", "f"), N, "camera intrinsics.{}", unit="px", doc="focal length {}; 100 when absent"),
+    *each(("fx", "fy", "f"), N, "camera intrinsics.{}", unit="px", doc="focal length {}; 100 when absent", least=1e-3),
     *each(("cx", "cy", "s"), N, "camera intrinsics.{}", unit="px", doc="{}; 0 when absent"),
     Key("projection matrix", Type.MATRIX, doc="rows of the OpenGL projection", fault=Fault.VALUE),
 )
