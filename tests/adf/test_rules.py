@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ligature
 import pytest
 from ligature.adf import Resolver, Severity, read_any
+from ligature.adf.schema import BY_PATH, SCHEMA, Status
 
 JOINT = (
     "joints: [J]\nJ:\n  name: j\n  parent: A\n  child: B\n  type: {type}\n"
@@ -60,7 +62,7 @@ def test_joint_keys_that_contradict_the_type_are_reported(tmp_path: Path, kind: 
         ),
         (
             "  look at: {x: 1, y: 0, z: 0}\n  clipping plane: {near: 2, far: 1}\n",
-            "has its near clipping plane at 2 m and its far one at 1 m; 0 < near < far",
+            "has its near clipping plane at 2 m and its far one at 1 m; give 0 < near < far; 0.1 m and 1000 m are taken",
         ),
         (
             "  look at: {x: 1, y: 0, z: 0}\n  publish image interval: 0\n",
@@ -80,13 +82,44 @@ def test_cameras_that_show_nothing_are_reported(tmp_path: Path, keys: str, words
         ("bodies", "  namespace: /a\n", "has a namespace without '/' at its end; write '/a/'"),
         ("bodies", "  publish frequency: {low: 9, high: 3}\n", "has a low publish frequency of 9 Hz, above the high one of 3 Hz"),
         ("bodies", "  plugins: [{name: p}]\n", "a plug-in of body 'X' lacks name or filename; it is left out"),
-        ("sensors", "  type: proximity\n", "has no rays, so it senses nothing; add 'array', 'mesh' or 'parametric'"),
+        ("sensors", "  type: proximity\n", "has no rays and is left out; add 'array', 'mesh' or 'parametric'"),
         ("sensors", "  type: contact\n  distance threshold: -1\n", "has a negative 'distance threshold'; use 0 to detect contact"),
         ("bodies", "  mass: -1\n", "'mass' of body 'X' is not usable; expected at least 0, not -1"),
     ],
 )  # fmt: skip
 def test_objects_that_cannot_work_are_reported(tmp_path: Path, list_: str, keys: str, words: str) -> None:
     assert words in findings(tmp_path, OBJECT.format(list=list_, keys=keys))
+
+
+@pytest.mark.parametrize(
+    ("kind", "owner"),
+    [("bodies", True), ("cameras", False), ("lights", False), ("ghost objects", False)],
+)
+@pytest.mark.parametrize(("file", "python"), [("spring.py", True), ("libdrill.so", False), ("drill.dll", False)])
+def test_plug_ins_are_offered_where_they_run(tmp_path: Path, kind: str, owner: bool, file: str, python: bool) -> None:
+    found = findings(tmp_path, OBJECT.format(list=kind, keys=f"  plugins: [{{name: p, filename: {file}}}]\n"))
+    assert ("--allow-plugins runs those in Python" in found) is (owner and python)
+    assert ("has plug-ins, which are not run" in found) is not owner
+
+
+@pytest.mark.parametrize("kind", ["soft body", "ghost object"])
+def test_keys_of_a_body_that_became_something_else_are_known(kind: str) -> None:
+    """Labs turn a body into a soft body by moving its key from one list to the other."""
+    ours = {key.path.split(".")[0] for key in SCHEMA["body"] if key.status is Status.OURS}
+    body = {key.path for key in SCHEMA["body"] if key.status in (Status.USED, Status.UNUSED) and not key.block}
+    assert body - ours - {"shaders"} <= set(BY_PATH[kind])
+
+
+@pytest.mark.parametrize("rays", ["", "  array: []\n"])
+def test_a_sensor_without_rays_is_reported_once(tmp_path: Path, rays: str) -> None:
+    lines = ["bodies: [B]", "sensors: [S]", "namespace: /n/", "B: {name: b, mass: 0}", "S:", "  name: s", "  parent: B"]
+    flat = "  location: {x: 1, y: 0, z: 0}"
+    (tmp_path / "m.yaml").write_text("\n".join([*lines, "  type: Proximity", flat, rays]))
+    found = [d.message for d in ligature.load(tmp_path / "m.yaml").diagnostics if d.severity >= Severity.WARNING]
+    assert sum("is left out" in message for message in found) == 1
+    assert [m for m in found if "unknown" in m] == [
+        "unknown keys 'location.x', 'location.y', 'location.z' in sensor 'S'"
+    ]
 
 
 def test_a_sound_object_draws_no_finding(tmp_path: Path) -> None:

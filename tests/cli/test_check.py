@@ -108,3 +108,40 @@ def test_check_takes_the_models_that_run_takes(tmp_path: Path) -> None:
     status, output = check("-l", "0,1")
     assert status == 1 and "bad.yaml:2:" in output and "none.yaml' does not exist" not in output
     assert "model index 7 is out of range" in check("-l", "0,7")[1]
+
+
+SHADERS = "{path: glsl, vertex: a.vs, fragment: a.fs}"
+
+
+@pytest.mark.parametrize("present", [[], ["a.vs"], ["a.vs", "a.fs"]])
+@pytest.mark.parametrize("place", ["model", "body", "camera", "world"])
+def test_a_missing_shader_is_reported_once_where_it_is_named(tmp_path: Path, place: str, present: list[str]) -> None:
+    """A picture shows it only to those who look for it: the built-in shader draws in its place."""
+    texts = {
+        "world.yaml": "environment: floor.yaml\ncameras: [C]\nlights: []\nnamespace: /n/\nC: {name: c, location: {x: 1, y: 0, z: 0}%s}\n",
+        "floor.yaml": "bodies: [F]\nnamespace: /n/\nF: {name: f, mass: 0.0}\n",
+        "model.yaml": "bodies: [B, D]\nnamespace: /n/\nB: {name: b, mass: 0.0%s}\nD: {name: d, mass: 0.0}\n",
+        "devices.yaml": "input devices: []\n",
+        "launch.yaml": "world config: world.yaml\ncolor config: c.yaml\ninput devices config: devices.yaml\n"
+        "multibody configs: [model.yaml]\n",
+    }
+    texts["world.yaml"] %= f", preprocessing shaders: {SHADERS}" if place == "camera" else ""
+    texts["model.yaml"] %= f", shaders: {SHADERS}" if place == "body" else ""
+    if place in ("world", "model"):
+        texts[f"{place}.yaml"] += f"shaders: {SHADERS}\n"
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "glsl").mkdir()
+    for name in present:
+        (tmp_path / "glsl" / name).write_text("void main() {}")
+    found = [d for d in findings(tmp_path / "launch.yaml", [], False) if d.severity >= Severity.WARNING]
+    if len(present) == 2:
+        assert found == []
+    else:
+        (finding,) = found
+        lacking = "a.fs" if present else "a.vs"
+        assert f"{lacking}' does not exist" in finding.message
+        assert finding.severity is Severity.WARNING and finding.hint == "the built-in shader is used instead"
+        assert finding.mark is not None and finding.mark.file.stem == (
+            "world" if place in ("world", "camera") else "model"
+        )

@@ -70,7 +70,9 @@ def test_a_camera_projects_or_is_left_out_with_an_error(folder: Path, text: str)
         assert np.isfinite(projection).all() and np.linalg.det(projection) != 0.0
 
 
-@pytest.mark.parametrize("planes", ["{near: 0.0, far: 10}", "{near: -1, far: 10}", "{near: 5, far: 5}", "{near: 9, far: 1}"])
+@pytest.mark.parametrize(
+    "planes", ["{near: 0.0, far: 10}", "{near: -1, far: 10}", "{near: 5, far: 5}", "{near: 9, far: 1}"]
+)
 def test_clipping_planes_that_enclose_nothing_are_those_of_chai3d(tmp_path: Path, planes: str) -> None:
     scene = load(tmp_path, f"{{name: eye, clipping plane: {planes}}}")
     assert (scene.cameras[0].near, scene.cameras[0].far) == (0.1, 1000.0)

@@ -91,6 +91,13 @@ def _gravity(folder: Path) -> tuple[ligature.Simulation, str]:
     return scene(folder, {"BODY ball": body}), "gravity of 900 m/s²"
 
 
+def _fall(folder: Path) -> tuple[ligature.Simulation, str]:
+    body = BALL.replace("}}", "}, gravity: {x: 3, y: 0, z: -9}, damping: {linear: 0}}")
+    simulation = scene(folder, {"BODY ball": body})
+    simulation.step(5500)
+    return simulation, "it falls, and nothing is below it"
+
+
 def _masses(folder: Path) -> tuple[ligature.Simulation, str]:
     joint = (
         f"{{name: hinge, type: fixed, parent: BODY a, child: BODY b, parent pivot: {ZERO}, child pivot: {ZERO}, "
@@ -109,7 +116,7 @@ def _overlap(folder: Path) -> tuple[ligature.Simulation, str]:
     return simulation, "it overlaps"
 
 
-@pytest.mark.parametrize("make", [_gravity, _masses, _overlap], ids=lambda make: make.__name__[1:])
+@pytest.mark.parametrize("make", [_gravity, _fall, _masses, _overlap], ids=lambda make: make.__name__[1:])
 def test_the_likely_cause_is_named(make: Callable[[Path], tuple[ligature.Simulation, str]], tmp_path: Path) -> None:
     simulation, cause = make(tmp_path)
     simulation.step(10)

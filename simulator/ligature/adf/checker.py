@@ -18,6 +18,9 @@ from ligature.adf.values import BadValue, convert, shortened
 MAX_FINDINGS = 2000
 """Most findings of one file; a file with more is not a scene."""
 
+MAX_NAMED = 6
+"""Most unknown keys of one vector or pose that are named: a flat {x, y, z, r, p, y}."""
+
 MAX_HINTED = 40
 """Longest unknown key, in characters, for which a known one is looked for."""
 
@@ -137,11 +140,13 @@ def _check_vector(key: Key, value: Mapping, element: Element, found: list[Diagno
     """Keys beside x y z, r p y or position and orientation are not read."""
     wanted = _VECTOR_KEYS[key.type]
     found += repeated_keys(value)
-    for name, (key_node, _) in value.entries.items():
-        if name not in wanted and f"{key.path}.{name}" not in BY_PATH[element.kind]:
-            message = f"unknown key '{key.path}.{shortened(name)}' in {element.kind} '{element.key}'"
-            hint = f"{key.name} holds {{{', '.join(wanted)}}}"
-            found.append(Diagnostic(Severity.WARNING, message, key_node.mark, hint, "unknown"))
+    unknown = [n for n in value.entries if n not in wanted and f"{key.path}.{n}" not in BY_PATH[element.kind]]
+    if unknown:
+        names = ", ".join(f"'{key.path}.{shortened(name)}'" for name in unknown[:MAX_NAMED])
+        more = f" and {len(unknown) - MAX_NAMED} more" if len(unknown) > MAX_NAMED else ""
+        message = f"unknown key{'s' if len(unknown) > 1 else ''} {names}{more} in {element.kind} '{element.key}'"
+        hint = f"{key.name} holds {{{', '.join(wanted)}}}"
+        found.append(Diagnostic(Severity.WARNING, message, value.entries[unknown[0]][0].mark, hint, "unknown"))
 
 
 def _check_required(node: Mapping, prefix: str, element: Element, found: list[Diagnostic]) -> None:

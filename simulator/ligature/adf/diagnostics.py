@@ -7,6 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 
+def length(metres: float, digits: int = 3) -> str:
+    """A length in the unit that a message wants: ``"0.102 mm"``, ``"1.04 m"``."""
+    millimetres = f"{1e3 * metres:.{digits}g}"
+    return f"{metres:.{digits}g} m" if "e+" in millimetres else f"{millimetres} mm"
+
+
 class Severity(enum.IntEnum):
     """How much a finding matters; only errors make `ligature check` fail."""
 

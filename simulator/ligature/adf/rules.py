@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 
 from ligature.adf.diagnostics import Diagnostic, Severity
 from ligature.adf.document import Element
-from ligature.adf.nodes import Mapping, Scalar, Sequence
+from ligature.adf.nodes import Mapping, Node, Scalar, Sequence
 from ligature.adf.schema import CLIPPING, SHAPE_KEYS
 
 Rule = Callable[[Element], Iterator[Diagnostic]]
@@ -22,6 +22,12 @@ _SPRINGS = ("linear spring", "torsion spring")
 _SIX_DOF = ("six dof", "six dof spring")
 _LIMITED = ("revolute", "prismatic", *_SPRINGS)
 _RAYS = ("PROXIMITY", "RESISTANCE")
+
+PLUGIN_OWNERS = ("launch", "world", "model", "body")
+"""Kinds of files and objects whose plug-ins are run."""
+
+LIBRARIES = (".so", ".dll", ".dylib")
+"""Ends of the file names of AMBF's plug-ins, which are compiled."""
 
 
 def _finding(
@@ -66,7 +72,7 @@ def frequencies(element: Element) -> Iterator[Diagnostic]:
 
 
 def plugins(element: Element) -> Iterator[Diagnostic]:
-    """Plug-in entries need a name and a file (§22)."""
+    """Plug-in entries need a name and a file (§22); compiled ones are reported where the others are looked for."""
     node = element.node.get("plugins")
     if node is None or (isinstance(node, Scalar) and node.null):
         return
@@ -75,10 +81,17 @@ def plugins(element: Element) -> Iterator[Diagnostic]:
         if not isinstance(entry, Mapping) or not {"name", "filename"} <= set(entry.entries):
             message = f"a plug-in of {element.kind} '{element.key}' lacks name or filename"
             yield Diagnostic(Severity.WARNING, message, entry.mark, "it is left out", "plugin")
-    if entries:
-        yield _finding(
-            element, Severity.INFO, "plugins", "has plug-ins", "--allow-plugins runs those in Python", "plugin"
-        )
+    if entries and element.kind not in PLUGIN_OWNERS:
+        hint = "those of launch, world and model files and of bodies are"
+        yield _finding(element, Severity.INFO, "plugins", "has plug-ins, which are not run", hint, "plugin")
+    elif not all(_is_compiled(entry) for entry in entries):
+        hint = "--allow-plugins runs those in Python"
+        yield _finding(element, Severity.INFO, "plugins", "has plug-ins", hint, "plugin")
+
+
+def _is_compiled(entry: Node) -> bool:
+    file = entry.get("filename") if isinstance(entry, Mapping) else None
+    return isinstance(file, Scalar) and file.text.endswith(LIBRARIES)
 
 
 def shapes(element: Element) -> Iterator[Diagnostic]:
@@ -157,7 +170,7 @@ def sensor_rays(element: Element) -> Iterator[Diagnostic]:
     if element.text("type") in _RAYS:
         if not any(element.has(path) for path in ("array", "mesh", "parametric")):
             hint = "add 'array', 'mesh' or 'parametric'"
-            yield _finding(element, Severity.WARNING, "type", "has no rays, so it senses nothing", hint)
+            yield _finding(element, Severity.WARNING, "type", "has no rays and is left out", hint)
     elif element.number("distance threshold") < 0.0:
         yield _finding(
             element,

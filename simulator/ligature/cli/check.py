@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
 
 import ligature
-from ligature.adf import AdfError, Diagnostic, Document, Resolver, Severity, read_any
+from ligature.adf import AdfError, Diagnostic, Document, ResolutionError, Resolver, Severity, read_any
 from ligature.model import reach
 from ligature.model.scene import Scene
 from ligature.physics import overlaps, springs
@@ -58,7 +59,22 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
         return list(error.diagnostics)
-    return _distinct([*document.diagnostics, *scene.diagnostics, *reach.findings(scene), *_at_start(scene)])
+    later = [*reach.findings(scene), *_at_start(scene), *_shaders(scene, resolver)]
+    return _distinct([*document.diagnostics, *scene.diagnostics, *later])
+
+
+def _shaders(scene: Scene, resolver: Resolver) -> list[Diagnostic]:
+    """Shader files that cannot be read, one finding for each place that names some; drawing finds what is in others."""
+    cameras = [files for c in scene.cameras for files in (c.preprocessing_shaders, c.depth_shaders)]
+    found = []
+    for files in dict.fromkeys([*(body.visual.shaders for body in scene.bodies), *cameras]):
+        try:
+            for path in (files.vertex, files.fragment) if files else ():
+                resolver.read_bytes(path, mark=files.mark)
+        except ResolutionError as error:
+            hint = error.diagnostic.hint or "the built-in shader is used instead"
+            found.append(replace(error.diagnostic, severity=Severity.WARNING, hint=hint, code="render"))
+    return found
 
 
 def _at_start(scene: Scene) -> list[Diagnostic]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
+from ligature.adf.diagnostics import length
 from ligature.model.axes import axes_of
 from ligature.model.axis import Axis
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_quaternion, matrix_rpy
@@ -197,7 +198,7 @@ class _Assembly:
         if metres > REPORTED_M or radians > REPORTED_RAD:
             name, key = self.bodies[outer].identity.identifier, joint.identity.key
             message = (
-                f"'{name}' starts {1e3 * metres:.3g} mm and {radians:.3g} rad away from its location: "
+                f"'{name}' starts {length(metres)} and {radians:.3g} rad away from its location: "
                 f"joint '{key}' requires it"
             )
             hint = "move the body, or the joint's pivots, axes, offset and limits"
@@ -363,14 +364,14 @@ class _Assembly:
         others = len(mechanism.chains) - 1
         loops = f"'{first.key}'" + (f" and {others} more" if others else "")
         if left > OPEN:
-            message = f"the loop of joint {loops} does not close: {1e3 * left:.3g} mm remain and are kept"
+            message = f"the loop of joint {loops} does not close: {length(left)} remain and are kept"
             hint = "correct the joint's pivots, or widen the limits of the joints of the loop"
             self.diagnostics.append(Diagnostic(Severity.WARNING, message, first.mark, hint, "loop"))
         elif file_gap > OPEN:
             message = (
-                f"the loop of joint {loops} is open by {1e3 * file_gap:.3g} mm and closes as it starts: "
-                f"'{name}' moves furthest, by {1e3 * moved[furthest]:.2g} mm, "
-                f"pivots by up to {1e3 * corrected[0]:.2g} mm"
+                f"the loop of joint {loops} is open by {length(file_gap)} and closes as it starts: "
+                f"'{name}' moves furthest, by {length(moved[furthest], 2)}, "
+                f"pivots by up to {length(corrected[0], 2)}"
             )
             severity = Severity.WARNING if moved[furthest] > PLACED_M else Severity.INFO
             self.diagnostics.append(Diagnostic(severity, message, first.mark, "", "loop"))
@@ -380,7 +381,7 @@ class _Assembly:
         if slack > OPEN:
             message = (
                 f"joint '{joint.identity.key}' is redundant in its loop; "
-                f"where it contradicts the other joints, it opens by up to {1e3 * slack:.2g} mm"
+                f"where it contradicts the other joints, it opens by up to {length(slack, 2)}"
             )
             self.diagnostics.append(Diagnostic(Severity.INFO, message, joint.identity.mark, "", "loop"))
 

@@ -275,9 +275,11 @@ class SceneBuilder:
             sensor = part.make(index=len(self.sensors), identity=identity, parent=parent)
             if sensor.type is not SensorType.CONTACT and not len(sensor.rays):
                 self._names["sensor"].identifiers.pop()
-                message = f"sensor '{element.key}' has no rays and is left out"
-                hint = "add 'array', 'mesh' or 'parametric'"
-                self.report(Diagnostic(Severity.WARNING, message, element.mark, hint, "sensor"))
+                sources = [name for name in ("array", "mesh", "parametric") if element.has(name)]
+                if sources:  # the checker reports those without
+                    message = f"'{sources[0]}' of sensor '{element.key}' gives no ray; it is left out"
+                    hint = "list at least one ray"
+                    self.report(Diagnostic(Severity.WARNING, message, element.mark_of(sources[0]), hint, "sensor"))
                 continue
             self.sensors.append(sensor)
 

@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from ligature.adf import Diagnostic, Document, Element, Mark, ResolutionError, Resolver, Severity
+from ligature.adf.rules import LIBRARIES
 
 MAX_VALUES = 250
 """Most numbers of one topic of a plug-in: those of one command."""
-
-LIBRARIES = (".so", ".dll", ".dylib")
-"""Ends of the file names of AMBF's plug-ins, which are compiled."""
 
 _NOT_PARAMETERS = ("name", "filename", "path", "publishes", "subscribes")
 

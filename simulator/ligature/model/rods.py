@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ligature.adf import Diagnostic, Severity
+from ligature.adf.diagnostics import length
 from ligature.model.frames import Array
 from ligature.model.scene import Body, Joint, JointType, RodChain, Sensor, SensorType
 from ligature.model.shapes import Capsule, Cylinder, Sphere
@@ -117,7 +118,7 @@ def _joined(
             moved[body.index] = body.T_world_body.copy()
             moved[body.index][:3, 3] += at - own
             message = (
-                f"'{body.identity.identifier}' starts {1e3 * off:.3g} mm away from its location: "
+                f"'{body.identity.identifier}' starts {length(off)} away from its location: "
                 f"joint '{joint.identity.key}' requires it, as an element of a rod"
             )
             hint = "move the body, or the joint's pivots"

@@ -15,6 +15,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
+from ligature.adf.diagnostics import length
 from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, pose7_matrix
 from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Closure
@@ -124,7 +125,7 @@ class Closures:
         """That a loop is open, by how much, and why."""
         joints, end = self._scene.joints, self._ends[k]
         name = joints[end.joint].identity
-        message = f"the loop of joint '{name.key}' is open by {1e3 * self._arrays.gap[k]:.3g} mm"
+        message = f"the loop of joint '{name.key}' is open by {length(self._arrays.gap[k])}"
         names = [f"'{joints[joint].identity.key}'" for joint in self._at_limits(end)]
         if names:
             message += f": {' and '.join(names)} {'is' if len(names) == 1 else 'are'} at the end of the range"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
+from ligature.adf.diagnostics import length
 from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Body, Joint, JointType, Scene
@@ -31,6 +32,9 @@ OPEN = 0.001
 
 STRONG_GRAVITY = 100.0
 """Gravity in m/s² from which it is a likely cause."""
+
+FALLS = 0.99
+"""Cosine between velocity and gravity from which a body falls: within 8°."""
 
 UNEQUAL = 1e4
 """Ratio of masses within a tree from which it is a likely cause."""
@@ -108,16 +112,22 @@ class Guard:
         strong = float(np.linalg.norm(body.gravity))
         if strong > STRONG_GRAVITY:
             return f"gravity of {strong:g} m/s²", "write gravity in m/s²"
+        velocity = self._twist[body.index, :3]
+        if strong > 0.0 and velocity @ body.gravity > FALLS * strong * np.linalg.norm(velocity):
+            return (
+                "it falls, and nothing is below it",
+                "put a floor below it, hold it by a joint, or set its gravity to 0",
+            )
         gaps = [(self._gap(scene.joints[j]), j) for j in scene.loops if self._touches(scene.joints[j], members)]
         gap, loop = max(gaps, default=(0.0, -1))
         if gap > OPEN:
             name = scene.joints[loop].identity.key
-            return f"joint '{name}' closes a loop that gapes by {1e3 * gap:.3g} mm", "let its pivots meet"
+            return f"joint '{name}' closes a loop that gapes by {length(gap)}", "let its pivots meet"
         depth, one, other = self._world.queries.overlap(members)
         if depth > DEEP:
             name = scene.bodies[other].identity.identifier
             who = "it" if one == body.index else f"'{scene.bodies[one].identity.identifier}'"
-            return f"{who} overlaps '{name}' by {1e3 * depth:.3g} mm", "move them apart, or disable their collision"
+            return f"{who} overlaps '{name}' by {length(depth)}", "move them apart, or disable their collision"
         masses = [scene.bodies[i].mass for i in members if scene.bodies[i].mass > 0.0]
         if max(masses) > UNEQUAL * min(masses):
             return f"joined bodies of {min(masses):g} kg and {max(masses):g} kg", "give them masses that are closer"

@@ -14,6 +14,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
+from ligature.adf.diagnostics import length
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.scene import Scene
 from ligature.physics.engine import Engine
@@ -39,7 +40,7 @@ class Overlap:
         """The overlap for the author of the scene."""
         one, other = (scene.bodies[i].identity for i in (self.body, self.other))
         message = (
-            f"'{one.identifier}' starts {1e3 * self.depth:.3g} mm inside '{other.identifier}', where joints hold it; "
+            f"'{one.identifier}' starts {length(self.depth)} inside '{other.identifier}', where joints hold it; "
             "they do not collide until they have separated"
         )
         return Diagnostic(Severity.WARNING, message, one.mark, "move them apart, or disable their collision", "overlap")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Severity
+from ligature.adf.diagnostics import length
 from ligature.model.scene import Scene
 from ligature.model.state import StateRecord
 from ligature.suture.bodies import Bodies, Masses
@@ -196,7 +197,7 @@ class Rods:
             self._names[self.colliders.body_of(part)],
         )
         message = (
-            f"'{one}' of an attached rod starts {1e3 * depth:.3g} mm inside '{other}'; such elements do not collide "
+            f"'{one}' of an attached rod starts {length(depth)} inside '{other}'; such elements do not collide "
             "with it until they have separated"
         )
         self.problems.append(Diagnostic(Severity.WARNING, message, None, "move the rod or the body", "overlap"))

@@ -34,4 +34,16 @@ NOT_SIMULATED = {"vehicle"}
 BY_PATH: dict[str, dict[str, Key]] = {kind: {key.path: key for key in keys} for kind, keys in SCHEMA.items()}
 """The rows of `SCHEMA` by kind and path."""
 
-__all__ = ["BY_PATH", "CLIPPING", "LISTS", "NOT_SIMULATED", "PLURALS", "SCHEMA", "SHAPE_KEYS", "Fault", "Key", "Status", "Type"]
+__all__ = [
+    "BY_PATH",
+    "CLIPPING",
+    "LISTS",
+    "NOT_SIMULATED",
+    "PLURALS",
+    "SCHEMA",
+    "SHAPE_KEYS",
+    "Fault",
+    "Key",
+    "Status",
+    "Type",
+]

@@ -231,7 +231,7 @@ JOINT = (
     Key("enable feedback", F, False, doc="compute effort and wrench"),
     Key("enable motor", Type.ANY, doc="0 or false: no position commands"),
     Key("ignore inter-collision", F, True, doc="the two bodies do not collide"),
-    *ignored(("detached", "redundant"), "hint for importers"),
+    *ignored(("detached", "redundant", "body rotation"), "hint for importers"),
     *ignored(("controller gains",), "not the controller's key, which is `controller`"),
     *ignored(("origin", "axis"), "of AMBF 1.0; pivots and axes replaced it"),
     ROD,
@@ -244,6 +244,9 @@ JOINT = (
         least=0.0,
     ),
 )
+_STATE_OF_JOINTS = ("publish children names", "publish joint names", "publish joint positions", "enable feedback")
+"""What the state of a body reports of joints; only rigid bodies have some."""
+
 GHOST = (
     *IDENTITY,
     *PARENT,
@@ -251,7 +254,11 @@ GHOST = (
     *unused(COLLISION, "collision groups"),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame"),
     Key("inertial offset", POSE, None, "m, rad", "taken when `collision offset` is absent"),
-    *ignored(("mass", "inertia", "friction", "damping", "restitution"), "a ghost has no mechanics"),
+    *ignored(
+        ("mass", "inertia", "friction", "damping", "restitution", "gravity", "controller", "controller output type"),
+        "a ghost has no mechanics",
+    ),
+    *ignored(_STATE_OF_JOINTS, "of bodies whose key was moved to the ghost objects"),
     Key("ligature hole", F, doc="whether needle and thread pass here; else recognised", status=Status.OURS),
     Key("ligature tissue", MAP, doc="how a hole holds what passes through it", status=Status.OURS),
     *TISSUE,
@@ -308,6 +315,7 @@ SOFT_BODY = (
         ),
         "no effect on a soft body",
     ),
+    *ignored(_STATE_OF_JOINTS, "of bodies whose key was moved to the soft bodies"),
     *_OWN_TISSUE,
 )  # fmt: skip
 _STATUS = Status.NOT_SIMULATED

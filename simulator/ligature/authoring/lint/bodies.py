@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from ligature.adf import Element, Severity
+from ligature.adf.diagnostics import length
 from ligature.adf.frames import Array, inverse
 from ligature.authoring.lint.subject import Finding, Subject, rule
 from ligature.authoring.placement import AXIS_TURNS, matrix_of
@@ -219,7 +220,7 @@ def overlap_at_rest(subject: Subject) -> Iterator[Finding]:
             continue
         depth = max((_depth(s, t) for s in shapes_a for t in shapes_b), default=0.0)
         if depth > OVERLAP:
-            message = f"it starts {1e3 * depth:.2g} mm inside '{b.key}'"
+            message = f"it starts {length(depth, 2)} inside '{b.key}'"
             yield Finding(
                 "overlap-at-rest", Severity.WARNING, a.key, message, "move one of them, or set collision groups"
             )

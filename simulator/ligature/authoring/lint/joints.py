@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ligature.adf import Element, Severity
+from ligature.adf.diagnostics import length
 from ligature.adf.frames import Array, inverse, joint_frames
 from ligature.authoring.lint.subject import Finding, Subject, rule
 from ligature.authoring.placement import matrix_of
@@ -129,13 +130,13 @@ def axes_nearly_antiparallel(subject: Subject) -> Iterator[Finding]:
     for joint, parent, child in _ends(subject):
         a = _turn(parent).T @ np.asarray(joint.vector("parent axis"))
         b = _turn(child).T @ np.asarray(joint.vector("child axis"))
-        length = np.linalg.norm(a) * np.linalg.norm(b)
-        if length == 0.0:
+        product = np.linalg.norm(a) * np.linalg.norm(b)
+        if product == 0.0:
             yield Finding(
                 "axis-zero", Severity.ERROR, joint.key, "an axis is zero", "set a direction of non-zero length"
             )
             continue
-        angle = float(np.arccos(np.clip(a @ b / length, -1.0, 1.0)))
+        angle = float(np.arccos(np.clip(a @ b / product, -1.0, 1.0)))
         if 3.13 < angle < np.pi - 1e-6:
             message = f"its axes are {angle:.5f} rad apart, where simulators disagree about the rotation of the child"
             yield Finding(
@@ -156,7 +157,7 @@ def joint_residual(subject: Subject) -> Iterator[Finding]:
             continue
         metres, radians = residual(joint, kind, parent, child)
         if metres > RESIDUAL_M or radians > RESIDUAL_RAD:
-            message = f"it is off by {1e3 * metres:.3g} mm and {radians:.3g} rad at the poses of its bodies"
+            message = f"it is off by {length(metres)} and {radians:.3g} rad at the poses of its bodies"
             hint = "move the child to where the joint holds it, or solve the joint again"
             yield Finding("joint-residual", Severity.ERROR, joint.key, message, hint)
 
