@@ -64,12 +64,14 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
 
 
 def _shaders(scene: Scene, resolver: Resolver) -> list[Diagnostic]:
-    """Shader files that cannot be read, one finding for each place that names some; drawing finds what is in others."""
+    """Shader files that cannot be read, one finding for each program; drawing finds what is wrong in others."""
     cameras = [files for c in scene.cameras for files in (c.preprocessing_shaders, c.depth_shaders)]
     found = []
     for files in dict.fromkeys([*(body.visual.shaders for body in scene.bodies), *cameras]):
+        if files is None:
+            continue
         try:
-            for path in (files.vertex, files.fragment) if files else ():
+            for path in (files.vertex, files.fragment):
                 resolver.read_bytes(path, mark=files.mark)
         except ResolutionError as error:
             hint = error.diagnostic.hint or "the built-in shader is used instead"
