@@ -108,7 +108,7 @@ curves: developers
 	mkdir -p $(CURVES)
 	set -e; for seed in 0 1 2; do \
 	  $(PYTHON) examples/scale_out.py reach $(CURVES)/reach_$$seed.onnx --seed $$seed --rounds 5 --episodes 10; \
-	  $(PYTHON) examples/scale_out.py pick $(CURVES)/pick_$$seed.onnx --seed $$seed --rounds 5 --episodes 20 --epochs 150; \
+	  $(PYTHON) examples/scale_out.py pick $(CURVES)/pick_$$seed.onnx --seed $$seed --first 60 --rounds 4 --episodes 20 --epochs 150; \
 	  $(PYTHON) examples/scale_out.py insert $(CURVES)/insert_$$seed.onnx --seed $$seed --rounds 4 --episodes 8 --noise 0.1; \
 	done
 	$(PYTHON) examples/learning_curves.py docs/pictures/learning_curves.png "episodes shown" \

@@ -119,7 +119,8 @@ def learn(given: argparse.Namespace, workers: list[Any], samples: Samples) -> No
     known, begin = set(ray.get([worker.process.remote() for worker in workers])), time.perf_counter()
     while samples.rounds < given.rounds:
         first = given.seed * SEEDS + samples.episodes
-        rolled = collect(workers, samples.rounds, samples.network, range(first, first + given.episodes))
+        count = given.episodes if samples.rounds else given.first or given.episodes
+        rolled = collect(workers, samples.rounds, samples.network, range(first, first + count))
         lost = {e.process for e in rolled} - known
         known |= lost
         observations = np.concatenate([samples.observations, *(e.observations for e in rolled)])
@@ -149,6 +150,7 @@ def main() -> int:
     arguments.add_argument("--address", help="of a Ray cluster that runs; a local one is started otherwise")
     arguments.add_argument("--rounds", type=int, default=6)
     arguments.add_argument("--episodes", type=int, default=40, help="of a round")
+    arguments.add_argument("--first", type=int, help="episodes of the first round, in which the expert shows the task")
     arguments.add_argument("--epochs", type=int, default=60, help="of training after each round")
     arguments.add_argument("--noise", type=float, default=0.2, help="that disturbs the expert, as a share of an action")
     arguments.add_argument("--seed", type=int, default=0)

@@ -12,9 +12,13 @@ from hypothesis import strategies as st
 from ligature.environments import SuturingEnv
 from ligature.environments.experts import CORRECTING, EXPERTS, Policy, demonstrate
 from ligature.environments.goals import GOALS
-from ligature.environments.hand import SHUT, Hand
+from ligature.environments.hand import JAW, SHUT, Hand
+from ligature.environments.layout import HELD
 
 from tests.environments.cheats import CHEATS, MOST, QUICK, described, roll
+
+OPENING = 48
+"""The number of an observation that has the set-point of the jaw."""
 
 LEARNING = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
 
@@ -157,3 +161,20 @@ def test_an_expert_corrects_a_policy_that_acts_in_its_stead(env: SuturingEnv) ->
     steps, info = demonstrate(env, 5, 0.3, lambda _, action: answers.append(action[:6]), stay)
     assert steps == len(answers) == MOST and not info["is_success"]
     np.testing.assert_allclose(answers[1:50], np.tile(answers[0], (49, 1)), atol=0.02)
+
+
+def test_a_disturbed_expert_shows_what_to_do_with_jaws_that_shut_on_nothing() -> None:
+    """It opens them again, and picks the needle up; without a disturbance they never shut by mistake."""
+    env = SuturingEnv("pick", max_steps=MOST)
+    for noise, mistakes in ((0.0, False), (0.1, True)):
+        shown: list[tuple[bool, float, float]] = []
+
+        def look(seen: np.ndarray, action: np.ndarray, shown: list[tuple[bool, float, float]] = shown) -> None:
+            shown.append((bool(seen[HELD]), float(seen[OPENING]), float(action[JAW])))
+
+        _, info = demonstrate(env, 5, noise, look)
+        held, opening, jaw = map(np.array, zip(*shown, strict=True))
+        opened = np.maximum.accumulate(opening) > 0.5
+        assert bool((opened & ~held & (opening < 0.2) & (jaw > 0.0)).any()) == mistakes
+        assert info["is_success"]
+    env.close()

@@ -8,6 +8,7 @@ that sees the state can learn it. World axes, metres, radians.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ GAP, LEAVE = 0.025, 0.005
 
 MORE = 0.003
 """Metres of thread that are pulled through beyond those that are asked for."""
+
+SLIPS, SLIP = 1.0 / 40.0, (6, 16)
+"""Share of actions with which a disturbed expert's jaws begin to shut by mistake, and for how many they do."""
 
 
 Act = Callable[[Array], NDArray[Any]]
@@ -120,6 +124,9 @@ EXPERTS: dict[str, Policy] = {
 CORRECTING = ("reach", "pick", "insert", "puncture", "suture")
 """Tasks whose experts act by where things are alone, so that they can correct what others do."""
 
+GRASPING = ("pick",)
+"""Those of them that begin with empty jaws, which must close on something."""
+
 
 def demonstrate(
     env: SuturingEnv, seed: int, noise: float, look: Callable[[Array, Array], None], act: Act | None = None
@@ -135,7 +142,8 @@ def demonstrate(
     noise
         Disturbs the expert, as a share of an action; each episode has its own part of it, from none to all. A policy
         that is shown nothing but the expert's own way cannot find back to it (Laskey et al., Conference on Robot
-        Learning 2017).
+        Learning 2017). In tasks of `GRASPING` the jaws shut by mistake now and then, if there is any: a policy whose
+        jaws shut on nothing must have seen what to do then.
     look
         Called with each observation and with what the expert would do there.
     act
@@ -153,12 +161,15 @@ def demonstrate(
     rng, steps = np.random.default_rng(seed), 0
     noise *= float(rng.uniform())
     disturbance = np.zeros(action_width(len(env.arms)))
+    slips = _slips(seed) if noise and env.task in GRASPING else repeat(False)
     for action in EXPERTS[env.task](Hand(env), observation):
         look(observation, action)
         if act is None:
             disturbance = 0.9 * disturbance + noise * rng.standard_normal(disturbance.shape)
             disturbance[JAW::ACTION] = 0.0
             taken = action + disturbance
+            if next(slips):
+                taken[JAW] = -1.0
         else:
             taken = act(observation)
         observation, _, ended, cut, info = env.step(np.asarray(taken, dtype=np.float32))
@@ -166,3 +177,13 @@ def demonstrate(
         if ended or cut:
             break
     return steps, info
+
+
+def _slips(seed: int) -> Iterator[bool]:
+    """Whether the jaws shut by mistake, for each action."""
+    rng = np.random.default_rng([seed, 1])
+    while True:
+        if rng.uniform() < SLIPS:
+            yield from repeat(True, int(rng.integers(*SLIP)))
+        else:
+            yield False
