@@ -75,7 +75,7 @@ def roll(env: SuturingEnv, policy: Policy | None, seed: int, noise: float) -> Ep
     def look(observation: np.ndarray, action: np.ndarray) -> None:
         seen.append((np.asarray(observation, np.float32), np.clip(action, -1.0, 1.0).astype(np.float32)))
 
-    _, info = demonstrate(env, seed, noise, look, None if policy is None else policy(env, seed))
+    _, info = demonstrate(env, seed, noise, look, None if policy is None else policy(env, seed), slips=True)
     observations, actions = map(np.stack, zip(*seen, strict=True))
     return Episode(observations, actions, bool(info["is_success"]), os.getpid())
 

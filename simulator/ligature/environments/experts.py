@@ -36,7 +36,7 @@ MORE = 0.003
 """Metres of thread that are pulled through beyond those that are asked for."""
 
 SLIPS, SLIP = 1.0 / 40.0, (6, 16)
-"""Share of actions with which a disturbed expert's jaws begin to shut by mistake, and for how many they do."""
+"""Share of actions with which an expert's jaws begin to shut by mistake, and for how many they do."""
 
 
 Act = Callable[[Array], NDArray[Any]]
@@ -129,7 +129,12 @@ GRASPING = ("pick",)
 
 
 def demonstrate(
-    env: SuturingEnv, seed: int, noise: float, look: Callable[[Array, Array], None], act: Act | None = None
+    env: SuturingEnv,
+    seed: int,
+    noise: float,
+    look: Callable[[Array, Array], None],
+    act: Act | None = None,
+    slips: bool = False,
 ) -> tuple[int, dict[str, Any]]:
     """One episode in which the expert says all the time what is to be done; what is done may be something else.
 
@@ -142,13 +147,15 @@ def demonstrate(
     noise
         Disturbs the expert, as a share of an action; each episode has its own part of it, from none to all. A policy
         that is shown nothing but the expert's own way cannot find back to it (Laskey et al., Conference on Robot
-        Learning 2017). In tasks of `GRASPING` the jaws shut by mistake now and then, if there is any: a policy whose
-        jaws shut on nothing must have seen what to do then.
+        Learning 2017).
     look
         Called with each observation and with what the expert would do there.
     act
         A policy that acts in the stead of an expert of `CORRECTING`, which only corrects it (Ross, Gordon and Bagnell,
         International Conference on Artificial Intelligence and Statistics 2011).
+    slips
+        Have the jaws of an expert of `GRASPING` shut by mistake now and then, so that it shows what to do with jaws
+        that shut on nothing.
 
     Returns
     -------
@@ -161,14 +168,14 @@ def demonstrate(
     rng, steps = np.random.default_rng(seed), 0
     noise *= float(rng.uniform())
     disturbance = np.zeros(action_width(len(env.arms)))
-    slips = _slips(seed) if noise and env.task in GRASPING else repeat(False)
+    slipping = _slipping(seed) if slips and env.task in GRASPING else repeat(False)
     for action in EXPERTS[env.task](Hand(env), observation):
         look(observation, action)
         if act is None:
             disturbance = 0.9 * disturbance + noise * rng.standard_normal(disturbance.shape)
             disturbance[JAW::ACTION] = 0.0
             taken = action + disturbance
-            if next(slips):
+            if next(slipping):
                 taken[JAW] = -1.0
         else:
             taken = act(observation)
@@ -179,7 +186,7 @@ def demonstrate(
     return steps, info
 
 
-def _slips(seed: int) -> Iterator[bool]:
+def _slipping(seed: int) -> Iterator[bool]:
     """Whether the jaws shut by mistake, for each action."""
     rng = np.random.default_rng([seed, 1])
     while True:
