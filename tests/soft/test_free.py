@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from ligature import Simulation
 from scipy.spatial.transform import Rotation
@@ -20,6 +20,8 @@ FLOATING = "  gravity: {x: 0, y: 0, z: 0}\n  mass:"
 
 SIZES = st.tuples(*[st.floats(0.02, 0.06)] * 3)
 ANGLES = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
+HEAVIEST = 0.15
+"""Greatest pressure of a body's own weight, in parts of Young's modulus."""
 YOUNGS, DENSITIES = st.floats(3.3, 6.0).map(lambda e: 10.0**e), st.floats(2.0, 3.5).map(lambda e: 10.0**e)
 
 few = settings(
@@ -115,6 +117,8 @@ def test_it_sinks_on_a_smooth_table_as_a_column_does_and_lies_still(tmp_path, yo
 @few
 @given(size=SIZES, rpy=ANGLES, young=YOUNGS, density=DENSITIES)
 def test_dropped_it_comes_to_rest_with_its_weight_and_does_not_sink(tmp_path, size, rpy, young, density):
+    # what its own weight would press flat sinks by millimetres as it falls
+    assume(density * GRAVITY * max(size) < HEAVIEST * young)
     simulation = Simulation(load(tmp_path, block(size, young, density, (0.0, 0.0, 0.07), rpy), TABLE))
     lowest = 0.0
     for _ in range(60):
