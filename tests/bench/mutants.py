@@ -65,9 +65,6 @@ PARTS = {
 SECONDS = 60.0
 """Processor time after which a mutant counts as noticed, for it runs for ever; other work on the machine costs none."""
 
-MEMORY = 4 << 30
-"""Bytes of data above which a mutant counts as noticed, before it takes all of the machine."""
-
 IDLE = 10.0
 """How many times that may pass on the clock: a mutant that waits for ever uses no processor."""
 
@@ -197,7 +194,6 @@ def survives(module: str, path: Path, text: str, tests: list[str], seconds: floa
     if child == 0:
         os.setpgid(0, 0)
         resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds),) * 2)
-        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY,) * 2)
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY,) * 2)
         sys.meta_path.insert(0, Changed(module, path, text))
         code = 1

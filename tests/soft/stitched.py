@@ -16,13 +16,14 @@ from ligature.adf.frames import minimal_rotation
 from ligature.model.frames import axis_rotation, matrix_pose7, matrix_quaternion, pose7_matrix, quaternion_matrix
 from ligature.soft.frame import Frame
 from ligature.soft.thread import SceneThread
-from ligature.suture.description import FREE, Attachment, from_material
+from ligature.suture.description import from_material
 from ligature.tissue.block import TissueBlock
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from tests.suture.conftest import DT, Bench, body, damped
 from tests.suture.knots import closed, determinant
+from tests.suture.throws import in_hands
 
 Array = NDArray[np.float64]
 
@@ -152,12 +153,7 @@ class StitchedWound:
             laid, thread.thick, thread.youngs, 1100.0, friction=thread.friction, gravity=(0, 0, 0), damping=0.003,
             straight=False, yield_strain=thread.yield_strain,
         )  # fmt: skip
-        none, ends = np.zeros(3), []
-        for element, hand, end in ((0, LEFT, 0), (n - 1, RIGHT, 1)):
-            T = np.eye(4)
-            T[:3, 3] = made.ends[element, end]
-            ends.append(Attachment(element, hand, T, np.eye(4), none, none, none, *FREE))
-        made = replace(made, compliance=np.full(n - 1, length / 4000.0), attachments=tuple(ends))
+        made = replace(made, compliance=np.full(n - 1, length / 4000.0), attachments=in_hands(made, LEFT, RIGHT))
         self.rod = self.bench.add(damped(made, 0.9))
         needle = SimpleNamespace(body=SimpleNamespace(index=LEFT), met=False)
         self.thread = SceneThread(self.rod, needle, self.block, self.frame)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.shapes import Cylinder
-from ligature.suture.description import FREE, Attachment, from_material
+from ligature.suture.description import FREE, Attachment, RodDescription, from_material
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
@@ -71,6 +71,16 @@ def throws(senses: Sequence[int], tail: float) -> tuple[Array, Array, int]:
     return np.vstack([first[::-1], second[1:]]), np.array(tips).reshape(-1, 2, 3), len(first) - 1
 
 
+def in_hands(thread: RodDescription, left: int, right: int) -> tuple[Attachment, ...]:
+    """Two bodies hold the ends of a thread, which turn freely."""
+    none, held = np.zeros(3), []
+    for element, hand, end in ((0, left, 0), (len(thread.ends) - 1, right, 1)):
+        T = np.eye(4)
+        T[:3, 3] = thread.ends[element, end]
+        held.append(Attachment(element, hand, T, np.eye(4), none, none, none, *FREE))
+    return tuple(held)
+
+
 class KnotOverWound:
     """A knot laid over a wound that fingers keep closed; two hands hold the ends of its thread."""
 
@@ -92,12 +102,7 @@ class KnotOverWound:
             points, THICK, 2e7, 1100.0, friction=friction, gravity=(0, 0, 0), damping=0.003, straight=False,
             yield_strain=yield_strain,
         )  # fmt: skip
-        none, ends = np.zeros(3), []
-        for element, hand, end in ((0, LEFT, 0), (n - 1, RIGHT, 1)):
-            T = np.eye(4)
-            T[:3, 3] = made.ends[element, end]
-            ends.append(Attachment(element, hand, T, np.eye(4), none, none, none, *FREE))
-        made = replace(made, compliance=np.full(n - 1, at[-1] / n / 4000.0), attachments=tuple(ends))
+        made = replace(made, compliance=np.full(n - 1, at[-1] / n / 4000.0), attachments=in_hands(made, LEFT, RIGHT))
         self.rod = self.bench.add(damped(made, 0.9))
         self._sides = {hand: float(np.sign(self.bench.pose[hand][1])) for hand in (LEFT, RIGHT)}
         self._laid, self._bottom = self.rod.positions.copy(), round(at[bottom] / at[-1] * n)
