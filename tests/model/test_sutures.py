@@ -7,8 +7,14 @@ from pathlib import Path
 import ligature
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from ligature import Scene, Simulation
 from ligature.adf import Severity
+from ligature.model import sutures
+from ligature.model.frames import pose_matrix
+from ligature.model.scene import JointType
+from ligature.model.shapes import Capsule
 from ligature.model.sutures import USP_MILLIMETRES
 from ligature.suture.description import from_chain
 
@@ -40,6 +46,80 @@ def test_one_block_becomes_one_rod_of_the_given_data(tmp_path: Path) -> None:
     assert six.stiffness[3] == pytest.approx(1e8 * np.pi * rod.radius**4 / 4 / 0.005)
     assert scene.bodies[rod.bodies[3]].identity.identifier == "/ambf/env/SUTURE silk_003"
     assert all(scene.bodies[b].identity.passive for b in rod.bodies)
+
+
+TRIPLE = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+
+
+def place(key: str, position: tuple[float, ...], turn: tuple[float, ...]) -> str:
+    x, y, z = position
+    r, p, w = turn
+    return f"{key}: {{position: {{x: {x}, y: {y}, z: {z}}}, orientation: {{r: {r}, p: {p}, y: {w}}}}}"
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    swaged=st.booleans(), n=st.integers(4, 12), length=st.floats(0.01, 1.0), diameter=st.floats(1e-4, 1e-2),
+    density=st.floats(100.0, 5000.0), start=st.tuples(TRIPLE, TRIPLE), needle=st.tuples(TRIPLE, TRIPLE),
+    inertial=st.tuples(TRIPLE, TRIPLE),
+)  # fmt: skip
+def test_elements_of_any_thread_are_cylinders_in_a_row_whose_joints_fit(
+    tmp_path_factory: pytest.TempPathFactory, swaged: bool, n: int, length: float, diameter: float, density: float,
+    start: tuple[tuple[float, ...], ...], needle: tuple[tuple[float, ...], ...], inertial: tuple[tuple[float, ...], ...],
+) -> None:  # fmt: skip
+    """At rest both frames of a joint coincide; second moments are sums over points, not the formula of a cylinder."""
+    text = (
+        "bodies: [BODY Needle]\nsutures: [SUTURE silk]\n"
+        "BODY Needle: {name: Needle, mass: 0.001, collision shape: SPHERE, collision geometry: {radius: 0.001}, "
+        f"{place('location', *needle)}, {place('inertial offset', *inertial)}}}\n"
+        f"SUTURE silk: {{name: silk, length: {length}, diameter: {diameter}, youngs modulus: 1.0e+8, "
+        f"density: {density}, elements: {n}, {'parent: BODY Needle, ' if swaged else ''}{place('location', *start)}}}\n"
+    )
+    scene = load(tmp_path_factory.mktemp("m"), text)
+    T_start = pose_matrix(*start)
+    if swaged:
+        T_start = scene.bodies[0].T_world_body @ T_start
+    elements = scene.bodies[1:]
+    assert len(elements) == n
+    each = length / n
+    radius = diameter / 2
+    around = [(np.cos(a), np.sin(a)) for a in np.pi / 2 * np.arange(4)]
+    points = [
+        (radius / np.sqrt(2) * x, radius / np.sqrt(2) * y, z * each / np.sqrt(12)) for x, y in around for z in (-1, 1)
+    ]
+    square = np.square(points).mean(axis=0)  # Gauss's points: exact for squares over a cylinder
+    mass = density * np.pi * radius**2 * each
+    for i, body in enumerate(elements):
+        middle = T_start @ (0.0, 0.0, (i + 0.5) * each, 1.0)
+        assert np.allclose(body.T_world_body[:3, 3], middle[:3]) and np.allclose(
+            body.T_world_body[:3, :3], T_start[:3, :3]
+        )
+        assert body.mass == pytest.approx(mass)
+        assert np.allclose(body.inertia, mass * (square.sum() - square), rtol=1e-9, atol=0.0)
+        (collider,) = body.colliders
+        assert isinstance(collider.shape, Capsule)
+        assert (collider.shape.radius, collider.shape.height) == pytest.approx((radius, each + diameter))
+        assert body.collision_margin == pytest.approx(radius / 10)
+    assert len(scene.joints) == n - 1 + swaged
+    for joint in scene.joints:
+        parent, child = scene.bodies[joint.parent], scene.bodies[joint.child]
+        inertials = [body.T_world_body @ body.T_body_inertial for body in (parent, child)]
+        assert np.allclose(inertials[0] @ joint.T_parent_a, inertials[1] @ joint.T_child_b)
+        assert np.allclose(parent.T_world_body @ joint.T_parent_child_zero, child.T_world_body)
+        assert np.allclose(inertials[0][:3, :3] @ joint.axis, T_start[:3, 2])
+        assert joint.passive and joint.identity.passive
+        if joint.type is JointType.SIX_DOF_SPRING:
+            assert joint.six_dof is not None
+            assert not joint.six_dof.low[:3].any() and not joint.six_dof.high[:3].any()
+            assert not joint.six_dof.stiffness[:3].any() and not joint.six_dof.equilibrium.any()
+    fixed = [(joint.parent, joint.child) for joint in scene.joints if joint.type is JointType.FIXED]
+    assert fixed == ([(0, 1)] if swaged else [])
+
+
+def test_a_thread_may_have_the_fewest_and_the_most_elements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sutures, "MOST_ELEMENTS", 7)
+    for n, rods in ((3, 0), (4, 1), (7, 1), (8, 0)):
+        assert len(load(tmp_path, NEEDLE + SILK.replace("elements: 20", f"elements: {n}")).rods) == rods
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
@@ -119,9 +199,11 @@ def test_it_hangs_from_its_needle(tmp_path: Path) -> None:
     ("old", "new", "text"),
     [
         ("USP size: 2-0", "USP size: 99", "has the USP size '99'; give diameter, or one of 10-0"),
-        ("elements: 20", "elements: 2", "has 2 elements; give 4 to 2000"),
+        ("elements: 20", "elements: 3", "has 3 elements; give 4 to 2000"),
+        ("elements: 20", "elements: 2001", "has 2001 elements; give 4 to 2000"),
         ("length: 0.1", "length: 0", "has no length; give metres"),
         ("USP size: 2-0", "diameter: -1", "has the diameter -1; give metres"),
+        ("USP size: 2-0", "diameter: 0", "has the diameter 0; give metres"),
     ],
 )
 def test_data_that_make_no_thread_are_reported(tmp_path: Path, old: str, new: str, text: str) -> None:

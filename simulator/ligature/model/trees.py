@@ -20,11 +20,11 @@ MAX_LINKS = 112
 
 @dataclass
 class _Below:
-    """Descendants of a body: (child body, joint) in the order of §11."""
+    """Descendants of a body, (child body, joint) in the order of §11, and its ancestors."""
 
     pairs: list[tuple[int, int]] = field(default_factory=list)
     children: set[int] = field(default_factory=set)
-    ancestors: list[int] = field(default_factory=list)
+    ancestors: dict[int, None] = field(default_factory=dict)
 
     def add(self, pairs: Iterable[tuple[int, int]]) -> None:
         for child, joint in pairs:
@@ -48,9 +48,7 @@ def command_vectors(n_bodies: int, joints: Sequence[Joint]) -> list[tuple[tuple[
                 below[body].add(pairs)
         heirs = (joint.child, *(child for child, _ in below[joint.child].pairs))
         for heir in heirs:
-            for ancestor in (joint.parent, *parent.ancestors):
-                if ancestor not in below[heir].ancestors and ancestor != heir:
-                    below[heir].ancestors.append(ancestor)
+            below[heir].ancestors.update({above: None for above in (joint.parent, *parent.ancestors) if above != heir})
     result = []
     for entry in below:
         active = [(child, joint) for child, joint in entry.pairs if not joints[joint].passive]
