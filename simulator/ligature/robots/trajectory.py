@@ -39,7 +39,6 @@ class JointTrajectory:
         n = len(goal)
         request = InputParameter(n)
         request.current_position, request.current_velocity = position.tolist(), velocity.tolist()
-        request.current_acceleration = [0.0] * n
         request.target_position = goal.tolist()
         request.target_velocity = request.target_acceleration = [0.0] * n
         request.max_velocity, request.max_acceleration = max_velocity.tolist(), max_acceleration.tolist()
