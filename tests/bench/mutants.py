@@ -6,7 +6,7 @@ A mutant is a module with one operator, comparison, constant or condition change
 the module run against it in a process of their own, forked after the packages that do not change were imported, so that a
 mutant takes as long as its tests. ``TESTS`` are paths below `tests`, divided by commas: those of the module's room where
 `PARTS` has none; a room is all of its modules. Without arguments `PARTS` are done. Kernels run as Python, for machine code
-that is kept would hide what changed.
+that is kept would hide what changed; tests marked `machine_code` are left out then.
 """
 
 from __future__ import annotations
@@ -44,6 +44,8 @@ PARTS = {
     "model.endoscopes": "model/test_endoscopes.py",
     "model.extents": "model/test_extents.py",
     "model.rods": "model/test_rods.py",
+    "model.sutures": "model/test_sutures.py",
+    "model.tissue": "model/test_tissue.py",
     "model.softening": "model/test_softening.py",
     "model.lookup": "model/test_lookup.py",
     "model.naming": "model/test_naming.py,model/test_load.py,model/test_prefix.py,model/test_proxies.py",
@@ -58,6 +60,7 @@ PARTS = {
     "robots.trajectory": "robots/test_trajectory.py,robots/test_operating_state.py",
     "robots.device": "robots/test_operating_state.py,robots/test_arm.py",
     "robots.axes": "robots/test_arm.py,robots/test_psm.py",
+    "robots.ecm": "robots/test_ecm.py",
     "robots.poses": "robots",
 }
 """Modules and the tests that are theirs."""
@@ -200,11 +203,13 @@ def survives(module: str, path: Path, text: str, tests: list[str], seconds: floa
         try:
             import pytest
 
+            marks = "not slow and not ros and not corpus"
             if KERNEL.search(text):
                 interpret_kernels()
+                marks += " and not machine_code"
 
             with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-                code = pytest.main(["-x", "-q", "-m", "not slow and not ros and not corpus", "--no-header", *tests])
+                code = pytest.main(["-x", "-q", "-m", marks, "--no-header", *tests])
         finally:
             os._exit(0 if code == 0 else 1)
     deadline = time.monotonic() + IDLE * seconds

@@ -19,6 +19,7 @@ def random_joints(mtm: Mtm, count: int) -> np.ndarray:
     return np.random.default_rng(5).uniform(mtm.lower, mtm.upper, (count, 7))
 
 
+@pytest.mark.machine_code
 def test_the_inverse_undoes_the_forward_for_100000_poses(mtm):
     q = random_joints(mtm, 100_000)
     T = mtm.forward(q)

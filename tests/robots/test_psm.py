@@ -32,6 +32,7 @@ def random_joints(psm: Psm, count: int, nearest: float = NEAR) -> np.ndarray:
     return np.random.default_rng(psm.instrument.id).uniform(lower, psm.upper, (count, 6))
 
 
+@pytest.mark.machine_code
 @pytest.mark.parametrize(("number", "model"), NUMBERS)
 def test_the_inverse_undoes_the_forward_for_100000_poses(number, model):
     psm = Psm(number, model)
@@ -156,6 +157,7 @@ def test_a_pose_of_the_palm_above_the_remote_centre_is_answered_as_such(depth):
     assert np.isnan(result.q).all()
 
 
+@pytest.mark.machine_code
 def test_every_pose_of_the_palm_above_the_remote_centre_is_answered_as_such():
     psm = Psm(400006, "SRC")
     q = random_joints(psm, 100_000)
