@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ligature.model import tissue
+from ligature.model.frames import pose_matrix
 from ligature.model.material import MATERIALS
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
@@ -127,7 +129,7 @@ def test_tissue_is_fixed_to_the_body_that_carries_it(tmp_path: Path) -> None:
         (LINE, LINE + "    youngs modulus: 0\n", "'ligature tissue.youngs modulus'"),
         (LINE, LINE + "    friction: -1\n", "'ligature tissue.friction'"),
         (LINE, LINE + "    fixed: [bottom]\n", "no face 'bottom'"),
-        ("0.005\n", "0.0001\n", "cells of 0.0001 m"),
+        ("0.005\n", "0.0001\n", "lies in a grid of"),
         ("0.005\n", "0.001\n", "nodes"),
         (LINE, LINE + "    slits: [{from: {x: 0, y: 0, z: 0}}]\n", "lacks the key 'to'"),
         (
@@ -142,6 +144,7 @@ def test_tissue_is_fixed_to_the_body_that_carries_it(tmp_path: Path) -> None:
         ),
         (LINE, LINE + "    slits: [{from: {x: -1, y: -1, z: 0}, to: {x: 1, y: 1, z: 0}}]\n", "are not held"),
         (LINE, LINE + "    layers: [{material: fat}, {material: skin}]\n", "layer without thickness"),
+        (LINE, LINE + "    layers: [{thickness: 0, material: fat}, {material: skin}]\n", "layer without thickness"),
         (
             LINE,
             LINE + "    fixed: []\n    slits: [{from: {x: 0, y: -1, z: -1}, to: {x: 0, y: 1, z: 1}}]\n",
@@ -161,6 +164,72 @@ def test_what_cannot_be_tissue_is_reported_where_it_stands(tmp_path: Path, old: 
     errors = [d for d in found if d.severity.name == "ERROR"]
     assert any(message in d.message for d in errors), errors
     assert all(d.mark is not None and d.mark.line > 1 and d.hint for d in errors)
+
+
+def test_a_body_may_have_as_many_nodes_as_are_simulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A box has all nodes of the grid around it, so that both bounds see the same number."""
+    for most, message in (
+        (540, ""),
+        (539, "has 540 nodes"),
+        (27, "has 540 nodes"),
+        (26, "lies in a grid of 540 nodes"),
+    ):
+        monkeypatch.setattr(tissue, "MOST_NODES", most)
+        found = load(tmp_path, PAD.replace("x: 0.06, y: 0.04, z: 0.01", "x: 0.095, y: 0.04, z: 0.01", 1))
+        errors = [d.message for d in found.diagnostics if d.severity.name == "ERROR"]
+        assert (message in errors[0] and not found.tissues) if message else (not errors and found.tissues), most
+
+
+NUMBER = st.floats(-1.0, 1.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(at=st.tuples(*[NUMBER] * 3), turn=st.tuples(*[NUMBER] * 3), mass=st.floats(0.01, 10.0))
+def test_moments_about_any_frame_are_those_of_a_box_with_steiners_share(
+    tmp_path_factory: pytest.TempPathFactory, at: tuple[float, ...], turn: tuple[float, ...], mass: float
+) -> None:
+    """I = R' (I_box + m (|p|² 1 - p p')) R, of whose matrix a body keeps the diagonal."""
+    offset = (
+        f"  inertial offset: {{position: {{x: {at[0]}, y: {at[1]}, z: {at[2]}}}, "
+        f"orientation: {{r: {turn[0]}, p: {turn[1]}, y: {turn[2]}}}}}\n"
+    )
+    text = PAD.replace("  mass: 0.0\n", f"  mass: {mass}\n{offset}", 1)
+    scene = load(tmp_path_factory.mktemp("m"), text)
+    body = scene.bodies[scene.tissues[0].body]
+    T = pose_matrix(at, turn)
+    np.testing.assert_allclose(body.T_body_inertial, T, atol=1e-12)
+    square = np.square((0.06, 0.04, 0.01))
+    p = np.array(at)
+    about = np.diag(square.sum() - square) / 12 + p @ p * np.eye(3) - np.outer(p, p)
+    np.testing.assert_allclose(body.inertia, mass * np.diag(T[:3, :3].T @ about @ T[:3, :3]), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("stated", "density"),
+    [
+        ("youngs modulus: 30000", None),
+        ("youngs modulus: 30000, density: 2000", 2000.0),
+        ("material: fat", MATERIALS["fat"].density),
+        ("material: fat, density: 2000", 2000.0),
+    ],
+)
+def test_a_stated_density_or_material_holds_beside_a_mass(tmp_path: Path, stated: str, density: float | None) -> None:
+    block = f"  ligature tissue: {{{stated}, cell size: 0.005, fixed: []}}\n"
+    start, end = PAD.index("  ligature tissue:"), PAD.index("BODY Tray:\n")
+    text = (PAD[:start] + block + PAD[end:]).replace("mass: 0.0", "mass: 0.5")
+    (found,) = load(tmp_path, text).tissues
+    volume = 0.06 * 0.04 * 0.01
+    assert found.form.cell_masses.sum() == pytest.approx(0.5 if density is None else density * volume)
+
+
+def test_a_finding_states_nodes_cells_and_stiffness_of_every_body_of_tissue(tmp_path: Path) -> None:
+    layers = "    layers: [{thickness: 0.004}, {youngs modulus: 1234}]\n"
+    text = PAD.replace(LINE, LINE + layers).replace("z: 0.01}", "z: 0.008}", 1)
+    (found,) = [d for d in load(tmp_path, text).diagnostics if "soft tissue" in d.message]
+    young = f"{MATERIALS['silicone pad'].youngs:.3g} and 1.23e+03"
+    assert found.message == (f"'BODY Pad' is soft tissue: 351 nodes, cells of 5 x 5 x 4 mm, Young's modulus {young} Pa")
+    assert (found.severity.name, found.hint) == ("INFO", "docs/tissue.md")
+    assert found.mark is not None and found.mark.line == text[: text.index("BODY Pad:")].count("\n") + 2
 
 
 def test_an_open_mesh_is_reported(tmp_path: Path) -> None:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
 MOST_NODES = 6000
 """Most nodes of a body: with more, a step takes longer than the four ticks that it stands for."""
+MOST_AROUND = 20
+"""Nodes of the grid around a shape, for each of `MOST_NODES`: of a larger grid nothing is sampled."""
 
 
 def tissue_of(
@@ -51,12 +53,10 @@ def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: T
     cell = element.value("ligature tissue.cell size")
     if cell is None:
         cell = usual_cell(vertices, bool(element.texts("ligature tissue.fixed")))
-    if not cell > 0.0:
-        raise _error(element, "ligature tissue.cell size", f"has cells of {cell:g} m", "give metres above 0")
-    cells = np.prod(np.ceil(np.ptp(vertices, axis=0) / cell) + 1.0)
-    if cells > 20 * MOST_NODES:
-        raise _error(element, "ligature tissue.cell size", f"would have {cells:.0f} cells of {cell:g} m",
-                     f"at most {MOST_NODES} nodes are simulated; use larger cells")  # fmt: skip
+    nodes = np.prod(np.ceil(np.ptp(vertices, axis=0) / cell) + 1.0)
+    if nodes > MOST_AROUND * MOST_NODES:
+        raise _error(element, "ligature tissue.cell size", f"lies in a grid of {nodes:.0f} nodes",
+                     f"at most {MOST_NODES} are simulated; use larger cells than {cell:g} m")  # fmt: skip
     slits = [np.array([item.vector("from"), item.vector("to")]) for item in element.children("ligature tissue.slits")]
     materials, heights = _layers(element, base, float(vertices[:, 2].max()))
     try:
@@ -72,7 +72,7 @@ def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: T
         raise _error(element, "ligature tissue.cell size", f"has {len(grid.nodes)} nodes",
                      f"at most {MOST_NODES} are simulated; use larger cells than {cell:g} m")  # fmt: skip
     fixed = _fixed(element, grid)
-    stated = element.has("ligature tissue.density") or element.has("ligature tissue.material")
+    stated = any(element.has(f"ligature tissue.{key}") for key in ("density", "material"))
     return TissueForm(grid, materials, fixed, own_density=stated, slits=tuple(slits))
 
 
