@@ -30,6 +30,8 @@ from importlib.abc import MetaPathFinder, SourceLoader
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
+from hypothesis import Phase, settings
+
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = {
     "adf.values": "adf",
@@ -170,6 +172,16 @@ class Changed(MetaPathFinder, SourceLoader):
         raise OSError("no bytecode")
 
 
+class Unshrunk:
+    """Has Hypothesis stop at the first example that fails: a smaller one, sought for up to minutes, says nothing more."""
+
+    def pytest_sessionstart(self) -> None:
+        """Change the profile that the tests' own configuration has loaded, before their modules are."""
+        usual = settings.get_profile("same")
+        settings.register_profile("unshrunk", parent=usual, phases=[Phase.explicit, Phase.generate])
+        settings.load_profile("unshrunk")
+
+
 def interpret_kernels() -> None:
     """Let kernels be plain functions."""
     from ligature import kernels
@@ -209,7 +221,7 @@ def survives(module: str, path: Path, text: str, tests: list[str], seconds: floa
                 marks += " and not machine_code"
 
             with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-                code = pytest.main(["-x", "-q", "-m", marks, "--no-header", *tests])
+                code = pytest.main(["-x", "-q", "-m", marks, "--no-header", *tests], plugins=[Unshrunk()])
         finally:
             os._exit(0 if code == 0 else 1)
     deadline = time.monotonic() + IDLE * seconds
@@ -241,7 +253,6 @@ def main() -> int:
     given = parser.parse_args()
     os.chdir(ROOT)
     sys.path[:0] = [str(ROOT / "simulator"), str(ROOT)]
-    import hypothesis  # noqa: F401
     import numba  # noqa: F401
     import numpy  # noqa: F401
     import yaml  # noqa: F401
