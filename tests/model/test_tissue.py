@@ -7,6 +7,7 @@ from pathlib import Path
 import ligature
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.model import tissue
@@ -184,24 +185,28 @@ NUMBER = st.floats(-1.0, 1.0)
 
 
 @settings(max_examples=30, deadline=None)
-@given(at=st.tuples(*[NUMBER] * 3), turn=st.tuples(*[NUMBER] * 3), mass=st.floats(0.01, 10.0))
+@given(
+    low=st.tuples(*[NUMBER] * 3), at=st.tuples(*[NUMBER] * 3), turn=st.tuples(*[NUMBER] * 3), mass=st.floats(0.01, 10.0)
+)
 def test_moments_about_any_frame_are_those_of_a_box_with_steiners_share(
-    tmp_path_factory: pytest.TempPathFactory, at: tuple[float, ...], turn: tuple[float, ...], mass: float
-) -> None:
+    tmp_path_factory: pytest.TempPathFactory, low: tuple[float, ...], at: tuple[float, ...], turn: tuple[float, ...],
+    mass: float,
+) -> None:  # fmt: skip
     """I = R' (I_box + m (|p|² 1 - p p')) R, of whose matrix a body keeps the diagonal."""
+    folder, edges = tmp_path_factory.mktemp("m"), np.array((0.06, 0.04, 0.01))
+    trimesh.creation.box(bounds=np.array((low, low + edges))).export(folder / "pad.obj", digits=12)
     offset = (
         f"  inertial offset: {{position: {{x: {at[0]}, y: {at[1]}, z: {at[2]}}}, "
         f"orientation: {{r: {turn[0]}, p: {turn[1]}, y: {turn[2]}}}}}\n"
     )
     text = PAD.replace("  mass: 0.0\n", f"  mass: {mass}\n{offset}", 1)
-    scene = load(tmp_path_factory.mktemp("m"), text)
+    scene = load(folder, text.replace("shape: BOX\n  geometry: {x: 0.06, y: 0.04, z: 0.01}", "mesh: pad.obj", 1))
     body = scene.bodies[scene.tissues[0].body]
     T = pose_matrix(at, turn)
     np.testing.assert_allclose(body.T_body_inertial, T, atol=1e-12)
-    square = np.square((0.06, 0.04, 0.01))
-    p = np.array(at)
-    about = np.diag(square.sum() - square) / 12 + p @ p * np.eye(3) - np.outer(p, p)
-    np.testing.assert_allclose(body.inertia, mass * np.diag(T[:3, :3].T @ about @ T[:3, :3]), rtol=1e-9, atol=1e-12)
+    p = np.array(low) + edges / 2 - at
+    about = np.diag(edges @ edges - edges**2) / 12 + p @ p * np.eye(3) - np.outer(p, p)
+    np.testing.assert_allclose(body.inertia, mass * np.diag(T[:3, :3].T @ about @ T[:3, :3]), rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(
