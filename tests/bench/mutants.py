@@ -64,6 +64,7 @@ PARTS = {
     "robots.axes": "robots/test_arm.py,robots/test_psm.py",
     "robots.ecm": "robots/test_ecm.py",
     "robots.poses": "robots",
+    "tissue.elements": "tissue/test_elements.py",
 }
 """Modules and the tests that are theirs."""
 
