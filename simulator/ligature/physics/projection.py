@@ -52,6 +52,12 @@ DONE = 1e-10
 PROGRESS, HELD_TWICE = 0.5, 1e-5
 """A step that leaves more than this share of a gap is the last below this one (m, rad), by which joints disagree."""
 
+PLAY = 2e-4
+"""Gap (m, rad) up to which a mechanism in a flat place stays where the tick found it, instead of being thrown back."""
+
+THROWN = 1e-4
+"""Way (m, rad) of a coordinate up to which a projection may go further than the speeds had led to."""
+
 TORN = 0.02
 """Gap (m, rad) from which on a loop closes at a pace: what turns by 0.2 rad in a tick opens it by less."""
 
@@ -204,7 +210,7 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
     """Move mechanism ``m``, whose ``widest`` gap is measured, to where its loops are closed; whether that worked."""
     n, rows = loops.size[m], 6 * (loops.begin[m + 1] - loops.begin[m])
     _gather(trees, loops, m)
-    share = 1.0 if widest <= TORN else most / widest
+    begun, share = widest, 1.0 if widest <= TORN else most / widest
     moved = math.inf
     for _ in range(STEPS):
         if not (_prepare(trees, loops, m, rows) and _step(loops, n, rows, share)):
@@ -220,11 +226,35 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
         before, widest = widest, _measure(trees, loops, m)
         if widest <= DONE or share < 1.0 or PROGRESS * before < widest <= HELD_TWICE:
             break
-    if moved > CURVED and not _prepare(trees, loops, m, rows):
+    back = _excess(loops, n, dt) if begun <= PLAY else 0.0
+    if back > 0.0:
+        for i in range(n):
+            loops.step[i] = loops.shift[i]
+            loops.shift[i] -= back * loops.step[i]
+        _move(trees, loops, m, -back)
+        _link(trees, loops, m)
+        _measure(trees, loops, m)
+    if (moved > CURVED or back > 0.0) and not _prepare(trees, loops, m, rows):
         return False
     _slow(loops, n, rows, dt)
     _scatter(trees, loops, m)
     return True
+
+
+@inlined
+def _excess(loops: Loops, n: int, dt: float) -> float:
+    """The share of `shift` that goes beyond the way that the speeds led to in this tick of ``dt``.
+
+    In a flat place, as where joints contradict each other by roundings, a narrow gap asks for a long way back. Done, it
+    would throw the mechanism back again and again, against the speeds that are reported.
+    """
+    far = 0.0
+    for a in range(n):
+        far = max(far, abs(loops.shift[a]))
+    if far <= THROWN:
+        return 0.0
+    led = -dt * _product(loops, n, loops.speed, loops.shift) / _product(loops, n, loops.shift, loops.shift)
+    return 1.0 - min(max(led, 0.0), 1.0)
 
 
 # --- gaps ---------------------------------------------------------------------------------------
@@ -629,7 +659,7 @@ def _slow(loops: Loops, n: int, rows: int, dt: float) -> None:
     """Take from `speed` what opens loops, passes limits or is faster than `MAX_SPEED`; kinetic energy only falls.
 
     Where places were taken back that speeds had led to in this tick of ``dt``, as in a flat place that the joints'
-    roundings block, so are the speeds.
+    roundings block, so are the speeds along this way.
     """
     rank, more, v = loops.rank[0], 0, loops.speed
     before = _product(loops, n, v, v)
@@ -651,14 +681,19 @@ def _slow(loops: Loops, n: int, rows: int, dt: float) -> None:
             break
         more += found
     after = _product(loops, n, v, v)
-    if after > 0.0:
-        share = min(1.0, math.sqrt(before / after))
-        for i in range(rank, rank + more):
-            loops.error[loops.row_of[i]] = 0.0
-        _constrain(loops, n, rank, more, loops.shift)
-        share *= min(max(1.0 + _product(loops, n, v, loops.shift) / (dt * after), 0.0), 1.0)
-        for a in range(n):
-            v[a] *= share
+    share = min(1.0, math.sqrt(before / after)) if after > 0.0 else 1.0
+    for a in range(n):
+        v[a] *= share
+    for i in range(rank, rank + more):
+        loops.error[loops.row_of[i]] = 0.0
+    way = loops.shift
+    _constrain(loops, n, rank, more, way)
+    square = _product(loops, n, way, way)
+    if square == 0.0:
+        return
+    taken = min(max(-_product(loops, n, v, way) / square, 0.0), 1.0 / dt)
+    for a in range(n):
+        v[a] += taken * way[a]
 
 
 @inlined
