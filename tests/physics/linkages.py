@@ -6,6 +6,7 @@ three digits.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,6 +133,23 @@ def linkage(rng: np.random.Generator, kind: str, closing: str = "revolute", grav
             _joint(rng, "J6", "revolute", right, bar, q[1], normal, starts[4]),
         ]
     return _file([base, *bars], joints, gravity)
+
+
+def doubled(rng: np.random.Generator, text: str) -> str:
+    """The linkage ``text`` with one of its joints twice: the second holds the same, or by 10 µm to 5 mm something else."""
+    joints = [line for line in text.splitlines() if re.match(r"J\d: ", line)]
+    first = joints[-1] if rng.random() < 0.5 else joints[rng.integers(len(joints))]
+    key = first.split(":")[0]
+    second = first.replace(f"{key}: {{name: {key},", "J9: {name: J9,")
+    if rng.random() < 0.5:
+        second = re.sub(r"type: [a-z ]+,", f"type: {rng.choice(('revolute', 'p2p'))},", second)
+    size = rng.choice((0.0, 1e-5, 1e-4, 1e-3, 5e-3))
+    for vector in ("parent pivot", "parent axis"):
+        found = re.search(vector + r": \{x: ([^,]+), y: ([^,]+), z: ([^}]+)\}", second)
+        assert found is not None
+        moved = np.array(found.groups(), dtype=float) + rng.normal(0.0, size, 3)
+        second = second.replace(found.group(), f"{vector}: {_vector(moved, 6)}")
+    return re.sub(r"^(joints: \[.*)\]$", r"\1, J9]", text, flags=re.MULTILINE) + second + "\n"
 
 
 def _file(bars: list[_Bar], joints: list[str], gravity: float) -> str:

@@ -52,10 +52,10 @@ DONE = 1e-10
 PROGRESS, HELD_TWICE = 0.5, 1e-5
 """A step that leaves more than this share of a gap is the last below this one (m, rad), by which joints disagree."""
 
-PLAY = 2e-4
+PLAY = 1e-4
 """Gap (m, rad) up to which a mechanism in a flat place stays where the tick found it, instead of being thrown back."""
 
-THROWN = 1e-4
+THROWN = 3e-5
 """Way (m, rad) of a coordinate up to which a projection may go further than the speeds had led to."""
 
 TORN = 0.02
@@ -236,6 +236,15 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
         _measure(trees, loops, m)
     if (moved > CURVED or back > 0.0) and not _prepare(trees, loops, m, rows):
         return False
+    if back > 0.0:  # what is not flat closes nevertheless
+        if not _step(loops, n, rows, 1.0):
+            return False
+        far = 0.0
+        for i in range(n):
+            far = max(far, abs(loops.step[i]))
+        _move(trees, loops, m, min(1.0, THROWN / far) if far > 0.0 else 0.0)
+        _link(trees, loops, m)
+        _measure(trees, loops, m)
     _slow(loops, n, rows, dt)
     _scatter(trees, loops, m)
     return True
