@@ -183,6 +183,9 @@ def test_hints_of_many_files_outside_name_one_root(lab: Path) -> None:
     resolver = Resolver.for_file(lab / "ADF" / "deep" / "m.yaml")
     hints = set()
     for number in range(20):
+        folder = lab / "meshes" / f"m{number}" / "high_res"
+        folder.mkdir(parents=True)
+        (folder / "m.obj").touch()
         with pytest.raises(ResolutionError) as caught:
             resolver.resolve(f"../../meshes/m{number}/high_res/m.obj", lab / "ADF" / "deep")
         hints.add(caught.value.diagnostic.hint)

@@ -21,6 +21,7 @@ from ligature.adf.checker import (
 )
 from ligature.adf.diagnostics import Diagnostic, Mark, Severity
 from ligature.adf.document import Document, Element
+from ligature.adf.lacking import lack_of
 from ligature.adf.nodes import Mapping, Node, Scalar, Sequence, parse
 from ligature.adf.resolver import ResolutionError, Resolver
 from ligature.adf.rules import rule_findings
@@ -322,8 +323,9 @@ def _resolved(node: Node, base: Path, resolver: Resolver) -> Reference:
         path = resolver.resolve(node.text, base, node.mark)
     except ResolutionError as error:
         return Reference(node.text, None, node.mark, error.diagnostic)
-    if not path.is_file():
-        message = f"'{node.text}' does not exist"
-        diagnostic = Diagnostic(Severity.ERROR, message, node.mark, f"looked for {path}", "path")
+    lack = lack_of(path)
+    if lack is not None:
+        message = f"'{node.text}' {lack.fault}"
+        diagnostic = Diagnostic(Severity.ERROR, message, node.mark, lack.hint or f"looked for {path}", "path")
         return Reference(node.text, None, node.mark, diagnostic)
     return Reference(node.text, path, node.mark)

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
+from ligature.adf.lacking import instead_of_url, lack_of
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
 from ligature.paths import real_path
 
@@ -69,16 +70,22 @@ class Resolver:
         if "\0" in reference:
             raise self._refusal("the path contains a zero byte", mark)
         if _URL.match(reference):
-            raise self._refusal(f"'{reference}' is a URL", mark, "give the path of a file")
+            raise self._refusal(f"'{reference}' is a URL", mark, instead_of_url(reference))
         return self.allow(Path(os.path.join(base, reference)), mark)
 
     def allow(self, path: Path, mark: Mark | None = None) -> Path:
         """``path`` with links resolved, if it lies below a root; raises `ResolutionError` at ``mark``."""
+        if "\0" in str(path):
+            raise self._refusal("the path contains a zero byte", mark)
         if len(str(path)) > MAX_PATH or any(len(part.encode("utf-8", "replace")) > MAX_NAME for part in path.parts):
             raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark)
         real = real_path(path)
         if not any(real == root or root in real.parents for root in self.roots):
             roots = ", ".join(map(str, self.roots))
+            lack = lack_of(real)
+            if lack is not None and not real.is_dir():
+                message = f"'{real}' {lack.fault}, and lies outside the scene's folders ({roots})"
+                raise self._refusal(message, mark, lack.hint or "give a file below them")
             raise self._refusal(
                 f"'{real}' lies outside the scene's folders ({roots})",
                 mark,
@@ -97,8 +104,9 @@ class Resolver:
         """The content of ``path``, at most ``limit`` bytes; raises `ResolutionError` at ``mark``."""
         real = self.allow(path, mark)
         try:
-            if not real.is_file():
-                raise self._refusal(f"'{real}' {_lack(real)}", mark)
+            lack = lack_of(real)
+            if lack is not None:
+                raise self._refusal(f"'{real}' {lack.fault}", mark, lack.hint)
             if real.stat().st_size > limit:
                 raise self._refusal(f"'{real}' is larger than {limit} bytes", mark)
             return real.read_bytes()
@@ -129,15 +137,6 @@ class Resolver:
     @staticmethod
     def _refusal(message: str, mark: Mark | None, hint: str = "") -> ResolutionError:
         return ResolutionError(Diagnostic(Severity.ERROR, message, mark, hint, "path"))
-
-
-def _lack(path: Path) -> str:
-    """Why ``path`` is not a file."""
-    if path.is_dir():
-        return "is a folder"
-    if path.is_symlink():
-        return "is a link that leads to no file"
-    return "is not a regular file" if path.exists() else "does not exist"
 
 
 def scene_root(path: Path) -> Path:

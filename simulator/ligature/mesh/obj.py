@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.adf.lacking import lack_of
 from ligature.adf.resolver import ResolutionError, Resolver
 from ligature.mesh.mesh import (
     MAX_PARTS,
@@ -133,7 +134,7 @@ class _Reader:
             library = self.resolver.resolve(name, self.path.parent)
         except ResolutionError:
             return None
-        return library if library.is_file() else None
+        return library if lack_of(library) is None else None
 
     def _read_library(self, library: Path) -> None:
         self.libraries.add(library)

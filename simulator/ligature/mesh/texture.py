@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path, PureWindowsPath
 
+from ligature.adf.lacking import lack_of
 from ligature.adf.resolver import ResolutionError, Resolver
 from ligature.mesh.mesh import LOOK, Findings
 
@@ -23,10 +24,12 @@ def texture_file(name: str, path: Path, line: int, folder: Path, resolver: Resol
         except ResolutionError as error:
             refusal = refusal or error
     for candidate in allowed:
-        if candidate.is_file():
+        if lack_of(candidate) is None:
             return candidate
     if refusal is not None:
         findings.add(path, f"texture: {refusal.diagnostic.message}", line, refusal.diagnostic.hint, code=LOOK)
     else:
-        findings.add(path, f"texture '{name[:200]}' does not exist", line, f"looked for {allowed[0]}", code=LOOK)
+        lack = lack_of(allowed[0])
+        fault, hint = lack or ("does not exist", "")
+        findings.add(path, f"texture '{name[:200]}' {fault}", line, hint or f"looked for {allowed[0]}", code=LOOK)
     return allowed[0] if allowed else None

@@ -14,6 +14,7 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
+from ligature.adf.lacking import lack_of
 from ligature.mesh import ConvexPart, collision_parts, load_mesh
 from ligature.mesh.load import EXTENSIONS
 from ligature.mesh.mesh import LOOK
@@ -233,18 +234,19 @@ def _mesh_path(element: Element, name: str, key: str, context: FileContext, leve
         raise GeometryError(error.diagnostics[0]) from error
     if path.suffix.lower() not in EXTENSIONS:
         raise _error(element, key, f"'{name}' is not a mesh format that is read", f"use {', '.join(EXTENSIONS)}")
-    if path.is_file():
+    lack = lack_of(path)
+    if lack is None:
         return path
     high = _allowed(context, os.path.join(context.high, element.text("high resolution path"), name))
-    if high is not None and high.is_file():
+    if high is not None and lack_of(high) is None:
         context.report(
             Diagnostic(
-                Severity.WARNING, f"'{text}' does not exist; using the high-resolution mesh",
+                Severity.WARNING, f"'{text}' {lack.fault}; using the high-resolution mesh",
                 element.mark_of(key), f"looked for {path}", "mesh",
             )
         )  # fmt: skip
         return high
-    raise _error(element, key, f"mesh '{name}' does not exist", f"looked for {path}")
+    raise _error(element, key, f"mesh '{name}' {lack.fault}", lack.hint or f"looked for {path}")
 
 
 def _allowed(context: FileContext, text: str) -> Path | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
+from ligature.adf.lacking import lack_of
 from ligature.adf.schema import CLIPPING
 from ligature.adf.schema.keys import FARTHEST
 from ligature.mesh import load_mesh
@@ -154,8 +155,13 @@ def _contour_rays(element: Element, folder: Path, resolver: Resolver, reach: flo
     """One ray a triangle, from its centroid along its normal."""
     try:
         path = resolver.resolve(element.text("mesh"), folder, element.mark_of("mesh"))
-        if not path.is_file() and (folder / "high_res" / element.text("mesh")).is_file():
+        if lack_of(path) is not None and lack_of(folder / "high_res" / element.text("mesh")) is None:
             path = resolver.resolve(f"high_res/{element.text('mesh')}", folder)
+        lack = lack_of(path)
+        if lack is not None:
+            message = f"sensor '{element.key}': mesh '{element.text('mesh')}' {lack.fault}"
+            hint = lack.hint or f"looked for {path}"
+            raise GeometryError(Diagnostic(Severity.ERROR, message, element.mark_of("mesh"), hint, "sensor"))
         mesh = load_mesh(path, resolver)
     except AdfError as error:
         raise GeometryError(error.diagnostics[0]) from error

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ligature.adf import Diagnostic, Document, Element, Mark, ResolutionError, Resolver, Severity
+from ligature.adf.lacking import lack_of
 from ligature.adf.rules import LIBRARIES
 
 MAX_VALUES = 250
@@ -83,11 +84,12 @@ def plugin_entries(
             try:
                 entry = _entry(element, body, item, resolver)
             except (ValueError, ResolutionError) as error:
-                reason = error.diagnostic.message if isinstance(error, ResolutionError) else str(error)
+                refused = error.diagnostic if isinstance(error, ResolutionError) else None
+                reason, hint = (refused.message, refused.hint) if refused else (str(error), "")
                 message = f"plug-in '{item['name']}' is left out: {reason}"
                 compiled = str(item["filename"]).endswith(LIBRARIES)
                 severity = Severity.INFO if compiled else Severity.WARNING
-                findings.append(Diagnostic(severity, message, element.mark_of("plugins"), code="plugin"))
+                findings.append(Diagnostic(severity, message, element.mark_of("plugins"), hint, "plugin"))
                 continue
             taken = sum(other.name == entry.name or other.name.startswith(f"{entry.name}_") for other in found)
             found.append(replace(entry, name=f"{entry.name}_{taken + 1}") if taken else entry)
@@ -115,8 +117,9 @@ def _entry(element: Element, body: int, item: Mapping[str, Any], resolver: Resol
         mark = element.mark_of("plugins")
         folder = resolver.resolve(str(item.get("path") or ""), element.mark.file.parent, mark)
         path = resolver.resolve(file, folder, mark)
-        if not path.is_file():
-            raise ValueError(f"'{path}' is not a file")
+        lack = lack_of(path)
+        if lack is not None:
+            raise ResolutionError(Diagnostic(Severity.WARNING, f"'{path}' {lack.fault}", mark, lack.hint, "plugin"))
     elif file.endswith(LIBRARIES) or "/" in file:
         raise ValueError(f"'{file}' is a library of AMBF's; plug-ins are Python files here")
     return PluginEntry(

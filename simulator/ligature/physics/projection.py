@@ -58,6 +58,9 @@ PLAY = 1e-4
 THROWN = 3e-5
 """Way (m, rad) of a coordinate up to which a projection may go further than the speeds had led to."""
 
+FLAT = 100.0
+"""Way of a coordinate per gap that is closed, above which a place is flat."""
+
 TORN = 0.02
 """Gap (m, rad) from which on a loop closes at a pace: what turns by 0.2 rad in a tick opens it by less."""
 
@@ -226,7 +229,7 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
         before, widest = widest, _measure(trees, loops, m)
         if widest <= DONE or share < 1.0 or PROGRESS * before < widest <= HELD_TWICE:
             break
-    back = _excess(loops, n, dt) if begun <= PLAY else 0.0
+    back = _excess(loops, n, begun, dt) if begun <= PLAY else 0.0
     if back > 0.0:
         for i in range(n):
             loops.step[i] = loops.shift[i]
@@ -251,16 +254,16 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
 
 
 @inlined
-def _excess(loops: Loops, n: int, dt: float) -> float:
+def _excess(loops: Loops, n: int, begun: float, dt: float) -> float:
     """The share of `shift` that goes beyond the way that the speeds led to in this tick of ``dt``.
 
-    In a flat place, as where joints contradict each other by roundings, a narrow gap asks for a long way back. Done, it
-    would throw the mechanism back again and again, against the speeds that are reported.
+    In a flat place, as where joints contradict each other by roundings, the gap ``begun`` asks for a long way back.
+    Done, it would throw the mechanism back again and again, against the speeds that are reported.
     """
     far = 0.0
     for a in range(n):
         far = max(far, abs(loops.shift[a]))
-    if far <= THROWN:
+    if far <= max(THROWN, FLAT * begun):
         return 0.0
     led = -dt * _product(loops, n, loops.speed, loops.shift) / _product(loops, n, loops.shift, loops.shift)
     return 1.0 - min(max(led, 0.0), 1.0)

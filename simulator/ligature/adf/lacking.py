@@ -1,0 +1,83 @@
+"""Why a path leads to no file that can be read, and what would be right."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import stat
+from pathlib import Path, PureWindowsPath
+from typing import NamedTuple
+from urllib.parse import unquote, urlsplit
+
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
+MOST_NAMES = 10_000
+"""Most files of a folder among which one of another case is looked for."""
+
+
+class Lack(NamedTuple):
+    """What is wrong with a path, as the end of a sentence, and a hint, which may be empty."""
+
+    fault: str
+    hint: str
+
+
+def lack_of(path: Path) -> Lack | None:
+    """What keeps ``path`` from being read as a file; None for one that can be."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError as error:
+        return _unfound(path, error)
+    if stat.S_ISDIR(mode):
+        return Lack("is a folder", "give the path of a file in it")
+    if not stat.S_ISREG(mode):
+        return Lack("is not a regular file", "")
+    if not os.access(path, os.R_OK, effective_ids=True):
+        return Lack("cannot be read: permission denied", "let your user read it")
+    return None
+
+
+def instead_of_url(url: str) -> str:
+    """What to write instead of ``url`` in a scene file."""
+    parts = urlsplit(url)
+    if parts.scheme == "file":
+        return f"give the path itself: '{unquote(parts.path)}'"
+    if parts.scheme in ("package", "model"):
+        return "give the path from the folder of this file: packages are not looked up"
+    return "give the path of a file"
+
+
+def _unfound(path: Path, error: OSError) -> Lack:
+    """What a failed look at ``path`` means."""
+    if error.errno == errno.ELOOP:
+        return Lack("is a link in a circle", "let it lead to a file")
+    if error.errno not in (errno.ENOENT, errno.ENOTDIR):
+        return Lack(f"cannot be read: {(error.strerror or str(error)).lower()}", "let your user read its folder")
+    if os.path.islink(path):
+        return Lack("is a link that leads to no file", "")
+    return Lack("does not exist", _spelling(path))
+
+
+def _spelling(path: Path) -> str:
+    """How the part of ``path`` that is missing is written, if it is meant for another system or case; else nothing."""
+    there = path.parent
+    while not there.is_dir() and there != there.parent:
+        there = there.parent
+    reference = str(path.relative_to(there))
+    if _URL.match(reference):
+        return instead_of_url(reference)
+    windows = PureWindowsPath(reference)
+    if windows.drive:
+        return f"'{windows.drive}' is a drive of Windows: give the path from the folder of this file"
+    if "\\" in reference:
+        return f"write '{windows.as_posix()}', with '/' between folders"
+    if reference.startswith("~"):
+        return "'~' does not stand for your home here: write it out"
+    wanted = path.relative_to(there).parts[0].casefold()
+    try:
+        with os.scandir(there) as names:
+            same = [entry.name for entry, _ in zip(names, range(MOST_NAMES), strict=False)]
+    except OSError:
+        return ""
+    found = sorted(name for name in same if name.casefold() == wanted)
+    return f"upper and lower case differ: there is '{there / found[0]}'" if found else ""
