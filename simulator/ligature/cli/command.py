@@ -8,7 +8,9 @@ import what they need when they need it, so this holds as long as they run.
 from __future__ import annotations
 
 import importlib
+import os
 import signal
+import sys
 from types import FrameType
 
 _IMPORT_SYSTEM = "<frozen importlib._bootstrap>"
@@ -25,9 +27,25 @@ def ambf_simulator() -> None:
 
 
 def _run(module: str) -> None:
+    _open_streams()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
         signal.signal(signal.SIGINT, _interrupt)
     importlib.import_module(module).main()
+
+
+def _open_streams() -> None:
+    """Lead input, output and errors that are closed, as a service may start a command, to nowhere.
+
+    The first files opened would take their places, and get what is printed.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            mode = os.O_WRONLY if number else os.O_RDONLY
+            nowhere = os.open(os.devnull, mode)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+            setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import math
 import os
@@ -17,6 +18,9 @@ from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices
 from ligature.cli.sampling import Sampling, picture_size
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import requested
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of writing to a disk that takes no more."""
 
 LONG = 120
 """Characters of a path that a message quotes."""
@@ -627,7 +631,9 @@ def main() -> None:
     except OSError as error:
         # What a file system says of a path of the user's: too long a name, a full disk, no permission.
         if error.filename is None:
-            raise
+            if error.errno not in FULL:
+                raise
+            _fail(f"error: what is printed cannot be written: {error.strerror}")
         name = os.fsdecode(error.filename)
         _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
 

@@ -12,6 +12,9 @@ def import_quietly(name: str) -> None:
     """Import ``name`` with standard error closed; PyBullet prints its build date there."""
     if name in sys.modules:
         return
+    if sys.stderr is None:  # closed, so that the file which has its number now is not to be touched
+        importlib.import_module(name)
+        return
     sys.stderr.flush()
     kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

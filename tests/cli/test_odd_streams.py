@@ -1,0 +1,59 @@
+"""Commands whose input, output or errors are closed, as a service starts them, or lead to a disk that is full."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BODY = "bodies: [B]\nB: {name: b, mass: 1, collision shape: SPHERE, collision geometry: {radius: 0.02}}\n"
+COMMANDS = {
+    "help": ["--help"],
+    "check": ["check", "scene.yaml"],
+    "bench": ["bench", "scene.yaml", "--seconds", "0.1"],
+    "inertia": ["inertia", "scene.yaml"],
+    "poses": ["poses", "scene.yaml", "--seconds", "0.01", "--out", "poses.npz"],
+}
+CLOSED = [numbers for count in (1, 2, 3) for numbers in itertools.combinations(range(3), count)]
+START = "from ligature.cli.command import ligature; ligature()"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "scene.yaml").write_text(BODY)
+    return tmp_path
+
+
+def started(words: list[str], folder: Path, redirections: str) -> subprocess.CompletedProcess[str]:
+    """The command as a shell starts it with ``redirections``."""
+    return subprocess.run(
+        ["bash", "-c", f'exec "$@" {redirections}', "bash", sys.executable, "-c", START, *words],
+        cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, env={**os.environ},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("closed", [(2,), (0, 1, 2)])
+def test_a_check_with_closed_streams_does_its_work(closed: tuple[int, ...], folder: Path) -> None:
+    done = started(COMMANDS["check"], folder, " ".join(f"{number}>&-" for number in closed))
+    assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", CLOSED)
+@pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
+def test_every_command_with_closed_streams_does_its_work(
+    words: list[str], closed: tuple[int, ...], folder: Path
+) -> None:
+    done = started(words, folder, " ".join(f"{number}>&-" for number in closed))
+    assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("words", [COMMANDS[name] for name in ("help", "check")], ids=("help", "check"))
+def test_a_full_disk_is_reported_in_words(words: list[str], folder: Path) -> None:
+    done = started(words, folder, "> /dev/full")
+    assert done.returncode == 2
+    assert done.stderr == "error: what is printed cannot be written: No space left on device\n"
