@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.scene import Light, Scene
-from ligature.render.camera import perspective
+from ligature.render.camera import eye_in_world, perspective
 from ligature.render.programs import Program
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ class Lights:
         if self._headlight:
             T_eye_light = np.eye(4)
             T_eye_light[:3, 0] = 0, 0, -1
-            self._T_world_light, self._used = (np.linalg.inv(view) @ T_eye_light)[None], [HEADLIGHT]
+            self._T_world_light, self._used = (eye_in_world(view) @ T_eye_light)[None], [HEADLIGHT]
         self._T_eye_light = view @ self._T_world_light
 
     def cast(
@@ -123,7 +123,7 @@ class Lights:
                 shadow.use()
                 draw(light, projection, size)
                 shadow.content = content
-            self._shadows.append((index, shadow, TO_TEXTURE @ projection @ light @ np.linalg.inv(view)))
+            self._shadows.append((index, shadow, TO_TEXTURE @ projection @ light @ eye_in_world(view)))
             shadow.spread = 2.0 / (abs(projection[0, 0]) * size)
 
     def bind(self, program: Program) -> None:
