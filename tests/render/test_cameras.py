@@ -7,12 +7,13 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 
+import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.optics import T_CAMERA_OPTICAL
-from ligature.render import unproject
+from ligature.render import Renderer, RenderUnavailable, unproject, view_of
 
 from tests.render.conftest import BEADS, LENS, camera
 
@@ -68,6 +69,44 @@ def test_a_camera_shows_the_state_as_it_is(simulate: Make) -> None:
     after = seen(simulation, "C", "Bead")
     f = simulation.cameras["C"].view().intrinsics[0, 0]
     assert before[0] - after[0] == pytest.approx(f * 0.1 / 1.2, abs=0.3)  # a bead is 20 pixels
+
+
+def test_pictures_of_two_cameras_in_turn_are_those_that_a_fresh_renderer_draws() -> None:
+    simulation = Simulation(ligature.load("suturing_small", (0, 1, 2)))
+    begun, moments = simulation.snapshot(), []
+    try:
+        used = Renderer(simulation.scene)
+    except RenderUnavailable as error:
+        pytest.skip(str(error))
+    for ticks in (20, 40):
+        simulation.step(ticks)
+        moments.append(simulation.state.copy())
+    simulation.restore(begun)
+    left, right = simulation.scene.cameras[:2]
+    for moment, looking in ((0, left), (0, right), (1, right), (1, left), (0, left)):
+        state = moments[moment]
+        view = view_of(looking, state["camera_world"][0, looking.index], (160, 120))
+        frame = used.render(state, view)
+        fresh = Renderer(simulation.scene)
+        expected = fresh.render(state, view)
+        fresh.release()
+        for name in ("rgb", "depth", "ids", "normals"):
+            assert (getattr(frame, name) == getattr(expected, name)).all(), (moment, looking.identity.name, name)
+    used.release()
+
+
+def test_no_picture_wakes_the_threads_of_openblas(simulate: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    def woken(matrix: np.ndarray) -> np.ndarray:
+        raise AssertionError("numpy.linalg was asked for an inverse: its threads spin for longer than a picture takes")
+
+    simulation = simulate(C=camera("C"))
+    lit = replace(simulation.scene.lights[0], shadow_quality=1)
+    renderer = Renderer(replace(simulation.scene, lights=(lit,)))
+    monkeypatch.setattr(np.linalg, "inv", woken)
+    monkeypatch.setattr(np.linalg, "solve", woken)
+    view = simulation.cameras["C"].view((64, 48))
+    assert renderer.render(simulation.state, view).rgb.any()
+    renderer.release()
 
 
 def test_a_camera_that_is_placed_looks_from_there(simulate: Make) -> None:

@@ -59,18 +59,6 @@ def view_matrix(T_world_camera: Array) -> Array:
     return view
 
 
-def eye_in_world(view: Array) -> Array:
-    """Eye to world (4, 4): the inverse of a ``view`` (4, 4), which turns and shifts.
-
-    `numpy.linalg.inv` would wake the threads of OpenBLAS even for a matrix of four rows, and they spin for longer than
-    a picture takes: a tenth of the processor's time where pictures follow each other.
-    """
-    T_world_eye = np.eye(4)
-    T_world_eye[:3, :3] = view[:3, :3].T
-    T_world_eye[:3, 3] = -view[:3, :3].T @ view[:3, 3]
-    return T_world_eye
-
-
 def perspective(field_of_view: float, aspect: float, near: float, far: float) -> Array:
     """OpenGL projection (4, 4) with the vertical ``field_of_view`` in radians."""
     f = 1.0 / np.tan(field_of_view / 2)

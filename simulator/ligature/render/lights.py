@@ -1,6 +1,7 @@
 """Lights of a scene as the shaders want them, in eye space, and the shadows they cast.
 
-A light shines along +X of its frame (ADF specification §19). Metres and radians.
+A light shines along +X of its frame (ADF specification §19). Metres and radians. Nothing here inverts by `numpy.linalg`:
+it wakes OpenBLAS's threads even for four rows, and they spin for longer than a picture takes.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.model.frames import inverse
 from ligature.model.scene import Light, Scene
-from ligature.render.camera import eye_in_world, perspective
+from ligature.render.camera import perspective
 from ligature.render.programs import Program
 
 Array = NDArray[np.float64]
@@ -96,7 +98,7 @@ class Lights:
         if self._headlight:
             T_eye_light = np.eye(4)
             T_eye_light[:3, 0] = 0, 0, -1
-            self._T_world_light, self._used = (eye_in_world(view) @ T_eye_light)[None], [HEADLIGHT]
+            self._T_world_light, self._used = (inverse(view) @ T_eye_light)[None], [HEADLIGHT]
         self._T_eye_light = view @ self._T_world_light
 
     def cast(
@@ -123,7 +125,7 @@ class Lights:
                 shadow.use()
                 draw(light, projection, size)
                 shadow.content = content
-            self._shadows.append((index, shadow, TO_TEXTURE @ projection @ light @ eye_in_world(view)))
+            self._shadows.append((index, shadow, TO_TEXTURE @ projection @ light @ inverse(view)))
             shadow.spread = 2.0 / (abs(projection[0, 0]) * size)
 
     def bind(self, program: Program) -> None:

@@ -128,6 +128,8 @@ class Renderer:
         if self._sky is not None:
             self._textures.around = self._sky.cube
         self._movement = Movement()
+        self._placed = b""
+        """Moment at which everything stands."""
 
     @property
     def lights(self) -> Lights:
@@ -202,23 +204,26 @@ class Renderer:
         self, state: NDArray[np.void], view: CameraView, passes: Sequence[str], shaders: ShaderFiles | None
     ) -> tuple[Target, Callable[[NDArray[np.uint8]], NDArray[np.uint8]]]:
         """Where the picture is being drawn, and what is to be done with its colours and alpha."""
-        self._place(state, view.view)
+        moment = b"".join(state[name].tobytes() for name in PLACES)
+        self._place(state, moment)
+        self._lights.place(pose7_matrices(state["light_world"][0]), view.view)
         target = self._target(view, passes, 0 if shaders else self._samples)
         seen = self._instances.seen(view.view, view.projection, view.height, COARSE_BELOW)
         if "rgb" in target.passes:
-            self._cast_shadows(seen, view, b"".join(state[name].tobytes() for name in PLACES))
-        target.clear(BACKGROUND)
+            self._cast_shadows(seen, view, moment)
         before = self._movement.before(self._instances, view, self._deforming) if "flow" in target.passes else None
         painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
         self.drawn_triangles = painter.triangles
         if "rgb" in target.passes and painter.needs_depth_behind:
             opaque = self._target(view, ["depth"], 0)
-            opaque.clear(BACKGROUND)
+            opaque.clear(BACKGROUND, apart=False)
             painter.paint_opaque(opaque.whole, ["depth"])
             painter.behind = opaque.texture("depth")
             self._targets.append(opaque)
         sky = self._sky if shaders is None else None
-        if target.colour is not None and (self._samples or painter.needs_colour_apart(shaders)):
+        apart = bool(self._samples) or painter.needs_colour_apart(shaders)
+        target.clear(BACKGROUND, apart)
+        if target.colour is not None and apart:
             painter.paint(target.colour, ["rgb"], shaders, sky)
             if target.geometry is not None:
                 painter.paint(target.geometry, [name for name in target.passes if name != "rgb"])
@@ -295,8 +300,13 @@ class Renderer:
             look = replace(look, metallic_map=metallic, roughness_map=roughness)
         return replace(surface, physical=look)
 
-    def _place(self, state: NDArray[np.void], view: Array) -> None:
-        """Move everything to where ``state`` has it."""
+    def _place(self, state: NDArray[np.void], moment: bytes) -> None:
+        """Move everything to where ``state`` has it at ``moment``, once for all cameras that look at it then."""
+        for batch, drawn in zip(self._deforming, self._tissues, strict=False):
+            batch.marks = self._marks[drawn.index].of(state)
+        if moment == self._placed:
+            return
+        self._placed = moment
         T = pose7_matrices(np.concatenate([state[name][0] for name in PLACES[:2]]))
         nodes = state["tissue_node"][0]
         surfaces = [*(s.triangles(nodes) for s in self._tissues), *(tube.triangles(T) for tube in self._tubes)]
@@ -313,9 +323,6 @@ class Renderer:
                 self._instances.reach(batch.rows.start, cut)
         for rays in self._rays:
             rays.update(state["volume_value"][0])
-        for batch, drawn in zip(self._deforming, self._tissues, strict=False):
-            batch.marks = self._marks[drawn.index].of(state)
-        self._lights.place(pose7_matrices(state["light_world"][0]), view)
 
     def _cast_shadows(self, seen: Seen, view: CameraView, moment: bytes) -> None:
         """Draw the shadow maps of what may throw shadows into the picture of the state at ``moment``."""

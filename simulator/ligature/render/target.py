@@ -82,13 +82,13 @@ class Target:
                 many = context.renderbuffer(size, 4, samples=samples)
                 self.colour = context.framebuffer([many], context.depth_renderbuffer(size, samples=samples))
 
-    def clear(self, background: tuple[float, float, float, float]) -> None:
-        """Empty what will be drawn into."""
+    def clear(self, background: tuple[float, float, float, float], apart: bool) -> None:
+        """Empty what will be drawn into: ``colour`` and ``geometry`` when ``apart``, else the ``whole``."""
         if self.geometry is not None:
             self.geometry.clear()
-        for buffer in (self.behind, self.colour):
-            if buffer is not None:
-                buffer.clear(*background)
+        colour = self.colour if apart else self.behind
+        if colour is not None:
+            colour.clear(*background)
 
     def texture(self, name: str) -> moderngl.Texture:
         """Where the pass of that name is drawn."""
@@ -109,7 +109,9 @@ class Target:
         data = np.frombuffer(self._textures[name].read(), dtype="u1" if dtype == "f1" else dtype)
         rows = data.reshape(height, width, channels)[::-1]
         if name == "depth":
-            return np.where(rows[..., 0] == 0.0, np.float32(np.inf), rows[..., 0])  # where nothing was drawn
+            depth = rows[..., 0].copy()
+            depth[depth == 0.0] = np.inf  # where nothing was drawn
+            return depth
         if name in ("ids", "parts"):
             return rows[..., 0].astype(np.int32)
         return rows[..., : 3 if name == "normals" else channels]

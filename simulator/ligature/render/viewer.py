@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.commands import BodyCommand, CommandType, PlaceCommand, Release
-from ligature.model.frames import matrix_pose7, pose7_matrix
+from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.optics import stereo_partners
 from ligature.model.scene import Scene
 from ligature.render import overlay
-from ligature.render.camera import CameraView, eye_in_world, perspective, view_matrix, view_of
+from ligature.render.camera import CameraView, perspective, view_matrix, view_of
 from ligature.render.controls import TOGGLES, Controls
 from ligature.render.steering import Motion, Steering
 from ligature.render.viewpoint import Viewpoint
@@ -364,4 +364,4 @@ def _point(view: CameraView, x: float, y: float, depth: float) -> Array:
     v = (y - K[1, 2]) / K[1, 1]
     u = (x - K[0, 2] - K[0, 1] * v) / K[0, 0]
     eye = np.array([u * reach, -v * reach, -depth, 1.0])
-    return eye_in_world(view.view)[:3] @ eye
+    return inverse(view.view)[:3] @ eye
