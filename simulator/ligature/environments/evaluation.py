@@ -43,9 +43,10 @@ class Episode:
     path_length
         Way of the control point of the tool in metres, of all tools together.
     peak_force
-        Largest force on the tip of a tool in newtons.
+        Largest force on the tip of a tool at the end of an action in newtons: of needle and thread, and of all that
+        a finger stands on.
     tissue_force
-        Largest force of tissue on the needle in newtons.
+        Largest force of tissue on the needle at the end of an action in newtons.
     """
 
     seed: int

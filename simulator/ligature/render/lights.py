@@ -1,7 +1,7 @@
 """Lights of a scene as the shaders want them, in eye space, and the shadows they cast.
 
-A light shines along +X of its frame (ADF specification §19). Metres and radians. Nothing here inverts by `numpy.linalg`:
-it wakes OpenBLAS's threads even for four rows, and they spin for longer than a picture takes.
+A light shines along +X of its frame (ADF specification §19). Metres and radians. Nothing here inverts by
+`numpy.linalg`: it wakes OpenBLAS's threads even for four rows, and they spin for longer than a picture takes.
 """
 
 from __future__ import annotations
