@@ -15,6 +15,7 @@ from ligature.model.state import MAX_INSERTIONS, MAX_PUNCTURES, StateRecord
 from ligature.soft.contacts import BodyContacts
 from ligature.soft.floating import Floating
 from ligature.soft.frame import Frame, open_frame
+from ligature.soft.lying import LyingThread
 from ligature.soft.needle import ScenePiercer
 from ligature.soft.thread import SceneThread
 from ligature.suture.bodies import SutureBodies
@@ -59,12 +60,18 @@ class Piece:
         self._carried = [p for p in self.piercers if p.rod is not None]
         self._alone = [p for p in self.piercers if p.rod is None]
         self.threads = [SceneThread(p.rod, p, self.block, self.frame) for p in self._carried if p.rod is not None]
+        self.lying = [self._lay(rod) for rod in rods]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
         self._floating = Floating(self._body, self.block) if self.block.elastic.floats else None
         self.wrench, self.peak = np.zeros(6), np.zeros(1)
         self._index, self._motion = np.array([tissue.body]), np.zeros((1, 13))
         self._read()
         self.frame.restart()
+
+    def _lay(self, rod: Rod) -> LyingThread:
+        """The rod where it lies on the tissue."""
+        inside = next((thread for thread in self.threads if thread.rod is rod), None)
+        return LyingThread(rod, self.block, self.frame, self._body.friction, inside)
 
     def _read(self) -> None:
         self._bodies.read_motions(self._index, self._motion)
@@ -80,6 +87,8 @@ class Piece:
             piercer.begin(self._bodies, self.frame)
         for thread in self.threads:
             thread.begin(self._dt)
+        for lying in self.lying:
+            lying.begin(self._dt)
 
     def end(self) -> None:
         """What comes after: forces of needles and threads, the reaction on the rigid body, the tissue's own motion."""
@@ -87,6 +96,8 @@ class Piece:
             piercer.end(self.frame)
         for thread in self.threads:
             thread.end(self._dt)
+        for lying in self.lying:
+            lying.end(self._dt)
         for piercer in self._alone:
             piercer.couple(self._bodies, self.frame)
         self._react()
@@ -175,8 +186,8 @@ class Piece:
             self._floating.reset()
         self.block.reset()
         self.contacts.reset()
-        for piercer in self.piercers:
-            piercer.reset()
+        for part in (*self.piercers, *self.lying):
+            part.reset()
         self.wrench[:], self.peak[:] = 0.0, 0.0
         self._read()
         self.frame.restart()
@@ -186,6 +197,7 @@ class Piece:
         return {
             "block": self.block.snapshot(), "frame": self.frame.snapshot(), "contacts": self.contacts.snapshot(),
             "piercers": [piercer.snapshot() for piercer in self.piercers],
+            "lying": [lying.snapshot() for lying in self.lying],
             "gravity": self.block.elastic.gravity.copy(), "wrench": self.wrench.copy(), "peak": self.peak.copy(),
             "floating": {} if self._floating is None else self._floating.snapshot(),
         }  # fmt: skip
@@ -197,6 +209,8 @@ class Piece:
         self.contacts.restore(snapshot["contacts"])
         for piercer, kept in zip(self.piercers, snapshot["piercers"], strict=True):
             piercer.restore(kept)
+        for lying, kept in zip(self.lying, snapshot["lying"], strict=True):
+            lying.restore(kept)
         self.block.elastic.gravity[:] = snapshot["gravity"]
         self.wrench[:], self.peak[:] = snapshot["wrench"], snapshot["peak"]
         if self._floating is not None:

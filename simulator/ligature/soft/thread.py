@@ -54,8 +54,8 @@ class SceneThread:
         self.inside = block.add_thread(float(rod.description.radius.min()))
         first = next(a for a in rod.description.attachments if a.body == piercer.body.index)
         # The thread's first point is at the needle's tail.
-        self._turned = first.element > 0
-        self._run = _run(len(rod.description.mass), rod.first, self._turned)
+        self.turned = first.element > 0
+        self._run = _run(len(rod.description.mass), rod.first, self.turned)
         self._tables = (
             block.interface.table, self.inside.table, table_of(self._run), table_of(rod.nodes), rod.spring_table,
             frame.table,
@@ -69,7 +69,7 @@ class SceneThread:
 
     def element(self, segment: int) -> int:
         """Element of the rod that a segment of the thread is."""
-        return len(self.rod.description.mass) - 1 - segment if self._turned else segment
+        return len(self.rod.description.mass) - 1 - segment if self.turned else segment
 
     def begin(self, dt: float) -> None:
         """Hand the rod what the tissue does to it."""
