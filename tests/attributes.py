@@ -93,6 +93,7 @@ CACHES: dict[str, str] = {
             "ScenePiercer._tables",
             "ScenePiercer._nodes",
             "SceneThread._tables",
+            "LyingThread._tables",
         ),
         "addresses of arrays",
     ),
@@ -137,6 +138,12 @@ CACHES: dict[str, str] = {
             "Piece._motion",
             "SceneThread._run",
             "SceneThread._holds",
+            "LyingThread._none",
+            "LyingThread._holds",
+            *(
+                f"Lying.{name}"
+                for name in ("spring", "normal", "gap", "row", "inside", "mine", "found", "corner", "at", "W", "K")
+            ),
         ),
         "written before it is read in every tick",
     ),

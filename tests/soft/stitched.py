@@ -100,7 +100,7 @@ class StitchedWound:
     """A wound of 4 mm in the pad of `scenes/soft_suturing`, a thread in a path through each lip, its ends in two hands.
 
     Fingers press both lips together beside the exits, with ``press`` newtons each, while `knot` draws it. A thread
-    meets tissue only in its paths, so that nothing lies on the top. The ``first`` throw is laid from the beginning.
+    meets tissue only in its paths here, so that nothing lies on the top. The ``first`` throw is laid from the beginning.
     """
 
     def __init__(self, first: int, thread: Thread, press: float) -> None:

@@ -69,7 +69,7 @@ class Piece:
         self.frame.restart()
 
     def _lay(self, rod: Rod) -> LyingThread:
-        """The rod where it lies on the tissue."""
+        """The rod on the surface of the tissue."""
         inside = next((thread for thread in self.threads if thread.rod is rod), None)
         return LyingThread(rod, self.block, self.frame, self._body.friction, inside)
 
@@ -186,8 +186,10 @@ class Piece:
             self._floating.reset()
         self.block.reset()
         self.contacts.reset()
-        for part in (*self.piercers, *self.lying):
-            part.reset()
+        for piercer in self.piercers:
+            piercer.reset()
+        for lying in self.lying:
+            lying.reset()
         self.wrench[:], self.peak[:] = 0.0, 0.0
         self._read()
         self.frame.restart()
