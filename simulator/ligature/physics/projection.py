@@ -265,8 +265,8 @@ def _excess(loops: Loops, n: int, begun: float, dt: float) -> float:
         far = max(far, abs(loops.shift[a]))
     if far <= max(THROWN, FLAT * begun):
         return 0.0
-    led = -dt * _product(loops, n, loops.speed, loops.shift) / _product(loops, n, loops.shift, loops.shift)
-    return 1.0 - min(max(led, 0.0), 1.0)
+    there = -dt * _product(loops, n, loops.speed, loops.shift) / _product(loops, n, loops.shift, loops.shift)
+    return 1.0 - min(max(there, 0.0), 1.0)
 
 
 # --- gaps ---------------------------------------------------------------------------------------
