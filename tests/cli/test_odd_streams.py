@@ -52,8 +52,19 @@ def test_every_command_with_closed_streams_does_its_work(
     assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr
 
 
+@pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("words", [COMMANDS[name] for name in ("help", "check")], ids=("help", "check"))
-def test_a_full_disk_is_reported_in_words(words: list[str], folder: Path) -> None:
+def test_a_full_disk_is_reported_in_words(
+    words: list[str], unbuffered: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)  # else what is printed is written at the end only
     done = started(words, folder, "> /dev/full")
     assert done.returncode == 2
     assert done.stderr == "error: what is printed cannot be written: No space left on device\n"
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_leaves_is_no_error(unbuffered: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
+    done = started(COMMANDS["check"], folder, "> >(exec true)")
+    assert done.returncode in (0, 1) and done.stderr == ""

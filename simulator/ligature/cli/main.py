@@ -6,6 +6,7 @@ import errno
 import importlib.util
 import math
 import os
+import sys
 from pathlib import Path
 from typing import Annotated, NoReturn, Optional
 
@@ -622,7 +623,10 @@ def dataset_export(
 def main() -> None:
     """Entry point of the command."""
     try:
-        app()
+        try:
+            app()
+        finally:
+            sys.stdout.flush()  # what waits to be written is written here, where a failure can still be reported
     except ModuleNotFoundError as error:
         text = remedy(error.name or "")
         if not text:
@@ -631,11 +635,21 @@ def main() -> None:
     except OSError as error:
         # What a file system says of a path of the user's: too long a name, a full disk, no permission.
         if error.filename is None:
-            if error.errno not in FULL:
+            if error.errno not in (*FULL, errno.EPIPE):
                 raise
+            _drop_output()
+            if error.errno == errno.EPIPE:  # whoever read has seen enough
+                raise SystemExit(1) from None
             _fail(f"error: what is printed cannot be written: {error.strerror}")
         name = os.fsdecode(error.filename)
         _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
+
+
+def _drop_output() -> None:
+    """Lead output to nowhere: at its end, Python would try once more to write what is left, in its own words."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
 
 
 def _fail(text: str) -> NoReturn:
