@@ -51,8 +51,8 @@ STRANGERS: dict[str, tuple[str, ...]] = {
 """Places that read files of strangers, and what fuzzes them."""
 
 OURS: dict[str, str] = {
-    "cli/main.py:_drop_output": "opens the null device in place of a full disk",
-    "cli/command.py:_open_streams": "opens the null device in place of closed streams",
+    "cli/command.py:_open_streams": "opens streams of the null device in place of closed ones",
+    "cli/command.py:open_null": "opens the null device",
     "cli/check.py:_shaders": "shaders, which are only tried for whether they can be read",
     "authoring/lint/files.py:material_dialect": "reads by a resolver what `mesh.obj` has read",
     "authoring/lint/files.py:file_unreferenced": "looks for names in scene files, by a resolver",

@@ -40,12 +40,16 @@ def _open_streams() -> None:
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
-            mode = os.O_WRONLY if number else os.O_RDONLY
-            nowhere = os.open(os.devnull, mode)
-            if nowhere != number:
-                os.dup2(nowhere, number)
-                os.close(nowhere)
+            open_null(number)
             setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: SIM115
+
+
+def open_null(number: int) -> None:
+    """Open the null device as the file descriptor ``number``."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    if nowhere != number:
+        os.dup2(nowhere, number)
+        os.close(nowhere)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 
 from ligature.bundle import launch_file, scene_names
+from ligature.cli.command import open_null
 from ligature.cli.missing import remedy
 from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, rate_notes
 from ligature.cli.sampling import Sampling, picture_size
@@ -637,19 +638,12 @@ def main() -> None:
         if error.filename is None:
             if error.errno not in (*FULL, errno.EPIPE):
                 raise
-            _drop_output()
+            open_null(1)  # else Python tries at its end once more to write what is left, and fails in its own words
             if error.errno == errno.EPIPE:  # whoever read has seen enough
                 raise SystemExit(1) from None
             _fail(f"error: what is printed cannot be written: {error.strerror}")
         name = os.fsdecode(error.filename)
         _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
-
-
-def _drop_output() -> None:
-    """Lead output to nowhere: at its end, Python would try once more to write what is left, in its own words."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    os.close(nowhere)
 
 
 def _fail(text: str) -> NoReturn:
