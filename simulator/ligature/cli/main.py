@@ -6,7 +6,6 @@ import errno
 import importlib.util
 import math
 import os
-import sys
 from pathlib import Path
 from typing import Annotated, NoReturn, Optional
 
@@ -624,10 +623,7 @@ def dataset_export(
 def main() -> None:
     """Entry point of the command."""
     try:
-        try:
-            app()
-        finally:
-            sys.stdout.flush()  # what waits to be written is written here, where a failure can still be reported
+        app()
     except ModuleNotFoundError as error:
         text = remedy(error.name or "")
         if not text:
@@ -636,11 +632,9 @@ def main() -> None:
     except OSError as error:
         # What a file system says of a path of the user's: too long a name, a full disk, no permission.
         if error.filename is None:
-            if error.errno not in (*FULL, errno.EPIPE):
+            if error.errno not in FULL:
                 raise
             open_null(1)  # else Python tries at its end once more to write what is left, and fails in its own words
-            if error.errno == errno.EPIPE:  # whoever read has seen enough
-                raise SystemExit(1) from None
             _fail(f"error: what is printed cannot be written: {error.strerror}")
         name = os.fsdecode(error.filename)
         _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
