@@ -154,7 +154,7 @@ def test_somebody_who_owns_nothing_can_simulate() -> None:
         Path(place).chmod(0o755)
         env = {**os.environ, "LIGATURE_CACHE": "", "XDG_CACHE_HOME": "", "HOME": "/root", "TMPDIR": str(temporary)}
         done = subprocess.run(
-            [*words, "-m", "ligature.cli.main", "bench", str(scene), "--seconds", "0.1"],
+            [*words, "-m", "ligature", "bench", str(scene), "--seconds", "0.1"],
             env=env, capture_output=True, text=True, timeout=280, cwd="/",
         )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr

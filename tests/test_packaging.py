@@ -101,7 +101,7 @@ def test_the_source_distribution_carries_everything_tracked_and_the_messages(dis
 def test_the_unpacked_wheel_finds_its_scenes_by_name(wheel: zipfile.ZipFile, tmp_path: Path) -> None:
     wheel.extractall(tmp_path)
     done = subprocess.run(
-        [sys.executable, "-m", "ligature.cli.main", "check", "peg_transfer"],
+        [sys.executable, "-m", "ligature", "check", "peg_transfer"],
         cwd="/", env=dict(os.environ, PYTHONPATH=str(tmp_path)), capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     assert f"{tmp_path}/ligature/bundled/scenes/peg_transfer/launch.yaml: 0 errors" in done.stdout, done.stderr

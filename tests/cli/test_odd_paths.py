@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ligature.cli import main as cli
+from ligature.cli import command
 
 COMMANDS = {
     "check": ["check", "PATH"],
@@ -59,8 +60,9 @@ def test_commands_say_what_is_wrong_with_a_path(
     monkeypatch.chdir(tmp_path)
     place = path(tmp_path)
     monkeypatch.setattr(sys, "argv", ["ligature", *(place if word == "PATH" else word for word in words)])
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # interrupts stay the test runner's
     with pytest.raises(SystemExit) as ended:
-        cli.main()
+        command.ligature()
     out, err = capfd.readouterr()
     assert ended.value.code in (1, 2), out + err
     assert (out + err).strip() and "Traceback" not in out + err
@@ -69,7 +71,7 @@ def test_commands_say_what_is_wrong_with_a_path(
 @pytest.mark.parametrize("scene", ["none.yaml", "x" * 300])
 def test_compile_says_why_a_scene_cannot_run(scene: str, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "ligature.cli.main", "compile", scene],
+        [sys.executable, "-m", "ligature", "compile", scene],
         cwd=tmp_path, capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     assert done.returncode in (1, 2) and "Traceback" not in done.stdout + done.stderr

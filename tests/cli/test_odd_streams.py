@@ -19,7 +19,7 @@ COMMANDS = {
     "poses": ["poses", "scene.yaml", "--seconds", "0.01", "--out", "poses.npz"],
 }
 CLOSED = [numbers for count in (1, 2, 3) for numbers in itertools.combinations(range(3), count)]
-START = "from ligature.cli.command import ligature; ligature()"
+START = "from ligature.cli import command; command.{}()"
 
 
 @pytest.fixture
@@ -28,11 +28,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def started(words: list[str], folder: Path, redirections: str) -> subprocess.CompletedProcess[str]:
+def started(
+    words: list[str], folder: Path, redirections: str, command: str = "ligature", pass_fds: tuple[int, ...] = ()
+) -> subprocess.CompletedProcess[str]:
     """The command as a shell starts it with ``redirections``."""
     return subprocess.run(
-        ["bash", "-c", f'exec "$@" {redirections}', "bash", sys.executable, "-c", START, *words],
-        cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, env={**os.environ},
+        ["bash", "-c", f'exec "$@" {redirections}', "bash", sys.executable, "-c", START.format(command), *words],
+        cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, pass_fds=pass_fds,
     )  # fmt: skip
 
 
@@ -58,13 +60,28 @@ def test_a_full_disk_is_reported_in_words(
     words: list[str], unbuffered: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)  # else what is printed is written at the end only
-    done = started(words, folder, "> /dev/full")
+    assert_full(started(words, folder, "> /dev/full"))
+
+
+def test_a_full_disk_is_reported_by_ambf_simulator(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONUNBUFFERED", "")
+    assert_full(started(COMMANDS["help"], folder, "> /dev/full", "ambf_simulator"))
+
+
+def assert_full(done: subprocess.CompletedProcess[str]) -> None:
+    """Fail unless the command says that what it prints cannot be written."""
     assert done.returncode == 2
     assert done.stderr == "error: what is printed cannot be written: No space left on device\n"
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_reader_that_leaves_is_no_error(unbuffered: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("command", ["ligature", "ambf_simulator"])
+def test_a_reader_that_leaves_is_no_error(
+    command: str, unbuffered: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
-    done = started(COMMANDS["check"], folder, "> >(exec true)")
+    reader, pipe = os.pipe()
+    os.close(reader)
+    done = started(COMMANDS["help"], folder, f">&{pipe}", command, (pipe,))
+    os.close(pipe)
     assert done.returncode in (0, 1) and done.stderr == ""

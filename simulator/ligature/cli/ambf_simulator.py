@@ -144,7 +144,3 @@ def _notes(given: argparse.Namespace) -> tuple[str, ...]:
         notes.append(f"-p {given.p:g}: a tick lasts 1 ms; using {MAX_UPDATE_RATE:g} updates per second")
         return tuple(notes)
     return (*notes, *rate_notes(given.p))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Where the commands begin: an interrupt while modules are imported ends them.
+"""Where the commands begin, and what ends them: interrupts amid imports, missing packages, paths and full disks.
 
 Python turns SIGINT into an exception, which is lost where it arrives while the import system releases a lock, or in a
 module that passes over errors: one start of 150 that were interrupted went on as if nothing had been said. Commands
@@ -7,11 +7,19 @@ import what they need when they need it, so this holds as long as they run.
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import signal
 import sys
 from types import FrameType
+from typing import NoReturn
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of writing to a disk that takes no more."""
+
+LONG = 120
+"""Characters of a path that a message quotes."""
 
 _IMPORT_SYSTEM = "<frozen importlib._bootstrap>"
 
@@ -30,7 +38,40 @@ def _run(module: str) -> None:
     _open_streams()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
         signal.signal(signal.SIGINT, _interrupt)
-    importlib.import_module(module).main()
+    try:
+        try:
+            importlib.import_module(module).main()
+        finally:
+            sys.stdout.flush()  # what waits to be written is written here, where a failure can still be reported
+    except ModuleNotFoundError as error:
+        from ligature.cli.missing import remedy
+
+        text = remedy(error.name or "")
+        if not text:
+            raise
+        _fail(text)
+    except OSError as error:
+        _end(error)
+
+
+def _end(error: OSError) -> NoReturn:
+    """End the command for what a file system says of a path of the user's, or of what is printed."""
+    if error.filename is not None:  # too long a name, a full disk, no permission
+        name = os.fsdecode(error.filename)
+        _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
+    if error.errno not in (*FULL, errno.EPIPE):
+        raise error
+    open_null(1)  # else Python tries at its end once more to write what is left, and fails in its own words
+    if error.errno == errno.EPIPE:  # whoever read has seen enough
+        raise SystemExit(1) from None
+    _fail(f"error: what is printed cannot be written: {error.strerror}")
+
+
+def _fail(text: str) -> NoReturn:
+    from rich.console import Console
+
+    Console(stderr=True, highlight=False, soft_wrap=True).print(text, style="red", markup=False)
+    raise SystemExit(2) from None
 
 
 def _open_streams() -> None:

@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import errno
 import importlib.util
 import math
 import os
 from pathlib import Path
-from typing import Annotated, NoReturn, Optional
+from typing import Annotated, Optional
 
 import typer
 from rich.console import Console
 
 from ligature.bundle import launch_file, scene_names
-from ligature.cli.command import open_null
 from ligature.cli.missing import remedy
 from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, rate_notes
 from ligature.cli.sampling import Sampling, picture_size
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import requested
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of writing to a disk that takes no more."""
-
-LONG = 120
-"""Characters of a path that a message quotes."""
 
 app = typer.Typer(
     add_completion=False,
@@ -622,28 +614,4 @@ def dataset_export(
 
 def main() -> None:
     """Entry point of the command."""
-    try:
-        app()
-    except ModuleNotFoundError as error:
-        text = remedy(error.name or "")
-        if not text:
-            raise
-        _fail(text)
-    except OSError as error:
-        # What a file system says of a path of the user's: too long a name, a full disk, no permission.
-        if error.filename is None:
-            if error.errno not in FULL:
-                raise
-            open_null(1)  # else Python tries at its end once more to write what is left, and fails in its own words
-            _fail(f"error: what is printed cannot be written: {error.strerror}")
-        name = os.fsdecode(error.filename)
-        _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
-
-
-def _fail(text: str) -> NoReturn:
-    Console(stderr=True, highlight=False, soft_wrap=True).print(text, style="red", markup=False)
-    raise SystemExit(2) from None
-
-
-if __name__ == "__main__":
-    main()
+    app()

@@ -1,0 +1,5 @@
+"""The command ``ligature`` as ``python -m ligature``."""
+
+from ligature.cli.command import ligature
+
+ligature()
