@@ -7,26 +7,42 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 
 import ligature
 from ligature.bundle import SCENES
+from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
+from ligature.model.piercing import Needle
 from ligature.process import end_with_parent
+from ligature.robots.arm import Kinematics
+from ligature.robots.ecm import Ecm
+from ligature.robots.mtm import Mtm
+from ligature.robots.psm import Psm
+from ligature.tasks.plans import COARSE, throws
+from ligature.tasks.throws import NeedleArc, Throw
 
-COMPILED_SCENES = tuple(SCENES / name / "launch.yaml" for name in ("suturing", "peg_transfer"))
+COMPILED_SCENES = tuple(SCENES / name / "launch.yaml" for name in ("suturing", "soft_suturing"))
 """Bundled scenes that between them need nearly all kernels."""
 
 TICKS = 300
 """Ticks that each scene runs, of which arms find their home for the last part."""
+
+BEFORE, BEYOND, SPEED = 0.005, 0.01, 0.05
+"""Metres of a needle's circle before the entry at which its tip begins, and of thread that goes in; metres a second."""
+
+FIRM = 20.0
+"""Metres a second by which the needle goes back for each metre that it is beside its circle."""
 
 
 def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
     """Compile what ``scenes`` need, or what most need; returns 1 when one of them cannot run."""
     scenes = scenes or COMPILED_SCENES
     begin = time.monotonic()
-    console.print(f"compiling the kernels of {len(scenes)} scenes in parallel; this takes 1 to 2 minutes, once")
+    console.print(f"compiling the kernels of {len(scenes)} scenes in parallel; this takes 2 to 4 minutes, once")
     running = {scene: _start(scene, console) for scene in scenes}
     status = 0
     for scene, (process, reader) in running.items():
@@ -56,13 +72,50 @@ def _start(scene: Path, console: Console) -> tuple[subprocess.Popen[str], thread
 
 
 def run_for_a_moment(launch: Path) -> None:
-    """Call what a run of the scene calls: ticks, arms that move, a picture; raises `ligature.SceneError`."""
+    """Call what a run of the scene calls; raises `ligature.SceneError`.
+
+    Ticks, arms that move, a needle and its thread that pass through tissue, a restored snapshot, a picture: what is
+    compiled here does not stop a run for seconds where it is first needed.
+    """
     simulation = ligature.Simulation(ligature.load(launch))
     simulation.step(TICKS)
     for name in simulation.arms:
         simulation.arms[name].home()
     simulation.step(TICKS)
+    for kinematics in (Psm("LARGE_NEEDLE_DRIVER:400006"), Ecm(), Mtm("left")):
+        _solve(kinematics)
+    for needle in simulation.scene.needles[:1]:
+        for throw in islice(throws(simulation.scene, simulation.state[0], needle.arc.radius, COARSE), 1):
+            _pierce(simulation, needle, throw)
+    simulation.restore(simulation.snapshot())
+    simulation.step()
     _draw(simulation)
+
+
+def _solve(kinematics: Kinematics) -> None:
+    """Solve forward and inverse kinematics and the Jacobians of an arm."""
+    middle = 0.5 * (kinematics.lower + kinematics.upper)
+    kinematics.inverse(kinematics.forward(middle), middle)
+    kinematics.jacobian_body(middle), kinematics.jacobian_spatial(middle)
+
+
+def _pierce(simulation: ligature.Simulation, needle: Needle, throw: Throw) -> None:
+    """Turn a needle on its circle until its thread is in, and release it."""
+    body = simulation.scene.bodies[needle.body]
+    arc, handle = NeedleArc.of(needle, body), simulation.bodies[body.identity.topic]
+    spin = SPEED / arc.radius * throw.normal
+    poses = [
+        throw.arc_at(tip / arc.radius, arc) @ inverse(arc.T_body_arc)
+        for tip in np.arange(-BEFORE, arc.length + BEYOND, SPEED * simulation.dt)
+    ]
+    handle.set_pose(matrix_pose7(poses[0]).tolist())
+    for T_world_body in poses:
+        wanted, now = T_world_body @ body.T_body_inertial, pose7_matrix(handle.pose) @ body.T_body_inertial
+        back = FIRM * (wanted[:3, 3] - now[:3, 3])
+        handle.command_twist([*(np.cross(spin, now[:3, 3] - throw.centre) + back), *spin])
+        simulation.step()
+    handle.release()
+    simulation.step(TICKS)
 
 
 def _draw(simulation: ligature.Simulation) -> None:
