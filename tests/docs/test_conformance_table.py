@@ -14,7 +14,7 @@ CITED = re.findall(r"`(test_\w+\.py)::(test_\w+)`", PAGE)
 LINES = [
     line
     for part in PAGE.split("\n## ")[1:]
-    if not part.startswith("Not as")
+    if not part.startswith("Differences")
     for line in part.splitlines()
     if line.startswith("| ") and not line.startswith(("| the dVRK |", "| program |"))
 ]
