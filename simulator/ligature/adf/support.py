@@ -6,23 +6,31 @@ from ligature.adf.schema import NOT_SIMULATED, PLURALS, SCHEMA, Fault, Key, Stat
 
 _INTRODUCTION = """# ADF support
 
-Every key that the reader knows, by kind of file or object, with its type, default and what becomes of it. Section
-numbers (§) are those of the ADF specification. Keys that are not here are reported as unknown, with a suggestion.
+ADF is the YAML format of AMBF's scenes. This page lists every key that Ligature reads, by kind of file or object, with
+type, default and effect. Section numbers (§) are those of the ADF specification. Other keys are reported as unknown,
+with a suggestion. To write your first file, see [your first scene](tutorial_scene.md). `ligature check` lists the keys
+of a file that have no effect. The effects of a key are:
 
-- **used**, where nothing else is stated: has the effect that AMBF gives it (`tests/adf/test_effects.py` tries each).
-- **{ignored}**: legal, without effect there and here; reported at debug level (`ligature check -v`).
-- **{unused}**: AMBF uses it, and its meaning is stated; its value is checked, and `ligature check -v` names it.
-- **{kept}**: handed to them as written; those in Python are run when the user allows it ([plug-ins](plugins.md)).
-- **{not_simulated_status}**: of kinds that are not simulated.
-- **{ours}**, so files that use it stay valid there.
+- **used** (not marked in the tables): the same effect as in AMBF (`tests/adf/test_effects.py` tests each).
+- **{ignored}**: valid, without effect in AMBF and Ligature; reported at debug level (`ligature check -v`).
+- **{unused}**: has an effect only in AMBF; the value is checked, and `ligature check -v` names it.
+- **{kept}**: passed to plug-ins as written; Python plug-ins run if the user allows it ([plug-ins](plugins.md)).
+- **{not_simulated_status}**: key of a kind of object that is not simulated.
+- **{ours}**; files that use it stay valid in AMBF.
 
-A bad value is an error at its place, and leaves its object out; where the table states "bad: default", it is a warning
-and the default is taken. {simulated} are simulated; {not_simulated} are read, checked and reported as not simulated.
+A bad value is an error with its file, line and column, and its object is left out. If the table states "bad: default",
+it is a warning, and the default is used.
 
-Where AMBF's behaviour is a defect that no file relies on, ours is the sane one: an unknown sensor type leaves that
-sensor out instead of crashing, one bad value leaves its object out instead of refusing the file (`--strict` refuses
-it), a joint without `type` is revolute with a warning, a lone `enable motor` is accepted, duplicates get topics of
-their own, a missing low-resolution mesh falls back to the high-resolution one with a warning.
+{simulated} are simulated; {not_simulated} are read, checked and reported as not simulated.
+
+Ligature deviates from AMBF only where AMBF has a defect on which no file relies:
+
+- a sensor of unknown type is left out; AMBF crashes;
+- an object with a bad value is left out; AMBF rejects the whole file, as `--strict` does;
+- a joint without `type` is revolute, with a warning;
+- `enable motor` alone is accepted;
+- objects of the same name get separate topics;
+- a missing low-resolution mesh is replaced by the high-resolution one, with a warning.
 
 This page is generated from the schema by `make docs`.
 """

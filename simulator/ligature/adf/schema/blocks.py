@@ -50,7 +50,7 @@ PLUGINS = Key(
 IDENTITY = (
     Key("name", T, "", doc="name of the topics and in messages; blanks are removed"),
     Key("namespace", T, "", doc="absolute with a leading '/', else appended to the file's"),
-    Key("passive", F, False, doc="no topics; on a joint: left out of command and state vectors"),
+    Key("passive", F, False, doc="no topics; on a joint: excluded from command and state vectors"),
     Key("publish frequency", MAP, doc="publishing rates without and with commands"),
     Key("publish frequency.low", U, 50, "Hz", "rate until a command arrives", required=True),
     Key("publish frequency.high", U, 1000, "Hz", "rate while commands arrive", required=True),
@@ -67,7 +67,7 @@ def _rgb(part: str, default: float) -> tuple[Key, ...]:
 
 
 COLOUR = (
-    Key("color rgba", MAP, doc="diffuse colour and alpha; comes before `color components`"),
+    Key("color rgba", MAP, doc="diffuse colour and alpha; takes precedence over `color components`"),
     *each("rgba", N, "color rgba.{}", doc="{} of 0 to 1", required=True),
     Key("color components", MAP, doc="material colours"),
     *_rgb("diffuse", 0.7),
@@ -108,8 +108,8 @@ def _compound(block: str, doc: str) -> tuple[Key, ...]:
 
 LOOKS = (
     Key("mesh", P, "", doc="visual mesh, and collision mesh unless another is named; '' is none"),
-    *unused((Key("mesh remove duplicates", F, False, doc="weld identical visual vertices, which look the same"),)),
-    Key("shape", C, doc="visual primitive; comes before `mesh`", choices=SHAPES),
+    *unused((Key("mesh remove duplicates", F, False, doc="merge identical visual vertices; no visible effect"),)),
+    Key("shape", C, doc="visual primitive; takes precedence over `mesh`", choices=SHAPES),
     *geometry("geometry", "dimensions of `shape`"),
     *_compound("compound shape", "several visual primitives"),
     Key("high resolution path", P, "", doc="folder of visual meshes, appended to the file's own"),
@@ -117,7 +117,7 @@ LOOKS = (
     *COLOUR,
 )
 COLLISION = (
-    Key("collision shape", C, doc="single collision primitive; comes first", choices=SHAPES),
+    Key("collision shape", C, doc="single collision primitive; takes precedence", choices=SHAPES),
     *geometry("collision geometry", "dimensions of `collision shape`"),
     Key(
         "collision offset",
@@ -163,5 +163,5 @@ def gains(block: str, doc: str, required: bool) -> tuple[Key, ...]:
 
 
 OUTPUT_TYPE = Key(
-    "controller output type", C, doc="what the output is applied as, §13", choices=OUTPUT_TYPES, fault=Fault.VALUE
+    "controller output type", C, doc="quantity that the output commands, §13", choices=OUTPUT_TYPES, fault=Fault.VALUE
 )

@@ -53,8 +53,8 @@ ROD = Key("ligature rod", F, True, doc="false: never part of a rod", status=Stat
 TISSUE = (
     Key("ligature tissue.stiffness", N, unit="N/m", doc="sideways", status=Status.OURS, least=0.0),
     Key("ligature tissue.strength", N, unit="N", doc="sideways force that tears it", status=Status.OURS, least=0.0),
-    Key("ligature tissue.friction", N, unit="N", doc="along what passes", status=Status.OURS, least=0.0),
-    Key("ligature tissue.drag", N, unit="N s/m", doc="along what passes", status=Status.OURS, least=0.0),
+    Key("ligature tissue.friction", N, unit="N", doc="along the needle or thread", status=Status.OURS, least=0.0),
+    Key("ligature tissue.drag", N, unit="N s/m", doc="along the needle or thread", status=Status.OURS, least=0.0),
 )
 
 _TISSUES = {name: name for name in ("silicone pad", "skin", "fat", "stomach", "liver")}
@@ -67,15 +67,15 @@ def _material(block: str) -> tuple[Key, ...]:
         path = f"{block}.{name}"
         return Key(path, N, unit=unit, doc=doc, least=least, most=most, status=Status.OURS, fault=Fault.OBJECT)
 
-    doc = "named material, whose numbers hold where none is given"
+    doc = "named material, which gives the defaults of the other keys"
     return (
         Key(f"{block}.material", C, doc=doc, choices=_TISSUES, status=Status.OURS, fault=Fault.OBJECT),
         number("youngs modulus", "Pa", "Young's modulus", 1.0, 1e9),
         number("poisson ratio", "", "Poisson's ratio, at most 0.499", 0.0, 0.499),
         number("density", "kg/m³", "density", 1.0),
         number("damping time", "s", "viscous over elastic stress"),
-        number("puncture force", "N", "at which a needle's tip enters"),
-        number("exit force", "N", "at which it leaves, over that of cutting"),
+        number("puncture force", "N", "force at which a needle's tip enters"),
+        number("exit force", "N", "force at which it leaves, in addition to cutting"),
         number("cutting force", "N", "at the tip while it cuts"),
         number("friction", "N/m", "along needle or thread, for each metre inside"),
         number("strength", "N/m", "load across, for each metre, that tears"),
@@ -87,8 +87,8 @@ SOFT_TISSUE = (
     Key("ligature tissue", MAP, doc="the body is soft tissue, docs/tissue.md", status=Status.OURS),
     *_material("ligature tissue"),
     Key("ligature tissue.cell size", N, unit="m", least=1e-5, status=Status.OURS, fault=Fault.OBJECT,
-        doc="edge of its cells; when absent some 600 cells, 150 where nothing holds it"),
-    Key("ligature tissue.fixed", Type.TEXTS, ("-z",), doc="faces that its rigid body holds, of -x +x -y +y -z +z",
+        doc="edge length of cells; default for 600 cells, 150 without fixed faces"),
+    Key("ligature tissue.fixed", Type.TEXTS, ("-z",), doc="faces fixed to its rigid body, of -x +x -y +y -z +z",
         status=Status.OURS),
     Key("ligature tissue.carried by", T, "", doc="body that it is fixed to", status=Status.OURS),
     Key("ligature tissue.surface friction", N, None, doc="coefficient of its surface; `friction.static` when absent",
@@ -129,8 +129,8 @@ BODY = (
     Key("friction.rolling", N, 0.01, doc="rolling friction coefficient"),
     *ignored(("friction.linear",), "old name of `static`"),
     Key("damping", MAP, doc="loss of velocity"),
-    Key("damping.linear", N, 0.04, doc="velocity × (1 − d)^dt; taken as 0 to 1"),
-    Key("damping.angular", N, 0.1, doc="velocity × (1 − d)^dt; taken as 0 to 1"),
+    Key("damping.linear", N, 0.04, doc="velocity × (1 − d)^dt; clipped to 0 to 1"),
+    Key("damping.angular", N, 0.1, doc="velocity × (1 − d)^dt; clipped to 0 to 1"),
     Key("restitution", N, 0.1, doc="coefficient of restitution"),
     Key("controller", MAP, doc="Cartesian controller, §13"),
     *gains("controller.linear", "gains of the linear half", required=True),
@@ -143,7 +143,7 @@ BODY = (
     *ignored(("resistive surface", "resistive surface1"), "of AMBF 1.0; sensors of type Resistance replaced it"),
     *ignored(("enable feedback",), "belongs to joints"),
     ROD,
-    Key("ligature needle", F, doc="false: never taken for a needle; else recognised", status=Status.OURS),
+    Key("ligature needle", F, doc="false: not a needle; by default needles are recognised", status=Status.OURS),
     *SOFT_TISSUE,
 )
 
@@ -208,7 +208,7 @@ JOINT = (
     Key("parent axis", V, doc="joint axis in the parent's body frame", required=True),
     Key("child axis", V, doc="joint axis in the child's body frame", required=True),
     Key("offset", N, None, "rad", "rotation of the child about the axis at joint position 0"),
-    Key("child offset", N, 0.0, "rad", "old name of `offset`, which wins"),
+    Key("child offset", N, 0.0, "rad", "former name of `offset`, which takes precedence"),
     Key("joint offset", N, 0.0, "rad", "rotation of the constraint frame about the axis"),
     Key("joint limits", MAP, doc="unlimited unless both ends are given"),
     Key("joint limits.low", N, unit="rad, m", doc="lower limit"),
@@ -239,7 +239,7 @@ JOINT = (
         "ligature yield moment",
         N,
         unit="N·m",
-        doc="of a thread's joint: moment from which a bend stays; none when absent",
+        doc="of a thread's joint: moment above which a bend is permanent; elastic when absent",
         status=Status.OURS,
         least=0.0,
     ),
@@ -253,14 +253,14 @@ GHOST = (
     *LOOKS,
     *unused(COLLISION, "collision groups"),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose in the parent's frame"),
-    Key("inertial offset", POSE, None, "m, rad", "taken when `collision offset` is absent"),
+    Key("inertial offset", POSE, None, "m, rad", "used when `collision offset` is absent"),
     *ignored(
         ("mass", "inertia", "friction", "damping", "restitution", "gravity", "controller", "controller output type"),
         "a ghost has no mechanics",
     ),
     *ignored(_STATE_OF_JOINTS, "of bodies whose key was moved to the ghost objects"),
     Key("ligature hole", F, doc="whether needle and thread pass here; else recognised", status=Status.OURS),
-    Key("ligature tissue", MAP, doc="how a hole holds what passes through it", status=Status.OURS),
+    Key("ligature tissue", MAP, doc="forces of a hole on needle and thread", status=Status.OURS),
     *TISSUE,
 )
 
@@ -298,7 +298,7 @@ SOFT_BODY = (
     *unused((Key("randomize constraints", F, doc="any value randomises their order"),)),
     Key("config", MAP, doc="Bullet's soft-body parameters, §20; how they count: docs/tissue.md"),
     Key("config.kLST", N, 1.0, doc="linear stiffness, 0 to 1; gives Young's modulus"),
-    Key("config.piterations", I, 1, doc="position iterations, which multiply it"),
+    Key("config.piterations", I, 1, doc="position iterations; they raise the stiffness"),
     Key("config.kMT", N, 0.0, doc="pose matching, 0 to 1; adds to Young's modulus"),
     Key("config.kVC", N, 0.0, doc="volume conservation: above 0 Poisson's ratio is 0.45, not 0.3"),
     Key("config.kPR", N, 0.0, doc="pressure: above 0 Poisson's ratio is 0.45; it does not inflate"),
@@ -355,7 +355,7 @@ SUTURE = (
     Key("youngs modulus", N, 2.0e9, "Pa", "Young's modulus"),
     Key("poisson ratio", N, 0.4, doc="ratio that gives the shear modulus"),
     Key("damping time", N, 0.002, "s", "bending damping over bending stiffness"),
-    Key("yield strain", N, doc="stretch of the skin from which a bend stays; none does when absent", least=0.0),
+    Key("yield strain", N, doc="strain at the surface above which a bend is permanent; elastic when absent", least=0.0),
     Key("elements", U, 40, doc="number of elements"),
     Key("friction", N, 0.3, doc="friction coefficient"),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose of the start; the thread leaves along +z"),

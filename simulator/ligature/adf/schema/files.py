@@ -71,7 +71,7 @@ LAUNCH = (
     PLUGINS,
     VERSION,
     *ignored(("gripper configs", *_DEVICE_NAMES), "of old files"),
-    Key("ligature arms", Type.ANY, doc="which bodies are an arm", status=Status.OURS),
+    Key("ligature arms", Type.ANY, doc="bodies that form an arm", status=Status.OURS),
 )
 DEVICES = (Key("input devices", Type.TEXTS, (), doc="devices that exist, in order"), VERSION)
 INPUT_DEVICE = (

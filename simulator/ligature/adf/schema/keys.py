@@ -44,9 +44,9 @@ class Status(enum.Enum):
 class Fault(enum.Enum):
     """What AMBF gives up when a value is bad or missing; we give up the object instead of the file."""
 
-    FILE = "the whole file is refused"
+    FILE = "the whole file is rejected"
     OBJECT = "the object is left out"
-    VALUE = "the default is taken"
+    VALUE = "the default is used"
 
 
 @dataclass(frozen=True)
