@@ -70,7 +70,7 @@ class OfPose:
         poses = model_of(context).adf.poses
         found = poses.get(self.name) if self.name else poses[0]
         if found is None:
-            self.report({"ERROR"}, f"There is no pose '{self.name}'; there are {', '.join(poses.keys())}")
+            self.report({"ERROR"}, f"There is no pose '{self.name}'; choose one of {', '.join(poses.keys())}")
         return found
 
 

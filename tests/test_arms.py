@@ -321,5 +321,5 @@ def test_a_snapshot_in_the_middle_of_moves_continues_bit_for_bit(whole: Simulati
 
 
 def test_an_unknown_arm_is_named_with_the_known_ones(whole: Simulation) -> None:
-    with pytest.raises(KeyError, match="no arm is called 'PSM3'; there are PSM1, PSM2, ECM, MTML, MTMR"):
+    with pytest.raises(KeyError, match="unknown arm 'PSM3'; choose one of PSM1, PSM2, ECM, MTML, MTMR"):
         whole.arms["PSM3"]

@@ -58,7 +58,7 @@ def _writable(wanted: Path) -> Path:
 def _private_folder() -> Path:
     """The user's own folder among the temporary ones, kept for the next start.
 
-    What lies in it is run as code: where somebody else made it, this process gets one for itself.
+    Its files are executed as code. If another user created the folder, this process uses a private one.
     """
     if hasattr(os, "getuid"):
         folder = Path(tempfile.gettempdir()) / f"ligature-{os.getuid()}"

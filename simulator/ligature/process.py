@@ -64,6 +64,6 @@ def run_in_real_time() -> bool:
 
 
 def report(event: str, text: str = "") -> None:
-    """Report ``event`` to the parent; names of files may hold what is no UTF-8."""
+    """Report ``event`` to the parent; names of files may hold what is not UTF-8."""
     sys.stdout.write(f"@{event} {text}\n".encode("utf-8", "backslashreplace").decode())
     sys.stdout.flush()

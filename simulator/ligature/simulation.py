@@ -109,7 +109,7 @@ class Handles(Mapping[str, Handle], Generic[Handle]):
             found = find_by_text(names, text)
             if found is not None:
                 return self._handles[found]
-        raise KeyError(f"'{text}' does not name exactly one {self._kind}; there are {', '.join(self._names[0])}")
+        raise KeyError(f"'{text}' does not name exactly one {self._kind}; choose one of {', '.join(self._names[0])}")
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names[0])
@@ -254,7 +254,7 @@ class Simulation:
             for name in ("write_state", "sense", "take_problems")
         )
         self._resting: dict[int, int] = {}
-        """Subsystems that are left out, by their number, and the tick from which each goes on."""
+        """Subsystems that are skipped, by their number, and the tick at which each continues."""
         self._reported: dict[tuple[str, str], int] = {}
         self._phases = [
             (self.phases[phase], [s for s in subsystems if type(s).step is not Subsystem.step])
@@ -308,13 +308,13 @@ class Simulation:
         self._clock.advance()
 
     def _leave_out(self, subsystem: Subsystem, error: Exception) -> None:
-        """A step raised: the subsystem goes on from the start of the scene, without commands, after a rest."""
-        self._report(subsystem, "step", f"is put back to its start and left out for {REST * self.dt:g} s", error)
+        """A step raised: the subsystem is reset and skipped for a while, then it continues without commands."""
+        self._report(subsystem, "step", f"it is reset to its start and skipped for {REST * self.dt:g} s", error)
         self._guarded(subsystem, "recover")
         self._resting[self._subsystems.index(subsystem)] = self._clock.tick + REST
 
     def _rests(self, subsystem: Subsystem) -> bool:
-        """Whether a subsystem is left out in this tick; it may be the one in which it goes on."""
+        """Whether a subsystem is skipped in this tick; recovers it in the tick in which it continues."""
         number = self._subsystems.index(subsystem)
         if self._resting.get(number, 0) > self._clock.tick:
             return True
@@ -323,18 +323,18 @@ class Simulation:
         return False
 
     def _guarded(self, subsystem: Subsystem, name: str, *arguments: StateRecord) -> None:
-        """Have a subsystem do something other than a step; what it raises is reported, and the others go on."""
+        """Call a method other than `step` of a subsystem; an exception is reported, and the others continue."""
         try:
             getattr(subsystem, name)(*arguments)
         except Exception as error:
-            self._report(subsystem, name, "goes on without", error)
+            self._report(subsystem, name, "the simulation continues without it", error)
 
     def _report(self, part: Subsystem | Guard, name: str, outcome: str, error: Exception) -> None:
         """Report a failure, unless the same method of the same part failed a moment ago."""
         what, now = (type(part).__name__, name), self._clock.tick
         if now >= self._reported.get(what, 0):
             self._reported[what] = now + REST
-            self.problems.append(failed(f"'{name}' of {what[0]} failed, which {outcome}", error))
+            self.problems.append(failed(f"'{name}' of {what[0]} failed; {outcome}", error))
 
     def _watch(self) -> None:
         """Report what moves as nothing commands."""
@@ -344,7 +344,7 @@ class Simulation:
             try:
                 alarm = self._guard.check(passed * self.dt)
             except Exception as error:
-                self._report(self._guard, "check", "goes on without", error)
+                self._report(self._guard, "check", "the simulation continues without it", error)
             else:
                 self.problems += [alarm] if alarm is not None else []
 
@@ -429,7 +429,7 @@ class Simulation:
         self._watch_anew()
 
     def reset(self, bodies_only: bool = False) -> None:
-        """Put everything back to where the scene starts, to the bit; time goes on and commands hold.
+        """Reset everything to the start of the scene, to the bit; time continues and commands hold.
 
         ``bodies_only`` leaves ghosts, cameras and lights where they are.
         """
@@ -502,7 +502,7 @@ class Clock:
         self.since_reset += 1
 
     def restart(self) -> None:
-        """The scene was put back to its start."""
+        """The scene was reset."""
         self.since_reset = 0
         self.resets += 1
 
@@ -525,5 +525,5 @@ def _digest(value: Any, update: Callable[[bytes], object]) -> None:
     else:
         array = np.ascontiguousarray(value)
         if array.dtype.hasobject:
-            raise TypeError(f"a snapshot holds a {type(value).__name__}, which has no bytes to compare")
+            raise TypeError(f"a snapshot contains a {type(value).__name__}, which has no bytes to compare")
         update(array.tobytes())

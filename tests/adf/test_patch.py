@@ -145,7 +145,7 @@ def test_changes_that_meet_are_refused() -> None:
 
 
 def test_what_cannot_be_is_reported() -> None:
-    with pytest.raises(PatchError, match="'mass' at m.yaml:4:9 is no block"):
+    with pytest.raises(PatchError, match="'mass' at m.yaml:4:9 is not a block"):
         set_value(TEXT, block(TEXT, "BODY a"), "mass.x", 1)
     with pytest.raises(PatchError, match="already exists"):
         add_key(TEXT, block(TEXT, "BODY a"), "mass", 1)

@@ -242,9 +242,9 @@ LINKS = '<link name="a"/><link name="b"/>'
     ("name", "content", "words"),
     [
         ("r.urdf", "<sdf/>", "the outermost element is <sdf>, not <robot>"),
-        ("r.urdf", f'<robot>{LINKS}<link name="a"/></robot>', "two links have one name"),
+        ("r.urdf", f'<robot>{LINKS}<link name="a"/></robot>', "two links have the same name"),
         ("r.urdf", f'<robot>{LINKS}<joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint></robot>',
-         "<joint name='j'>: its child is 'c', which is no link"),
+         "<joint name='j'>: its child is 'c', which is not a link"),
         ("r.urdf", '<robot><link name="a"><visual><origin xyz="0 nan 0"/><geometry><sphere radius="1"/></geometry></visual>'
          "</link></robot>", "<origin>: 'xyz' is '0 nan 0'; give 3 finite numbers"),
         ("r.urdf", '<robot><link name="a"><visual><geometry><sphere radius="-1"/></geometry></visual></link></robot>',
@@ -257,7 +257,7 @@ LINKS = '<link name="a"/><link name="b"/>'
         ("r.sdf", '<sdf><model name="m"><link name="a"><pose relative_to="z">0 0 0 0 0 0</pose></link></model></sdf>',
          "there is no frame 'z'"),
         ("r.sdf", '<sdf><model name="m"><link name="a"/><joint name="j" type="fixed"><parent>a</parent><child>q</child>'
-         "</joint></model></sdf>", "its child is 'q', which is no link of the model"),
+         "</joint></model></sdf>", "its child is 'q', which is not a link of the model"),
     ],
 )  # fmt: skip
 def test_a_file_that_is_no_robot_is_rejected_with_a_reason(tmp_path: Path, name: str, content: str, words: str) -> None:

@@ -68,7 +68,7 @@ def test_flags_without_effect_are_accepted_and_reported() -> None:
     run = options("-t 0 -g 1 --plugins 'a.so, b.so'")
     assert run.notes == (
         "--plugins (AMBF's plug-ins in C++) has no effect here",
-        "-t 0: the step is fixed here anyway; simulated time falls behind on a machine that is too slow",
+        "-t 0: the step is always fixed; simulated time falls behind on a machine that is too slow",
     )
 
 

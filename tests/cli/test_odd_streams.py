@@ -71,7 +71,7 @@ def test_a_full_disk_is_reported_by_ambf_simulator(folder: Path, monkeypatch: py
 def assert_full(done: subprocess.CompletedProcess[str]) -> None:
     """Fail unless the command says that what it prints cannot be written."""
     assert done.returncode == 2
-    assert done.stderr == "error: what is printed cannot be written: No space left on device\n"
+    assert done.stderr == "error: the output cannot be written: No space left on device\n"
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

@@ -41,7 +41,7 @@ def rest(served: Served) -> None:
 
 def test_the_page_shows_scene_figures_and_cameras(served: Served, person: Person) -> None:
     person.opens(served.url)
-    for text in ("suturing_small", "running", "nobody operates", "PSM1", "PSM2", "ECM", "DISABLED", "commands"):
+    for text in ("suturing_small", "running", "no operator", "PSM1", "PSM2", "ECM", "DISABLED", "commands"):
         person.sees(text)
     shown = "return [...document.querySelectorAll('img')].some(i => i.naturalWidth > 400)"
     until(lambda: person.driver.execute_script(shown), "pictures of both eyes are shown")

@@ -163,7 +163,7 @@ def test_the_reader_of_the_examples_says_what_it_wants(words: list[str]) -> None
         ({"rate": 0.0}, "rate must be above 0 and at most 1000 samples per simulated second"),
         ({"size": (0, 48)}, "size is a width and a height"),
         ({"gestures": {"work": "G3"}}, "'work' is no phase"),
-        ({"phases": ("work",), "gestures": {"work": "G99"}}, "'G99' none of the gestures G1, G2"),
+        ({"phases": ("work",), "gestures": {"work": "G99"}}, "'G99' is not one of the gestures G1, G2"),
     ],
 )
 def test_what_no_dataset_can_have_is_refused(
@@ -184,7 +184,7 @@ def test_what_exists_is_not_replaced(simulation: ligature.Simulation, tmp_path: 
 
 def test_a_phase_that_was_not_announced_is_refused(simulation: ligature.Simulation, tmp_path: Path) -> None:
     with (
-        pytest.raises(ValueError, match="no phase is called 'knit'; there are work"),
+        pytest.raises(ValueError, match="unknown phase 'knit'; choose one of work"),
         DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), phases=("work",)) as writer,
     ):
         writer.sample("knit")

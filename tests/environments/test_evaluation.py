@@ -104,7 +104,7 @@ def test_whatever_is_in_a_file_it_is_a_network_or_an_error(
 ) -> None:
     path = tmp_path_factory.mktemp("any") / "policy.onnx"
     path.write_bytes(data)
-    with pytest.raises(PolicyError, match=r"is no network in ONNX"):
+    with pytest.raises(PolicyError, match=r"is not an ONNX network"):
         load_policy(str(path))
 
 

@@ -78,7 +78,7 @@ def test_ranges_come_back_from_a_file(tmp_path_factory: pytest.TempPathFactory, 
 @pytest.mark.parametrize(
     ("config", "message"),
     [
-        ({"masses": [1, 2]}, "randomise has no 'masses'; there are light, light_shift"),
+        ({"masses": [1, 2]}, "randomise: unknown key 'masses'; choose one of light, light_shift"),
         ({"mass": 1.0}, r"mass must be a pair \[low, high\] of numbers from 0.2 to 5 \(times\), not 1.0"),
         ({"mass": [1.0, 2.0, 3.0]}, r"mass must be a pair .* not \[1.0, 2.0, 3.0\]"),
         ({"mass": "ab"}, "mass must be a pair .* not 'ab'"),

@@ -289,7 +289,7 @@ class Run:
         assert self._log.lost == 0
         for problem in self.simulation.problems:
             assert len(str(problem)) < 2000, "a problem repeats what it is about"
-            assert " failed, which " not in problem.message, problem.message
+            assert " failed; " not in problem.message, problem.message
         assert len(self.simulation.problems) < 1000
         self.simulation.problems.clear()
 

@@ -210,21 +210,24 @@ PHASE = "episode_0000/phase"
         (replaced(PHASE, shape=(1 << 44,), dtype="u1", chunks=True), "claims 17592186044416 bytes and has 0"),
         (
             replaced(PHASE, shape=(3,), dtype="u1", external=[("/etc/passwd", 0, 3)]),
-            "takes its numbers from another file",
+            "refers to data in another file",
         ),
         (linked("episode_0001", h5py.ExternalLink("/etc/other.h5", "/")), "is a link to '/etc/other.h5'"),
         (linked("episode_0001", h5py.ExternalLink("../a.h5.episodes/episode_0001.h5", "/")), "is a link to '../a.h5"),
         (linked("arms/PSM1", h5py.SoftLink("/arms")), "'arms/PSM1' is a link"),
-        (lambda file: file.__setitem__("episode_0000/again", file["episode_0000"]), "is there twice"),
-        (replaced(PHASE, data=[7, 7, 7]), "has phase 7; there are 3"),
+        (lambda file: file.__setitem__("episode_0000/again", file["episode_0000"]), "occurs twice"),
+        (replaced(PHASE, data=[7, 7, 7]), "has phase 7; the number of phases is 3"),
         (replaced(PHASE, data=[0.5, 0.5, 0.5]), "must be 3 numbers"),
         (replaced("episode_0000/arms/PSM1/measured_js", data=[[0.0] * 6] * 3), "it must be 3 × 3 × 6 numbers"),
         (
             replaced("episode_0000/arms/PSM1/local_action_cp", data=[[float("nan")] * 7] * 3),
-            "has numbers that no pose has",
+            "has values that are not a valid pose",
         ),
         (lambda file: file.attrs.__setitem__("gestures", ["a", "b"]), "it has 3 phases and 2 gestures of them"),
-        (lambda file: (file.pop("id_names", None), file.create_group("id_names")), "'id_names' is no list of texts"),
+        (
+            lambda file: (file.pop("id_names", None), file.create_group("id_names")),
+            "'id_names' is not a list of strings",
+        ),
         (lambda file: file.attrs.pop("rate"), "attribute 'rate' of '/' is missing; it is a number above 0"),
         (lambda file: file["episode_0001"].attrs.__setitem__("samples", "three"), "must be a whole number"),
     ],
@@ -288,4 +291,4 @@ def test_ranges_that_multiply_are_refused_before_they_do(tmp_path: Path) -> None
 def test_a_teleoperation_file_that_is_no_text_is_named_with_the_place(tmp_path: Path) -> None:
     path = tmp_path / "teleop.yaml"
     path.write_bytes(b"camera: ECM\nprefix: \xff\n")
-    assert f"{path}:2:9: error: byte 0xff is no UTF-8" in refusal(readers.read_teleop, path)
+    assert f"{path}:2:9: error: byte 0xff is not UTF-8" in refusal(readers.read_teleop, path)

@@ -47,5 +47,5 @@ def test_pictures_have_the_size_and_rate_of_the_video_standard(name: str, size: 
 
 
 def test_an_unknown_endoscope_is_named_with_those_there_are() -> None:
-    with pytest.raises(KeyError, match="no endoscope is called 'Xi'; there are Classic_SD, Classic_HD, Si_HD"):
+    with pytest.raises(KeyError, match="unknown endoscope 'Xi'; choose one of Classic_SD, Classic_HD, Si_HD"):
         seen_through(ligature.load(SCENE).cameras[0], "Xi")

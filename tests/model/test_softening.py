@@ -51,5 +51,5 @@ def test_wrong_names_are_reported(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(RIGID)
     found = ligature.load(tmp_path / "m.yaml", soft=["Table"]).diagnostics
     assert any("no body is called 'Table'" in d.message for d in found)
-    with pytest.raises(ValueError, match="'jelly' is no material"):
+    with pytest.raises(ValueError, match="'jelly' is not a known material"):
         ligature.load(tmp_path / "m.yaml", soft=["Pad=jelly"])

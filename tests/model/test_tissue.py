@@ -136,12 +136,12 @@ def test_tissue_is_fixed_to_the_body_that_carries_it(tmp_path: Path) -> None:
         (
             LINE,
             LINE + "    slits: [{from: {x: 0, y: 0.5, z: 0}, to: {x: 1, y: 0.5, z: 1}}]\n",
-            "no rectangle or box inside",
+            "not a rectangle or box inside",
         ),
         (
             LINE,
             LINE + "    slits: [{from: {x: 0, y: 0, z: 0}, to: {x: 1, y: 0, z: 0}}]\n",
-            "no rectangle or box inside",
+            "not a rectangle or box inside",
         ),
         (LINE, LINE + "    slits: [{from: {x: -1, y: -1, z: 0}, to: {x: 1, y: 1, z: 0}}]\n", "are not held"),
         (LINE, LINE + "    layers: [{material: fat}, {material: skin}]\n", "layer without thickness"),
@@ -149,7 +149,7 @@ def test_tissue_is_fixed_to_the_body_that_carries_it(tmp_path: Path) -> None:
         (
             LINE,
             LINE + "    fixed: []\n    slits: [{from: {x: 0, y: -1, z: -1}, to: {x: 0, y: 1, z: 1}}]\n",
-            "falls into 2",
+            "consists of 2",
         ),
         ("cell size: 0.005", "cell size: 0.5\n    fixed: [-z, +z]", "no node that can move"),
         ("shape: BOX\n  geometry: {x: 0.06, y: 0.04, z: 0.01}", "friction: {static: 0.5}", "has no shape"),

@@ -75,7 +75,7 @@ def test_a_stop_more_doubles_the_light(simulate: Make) -> None:
         ({"noise": float("nan")}, "the noise of a sensor lies between 0 and 10, not at nan"),
         ({"depth_noise": -1.0}, "the depth_noise of a sensor lies between 0 and 1000, not at -1"),
         ({"exposure": 1e9}, "the exposure of a sensor lies between -32 and 32, not at 1e[+]09"),
-        ({"distortion": (0.0, float("inf"), 0.0, 0.0, 0.0)}, "the distortion of a sensor has to be finite"),
+        ({"distortion": (0.0, float("inf"), 0.0, 0.0, 0.0)}, "the distortion of a sensor must be finite"),
     ],
 )
 def test_a_sensor_that_is_invalid_is_refused(wrong: dict[str, Any], words: str) -> None:

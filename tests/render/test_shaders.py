@@ -305,7 +305,7 @@ def test_shaders_that_do_not_link_are_reported(stage: Callable[..., Drawn]) -> N
 def test_an_attribute_that_no_object_has_is_reported(stage: Callable[..., Drawn]) -> None:
     vertex = "attribute vec3 aBoneWeights;\nvoid main() { gl_Position = ftransform() + vec4(aBoneWeights, 0.0); }\n"
     renderer, *_ = stage(vertex, shader("labels.frag"))
-    assert "wants the vertex attribute 'aBoneWeights'" in renderer.problems[0].diagnostics[0].message
+    assert "needs the vertex attribute 'aBoneWeights'" in renderer.problems[0].diagnostics[0].message
 
 
 def test_a_missing_shader_is_reported_once_where_the_scene_names_it(stage: Callable[..., Drawn]) -> None:

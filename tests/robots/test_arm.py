@@ -233,7 +233,7 @@ def test_another_instrument_brings_its_own_limits(ready: PsmArm, reported: Repor
     assert reported(ready, "tool_type") == ["MEGA_NEEDLE_DRIVER:420194"]
     ready.servo_jp([0, 0, 0.12, 0, 1.39, 0])
     assert ready.setpoint_js().position[4] == pytest.approx(1.2217)
-    with pytest.raises(Rejected, match="set_tool_type: there is no instrument 1"):
+    with pytest.raises(Rejected, match="set_tool_type: unknown instrument 1"):
         ready.set_tool_type("SPOON:1")
 
 

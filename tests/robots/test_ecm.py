@@ -127,9 +127,9 @@ def test_at_zero_the_endoscope_looks_down_the_shaft():
 
 
 def test_an_endoscope_or_a_model_that_does_not_exist_is_refused():
-    with pytest.raises(ValueError, match="there is no endoscope 'ERROR'; known are Classic_SD_STRAIGHT, "):
+    with pytest.raises(ValueError, match="unknown endoscope 'ERROR'; choose one of Classic_SD_STRAIGHT, "):
         Ecm("ERROR")
-    with pytest.raises(ValueError, match="there is no ECM model 'Xi'; known are Classic, Si"):
+    with pytest.raises(ValueError, match="unknown ECM model 'Xi'; choose one of Classic, Si"):
         Ecm(model="Xi")
 
 

@@ -40,7 +40,7 @@ def test_a_geared_variant_has_the_kinematics_of_the_plain_one():
     [
         ("SPOON", "no instrument is called 'SPOON'"),
         ("SPOON:400006", "instrument 400006 is called LARGE_NEEDLE_DRIVER, not SPOON"),
-        ("LARGE_NEEDLE_DRIVER:7", "there is no instrument 7; for example 400006 and 420006 are known"),
+        ("LARGE_NEEDLE_DRIVER:7", "unknown instrument 7; known are for example 400006 and 420006"),
         ("400006:LARGE_NEEDLE_DRIVER", "not a tool type; write NAME:NUMBER, for example LARGE_NEEDLE_DRIVER:400006"),
         ("", "'' is not a tool type"),
         *((number, "has a snake wrist, which is not modelled") for number in SNAKES),

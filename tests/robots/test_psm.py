@@ -233,7 +233,7 @@ def test_poses_rounded_to_messages_are_accepted(psm):
 @pytest.mark.parametrize(
     ("tool", "model", "message"),
     [
-        (400006, "Xi", "there is no PSM model 'Xi'; known are Classic, Si, SRC"),
+        (400006, "Xi", "unknown PSM model 'Xi'; choose one of Classic, Si, SRC"),
         (400093, "SRC", "carries instruments 400006 and 420006, not PROGRASP_FORCEPS:400093"),
     ],
 )

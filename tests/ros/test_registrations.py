@@ -107,7 +107,7 @@ def test_what_killed_nodes_left_is_removed_under_the_own_name_and_reported_under
             haunt(env, node, rng.choice((nobody, reused)), rng)
         expected = sum(len(listed(env, node)) for node in own)
         line = claim("/ligature")
-        assert (f"({expected} topics and services) was removed" in line) if expected else line == "", seed
+        assert (f"({expected} topics and services) were removed" in line) if expected else line == "", seed
         assert not any(registered(env, node) for node in own)
         lines = dead_neighbours("/ligature", [*PUBLISHED, *SUBSCRIBED])
         assert len(lines) == len(other)

@@ -83,4 +83,4 @@ def test_a_task_that_there_is_not_is_refused_with_those_that_there_are(ros_env: 
         [BIN / "ligature", "run", SMALL, "--task", "knit"], env=ros_env, capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 2
-    assert "there is no task 'knit'" in done.stderr
+    assert "unknown task 'knit'" in done.stderr

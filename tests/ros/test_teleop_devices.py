@@ -106,7 +106,7 @@ def test_messages_of_a_type_that_is_no_pose_are_reported_and_the_pen_is_heard_on
     wrong = publish("/mixed/pose", String)
     until(lambda: wrong.publish("here") or reported)
     assert "/mixed/pose: /ligature_tests" in reported[0]
-    assert "sends std_msgs/String, which cannot be read here" in reported[0]
+    assert "sends std_msgs/String, which cannot be decoded" in reported[0]
     assert not readings
     wrong.unregister()
     pose = publish("/mixed/pose", PoseStamped)

@@ -121,5 +121,5 @@ def test_what_a_scene_lacks_is_named(scene: Scene) -> None:
     ]
     with pytest.raises(MissingBodies, match="has no body 'CameraFrame'"):
         Attempt(replace(scene, bodies=tuple(bodies)), "pose_estimation")
-    with pytest.raises(ValueError, match="there is no task 'knit'; there are pose_estimation, insertion, suture"):
+    with pytest.raises(ValueError, match="unknown task 'knit'; choose one of pose_estimation, insertion, suture"):
         Attempt(scene, "knit")

@@ -59,14 +59,14 @@ def test_a_fixed_camera_stands_in_the_world() -> None:
 @pytest.mark.parametrize(
     ("wrong", "right", "message"),
     [
-        ("kind: mtm", "kind: glove", "6:16: error: device MTMR has the unknown kind 'glove'; known are mtm, touch"),
-        ("scale: 0.3", "size: 0.3", "settings has no key 'size'; known are scale"),
+        ("kind: mtm", "kind: glove", "6:16: error: device MTMR has the unknown kind 'glove'; choose one of mtm, touch"),
+        ("scale: 0.3", "size: 0.3", "settings has no key 'size'; choose one of scale"),
         ("scale: 0.3", "scale: big", "4:19: error: scale must be a number, not 'big'"),
         ("scale: 0.3", "scale: -1", "scale must be within 0"),
         ("grey: clutch", "grey: fly", "a button cannot 'fly'; it can clutch, camera"),
         ("[right, up, near]", "[right, up, away]", "axes right, up, away do not form a right-handed frame"),
         ("pen: PSM2", "pen: PSM1", "pen and MTMR would both start with PSM1"),
-        ("pen: PSM2", "pan: PSM2", "there is no device 'pan'; there are MTMR, pen, pad"),
+        ("pen: PSM2", "pan: PSM2", "unknown device 'pan'; choose one of MTMR, pen, pad"),
         ('["-0", "-1", "+7"]', '["-0", "-1"]', "moves must be a list of 3"),
         ("[[-1, -1, 0], [1, 1, 1]]", "[[1, 1, 1], [0, 0, 0]]", "first corner of the workspace must be below"),
         ("pairs:", "pears:", "a teleoperation has no key 'pears'"),

@@ -116,14 +116,14 @@ def test_two_hands_roll_the_camera_by_the_line_between_them() -> None:
     T = drive.update(turned)
     assert T[:3, 3] == pytest.approx(np.zeros(3), abs=1e-12)
     assert T[:3, :3] == pytest.approx(axis_rotation((0, 0, 1), -0.3), abs=1e-12)
-    with pytest.raises(ValueError, match="taken with 2 hands, not 1"):
+    with pytest.raises(ValueError, match="began with 2 hands, not 1"):
         drive.update(turned[:1])
     with pytest.raises(ValueError, match="one or two hands"):
         CameraDrive().engage([], np.eye(4))
 
 
 def test_unknown_names_are_reported_with_the_known_ones(seat: Seat) -> None:
-    with pytest.raises(Conflict, match="no leader 'omni'; there are MTML, MTMR"):
+    with pytest.raises(Conflict, match="unknown leader 'omni'; choose one of MTML, MTMR"):
         seat.sample("omni", Hand(0.0, np.eye(4)))
 
 

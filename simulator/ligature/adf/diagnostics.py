@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def length(metres: float, digits: int = 3) -> str:
-    """A length in the unit that a message wants: ``"0.102 mm"``, ``"1.04 m"``."""
+    """A length in the unit that suits a message: ``"0.102 mm"``, ``"1.04 m"``."""
     millimetres = f"{1e3 * metres:.{digits}g}"
     return f"{metres:.{digits}g} m" if "e+" in millimetres else f"{millimetres} mm"
 

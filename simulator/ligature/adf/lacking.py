@@ -72,7 +72,7 @@ def _spelling(path: Path) -> str:
     if "\\" in reference:
         return f"write '{windows.as_posix()}', with '/' between folders"
     if reference.startswith("~"):
-        return "'~' does not stand for your home here: write it out"
+        return "'~' is not expanded here: write the path of your home folder"
     wanted = path.relative_to(there).parts[0].casefold()
     try:
         with os.scandir(there) as names:
@@ -80,4 +80,4 @@ def _spelling(path: Path) -> str:
     except OSError:
         return ""
     found = sorted(name for name in same if name.casefold() == wanted)
-    return f"upper and lower case differ: there is '{there / found[0]}'" if found else ""
+    return f"upper and lower case differ; the folder has '{there / found[0]}'" if found else ""

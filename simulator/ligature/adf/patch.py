@@ -21,7 +21,7 @@ class PatchError(ValueError):
 
 @dataclass(frozen=True, order=True)
 class Edit:
-    """``text`` in place of what stands at ``span``."""
+    """Replacement of the text at ``span`` by ``text``."""
 
     span: Span
     text: str
@@ -68,7 +68,7 @@ def set_value(text: str, owner: Mapping, path: str, value: Any) -> Edit:
         if isinstance(node, Scalar) and node.null:
             return _replaced(text, parent, part, _nested(rest, value))
         if not isinstance(node, Mapping):
-            raise PatchError(f"'{part}' at {node.mark} is no block, so '{path}' cannot stand in it")
+            raise PatchError(f"'{part}' at {node.mark} is not a block, so '{path}' cannot be inside it")
         parent = node
     if name not in parent.entries:
         return add_key(text, parent, name, value)
@@ -76,7 +76,7 @@ def set_value(text: str, owner: Mapping, path: str, value: Any) -> Edit:
 
 
 def add_key(text: str, owner: Mapping, name: str, value: Any) -> Edit:
-    """Add ``name: value`` at the end of the block ``owner``; raises `PatchError` when it is there already."""
+    """Add ``name: value`` at the end of the block ``owner``; raises `PatchError` when the key exists already."""
     if name in owner.entries:
         raise PatchError(f"'{name}' already exists, at {owner.entries[name][0].mark}")
     if owner.flow:
@@ -127,7 +127,7 @@ def insert_item(text: str, items: Sequence, index: int, value: Any) -> Edit:
     dash = _dash(text, start)
     begin = text.rfind("\n", 0, dash) + 1
     if text[begin:dash].strip():
-        raise PatchError(f"the item at {items.items[index].mark} shares its line, so nothing can be put before it")
+        raise PatchError(f"the item at {items.items[index].mark} shares its line, so nothing can be inserted before it")
     return Edit((begin, begin), _lines(text, [*_item_lines(text, dash, items.items[index], value), ""]))
 
 
@@ -205,7 +205,7 @@ def _item_end(items: Sequence, index: int) -> int:
 
 
 def _replaced(text: str, parent: Mapping, name: str, value: Any) -> Edit:
-    """Another value for a key that is there, in the way the old one was written."""
+    """New value of an existing key, in the style of the old one."""
     node = parent.entries[name][1]
     if parent.aliased(name):
         return Edit(parent.uses[name], flow_text(value))

@@ -275,7 +275,7 @@ def _undefined(document: Document, item: Scalar, node: Node | None, kind: str) -
     """AMBF makes a default body, camera or light, and refuses the file for a joint (§4.7)."""
     severity = Severity.WARNING if kind in _DEFAULTED or (isinstance(node, Scalar) and node.null) else Severity.ERROR
     if node is not None:
-        message, hint = f"{kind} '{item.text}' is listed, but what defines it is no block of keys", "it is left out"
+        message, hint = f"{kind} '{item.text}' is listed, but its definition is not a block of keys", "it is left out"
         return Diagnostic(severity, message, node.mark, hint, "undefined")
     others = {name for name in document.root.entries if name not in BY_PATH[document.kind]}
     hint = suggestion(item.text, others - _listed(document.root, document.kind)) or "define it or take it from the list"

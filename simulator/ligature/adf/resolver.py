@@ -116,7 +116,7 @@ class Resolver:
     def read_text(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> str:
         """The content of ``path`` as UTF-8 text, at most ``limit`` bytes.
 
-        Raises `ResolutionError` at ``mark``, or at the byte that is no UTF-8.
+        Raises `ResolutionError` at ``mark``, or at the byte that is not UTF-8.
         """
         data = self.read_bytes(path, limit, mark)
         try:

@@ -39,7 +39,7 @@ class BadValue(Exception):
 
 
 def convert(key: Key, node: Node) -> Any:
-    """The value of ``node`` as the schema's ``key`` wants it; raises `BadValue`."""
+    """The value of ``node`` in the type that the schema's ``key`` requires; raises `BadValue`."""
     value = _CONVERTERS[key.type](key, node)
     if key.least is not None and isinstance(value, int | float) and value < key.least:
         raise BadValue(node, f"at least {key.least:g}, not {value:g}", unusable=True)

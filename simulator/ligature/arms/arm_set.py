@@ -22,7 +22,7 @@ from ligature.robots.operating_state import Rejected
 _BUILDERS = {ArmKind.PSM: build_psm, ArmKind.ECM: build_ecm, ArmKind.MTM: build_mtm}
 
 WATCH_PERIOD = 5
-"""Ticks between two looks at following errors."""
+"""Ticks between two checks of following errors."""
 
 
 class ArmSet(Subsystem, Mapping[str, Arm]):
@@ -41,7 +41,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def __getitem__(self, name: str) -> Arm:
         if name not in self._by_name:
             known = ", ".join(self._by_name) or "none"
-            raise KeyError(f"no arm is called '{name}'; there are {known}")
+            raise KeyError(f"unknown arm '{name}'; choose one of {known}")
         return self._by_name[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -63,7 +63,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
             arm.fault(f"{command.verb} failed: {_words(error)}")
 
     def _guarded(self, what: str, arm: Arm, act: Callable[..., None], *arguments: Any) -> None:
-        """Have an arm do something; whatever it raises becomes its FAULT, and the other arms go on."""
+        """Call a method of an arm; an exception puts the arm in FAULT, and the other arms continue."""
         try:
             act(*arguments)
         except Exception as error:
@@ -73,7 +73,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         arm.fault(f"{what} failed: {_words(error)}")
 
     def release(self, index: int) -> None:
-        """Whoever commanded an arm is gone: it stays where it is."""
+        """The client that commanded an arm is gone: the arm holds its position."""
         arm = self._arms[index]
         if arm.is_taken_over:
             self._guarded("hold", arm, arm.direct, "hold")
@@ -116,7 +116,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         return found
 
     def reset(self) -> None:
-        """The scene was put back to its start: moves end, and arms hold where they are now."""
+        """The scene was reset: moves end, and arms hold their present positions."""
         for arm in self._arms:
             self._guarded("reset", arm, arm.settle)
 

@@ -187,7 +187,7 @@ class Record:
     def read(cls, path: Path) -> Record:
         """The record ``path``; raises `RecordError`, and OSError."""
         if regular_file(path).stat().st_size > MOST_FILE_BYTES:
-            raise RecordError(f"{path}: has more than {MOST_FILE_BYTES >> 30} GiB; no record is as large")
+            raise RecordError(f"{path}: has more than {MOST_FILE_BYTES >> 30} GiB, the maximum size of a record")
         data = path.read_bytes()
         header, begin = _header(data, path)
         commands: list[tuple[int, Command]] = []

@@ -1,4 +1,4 @@
-"""The word that begins and ends a recording while a run goes on."""
+"""The command that begins and ends a recording during a run."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
         help="1: damping in `ligature teleop` reckons with one period of -d (1000 Hz) between readings",
     )  # fmt: skip
     flags.add_argument("-e", "--enableforces", dest="e", type=_switch, help="0: `ligature teleop` sends no forces")
-    flags.add_argument("-n", "--ndevs", dest="n", type=int, help="the first N input devices, where there is no -i")
+    flags.add_argument("-n", "--ndevs", dest="n", type=int, help="the first N input devices, if -i is not given")
     for words, what in _WITHOUT_EFFECT.items():
         flags.add_argument(*words, dest=words[0].lstrip("-"), help=f"{what}; accepted, without effect")
     return flags
@@ -90,11 +90,11 @@ def options_of(arguments: list[str]) -> RunOptions:
     except ValueError as error:
         flags.error(f"-i {error}")
     if given.n is not None and given.n < 0:
-        flags.error(f"-n {given.n}: there cannot be fewer than no devices")
+        flags.error(f"-n {given.n}: the number of devices must be 0 or more")
     if given.n is not None and not given.i:
         devices = tuple(range(given.n))
     if not 0.0 <= given.d < float("inf"):
-        flags.error("-d must be a rate in Hz")
+        flags.error("-d must be a rate in Hz, at least 0")
     try:
         only = arm_names(given.only)
     except ValueError as error:
@@ -139,7 +139,7 @@ def _notes(given: argparse.Namespace) -> tuple[str, ...]:
         if getattr(given, words[0].lstrip("-")) is not None
     ]
     if given.t is False:
-        notes.append("-t 0: the step is fixed here anyway; simulated time falls behind on a machine that is too slow")
+        notes.append("-t 0: the step is always fixed; simulated time falls behind on a machine that is too slow")
     if given.p > MAX_UPDATE_RATE:
         notes.append(f"-p {given.p:g}: a tick lasts 1 ms; using {MAX_UPDATE_RATE:g} updates per second")
         return tuple(notes)

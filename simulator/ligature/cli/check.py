@@ -43,7 +43,7 @@ def check(
 def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[int] | None = None) -> list[Diagnostic]:
     """Findings of one file: those of reading it, and for launch and model files those of resolving it.
 
-    Of the models of a launch file those of the indices ``models`` are looked at, all for None.
+    ``models`` are indices of the launch file's models; None checks all.
     """
     resolver = Resolver.for_file(file, roots)
     try:

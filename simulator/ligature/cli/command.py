@@ -64,7 +64,7 @@ def _end(error: OSError) -> NoReturn:
     open_null(1)  # else Python tries at its end once more to write what is left, and fails in its own words
     if error.errno == errno.EPIPE:  # whoever read has seen enough
         raise SystemExit(1) from None
-    _fail(f"error: what is printed cannot be written: {error.strerror}")
+    _fail(f"error: the output cannot be written: {error.strerror}")
 
 
 def _fail(text: str) -> NoReturn:

@@ -85,7 +85,9 @@ def _robot(source: Path) -> Converted:
 def _export(source: Path, out: Path, console: Console) -> int:
     """Write a model as URDF or SDF with its meshes; returns the exit status."""
     if out.suffix.lower() not in WRITTEN:
-        console.print(f"{out}: a model is written as .urdf or .sdf; name such a file", style="red", markup=False)
+        console.print(
+            f"{out}: unknown format; the name of the output must end in .urdf or .sdf", style="red", markup=False
+        )
         return 1
     try:
         resolver = Resolver.for_file(source)

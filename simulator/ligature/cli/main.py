@@ -26,7 +26,7 @@ app = typer.Typer(
 )
 
 
-dataset_app = typer.Typer(no_args_is_help=True, help="Datasets to learn from: what is in them, and LeRobot's formats.")
+dataset_app = typer.Typer(no_args_is_help=True, help="Inspect datasets and export them to LeRobot's formats.")
 app.add_typer(dataset_app, name="dataset")
 
 
@@ -41,7 +41,7 @@ Launch = Annotated[
         callback=launch_file,
     ),
 ]
-Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', such as 10,11,6.")]  # noqa: UP045
+Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', for example 10,11,6.")]  # noqa: UP045
 Roots = Annotated[
     list[Path] | None, typer.Option("--root", help="Additional folder that scene files may be read from.")
 ]  # noqa: UP045
@@ -109,7 +109,7 @@ def task_name(text: str) -> str:
     from ligature.tasks import TASKS
 
     if text and text not in TASKS:
-        raise typer.BadParameter(f"there is no task '{text}'; there are {', '.join(TASKS)}")
+        raise typer.BadParameter(f"unknown task '{text}'; choose one of {', '.join(TASKS)}")
     return text
 
 
@@ -127,9 +127,10 @@ def run(
         Optional[list[str]],  # noqa: UP045
         typer.Option(help="An arm, NAME=KIND:BODY:TOOL; replaces the arms found in the scene; repeatable."),
     ] = None,
-    only: Annotated[str, typer.Option(help="Names of the arms that are there, such as PSM1,PSM2; no others.")] = "",
+    only: Annotated[str, typer.Option(help="Only these arms, for example PSM1,PSM2.")] = "",
     masters: Annotated[
-        bool, typer.Option("--masters/--no-masters", help="With master arms, or without: a real console has its own.")
+        bool,
+        typer.Option("--masters/--no-masters", help="Simulate master arms; switch them off beside a real console."),
     ] = True,
     base_frames: Annotated[
         str, typer.Option(help="Arm in the frame of whose tip the others give their poses: ECM, as a dVRK with a cart.")
@@ -144,7 +145,7 @@ def run(
         Optional[bool],  # noqa: UP045
         typer.Option(
             "--cameras/--no-cameras",
-            help="Publish pictures of all cameras, or of none; by default as the scene sets it.",
+            help="Publish pictures of all cameras, or of none; the default is that of the scene.",
         ),
     ] = None,
     window: Annotated[bool, typer.Option("--window", help="Show the scene in a window.")] = False,
@@ -163,7 +164,7 @@ def run(
     devices: Devices = None,
     soft: Annotated[
         Optional[list[str]],  # noqa: UP045
-        typer.Option(help="A rigid body that is to be soft tissue, BODY or BODY=MATERIAL; repeatable."),
+        typer.Option(help="Simulate a rigid body as soft tissue, BODY or BODY=MATERIAL; repeatable."),
     ] = None,
     allow_plugins: AllowPlugins = False,
 ) -> None:
@@ -499,7 +500,7 @@ def replay(
     ] = "",
     success: Annotated[
         Optional[bool],  # noqa: UP045
-        typer.Option("--success/--failure", help="For a dataset: how the run went, where nothing judges it."),
+        typer.Option("--success/--failure", help="For a dataset: the outcome of the run, if no task scores it."),
     ] = None,
     text: Annotated[str, typer.Option(help="For a dataset: the task as an instruction in words.")] = "",
     allow_plugins: AllowPlugins = False,
@@ -552,21 +553,23 @@ def score(
 def teleop(
     config: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Argument(help="Teleoperation file, or a launch file with input devices; none with --device."),
+        typer.Argument(help="Teleoperation file, or a launch file with input devices; omit it with --device."),
     ] = None,
     device: Annotated[
         Optional[list[str]],  # noqa: UP045
-        typer.Option(help="Device that needs no file, such as touch, or touch=/arm1/ for its topics; repeatable."),
+        typer.Option(help="Device without a file, for example touch, or touch=/arm1/ for its topics; repeatable."),
     ] = None,
     record: Annotated[Optional[Path], typer.Option(help="File to record all device input to.")] = None,  # noqa: UP045
     replay: Annotated[Optional[Path], typer.Option(help="Recorded file to play back instead of the devices.")] = None,  # noqa: UP045
     calibrate: Annotated[Optional[str], typer.Option(help="Device to calibrate.")] = None,  # noqa: UP045
     check: Annotated[
-        bool, typer.Option("--check", help="Only read the file and print which device drives which arm.")
+        bool, typer.Option("--check", help="Read the file, print which device controls which arm, and end.")
     ] = False,
     timeout: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(help="Seconds of silence after which a device is not trusted, instead of the file's or 0.1."),
+        typer.Option(
+            help="Seconds without a reading after which a follower holds; replaces the file's value (default 0.1)."
+        ),
     ] = None,
     devices: Annotated[Optional[str], typer.Option("-i", help="Indices of a launch file's input devices.")] = None,  # noqa: UP045
 ) -> None:
@@ -601,10 +604,10 @@ def dataset_join(file: DatasetFile) -> None:
 @dataset_app.command("export")
 def dataset_export(
     file: DatasetFile,
-    out: Annotated[Path, typer.Argument(help="Folder to write, which must not exist.")],
+    out: Annotated[Path, typer.Argument(help="Output folder; it must not exist.")],
     format: Annotated[str, typer.Option(help="lerobot-3.0, or lerobot-2.1 as Open-H asks for.")] = "lerobot-3.0",
-    codec: Annotated[str, typer.Option(help="Of the videos: h264, or av1, which is smaller and slower.")] = "h264",
-    license: Annotated[str, typer.Option(help="Licence of the data for its card, such as cc-by-4.0.")] = "",
+    codec: Annotated[str, typer.Option(help="Video codec: h264, or av1 (smaller files, slower).")] = "h264",
+    license: Annotated[str, typer.Option(help="Licence of the data, for its card, for example cc-by-4.0.")] = "",
 ) -> None:
     """Write a dataset in a format of LeRobot: Parquet, videos, statistics, splits, a card."""
     from ligature.cli.dataset import export

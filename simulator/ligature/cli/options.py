@@ -92,7 +92,7 @@ class RunOptions:
             raise ligature.SceneError(Diagnostic(Severity.ERROR, text))
         bodied = [arm.name for arm in scene.arms if arm.kind.value != "mtm"]
         if self.base_frames and (self.base_frames not in bodied or self.only and self.base_frames not in self.only):
-            text = f"--base-frames: '{self.base_frames}' is no arm of this run with a tip in the scene; write ECM"
+            text = f"--base-frames: '{self.base_frames}' is not an arm of this run with a tip in the scene; write ECM"
             raise ligature.SceneError(Diagnostic(Severity.ERROR, text))
         return tuple(
             arm

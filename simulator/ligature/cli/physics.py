@@ -24,7 +24,7 @@ from ligature.simulation import Simulation
 
 TICK = 1e-3
 LONGEST_NAP = 0.01
-"""Longest sleep in seconds between two looks at commands and signals."""
+"""Maximum sleep in seconds between two checks for commands and signals."""
 
 CLOCK_NAP = 1e-3
 """Sleep in seconds while the clock of a client rests: its next edge is answered that soon."""

@@ -23,7 +23,7 @@ STATE_NAP = 0.005
 """Seconds between two looks for the first state."""
 
 END_TIMEOUT = 10.0
-"""Seconds that a process which cannot go on waits for the end of the run, before it is started again."""
+"""Seconds that a process which cannot continue waits for the end of the run, before it is restarted."""
 
 
 @dataclass(frozen=True)

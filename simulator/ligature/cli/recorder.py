@@ -1,4 +1,4 @@
-"""What a run writes down of itself: all of it for ``--record``, parts of it for whoever asks while it goes on.
+"""Records a run: all of it for ``--record``, and parts of it on request.
 
 A part cannot be simulated again without what was before it. With a page, where one may ask, every command is kept from
 the beginning on for that: in the file of ``--record``, else in one without a name that ends with the run.
@@ -79,7 +79,7 @@ class Recorder:
                 self._give_up(error)
 
     def obey(self, update: int, recording: Recording) -> None:
-        """Begin a recording, or end the one that goes on."""
+        """Begin a recording, or end the present one."""
         name = file_name(recording.name)
         if name and self._excerpt is not None:
             self._report(f"'{self._excerpt.path}' is being recorded already", True)

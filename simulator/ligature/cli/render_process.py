@@ -1,4 +1,4 @@
-"""The camera process: draws the newest state of the bus for whoever listens, and hands the pictures to ROS.
+"""The camera process: draws the newest state of the bus for subscribers, and publishes the pictures on ROS.
 
 It never holds up physics: it has a lower priority, takes the newest state, and leaves out what comes too late.
 """
@@ -30,7 +30,7 @@ from ligature.ros.parameters import Follower
 from ligature.ros.registrations import NameTaken
 
 NAP = 0.05
-"""Longest sleep in seconds between two looks at the stop signal and the physics process."""
+"""Maximum sleep in seconds between two checks of the stop signal and the physics process."""
 
 
 def main() -> None:

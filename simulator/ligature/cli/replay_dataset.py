@@ -16,7 +16,7 @@ from ligature.datasets.labels import ACTIVITIES, ActivityWatch, phase_of
 from ligature.tasks import Attempt
 
 NEEDS_REPORT = "pose_estimation"
-"""The task that is judged by what somebody reports."""
+"""The task that is scored by a reported pose."""
 
 
 class _Sampler:
@@ -59,14 +59,16 @@ class _Sampler:
             figures = {f"measured_{name}": value for name, value in self._attempt.monitor.measures().report().items()}
         self._writer.end_episode(bool(found), judged=found is not None, why=why, **figures)
         if found is None:
-            return "the episode is not judged: say with '--task' what was to be done, or with '--success' how it went"
+            return (
+                "the episode has no result: name its task with '--task', or its outcome with '--success' or '--failure'"
+            )
         return f"the episode is a {'success' if found else 'failure'}{': ' + why if why else ''}"
 
 
 def sampled(record: Record, scene: Path | None, dataset: Sampled) -> tuple[ligature.Simulation, str]:
     """Simulate ``record`` again into ``dataset``; returns the simulation at its end, and how the episode went."""
     if dataset.task == NEEDS_REPORT:
-        raise ValueError(f"a record of a run holds no reported pose, which '{NEEDS_REPORT}' needs")
+        raise ValueError(f"a record of a run contains no reported pose, which '{NEEDS_REPORT}' needs")
     recorded = RunOptions.from_text(record.header.options).task
     task = dataset.task or (recorded if recorded != NEEDS_REPORT else "")
     with interrupted_once(), ExitStack() as files:

@@ -46,6 +46,6 @@ def picture_size(text: str) -> tuple[int, int]:
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if not SMALLEST <= min(size) <= max(size) <= LARGEST:
         raise ValueError(
-            f"'{text}' is no size of pictures: width x height in pixels, {SMALLEST} to {LARGEST} each, such as 640x480"
+            f"'{text}' is not a size of pictures; write WIDTHxHEIGHT in pixels, {SMALLEST} to {LARGEST} each: 640x480"
         )
     return size

@@ -1,4 +1,4 @@
-"""``ligature score``: how well a task was done, in a run that goes on, in a bag, or in a run's record."""
+"""``ligature score``: the score of a task in a running simulation, a bag, or a record of a run."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _recorded(task: str, file: Path, scene: Path | None) -> Figures:
             attempts[0].observe(simulation.state[0])
 
     if task == "pose_estimation":
-        raise ValueError(f"{file}: a record of a run holds no reported pose; score a bag")
+        raise ValueError(f"{file}: a record of a run contains no reported pose; score a bag")
     resimulate(record, scene, watch).close()
     return attempts[0].judge().report(), attempts[0].monitor.measures().report()
 
@@ -76,7 +76,7 @@ def _in_bag(task: str, file: Path, scene: Path | None) -> Figures:
     from ligature.ros.bags import judge
 
     if scene is None:
-        raise ValueError("a bag holds poses, no bodies; name the launch file with '--scene'")
+        raise ValueError("a bag contains poses but no scene; name the launch file with '--scene'")
     found, attempt = judge(file, ligature.load(str(scene)), task)
     measures = attempt.monitor.measures().report()
     return found.report(), {name: measures[name] for name in measures if name in ("time", "passages") or "path" in name}

@@ -26,7 +26,7 @@ from ligature.process import end_with_parent, lower_priority
 
 MASTER_TIMEOUT = 15.0
 LAST_TIMEOUT = 1.8
-"""Seconds after a signal at which the supervisor ends even when nobody reads its output any more."""
+"""Seconds after a signal at which the supervisor ends even if its output is no longer read."""
 
 RESTART_PAUSE = 0.3
 QUICK_DEATH, MAX_QUICK_DEATHS = 5.0, 5

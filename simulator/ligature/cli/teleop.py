@@ -1,4 +1,4 @@
-"""The command ``ligature teleop``: devices drive arms on ROS, whoever runs those."""
+"""The command ``ligature teleop``: devices control arms on ROS, simulated or real."""
 
 from __future__ import annotations
 

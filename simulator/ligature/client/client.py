@@ -75,7 +75,7 @@ class Client:
     def connect(self, default_publish_rate: float = 120) -> None:
         """Start the node, find all objects, and publish commands at ``default_publish_rate`` (Hz) from now on.
 
-        Without a simulator it goes on with no objects after ``max_discovery_attempts`` attempts, with a message.
+        Without a simulator it continues without objects after ``max_discovery_attempts`` attempts, and logs it.
         ConnectionError when there is no ROS master.
         """
         if not default_publish_rate > 0:

@@ -111,7 +111,7 @@ class ral:  # noqa: N801 - the name that clients import
         """Nothing to do: rospy takes messages on its own threads."""
 
     def spin_and_execute(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call ``function(*arguments)`` while messages are taken; returns its result."""
+        """Call ``function(*arguments)`` while messages are received; returns its result."""
         return function(*arguments)
 
     def shutdown(self) -> None:
@@ -157,7 +157,7 @@ class ral:  # noqa: N801 - the name that clients import
         return str(end.name)
 
     def get_published_topics(self) -> list[tuple[str, str]]:
-        """Name and type of every topic that somebody publishes; ConnectionError when the master is gone."""
+        """Name and type of every published topic; ConnectionError when the master does not answer."""
         try:
             return [(name, type_) for name, type_ in rospy.get_published_topics()]
         except OSError as error:

@@ -67,7 +67,7 @@ class World(BaseObject):
             self.publish()
 
     def reset(self) -> None:
-        """Put everything back to where it began; time goes on."""
+        """Reset everything to the start of the scene; time continues."""
         if _heard(self._reset_pub, self._name):
             self._reset_pub.publish(Empty())
 
@@ -77,7 +77,7 @@ class World(BaseObject):
             self._reset_bodies_pub.publish(Empty())
 
     def clear_command(self) -> None:
-        """End throttling when no `update` has come for the time-out."""
+        """End throttling when no `update` was called for the timeout."""
         with self._lock:
             if time.monotonic() - self._updated > self._time_out:
                 self._cmd.enable_step_throttling = False

@@ -1,4 +1,4 @@
-"""The browsers before the page: who watches, who operates, and how an operator comes back after a reload."""
+"""The browsers that show the page: viewers, the operator, and how an operator reconnects after a reload."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Audience:
         if self.desk.operator is not None:
             return "operated"
         kept = self.desk.kept(now)
-        return f"operator away, control reserved {kept:.0f} s" if kept else "nobody operates"
+        return f"operator away, control reserved {kept:.0f} s" if kept else "no operator"
 
     def hear(self, word: str, client: int, value: Any, now: float) -> bool:
         """Take what happened; False when it is for somebody else to decide."""

@@ -22,11 +22,9 @@ class CameraControls:
     ) -> None:  # fmt: skip
         with folder:
             self._choice = client.gui.add_dropdown("Camera", (*names, NO_PICTURES), initial_value=chosen)
-            self._tube = client.gui.add_checkbox(
-                "Endoscope", tube, hint="Its tube in the 3D view, where it stands in the way at first"
-            )
+            self._tube = client.gui.add_checkbox("Endoscope", tube, hint="Show its tube in the 3D view")
             self._cut = client.gui.add_slider(
-                "Cut away mm", 0, MOST_CUT, 5, 0, hint="The 3D view leaves out what is nearer to your eye than this"
+                "Cut away mm", 0, MOST_CUT, 5, 0, hint="Hide objects in the 3D view that are nearer than this"
             )
         self._act = act
         self._choice.on_update(self._on_choice)

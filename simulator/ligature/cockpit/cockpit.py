@@ -63,9 +63,9 @@ AFTER_FAILURE = 1.0
 CLAIM_TIMEOUT = 30.0
 """Seconds in which who pressed *Start* gets control, or has to press it again."""
 
-AGAIN = "Press again to go on from here."
+AGAIN = "Press again to continue from here."
 BY_HAND = f"Your hand took over. {AGAIN}"
-"""Why help of the page has stopped, and how it goes on."""
+"""Why the assistance has stopped, and how to continue."""
 
 REPORTED = ("warning", "error")
 """Events of an arm that are shown beside it."""
@@ -221,7 +221,7 @@ class Cockpit:
         self._begins = (-1, 0.0)
 
     def _end_operating(self, why: str, there: bool) -> None:
-        """Nobody operates any more; ``there``: whether the browser still shows the controls."""
+        """The operator is gone; ``there``: whether the browser still shows the controls."""
         self._stop_all(why)
         if there:
             for controls in (*self._controls, self._run_controls, self._camera_controls, self._teleop_controls):

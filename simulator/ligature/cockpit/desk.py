@@ -18,7 +18,7 @@ class Desk:
         self._left = float("-inf")
 
     def claim(self, client: int, now: float, key: str = "") -> str | None:
-        """Seat ``client``; the key by which it comes back, None when the desk is taken or kept for somebody.
+        """Seat ``client``; the key by which it reconnects, None when the desk is occupied or reserved.
 
         Who has the key of the last operator may sit down in any case: it is the same browser in another tab.
         """

@@ -91,7 +91,7 @@ class Gate:
         now = time.monotonic()
         if now - self._crowded > REPORT_PAUSE:
             self._crowded = now
-            self._log(f"cockpit: {MOST_CONNECTIONS} connections are open; no more are taken")
+            self._log(f"cockpit: {MOST_CONNECTIONS} connections are open; further ones are rejected")
 
     def answer(self, request: Request, who: str = "") -> Response | None:
         """The response that ends a request of address ``who`` here; None lets it in."""
@@ -162,7 +162,7 @@ def _path(connection: Any) -> str:
 
 
 def _caller(connection: ServerConnection) -> str:
-    """The address of whoever asks."""
+    """The address of the client."""
     address = connection.remote_address
     return str(address[0]) if address else "an unknown address"
 

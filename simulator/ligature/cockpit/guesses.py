@@ -1,4 +1,4 @@
-"""Wrong tokens: whoever shows one waits, longer each time, and the terminal reports it. Seconds, monotonic clock."""
+"""Wrong tokens: their address must wait, longer each time, and the terminal reports it. Seconds, monotonic clock."""
 
 from __future__ import annotations
 

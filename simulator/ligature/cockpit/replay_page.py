@@ -136,7 +136,7 @@ class ReplayPage:
             )  # fmt: skip
 
     def turn(self) -> None:
-        """Show what the slider points at; go on while it plays."""
+        """Show the state at the slider; advance while playing."""
         now = time.monotonic()
         if self._play.value:
             there = float(self._time.value) + now - self._clock

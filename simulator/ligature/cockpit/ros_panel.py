@@ -37,7 +37,7 @@ class Health(Protocol):
 
     @property
     def topics(self) -> Sequence[Topic]:
-        """Those that somebody listens to."""
+        """Topics with subscribers."""
 
     @property
     def published(self) -> int:

@@ -30,7 +30,7 @@ class Clockwork:
         self.paused = False
 
     def pause(self, paused: bool) -> None:
-        """Stop or go on."""
+        """Pause or resume."""
         self.paused = paused
         self._send(Throttle(paused, self._clock, 1 if paused else 0))
 

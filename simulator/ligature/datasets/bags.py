@@ -46,13 +46,13 @@ def record_bag(
     rate
         Samples a second; simulated ones where the bag has the state of a world.
     cameras
-        Names of cameras whose pictures are taken; by default all that the bag has.
+        Names of the cameras to include; by default all of the bag.
     size
         Width and height of pictures, to which those of the bag are scaled.
     text
         What was done, as an instruction.
     success, why
-        How it went; None: nobody judged it.
+        The outcome; None if it is unknown.
 
     Raises
     ------

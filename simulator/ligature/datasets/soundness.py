@@ -107,7 +107,7 @@ class _Walk:
         item = group[key]
         info = h5py.h5o.get_info(item.id)
         if (place := (info.fileno, info.addr)) in self._seen:
-            raise Unsound(f"'{name}' is there twice")
+            raise Unsound(f"'{name}' occurs twice")
         self._seen.add(place)
         return item
 
@@ -115,7 +115,7 @@ class _Walk:
 def _check_stored(array: Any, name: str) -> None:
     """Its bytes are in this file, and about as many as it claims."""
     if array.external or array.is_virtual:
-        raise Unsound(f"'{name}' takes its numbers from another file")
+        raise Unsound(f"'{name}' refers to data in another file")
     size = math.prod(array.shape or (0,)) * array.dtype.itemsize
     if size > SMALL and size > MOST_PACKED * array.id.get_storage_size():
         raise Unsound(f"'{name}' claims {size} bytes and has {array.id.get_storage_size()}")
@@ -133,10 +133,10 @@ def _described(file: Any) -> int:
     for key in ("phases", *(("gestures", "activities") if "gestures" in file.attrs else ())):
         _attribute(file, key, "a list of texts", _are_texts)
     if not isinstance(file.get("arms", file), h5py.Group):
-        raise Unsound("'arms' is no group")
+        raise Unsound("'arms' is not a group")
     names = file.get("id_names")
     if names is not None and (not isinstance(names, h5py.Dataset) or names.dtype.kind not in TEXTS or names.ndim != 1):
-        raise Unsound("'id_names' is no list of texts")
+        raise Unsound("'id_names' is not a list of strings")
     if "gestures" in file.attrs and len(file.attrs["gestures"]) != len(file.attrs["phases"]):
         raise Unsound(f"it has {len(file.attrs['phases'])} phases and {len(file.attrs['gestures'])} gestures of them")
     return len(file.attrs["phases"])
@@ -145,7 +145,7 @@ def _described(file: Any) -> int:
 def _arm(arm: Any, name: str) -> tuple[int, bool]:
     """How many joints an arm has, and whether it has a jaw."""
     if not isinstance(arm, h5py.Group):
-        raise Unsound(f"'arms/{name}' is no group")
+        raise Unsound(f"'arms/{name}' is not a group")
     for key in ("kind", "tool"):
         _attribute(arm, key, "a text", _is_text)
     for key in ("joint_names", "joint_units"):
@@ -205,7 +205,7 @@ class _Episode:
         ):
             return
         if not isinstance(array, h5py.Dataset):
-            raise Unsound(f"'{place}' is missing or no array")
+            raise Unsound(f"'{place}' is missing or not an array")
         wanted, found = shape.split(), array.shape or ()
         free = wanted[-1] == "…"
         kinds = WHOLE if last in ("phase", "activity") else NUMBERS
@@ -218,14 +218,14 @@ class _Episode:
             means = " × ".join(str(self._lengths.get(letter, letter)) for letter in wanted)
             raise Unsound(f"'{place}' is {found} of {array.dtype}; it must be {means} numbers")
         if last in POSES and not (np.abs(array[:]) <= FARTHEST).all():
-            raise Unsound(f"'{place}' has numbers that no pose has")
+            raise Unsound(f"'{place}' has values that are not a valid pose")
         if last in PHASES and len(array) and not 0 <= int(array[:].max()) < self._phases:
-            raise Unsound(f"'{place}' has phase {int(array[:].max())}; there are {self._phases}")
+            raise Unsound(f"'{place}' has phase {int(array[:].max())}; the number of phases is {self._phases}")
 
 
 def _group(file: Any, name: str) -> Any:
     if not isinstance(file[name], h5py.Group):
-        raise Unsound(f"'{name}' is no group")
+        raise Unsound(f"'{name}' is not a group")
     return file[name]
 
 

@@ -203,7 +203,7 @@ def damaged(path: Path) -> Iterator[None]:
     except (DatasetError, MemoryError):
         raise
     except Unsound as error:
-        raise DatasetError(f"'{path}' is no sound dataset: {_printable(error)}") from error
+        raise DatasetError(f"'{path}' is not a valid dataset: {_printable(error)}") from error
     except (OSError, RuntimeError, KeyError, UnicodeError) as error:
         if isinstance(error, OSError) and error.filename is not None:
             raise

@@ -1,4 +1,4 @@
-"""Writes a simulation that goes on into an HDF5 dataset, episode by episode; docs/learning.md shows the layout.
+"""Writes a running simulation to an HDF5 dataset, episode by episode; docs/learning.md shows the layout.
 
 Metres, radians, seconds, newtons; poses are x y z qx qy qz qw in world axes unless a name sets otherwise. An episode
 that has ended is on the disk (`ligature.datasets.store`), whatever interrupts the next one.
@@ -134,13 +134,13 @@ class DatasetWriter:
     def sample(
         self, phase: str = "", arms: Collection[str] | None = None, extra: Mapping[str, Any] | None = None
     ) -> bool:
-        """Take a sample if one is due, which begins an episode if none goes on; returns whether it did.
+        """Take a sample if one is due; the first begins an episode. Returns whether a sample was taken.
 
         ``arms`` are those that do what ``phase`` names, by default all; ``extra`` are further numbers by name, such as
         an environment's observation. Raises ValueError for a phase that was not announced.
         """
         if phase not in self._phases:
-            raise ValueError(f"no phase is called '{phase}'; there are {', '.join(self._phases[1:]) or 'none'}")
+            raise ValueError(f"unknown phase '{phase}'; choose one of {', '.join(self._phases[1:]) or 'none'}")
         time = self._simulation.time
         if self._episode is not None and time < self._due - EARLY:
             return False
@@ -184,7 +184,7 @@ class DatasetWriter:
             self._store.finish()
 
     def drop_episode(self) -> None:
-        """Forget the episode that goes on."""
+        """Discard the present episode."""
         self._forget()
         self._store.drop()
 
@@ -256,7 +256,7 @@ class DatasetWriter:
     def close(self) -> None:
         """End the dataset and make one file of it; a second time does nothing.
 
-        An episode that goes on counts as failed.
+        An unfinished episode counts as failed.
         """
         if self._ended:
             return
@@ -266,7 +266,7 @@ class DatasetWriter:
         self._ended = True
 
     def abandon(self) -> None:
-        """End the dataset without the episode that goes on; without any other, nothing stays."""
+        """End the dataset without the unfinished episode; without any other, delete it."""
         if not self._ended:
             self._ended = True
             self._forget()
@@ -274,7 +274,7 @@ class DatasetWriter:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Reports in one way what may go wrong with a disk, and drops the episode that goes on then."""
+        """Reports errors of the disk in one way, and discards the present episode then."""
         try:
             with uninterrupted():
                 yield
@@ -310,7 +310,9 @@ def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: 
         raise ValueError(f"a dataset has at most 255 phases, not {len(phases)}")
     for phase, gesture in gestures.items():
         if phase not in phases or gesture not in GESTURES:
-            raise ValueError(f"'{phase}' is no phase, or '{gesture}' none of the gestures {', '.join(GESTURES)}")
+            raise ValueError(
+                f"'{phase}' is not a phase, or '{gesture}' is not one of the gestures {', '.join(GESTURES)}"
+            )
 
 
 def _unit(kind: JointType) -> str:

@@ -114,7 +114,7 @@ class Hand:
         return every.ravel(), max(left, abs(closing))
 
     def go(self, T: Array, jaw: float, most: int = 120) -> Iterator[Array]:
-        """Actions until the set-point is there."""
+        """Number of actions until the set-point arrives."""
         for _ in range(most):
             found, left = self.action(T, jaw)
             if left < 0.2:
@@ -139,7 +139,7 @@ class Hand:
         depths = (0.004, 0.006, 0.5 * self.arc.length)
         found = best_grasp(self.arc, depths, self.arm.kinematics, self.base, [raised], now, surface, upright=True)
         if found is None:
-            raise ValueError("the arm cannot reach a grasp from which it could lift the needle")
+            raise ValueError("the arm reaches no grasp from which it can lift the needle")
         return now @ found.tool_in_arc(self.arc)
 
     def take(self, T: Array) -> Iterator[Array]:

@@ -92,7 +92,7 @@ def _network(path: Path) -> Policy:
     try:
         session = onnxruntime.InferenceSession(path.read_bytes(), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime has a class of its own for each way in which a file can be wrong
-        raise PolicyError(f"{path} is no network in ONNX: {_first_line(error)}") from error
+        raise PolicyError(f"{path} is not an ONNX network: {_first_line(error)}") from error
     inputs = session.get_inputs()
     if not inputs:
         raise PolicyError(f"{path} has no input; a policy takes an observation")
@@ -127,7 +127,7 @@ def _function(place: str, name: str) -> Policy:
     except (ImportError, AttributeError, OSError) as error:
         raise PolicyError(f"no policy '{place}:{name}': {error}") from error
     if not callable(found):
-        raise PolicyError(f"'{place}:{name}' is no function")
+        raise PolicyError(f"'{place}:{name}' is not a function")
     return found  # type: ignore[no-any-return]
 
 

@@ -131,7 +131,7 @@ class Randomisation:
             raise ValueError(f"randomise must be ranges by name or a YAML file of them, not {type(given).__name__}")
         unknown = [str(name) for name in given if name not in BOUNDS]
         if unknown:
-            raise ValueError(f"randomise has no '{unknown[0]}'; there are {', '.join(BOUNDS)}")
+            raise ValueError(f"randomise: unknown key '{unknown[0]}'; choose one of {', '.join(BOUNDS)}")
         return cls(**given)
 
     def as_dict(self) -> dict[str, list[float]]:

@@ -110,7 +110,7 @@ driven, and taken by the second arm (``suture``) | |
     With ``randomise`` each episode draws its own world, `randomisation` has it, and ``info`` of `reset` in
     ``"randomisation"``.
 
-    `save` and `restore` keep and take up any moment; copies (``copy.deepcopy``) and pickles go on alike.
+    `save` and `restore` work at any time; copies (``copy.deepcopy``) and pickles continue identically.
 
     Parameters
     ----------
@@ -381,7 +381,7 @@ driven, and taken by the second arm (``suture``) | |
         return self._observe() if self._channel is None else self._channel.last
 
     def __deepcopy__(self, memo: dict[int, Any]) -> SuturingEnv:
-        """Another simulation that goes on as this one does."""
+        """A copy of the simulation that continues identically."""
         return _made(self._options, None if self._progress is None else self.save())
 
     def __copy__(self) -> SuturingEnv:
@@ -502,7 +502,7 @@ def _on_side(pose: Array, side: Array) -> Array:
 
 
 def _made(options: Mapping[str, Any], state: EnvState | None) -> SuturingEnv:
-    """An environment of ``options`` that goes on from ``state``."""
+    """An environment of ``options`` that continues from ``state``."""
     env = SuturingEnv(**options)
     if state is not None:
         env.restore(state)

@@ -1,4 +1,4 @@
-"""Runs CoACD in a process of its own, so that a crash, a hang or Ctrl-C in its native code harms nobody else.
+"""Runs CoACD in a separate process, so that a crash, a hang or Ctrl-C in its native code affects nothing else.
 
 ``python -m ligature.mesh.coacd_process INPUT OUTPUT SETTINGS PARENT``: INPUT is an npz file of ``vertices`` (n, 3) and
 ``faces`` (m, 3), OUTPUT gets one array (k, 3) of vertices per convex piece, SETTINGS is a JSON

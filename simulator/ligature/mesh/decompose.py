@@ -53,7 +53,7 @@ HANG_LIMIT = 3600.0
 """Seconds after which CoACD counts as hanging."""
 
 PROGRESS_SECONDS = 4.0
-"""Seconds between two lines about a decomposition that goes on."""
+"""Seconds between two progress lines of a decomposition."""
 
 _FROM_OUTSIDE = tuple(-s for s in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP))
 _MACHINE_ERRORS = ("ImportError", "ModuleNotFoundError", "MemoryError", "OSError")

@@ -114,7 +114,7 @@ def lattice(
         inside = [(a[:-1] + np.diff(a) / 2 > lo) & (a[:-1] + np.diff(a) / 2 < hi)
                   for a, lo, hi in zip(axes, box.min(axis=0), box.max(axis=0), strict=True)]  # fmt: skip
         if len(flat) > 1 or (len(flat) and not low[flat[0]] < box[0, flat[0]] < high[flat[0]]):
-            raise ValueError(f"the slit from {box[0]} to {box[1]} m is no rectangle or box inside the mesh")
+            raise ValueError(f"the slit from {box[0]} to {box[1]} m is not a rectangle or box inside the mesh")
         if len(flat):
             axis = int(flat[0])
             index = int(np.argmin(np.abs(axes[axis] - box[0, axis])))

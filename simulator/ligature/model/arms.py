@@ -117,7 +117,9 @@ def _tool(bodies: Iterable[Body], base: Body) -> str:
 
 
 def _incomplete(name: str, why: str, mark: Mark | None) -> Diagnostic:
-    return Diagnostic(Severity.WARNING, f"'{name}' is no arm: {why}", mark, "its bodies stay ordinary bodies", "arm")
+    return Diagnostic(
+        Severity.WARNING, f"'{name}' is not an arm: {why}", mark, "its bodies stay ordinary bodies", "arm"
+    )
 
 
 def _declared(
@@ -130,7 +132,7 @@ def _declared(
         try:
             arm = _entry(bodies, chains, entry)
             if any(other.name == arm.name for other in arms):
-                raise ValueError(f"the name '{arm.name}' is taken")
+                raise ValueError(f"another arm is already called '{arm.name}'")
             arms.append(arm)
         except ValueError as error:
             message = f"'ligature arms': {error}"
@@ -144,7 +146,7 @@ def _entry(bodies: Sequence[Body], chains: Chains, entry: Any) -> ArmDescription
         raise ValueError(f"'{entry}' is not a mapping")
     unknown = [str(key) for key in entry if key not in KEYS]
     if unknown:
-        raise ValueError(f"there is no key '{unknown[0]}'")
+        raise ValueError(f"unknown key '{unknown[0]}'")
     name, word = str(entry.get("name", "")), str(entry.get("kind", "")).lower()
     if not re.fullmatch(r"[A-Za-z]\w*", name):
         raise ValueError(f"'{name}' is not a valid name; write letters, digits and '_'")

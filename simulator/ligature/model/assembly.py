@@ -364,7 +364,7 @@ class _Assembly:
         others = len(mechanism.chains) - 1
         loops = f"'{first.key}'" + (f" and {others} more" if others else "")
         if left > OPEN:
-            message = f"the loop of joint {loops} does not close: {length(left)} remain and are kept"
+            message = f"the loop of joint {loops} does not close: {length(left)} remain"
             hint = "correct the joint's pivots, or widen the limits of the joints of the loop"
             self.diagnostics.append(Diagnostic(Severity.WARNING, message, first.mark, hint, "loop"))
         elif file_gap > OPEN:

@@ -164,7 +164,7 @@ class Reset(Command, code=5):
 
 @dataclass(frozen=True)
 class WatchContacts(Command, code=9):
-    """Write contact points and forces into states from now on, or no longer: somebody looks at them."""
+    """Switch the contact points and forces in states on or off, for a view that shows them."""
 
     enabled: bool = wire(FLAG)
 

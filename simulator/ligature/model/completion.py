@@ -1,4 +1,4 @@
-"""Completes a scene: what only shows when all its objects are there.
+"""Completes a scene with everything that depends on all of its objects.
 
 Parents of mounted objects, rods, trees and loops, arms, needles, holes and jaws.
 """

@@ -57,11 +57,11 @@ def seen_through(camera: Camera, name: str) -> Camera:
     Raises
     ------
     KeyError
-        When no endoscope is called ``name``; the message names those there are.
+        When no endoscope is called ``name``; the message lists the known ones.
     """
     scope = ENDOSCOPES.get(name)
     if scope is None:
-        raise KeyError(f"no endoscope is called '{name}'; there are {', '.join(ENDOSCOPES)}")
+        raise KeyError(f"unknown endoscope '{name}'; choose one of {', '.join(ENDOSCOPES)}")
     return replace(
         camera,
         field_of_view=scope.field_of_view,

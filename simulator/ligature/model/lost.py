@@ -1,4 +1,4 @@
-"""Bodies that could not be built, and what goes with them: one finding for a cause and all its consequences."""
+"""Bodies that could not be built, and objects that depend on them: one finding for each cause with all consequences."""
 
 from __future__ import annotations
 

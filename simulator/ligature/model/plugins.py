@@ -111,7 +111,7 @@ def _entry(element: Element, body: int, item: Mapping[str, Any], resolver: Resol
     """The plug-in of one entry; raises ValueError or `ResolutionError` with the reason why there is none."""
     name, file = str(item["name"] or "").strip(), str(item["filename"] or "").strip()
     if not name.isidentifier():
-        raise ValueError(f"'{name}' is no name; use letters, digits and '_'")
+        raise ValueError(f"'{name}' is not a valid name; use letters, digits and '_'")
     path = None
     if file.endswith(".py"):
         mark = element.mark_of("plugins")
@@ -121,7 +121,7 @@ def _entry(element: Element, body: int, item: Mapping[str, Any], resolver: Resol
         if lack is not None:
             raise ResolutionError(Diagnostic(Severity.WARNING, f"'{path}' {lack.fault}", mark, lack.hint, "plugin"))
     elif file.endswith(LIBRARIES) or "/" in file:
-        raise ValueError(f"'{file}' is a library of AMBF's; plug-ins are Python files here")
+        raise ValueError(f"'{file}' is a C++ library for AMBF; write the plug-in in Python")
     return PluginEntry(
         name, path, "" if path else file, element.kind, body, _topics(item, "publishes"), _topics(item, "subscribes"),
         {key: value for key, value in item.items() if key not in _NOT_PARAMETERS}, element.mark_of("plugins"),
@@ -137,6 +137,6 @@ def _topics(item: Mapping[str, Any], key: str) -> dict[str, int]:
     for topic, size in listed.items():
         text = str(size)
         if not topic.isidentifier() or not text.isdecimal() or not 1 <= int(text) <= MAX_VALUES:
-            raise ValueError(f"'{key}.{topic}: {text[:20]}' is no topic with 1 to {MAX_VALUES} numbers")
+            raise ValueError(f"'{key}.{topic}: {text[:20]}' must be a topic with 1 to {MAX_VALUES} numbers")
         topics[topic] = int(text)
     return topics

@@ -18,13 +18,15 @@ def requested(requests: Sequence[str]) -> dict[str, str]:
     for request in requests:
         body, _, material = request.partition("=")
         if (material or USUAL) not in MATERIALS:
-            raise ValueError(f"--soft {request}: '{material}' is no material; give one of {', '.join(MATERIALS)}")
+            raise ValueError(
+                f"--soft {request}: '{material}' is not a known material; give one of {', '.join(MATERIALS)}"
+            )
         materials[body] = material or USUAL
     return materials
 
 
 def soften(documents: Sequence[Document], requests: Sequence[str], start: Mark) -> list[Diagnostic]:
-    """Give the bodies that a user wants soft the block that a file would have.
+    """Give the bodies that the user requested as soft the block that a file would have.
 
     Parameters
     ----------

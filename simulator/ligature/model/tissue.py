@@ -63,7 +63,7 @@ def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: T
         grid, _ = voxelise(vertices, faces, cell, slits=slits, planes=((), (), heights))
     except ValueError as error:
         raise _error(
-            element, "ligature tissue", f"is no tissue: {error}", "give a closed mesh and fitting cells"
+            element, "ligature tissue", f"cannot be tissue: {error}", "give a closed mesh and fitting cells"
         ) from None
     middle = grid.nodes[grid.cells].mean(axis=1)[:, 2]
     layer = np.searchsorted(-np.array(heights), -middle).astype(np.int64)
@@ -115,7 +115,7 @@ def material_of(element: Element, prefix: str, below: TissueMaterial | None) -> 
         return TissueMaterial(**{**values, **given})
     except ValueError as error:
         first = next((key for field, key in KEYS.items() if str(error).startswith(field)), "poisson ratio")
-        raise _error(element, prefix + first, f"is no tissue: {error}", "see docs/tissue.md") from None
+        raise _error(element, prefix + first, f"cannot be tissue: {error}", "see docs/tissue.md") from None
 
 
 def _layers(element: Element, base: TissueMaterial, top: float) -> tuple[tuple[TissueMaterial, ...], list[float]]:
@@ -151,7 +151,7 @@ def _fixed(element: Element, grid: Grid) -> NDArray[np.bool_]:
             raise _error(element, "ligature tissue.fixed", f"has {len(loose)} pieces that are not held",
                          "hold them by a further face, shorten the slits, or use smaller cells")  # fmt: skip
     elif pieces.max() > 0:
-        raise _error(element, "ligature tissue", f"falls into {pieces.max() + 1} pieces",
+        raise _error(element, "ligature tissue", f"consists of {pieces.max() + 1} pieces",
                      "use smaller cells, shorten the slits, or hold the pieces by 'fixed'")  # fmt: skip
     if fixed.all():
         raise _error(

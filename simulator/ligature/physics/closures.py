@@ -131,7 +131,7 @@ class Closures:
             message += f": {' and '.join(names)} {'is' if len(names) == 1 else 'are'} at the end of the range"
             hint = "widen the limits, or command less"
         else:
-            message += ": what pulls it is stronger than its bodies can bear, or its joints hold it differently"
+            message += ": the forces on it are too large for its bodies, or its joints contradict each other"
             hint = "command it slower and with less force, or look at its pivots and axes"
         return Diagnostic(Severity.WARNING, message, name.mark, hint, "loop")
 

@@ -108,7 +108,7 @@ class Guard:
         """Likely cause and remedy."""
         scene = self._scene
         if body.index in scene.rod_bodies:
-            return "a rod that is pulled or squeezed too hard", "look at what holds it"
+            return "a rod that is pulled or squeezed too hard", "check its joints and attachments"
         strong = float(np.linalg.norm(body.gravity))
         if strong > STRONG_GRAVITY:
             return f"gravity of {strong:g} m/s²", "write gravity in m/s²"

@@ -198,7 +198,7 @@ class Host:
 
     @contextmanager
     def before_step(self) -> Iterator[None]:
-        """Within it, pushes are taken."""
+        """Within it, pushes are accepted."""
         self._before = True
         try:
             yield
@@ -269,7 +269,7 @@ class Host:
 
     def _check_before(self, what: str) -> None:
         if not self._before:
-            raise RuntimeError(f"{what}, where what is done belongs to one tick")
+            raise RuntimeError(f"{what}, where actions apply to one tick")
 
     def apply(self, command: Command) -> None:
         """Give a command of `ligature.model.commands` or `ligature.robots.commands`, as front ends do.

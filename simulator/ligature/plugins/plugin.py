@@ -20,7 +20,7 @@ Line = tuple[Sequence[float], Sequence[float], tuple[int, int, int]]
 class Plugin:
     """What a plug-in derives from: it overrides the hooks that it needs.
 
-    A hook that raises switches its plug-in off; the run goes on. Hooks run in the physics process, one after the
+    A hook that raises switches its plug-in off; the run continues. Hooks run in the physics process, one after the
     other, in the time of a tick: 1 ms for everything.
 
     Attributes
@@ -49,7 +49,7 @@ class Plugin:
         self._published[topic][:] = values
 
     def on_load(self) -> None:
-        """Begin: all attributes are there, and the simulation is at the start of the scene."""
+        """Called once: all attributes are set, and the simulation is at the start of the scene."""
 
     def before_step(self) -> None:
         """Act before a tick: `Host.push` and `Host.apply` have their effect in this tick."""
@@ -58,7 +58,7 @@ class Plugin:
         """Look at what a tick has made."""
 
     def on_reset(self) -> None:
-        """Go back to the start: bodies, threads and joints are there already."""
+        """Reset the plug-in; bodies, threads and joints have been reset already."""
 
     def on_close(self) -> None:
         """End: the run is over."""

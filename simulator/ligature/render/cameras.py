@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 class Studio:
-    """Draws the cameras of a simulation with one renderer, which is made when the first picture is taken."""
+    """Draws the cameras of a simulation with one renderer, which is created for the first picture."""
 
     def __init__(self, simulation: Simulation) -> None:
         self.scene = simulation.scene
@@ -40,7 +40,7 @@ class Studio:
     def renderer(self) -> Renderer:
         """The renderer; raises `RenderUnavailable` where no OpenGL is available, RuntimeError after `close`."""
         if self._closed:
-            raise RuntimeError("the simulation is closed: its cameras take no more pictures")
+            raise RuntimeError("the simulation is closed: its cameras can take no pictures")
         if self._renderer is None:
             self._renderer = Renderer(self.scene)
             if self._look is not None:
@@ -126,7 +126,7 @@ class CameraHandle:
         eye: str = "",
         sensor: ImageSensor = IDEAL,
     ) -> Exposure:
-        """Begin the picture that `capture` takes: where a processor draws, it is drawn while the simulation goes on."""
+        """Begin a picture like `capture`: with software rendering it is drawn while the simulation continues."""
         state = self._simulation.state
         view, moment = self.view(resolution, eye), (self.camera.index, int(state["tick"][0]))
         shaders = self.camera.preprocessing_shaders

@@ -31,7 +31,7 @@ class Triangles:
     faces: NDArray[np.int32]
 
     def interleaved(self, tangents: bool = False) -> NDArray[np.float32]:
-        """Vertices as the shaders want them: position, normal, uv, tangent if wanted; (n, 8 or 12) float32."""
+        """Vertices in the shaders' format: position, normal, uv, tangent if needed; (n, 8 or 12) float32."""
         columns = [self.positions, self.normals, self.uvs]
         return np.hstack([*columns, self.tangents()] if tangents else columns).astype("f4")
 

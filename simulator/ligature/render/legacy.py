@@ -70,8 +70,8 @@ def compiled(context: moderngl.Context, files: ShaderFiles, resolver: Resolver) 
         raise ShaderError(*findings(str(error), files)) from None
     unknown = sorted(set(program.attributes) - set(_ATTRIBUTES))
     if unknown:
-        message = f"wants the vertex attribute '{unknown[0]}', which no object has"
-        hint = f"there are {', '.join(name for name in _ATTRIBUTES if not name.startswith(PREFIX))}"
+        message = f"needs the vertex attribute '{unknown[0]}', which no object has"
+        hint = f"it can use {', '.join(name for name in _ATTRIBUTES if not name.startswith(PREFIX))}"
         raise ShaderError(Diagnostic(Severity.ERROR, message, Mark(files.vertex, 1, 1), hint, "render"))
     for unit, name in enumerate((n for n in program.samplers if n not in _UNITS), _FIRST_FREE_UNIT):
         program.set(name, unit)  # samplers of different kinds may not share a unit

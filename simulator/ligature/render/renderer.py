@@ -358,7 +358,7 @@ class Renderer:
     def _target(self, view: CameraView, passes: Sequence[str], samples: int) -> Target:
         unknown = set(passes) - set(PASSES)
         if unknown or not passes:
-            raise ValueError(f"{sorted(unknown) or 'no pass'} cannot be drawn; there are {', '.join(PASSES)}")
+            raise ValueError(f"{sorted(unknown) or 'no pass'} cannot be drawn; choose one of {', '.join(PASSES)}")
         size, wanted = (view.width, view.height), [name for name in PASSES if name in passes]
         for target in reversed(self._targets):
             if (target.size, target.passes, target.samples) == (size, wanted, samples):

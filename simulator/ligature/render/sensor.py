@@ -59,7 +59,7 @@ class ImageSensor:
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.distortion).all():
-            raise ValueError(f"the distortion of a sensor has to be finite, not {self.distortion}")
+            raise ValueError(f"the distortion of a sensor must be finite, not {self.distortion}")
         for name, most in LIMITS.items():
             value, least = getattr(self, name), -most if name == "exposure" else 0.0
             if not least <= value <= most:

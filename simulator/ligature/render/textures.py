@@ -19,7 +19,7 @@ class Textures:
         self._context, self._problems = context, problems
         self._loaded: dict[Path, moderngl.Texture | None] = {}
         self.white = context.texture((1, 1), 4, b"\xff" * 4)
-        """Stands in where a shader wants a texture that a surface lacks."""
+        """Replaces a texture that a shader needs and a surface lacks."""
 
         self.around = context.texture_cube((1, 1), 4, b"\xff" * 24)
         """What surrounds the scene: its sky box; white where it has none."""

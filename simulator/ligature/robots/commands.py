@@ -231,7 +231,7 @@ class BodyServoCf(_Wrench, code=67, verb="body/servo_cf", streamed=True):
 
 @dataclass(frozen=True)
 class ServoCs(ArmCommand, code=68, verb="servo_cs", streamed=True):
-    """Follow whichever of pose (7,), twist (6,) and wrench (6,) is there (``crtk_msgs/CartesianState``)."""
+    """Follow the given ones of pose (7,), twist (6,) and wrench (6,) (``crtk_msgs/CartesianState``)."""
 
     pose: Vector | None = wire(Numbers(7, optional=True), default=None)
     twist: Vector | None = wire(Numbers(6, optional=True), default=None)

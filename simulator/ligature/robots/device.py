@@ -163,7 +163,7 @@ class Device:
         self._emit_state()
 
     def _power_up(self, then: Action) -> None:
-        """Begin to switch the drives on, or go on with it: clients repeat a command until it has its effect."""
+        """Begin to switch the drives on, or continue: clients repeat a command until it takes effect."""
         if self._pending is None:
             self._due, self._busy = self.time + POWER_UP_SECONDS, True
         if self._pending is not Action.HOME:
@@ -186,7 +186,7 @@ class Device:
         self._begin_busy()
 
     def _powered(self) -> None:
-        """The drives are on: stay where the joints are, and go on with what was asked for."""
+        """The drives are on: hold the joints, and continue with the requested command."""
         then, self._pending = self._pending, None
         self._state, self._busy = State.ENABLED, False
         self._hold_all()
@@ -200,7 +200,7 @@ class Device:
         self._off_all()
 
     def fault(self, why: str) -> None:
-        """Stop with a fault; ``disable`` ends it. A fault that is there already is not reported again."""
+        """Stop with a fault; ``disable`` ends it. A present fault is not reported again."""
         if self._state is not State.FAULT:
             self.emit("error", f"{self.name}: {why[:MOST_CHARACTERS]}")
         self._switch_off(State.FAULT)
@@ -213,7 +213,7 @@ class Device:
             self.emit("operating_state", [int(state.state), state.is_homed, state.is_busy])
 
     def emit(self, name: str, value: Any) -> None:
-        """Note an event for whoever serves this arm."""
+        """Store an event for the publisher of this arm."""
         self.events.append(Event(self.name, name, value))
 
     # --- groups of joints -------------------------------------------------------------------

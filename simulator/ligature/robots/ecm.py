@@ -89,9 +89,9 @@ class Ecm(Chain):
 
     def __init__(self, endoscope: str = "Classic_HD_STRAIGHT", model: str = "Classic") -> None:
         if endoscope not in ENDOSCOPES:
-            raise ValueError(f"there is no endoscope '{endoscope}'; known are {', '.join(ENDOSCOPES)}")
+            raise ValueError(f"unknown endoscope '{endoscope}'; choose one of {', '.join(ENDOSCOPES)}")
         if model not in LIMITS:
-            raise ValueError(f"there is no ECM model '{model}'; known are {', '.join(LIMITS)}")
+            raise ValueError(f"unknown ECM model '{model}'; choose one of {', '.join(LIMITS)}")
         self.endoscope, self.model = endoscope, model
         super().__init__(JOINT_NAMES, _links(RCC, SHAFT), Convention.MODIFIED, ENDOSCOPES[endoscope], LIMITS[model])
 

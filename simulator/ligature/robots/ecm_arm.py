@@ -42,7 +42,7 @@ class EcmArm(Arm):
     def set_endoscope_type(self, endoscope: str) -> None:
         """Change the endoscope, which turns the picture of UP and DOWN scopes; NONE keeps the straight one."""
         if endoscope not in ENDOSCOPES:
-            raise Rejected(f"there is no endoscope '{endoscope}'; known are {', '.join(ENDOSCOPES)}")
+            raise Rejected(f"unknown endoscope '{endoscope}'; choose one of {', '.join(ENDOSCOPES)}")
         self.kinematics = Ecm(endoscope, self.kinematics.model)
         self.emit("endoscope_type", endoscope)
 

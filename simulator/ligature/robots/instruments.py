@@ -181,5 +181,5 @@ def _by_number(number: int) -> Instrument:
     if number in SNAKES:
         raise ValueError(f"{SNAKES[number]}:{number} has a snake wrist, which is not modelled")
     if number not in INSTRUMENTS:
-        raise ValueError(f"there is no instrument {number}; for example 400006 and 420006 are known")
+        raise ValueError(f"unknown instrument {number}; known are for example 400006 and 420006")
     return INSTRUMENTS[number]

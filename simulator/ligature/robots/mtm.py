@@ -123,7 +123,7 @@ def _inverse_rows(
 
 @compiled
 def _place(T: Array, q: Array) -> int:
-    """Yaw, shoulder and elbow that put the wrist at the position of ``T``, the elbow bent as the limits want it."""
+    """Yaw, shoulder and elbow for the position of ``T``; the elbow bends to the side that the limits allow."""
     x, y, z = T[0, 3], T[1, 3], T[2, 3]
     r = np.sqrt(x * x + y * y)
     cosine = (r * r + z * z - UPPER_ARM**2 - ELBOW_TO_WRIST**2) / (2 * UPPER_ARM * ELBOW_TO_WRIST)

@@ -43,7 +43,7 @@ class Plant(Protocol):
         """Put the axes somewhere at once, at rest."""
 
     def reset(self) -> None:
-        """The scene was put back to its start."""
+        """The scene was reset."""
 
     def snapshot(self) -> Any:
         """What lasts from tick to tick and is not part of the physics, for snapshots."""

@@ -150,7 +150,7 @@ def _lengths(tool: Instrument, model: str) -> PsmLengths:
     if model in MANIPULATORS:
         return PsmLengths(MANIPULATORS[model].rcc, *tool.lengths)
     if model != "SRC":
-        raise ValueError(f"there is no PSM model '{model}'; known are {', '.join(MODELS)}")
+        raise ValueError(f"unknown PSM model '{model}'; choose one of {', '.join(MODELS)}")
     if tool.id not in SRC_LENGTHS:
         known = " and ".join(map(str, SRC_LENGTHS))
         raise ValueError(f"the arm of the challenge carries instruments {known}, not {tool.type}")

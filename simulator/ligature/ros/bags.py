@@ -74,7 +74,7 @@ def _blamed(path: Path | str, bag: rosbag.Bag | None = None) -> Iterator[None]:
             f"{path}: the bag is truncated: its recorder did not finish; 'rosbag reindex' may repair it"
         ) from None
     except rosbag.ROSBagException as error:
-        raise BagError(f"{path}{_place(bag)}: not a bag, or a damaged one: {error}") from None
+        raise BagError(f"{path}{_place(bag)}: not a valid bag: {error}") from None
     except BagError as error:
         raise BagError(f"{path}{_place(bag)}: {error}") from None
     except OSError as error:

@@ -95,7 +95,7 @@ class CameraTopics:
         self._send("CameraInfo", pictures.camera_info(calibration, _header(stamp, self.optical_frame)))
 
     def publish_picture(self, picture: Picture, stamp: float) -> None:
-        """Publish what was drawn to whoever listens."""
+        """Publish the drawn pictures to their subscribers."""
         header = _header(stamp, self.optical_frame)
         if picture.rgb.size and self._heard("ImageData"):
             self._send("ImageData", pictures.image(picture.rgb, "rgb8", header))
@@ -121,7 +121,7 @@ class CameraTopics:
 class CameraNode:
     """Every camera in ``shown``, as ROS topics and frames; ``everything`` gives images and clouds of all of them.
 
-    Raises `ligature.ros.registrations.NameTaken` when the cameras of another simulator are there already.
+    Raises `ligature.ros.registrations.NameTaken` when another simulator already publishes these cameras.
     """
 
     def __init__(self, scene: Scene, shown: Sequence[Camera], everything: bool) -> None:

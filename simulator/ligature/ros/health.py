@@ -19,7 +19,7 @@ LISTENING = 1.0
 """Seconds for which a topic is listened to."""
 
 HEAVY = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2")
-"""Types that are not listened to: pictures and clouds are made only for who wants them."""
+"""Types without subscription: pictures and clouds are only rendered for other subscribers."""
 
 QUIET = ("/rosout", "/rosout_agg", "/tf_static")
 
@@ -39,7 +39,7 @@ class Topic:
 
 
 class TopicHealth(threading.Thread):
-    """Looks at the topics that somebody listens to, one after the other; ``also`` runs at every look."""
+    """Measures topics with subscribers, one after the other; ``also`` runs with every measurement."""
 
     def __init__(self, also: Callable[[], None] = lambda: None) -> None:
         super().__init__(name="topic health", daemon=True)
@@ -51,7 +51,7 @@ class TopicHealth(threading.Thread):
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Topics that somebody besides this node listens to, by name."""
+        """Topics with subscribers other than this node, by name."""
         return self._topics
 
     @property

@@ -19,7 +19,7 @@ from rospy.impl.registration import Registration, get_registration_listeners, ge
 
 DEFAULT_WORLD = "/ambf/env/World"
 PERIOD = 1.0
-"""Seconds between looks at the master."""
+"""Seconds between checks of the master."""
 
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 TIMEOUT = 2.0

@@ -49,11 +49,11 @@ COUNTING = 1.0
 REST = 0.0002
 """Seconds of sleep after each publication: of a thread in real time that never sleeps nobody gets the processor."""
 HOUSEKEEPING = 0.02
-"""Seconds between looks at watchdogs and the physics process."""
+"""Seconds between checks of watchdogs and the physics process."""
 
 
 class Node:
-    """The simulator on ROS; raises `ligature.ros.registrations.NameTaken` when another one is there already."""
+    """The simulator on ROS; raises `ligature.ros.registrations.NameTaken` when another one runs already."""
 
     def __init__(
         self, scene: Scene, block: Block, min_hz: int | None, max_hz: int | None, policy: str, challenge: bool,

@@ -35,7 +35,7 @@ class PaceServices:
         rospy.Subscriber(f"{root}/set_speed", Float64, self._set_speed, queue_size=1)
 
     def _pause(self, request: SetBool) -> SetBoolResponse:
-        """Pause or resume; answers when the run has stopped or goes on."""
+        """Pause or resume; replies when the run has stopped or resumed."""
         with self._lock:
             self._push(Throttle(request.data, self._clock, 1 if request.data else 0))
             self._paused = request.data

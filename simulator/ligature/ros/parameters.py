@@ -23,7 +23,7 @@ Value = float | str | list[Any]
 Values = Mapping[str, Any]
 
 PERIOD = 2.0
-"""Seconds between looks at the server, as in the reference."""
+"""Seconds between reads of the parameter server, as in the reference."""
 
 DEFAULT_STEREO = (0.2, 0.5)
 DEFAULT_ANGLE, DEFAULT_WIDTH = 0.7, 10.0

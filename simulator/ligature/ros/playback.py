@@ -45,7 +45,7 @@ def play(path: Path, joints: str, speed: float, log: Callable[[str], None]) -> i
         if not routes:
             what = f"{joints} joints of an arm" if joints else "commands"
             raise BagError(
-                f"{path}: holds no {what} that the running simulator takes; '--joints measured' plays joint states"
+                f"{path}: contains no {what} for the running simulator; '--joints measured' plays joint states"
             )
         log(f"playing {', '.join(routes)}")
         types = {topic: message for topic, message, _ in _firsts(bag, routes)}

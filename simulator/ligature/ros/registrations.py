@@ -109,7 +109,7 @@ def claim(name: str) -> str:
         return ""
     if not removed:
         return ""
-    return f"node {name} was killed; what it left at the ROS master ({removed} topics and services) was removed"
+    return f"node {name} was killed; its entries at the ROS master ({removed} topics and services) were removed"
 
 
 def dead_neighbours(me: str, topics: Sequence[str]) -> list[str]:

@@ -43,7 +43,7 @@ class Outlet:
         self._sent_due = -math.inf
 
     def send(self, state: Record, stamp: Any) -> bool:
-        """Publish ``state`` when somebody listens and has not seen it; whether it was published."""
+        """Publish ``state`` if it has subscribers and is new; returns whether it was published."""
         update = int(state["update"])
         seen = update == self._sent_update and self.due < self._sent_due + 1.0 / self.low - SLACK
         if seen or not self.publisher.heard:

@@ -117,7 +117,7 @@ class TaskNode:
             self._judge(team)
 
     def _judge(self, team: str, T_camera_needle: Array | None = None) -> None:
-        """Judge and publish; a task that goes on may be reported again."""
+        """Score and publish; an unfinished task may be reported again."""
         try:
             with self._lock:
                 score, measures = self._attempt.judge(T_camera_needle), self._attempt.monitor.measures()

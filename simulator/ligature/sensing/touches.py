@@ -46,7 +46,7 @@ class Touches(Subsystem):
                 state[name][0, :count], state[name][0, count:] = found, 0.0
 
     def reset(self) -> None:
-        """Forget the last reading; watching goes on."""
+        """Forget the last reading; measurement continues."""
         self._empty()
 
     def snapshot(self) -> dict[str, Any]:

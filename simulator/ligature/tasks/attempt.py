@@ -44,7 +44,7 @@ class Attempt:
 
     def __init__(self, scene: Scene, task: str, pairs: int = SUTURE_PAIRS) -> None:
         if task not in TASKS:
-            raise ValueError(f"there is no task '{task}'; there are {', '.join(TASKS)}")
+            raise ValueError(f"unknown task '{task}'; choose one of {', '.join(TASKS)}")
         self.task, self._scene, self._pairs = task, scene, pairs
         needed = {"pose_estimation": 0, "insertion": 1, "suture": pairs}[task]
         self._scenery = Scenery.of(scene, needed)

@@ -45,7 +45,7 @@ class CameraDrive:
     def update(self, hands: Sequence[Array]) -> Array:
         """Goal (4, 4) of the camera in the world for new poses of the hands."""
         if len(hands) != len(self._hands):
-            raise ValueError(f"the camera was taken with {len(self._hands)} hands, not {len(hands)}")
+            raise ValueError(f"the camera motion began with {len(self._hands)} hands, not {len(hands)}")
         moved = np.mean([now[:3, 3] - then[:3, 3] for now, then in zip(hands, self._hands, strict=True)], axis=0)
         R = axis_rotation((0.0, 0.0, 1.0), -self._roll(hands))
         return self._T_world_camera @ frame(R, -self.scale * moved)

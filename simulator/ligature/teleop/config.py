@@ -120,7 +120,7 @@ def text_of(path: Path) -> str:
         line = data.count(b"\n", 0, error.start) + 1
         mark = Mark(path, line, error.start - (data.rfind(b"\n", 0, error.start) + 1) + 1)
         raise AdfError(
-            Diagnostic(Severity.ERROR, f"byte {data[error.start]:#04x} is no UTF-8", mark, "", "teleop")
+            Diagnostic(Severity.ERROR, f"byte {data[error.start]:#04x} is not UTF-8", mark, "", "teleop")
         ) from None
 
 
@@ -152,7 +152,7 @@ class _Reader:
                 self._notes.append(f"{name.mark}: '{former}' is deprecated; write '{key}'")
         for key, (name, _) in block.entries.items():
             if key not in keys:
-                raise self.fail(name.mark, f"{what} has no key '{key}'", f"known are {', '.join(keys)}")
+                raise self.fail(name.mark, f"{what} has no key '{key}'", f"choose one of {', '.join(keys)}")
 
     def block(self, node: Node, what: str) -> Block:
         if not isinstance(node, Block):
@@ -224,7 +224,7 @@ class _Reader:
         waiting: set[str] = set()
         for name, (key, node) in self.block(found, "pairs").entries.items():
             if name not in devices:
-                raise self.fail(key.mark, f"there is no device '{name}'", f"there are {', '.join(devices)}")
+                raise self.fail(key.mark, f"unknown device '{name}'", f"choose one of {', '.join(devices)}")
             arms = self.items(node, f"followers of {name}") if isinstance(node, Sequence) else [node]
             followers = tuple(self.text(arm, "a follower") for arm in arms)
             if followers[:1] == (NOBODY,):
@@ -254,7 +254,7 @@ class _Reader:
         kind = self.text(node, "kind") if node is not None else ""
         if kind not in KINDS:
             mark = node.mark if node is not None else block.mark
-            raise self.fail(mark, f"device {name} has the unknown kind '{kind}'", f"known are {', '.join(KINDS)}")
+            raise self.fail(mark, f"device {name} has the unknown kind '{kind}'", f"choose one of {', '.join(KINDS)}")
         adapter = module(kind)
         own = ("kind", "topic", "axes", "handle", "grip", "buttons", "force", "settings")
         self.known(block, (*own, *adapter.OPTIONS), f"device {name}")

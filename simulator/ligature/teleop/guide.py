@@ -46,7 +46,7 @@ class Ear:
 def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], show: Callable[[str], None]) -> str:
     """Ask the operator to move a device; returns the YAML lines for its block in the configuration."""
     if name not in config.devices:
-        raise Unclear(f"there is no device '{name}'; there are {', '.join(config.devices)}")
+        raise Unclear(f"unknown device '{name}'; choose one of {', '.join(config.devices)}")
     spec, ear = config.devices[name], Ear()
     ear.device = module(spec.kind).Adapter(spec.topic, dict(spec.options), ear.readings.append)
     assert ear.device is not None

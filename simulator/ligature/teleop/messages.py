@@ -50,7 +50,7 @@ class Listener:
         except AttributeError as error:
             sender = header["callerid"]
             rospy.logerr_throttle_identical(
-                10.0, f"{self._topic}: {sender} sends {header['type']}, which cannot be read here: {error}"
+                10.0, f"{self._topic}: {sender} sends {header['type']}, which cannot be decoded: {error}"
             )
 
     def _class_of(self, md5: str, type_: str, definition: str) -> Any:

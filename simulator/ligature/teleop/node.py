@@ -260,7 +260,7 @@ class Teleop:
                 leader.pairing.release()
 
     def _drive(self, now: float, tips: dict[str, Tip | None]) -> None:
-        """Send the arms where the hands want them."""
+        """Send the arms their goals from the hands."""
         seen = self._camera.setpoint() if self._camera is not None else None
         if self._camera_pressed and not self._camera_ready():
             return
@@ -340,7 +340,7 @@ class Teleop:
     def _on_reading(self, value: tuple[str, Reading]) -> None:
         name, reading = value
         if name not in self._handsets:
-            raise Conflict(f"there is no device '{name}'; there are {', '.join(self._handsets)}")
+            raise Conflict(f"unknown device '{name}'; choose one of {', '.join(self._handsets)}")
         if self._recorder is not None:
             self._recorder.reading(name, reading)
         hand, presses = self._handsets[name].take(reading)
@@ -382,7 +382,7 @@ class Teleop:
 
     def _on_cycle(self, leader: str, step: int = 1) -> None:
         if leader not in self.seat.leaders:
-            raise Conflict(f"there is no leader '{leader}'; there are {', '.join(self.seat.leaders)}")
+            raise Conflict(f"unknown leader '{leader}'; choose one of {', '.join(self.seat.leaders)}")
         before = self.seat.leaders[leader].selected
         after = self.seat.next_follower(leader, step)
         self._selected(leader, before, after)
@@ -441,7 +441,7 @@ class Teleop:
             if f"{pair.leader.name}_{pair.arm.name}" == name:
                 return pair
         names = ", ".join(f"{leader}_{arm}" for leader, arm in self.pairs)
-        raise Conflict(f"there is no pair '{name[:40]}'; there are {names}")
+        raise Conflict(f"unknown pair '{name[:40]}'; choose one of {names}")
 
     def _select(self, leader: str, follower: str | None) -> None:
         before = self.seat.leaders[leader].selected if leader in self.seat.leaders else None
@@ -453,7 +453,7 @@ class Teleop:
         self._selected(leader, before, follower)
 
     def _contest(self, claimer: str, follower: str | None) -> None:
-        """Somebody else wants an arm: it holds until its leader's clutch is pressed, or one lets go."""
+        """Another node commands an arm: it holds until its leader's clutch is pressed, or the other stops."""
         for leader in self.seat.leaders.values():
             if leader.selected == follower and follower is not None and (claimer, follower) in self.pairs:
                 leader.pairing.contest()

@@ -59,7 +59,7 @@ class Pair:
             self._enter(ALIGNING, "aligning")
 
     def advance(self, now: float, tip: Tip | None, idle: str) -> None:
-        """Take the next step; ``idle`` is the reason why nobody may drive now, empty when all may."""
+        """Take the next step; ``idle`` is the reason why no pair may be enabled now, empty if all may."""
         why = "" if self.wanted and self.selected else "not selected" if self.wanted else "disabled"
         if why or idle:
             self._enter(DISABLED, why or idle)

@@ -125,7 +125,7 @@ class Pairing:
         self.status = Status.IDLE
 
     def contest(self) -> None:
-        """Stop driving because somebody else wants the follower, until the pairing is engaged again."""
+        """Stop because another node commands the follower, until the pairing is engaged again."""
         self.status = Status.CONTESTED
 
     def change(self, settings: Settings) -> None:

@@ -24,7 +24,7 @@ from ligature.teleop.pairing import Tip
 Array = NDArray[np.float64]
 
 KEEP = 0.05
-"""Seconds after which the last command is sent again: a body that nobody commands is let go."""
+"""Seconds after which the last command is sent again: a body without commands is released."""
 
 
 class Proxy:

@@ -40,7 +40,7 @@ def of_devices(wanted: Sequence[str]) -> TeleopConfig:
                 waiting.add(own)
             pairs[own] = (*free, *(arm for arm in followers if arm not in free))
     if first is None:
-        raise ValueError(f"name a device; there are {', '.join(names())}")
+        raise ValueError(f"name a device; choose one of {', '.join(names())}")
     return replace(first, devices=devices, pairs=pairs, waiting=frozenset(waiting))
 
 
@@ -48,7 +48,7 @@ def _one(text: str) -> tuple[TeleopConfig, str]:
     """The teleoperation of one device, with the topic that the user named."""
     name, equals, topic = text.partition("=")
     if name not in names() or (equals and not topic):
-        raise ValueError(f"no device '{text}' is ready; there are {', '.join(names())}, each also as touch=/arm1/")
+        raise ValueError(f"no device '{text}' is ready; choose one of {', '.join(names())}, each also as touch=/arm1/")
     if equals and name in ("touch", "mtm"):  # topics begin with it
         topic = topic.rstrip("/") + "/"
     return config.read(FOLDER / f"{name}.yaml"), topic

@@ -108,7 +108,7 @@ class Seat:
 
     def _leader(self, name: str) -> Leader:
         if name not in self._leaders:
-            raise Conflict(f"there is no leader '{name}'; there are {', '.join(self._leaders)}")
+            raise Conflict(f"unknown leader '{name}'; choose one of {', '.join(self._leaders)}")
         return self._leaders[name]
 
     # --- pairing ----------------------------------------------------------------------------

@@ -74,7 +74,9 @@ def _bodies(model: Any, notes: list[str]) -> list[int]:
             owner_name = name_of(model, "body", owner)
             notes.append(f"body '{name_of(model, 'body', body)}' has no mass; its geoms are part of '{owner_name}'")
         if model.body_mocapid[body] >= 0:
-            notes.append(f"body '{name_of(model, 'body', body)}' is moved by motion capture; here it stands still")
+            notes.append(
+                f"body '{name_of(model, 'body', body)}' is moved by motion capture; in Ligature it does not move"
+            )
     return found
 
 
@@ -190,7 +192,9 @@ def _shapes(
             vertices, faces = _triangles(model, int(model.geom_dataid[geom]))
             parts.append(MeshPart(name, vertices @ T[:3, :3].T + T[:3, 3], faces, material=material))
         else:
-            notes.append(f"geom '{name}' is a height or distance field, which ADF has no shape for; it is left out")
+            notes.append(
+                f"geom '{name}' is a height or distance field, which no shape of ADF can represent; it is left out"
+            )
     return primitives, parts
 
 
@@ -211,5 +215,5 @@ def _note_unsupported(model: Any, notes: list[str]) -> None:
     if model.nu:
         notes.append(
             f"gains of the actuators are left out: {names_of(model, 'actuator', range(model.nu))}; "
-            "the joints that they drive take commands"
+            "send commands to their joints instead"
         )

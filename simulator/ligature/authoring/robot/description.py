@@ -94,7 +94,7 @@ def links_by_name(links: Iterable[Link]) -> dict[str, Link]:
     named: dict[str, Link] = {}
     for link in links:
         if link.name in named:
-            raise RobotError("two links have one name; give each its own")
+            raise RobotError("two links have the same name; names must be unique")
         named[link.name] = link
     return named
 

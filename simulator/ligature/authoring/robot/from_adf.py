@@ -92,7 +92,9 @@ class _Exporter:
         text = joint.text(end)
         found = find_by_text([body.key for body in self.bodies], text)
         if found is None:
-            self.done.notes.append(f"joint '{joint.key}': its {end} '{text}' is no body of this file; it is left out")
+            self.done.notes.append(
+                f"joint '{joint.key}': its {end} '{text}' is not a body of this file; it is left out"
+            )
         return None if found is None else self.bodies[found]
 
     def _zero_poses(
@@ -138,7 +140,7 @@ class _Exporter:
     ) -> Joint | None:
         kind = joint.text("type")
         if kind not in KINDS:
-            self.done.notes.append(f"joint '{name}' is {kind}, which neither format has; it is left out")
+            self.done.notes.append(f"joint '{name}' is {kind}, which neither format supports; it is left out")
             return None
         if kind.endswith("spring"):
             self.done.notes.append(f"joint '{name}' keeps its axis and limits, not its spring")

@@ -186,7 +186,7 @@ def _joint(element: Element, prefix: str, names: set[str], frames: _Frames) -> J
     ends = {end: (element.findtext(end) or "").strip() for end in ("parent", "child")}
     for end, name in ends.items():
         if prefix + name not in names and not (end == "parent" and name == WORLD):
-            refuse(element, f"its {end} is '{name}', which is no link of the model")
+            refuse(element, f"its {end} is '{name}', which is not a link of the model")
     T = frames.of(element.get("name", ""), element)
     given = element.find("axis")
     axis, lower, upper = [0.0, 0.0, 1.0], None, None
@@ -240,7 +240,7 @@ def sdf_text(robot: Robot) -> tuple[str, list[str]]:
             SubElement(anchor, "parent").text, SubElement(anchor, "child").text = WORLD, link.name
     for joint in robot.joints:
         if joint.kind not in KINDS:
-            notes.append(f"joint '{joint.name}' is {joint.kind}, which SDF has not; it is left out")
+            notes.append(f"joint '{joint.name}' is {joint.kind}, which SDF does not support; it is left out")
             continue
         _put_joint(model, joint, inverse(poses[joint.child]) @ joint.T)
     ElementTree.indent(root)

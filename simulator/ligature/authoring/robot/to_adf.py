@@ -42,7 +42,9 @@ def to_adf(robot: Robot, folder: Path) -> Converted:
         if joint.parent:
             items += _joint(joint, poses, inertial, notes)
         elif joint.kind != "fixed":
-            notes.append(f"joint '{joint.name}' joins '{joint.child}' to the world, which is no body; it is left out")
+            notes.append(
+                f"joint '{joint.name}' joins '{joint.child}' to the world, which is not a body; it is left out"
+            )
     return Converted(Parts(tuple(items), meshes), notes)
 
 
@@ -118,7 +120,7 @@ def _found(name: str, folder: Path) -> Path | None:
 def _joint(joint: Joint, poses: dict[str, Array], inertial: dict[str, Array], notes: list[str]) -> list[Item]:
     kind = _KINDS.get(joint.kind)
     if kind is None:
-        notes.append(f"joint '{joint.name}' is {joint.kind}, which ADF has no joint for; its child stays free")
+        notes.append(f"joint '{joint.name}' is {joint.kind}, which no joint of ADF can represent; its child stays free")
         return []
     if joint.mimics:
         notes.append(f"joint '{joint.name}' mimics '{joint.mimics}', which ADF cannot express")

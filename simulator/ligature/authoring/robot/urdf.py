@@ -90,7 +90,7 @@ def _ends(joint: Element, links: dict[str, Link]) -> tuple[str, str]:
         element = joint.find(end)
         name = "" if element is None else element.get("link", "")
         if name not in links:
-            refuse(joint, f"its {end} is '{name}', which is no link of the file")
+            refuse(joint, f"its {end} is '{name}', which is not a link of the file")
         found.append(name)
     return found[0], found[1]
 
@@ -194,7 +194,7 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     A link that a joint carries has the joint's frame; what belongs to it is placed anew.
     """
     notes = [
-        f"link '{link.name}' has an infinite plane, which URDF has not; it is left out"
+        f"link '{link.name}' has an infinite plane, which URDF does not support; it is left out"
         for link in robot.links
         if any(
             isinstance(look.shape, Shape) and look.shape.kind == "PLANE" for look in (*link.visuals, *link.collisions)
@@ -229,7 +229,7 @@ def _tree(robot: Robot, notes: list[str]) -> list[Joint]:
         if not joint.parent:
             continue
         if joint.kind not in KINDS:
-            notes.append(f"joint '{joint.name}' is {joint.kind}, which URDF has not; it is left out")
+            notes.append(f"joint '{joint.name}' is {joint.kind}, which URDF does not support; it is left out")
         elif joint.child in above or _reaches(above, joint.parent, joint.child):
             notes.append(f"joint '{joint.name}' closes a loop, which URDF cannot express; it is left out")
         else:

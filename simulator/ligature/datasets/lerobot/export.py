@@ -218,7 +218,9 @@ class _Export:
         }
         known = {key: value for key, value in self._written.features.items() if value["dtype"] != "video"}
         if known and known != features:
-            raise DatasetError("the episodes differ in what they hold; a dataset of LeRobot has one set of features")
+            raise DatasetError(
+                "the episodes contain different features; all episodes of a LeRobot dataset must have the same"
+            )
         self._written.features |= features
 
     def _film(self, key: str, number: int, pictures: h5py.Dataset) -> statistics.Statistics:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 MOST_PICTURES, MOST_PIXELS = 100, 160
-"""Pictures of an episode that are looked at, evenly over it, and pixels of their longer side."""
+"""Pictures of an episode that are evaluated, evenly spaced, and pixels of their longer side."""
 
 Statistics = dict[str, Any]
 
@@ -28,7 +28,7 @@ def of_numbers(values: NDArray[Any], quantiles: bool) -> Statistics:
 
 
 def chosen(count: int) -> NDArray[np.int64]:
-    """Which of ``count`` pictures are looked at."""
+    """Indices of the pictures of ``count`` that are evaluated."""
     return np.unique(np.linspace(0, count - 1, min(count, MOST_PICTURES)).round().astype(np.int64))
 
 

@@ -92,7 +92,7 @@ class PullThrough(Goal):
         base = base_of(self._simulation, arm)
         found = best_grasp(self.arc, self.DEPTHS, arm.kinematics, base, way, self._needle_arc(), self.surface)
         if found is None:
-            raise ValueError(f"{arm.name} has no grasp of the needle with which it could turn it out")
+            raise ValueError(f"{arm.name} cannot grasp the needle so that it could turn it out of the tissue")
         return found.tool_in_arc(self.arc)
 
     def place(self) -> Array:

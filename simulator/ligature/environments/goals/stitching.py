@@ -52,7 +52,7 @@ class Suture(Insert):
         way = [*out, frame(np.eye(3), self.RAISED * UP) @ out[-1]]
         grasp = best_grasp(self.arc, self.ENDS, puller.kinematics, base, way, out[0], self._places[0])
         if grasp is None:
-            raise ValueError(f"{puller.name} has no grasp of the needle with which it could draw it out")
+            raise ValueError(f"{puller.name} cannot grasp the needle so that it could pull it out")
         self.T_arc_puller = grasp.tool_in_arc(self.arc)
         self._end = self.arc.point(grasp.depth)
 

@@ -165,7 +165,7 @@ class SetupJoints:
         if message.data in known:
             self._reference = message.data
         else:
-            rospy.logwarn(f"SUJ/set_reference_arm: there is no '{message.data}'; there are {', '.join(known)}")
+            rospy.logwarn(f"SUJ/set_reference_arm: unknown arm '{message.data}'; choose one of {', '.join(known)}")
 
     def publish(self, state: Any, stamp: Any) -> None:
         """Poses of the bases: of the reference arm in the world, of the others in the tip of the reference arm."""

@@ -1,4 +1,4 @@
-"""Latched topics that can fall silent while others of this process go on."""
+"""Latched topics that can stop publishing while others of this process continue."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ class ArmsNode:
 
     @property
     def outlets(self) -> list[ArmOutlet]:
-        """The arms that are there on ROS, in the order of the scene."""
+        """The arms that are published on ROS, in the order of the scene."""
         return list(self._outlets.values())
 
     @property

@@ -59,7 +59,7 @@ class ArmOutlet:
         self._T_reference_base = referred @ inverse(local)
 
     def publish(self, record: Any, stamp: Any, count: int) -> int:
-        """Publish the readings that are due in period number ``count`` and that somebody hears."""
+        """Publish the readings that are due in period number ``count`` and have subscribers."""
         sent = 0
         for reading, publisher, every in self._outlets:
             if publisher.heard and count % every == 0:

@@ -40,7 +40,9 @@ class Adapter(Device):
         self._opened = os.open(topic, os.O_RDONLY | os.O_NOCTTY) if topic else None
         self._input = sys.stdin.fileno() if self._opened is None else self._opened
         if not os.isatty(self._input):
-            raise ValueError("the keyboard needs a terminal: run it there, or name one such as /dev/pts/3 as its topic")
+            raise ValueError(
+                "the keyboard needs a terminal: run the command in one, or set the topic to one such as /dev/pts/3"
+            )
         self._before = termios.tcgetattr(self._input)
         tty.setcbreak(self._input)
 
