@@ -158,7 +158,7 @@ def test_what_cannot_be_scored_is_reported(session: Session, tmp_path: Path) -> 
         (("insertion", session.bag), "name the launch file"),
         (("insertion", session.bag, small), "has 0 pairs of holes"),
         (("pose_estimation", session.bag, SCENE), "no pose is reported on"),
-        (("pose_estimation", session.record), "holds no reported pose"),
+        (("pose_estimation", session.record), "contains no reported pose"),
         (("insertion", tmp_path / "none.bag"), "No such file"),
     ):
         status, output = scored(*words)
