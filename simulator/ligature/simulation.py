@@ -7,10 +7,11 @@ same scene, commands and calls give the same bits.
 from __future__ import annotations
 
 import hashlib
+import math
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ from ligature.model.commands import (
     object_counts,
 )
 from ligature.model.frames import inverse, pose7_matrix
-from ligature.model.lookup import find_by_text
+from ligature.model.lookup import UnknownNameError, find_by_text
 from ligature.model.messages import Message, handle
 from ligature.model.scene import Actuator, Body, Camera, Joint, Light, Scene
 from ligature.model.state import StateRecord, new_state
@@ -86,6 +87,8 @@ class Snapshot:
 
     parts: Mapping[str, Any]
     state: StateRecord
+    scene: str
+    """Digest of the objects of the scene; see `_digest_of`."""
 
 
 class Handles(Mapping[str, Handle], Generic[Handle]):
@@ -109,7 +112,9 @@ class Handles(Mapping[str, Handle], Generic[Handle]):
             found = find_by_text(names, text)
             if found is not None:
                 return self._handles[found]
-        raise KeyError(f"'{text}' does not name exactly one {self._kind}; choose one of {', '.join(self._names[0])}")
+        raise UnknownNameError(
+            f"'{text}' does not name exactly one {self._kind}; choose one of {', '.join(self._names[0])}"
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names[0])
@@ -208,6 +213,11 @@ class Simulation:
         taken and states are written for them.
     allow_plugins
         Whether the plug-ins that the scene's files name are run: their code has the rights of this process.
+
+    Raises
+    ------
+    ValueError
+        For a length that is not above 0 and finite.
     """
 
     def __init__(
@@ -215,6 +225,9 @@ class Simulation:
     ) -> None:
         if scene.plugins and not allow_plugins:
             scene = replace(scene, plugins=())
+        for name, value in (("dt", dt), ("update", update)):
+            if value is not None and not 0.0 < value < math.inf:
+                raise ValueError(f"{name} is {value}; it must be a number of seconds above 0")
         self.scene = scene
         self.dt = dt
         self.ticks_per_update = max(1, round((update or dt) / dt))
@@ -222,6 +235,8 @@ class Simulation:
         self.phases = {name: Stopwatch() for name in PHASES}
         self.problems: list[Diagnostic] = []
         self._counts = object_counts(scene)
+        self._scene_digest = _digest_of(scene, self.state)
+        self._closed = False
         self._clock = Clock()
         self._watched = 0
         self._world = World(scene, dt)
@@ -286,7 +301,13 @@ class Simulation:
         return self._clock.tick * self.dt
 
     def step(self, ticks: int = 1) -> None:
-        """Advance by ``ticks`` ticks and write the state; how ticks are shared out over calls changes nothing."""
+        """Advance by ``ticks`` ticks and write the state; how ticks are shared out over calls changes nothing.
+
+        Raises ValueError for less than no ticks, TypeError for what is no whole number.
+        """
+        self._check_open()
+        if ticks < 0:
+            raise ValueError(f"ticks is {ticks}; it must be 0 or more, for time does not run backwards")
         for _ in range(ticks):
             self._advance()
         self._write_state()
@@ -379,6 +400,7 @@ class Simulation:
         What an arm rejects becomes its warning, what goes wrong in it its FAULT. What goes wrong in another object
         clears its command and is among `problems`.
         """
+        self._check_open()
         command.check(self._counts)
         try:
             handle(self._handlers, command)
@@ -418,6 +440,7 @@ class Simulation:
 
         Raises ValueError for a link of an arm.
         """
+        self._check_open()
         BodyCommand(body, CommandType.POSITION, tuple(pose)).check()
         before = pose7_matrix(self._world.pose7(body))
         self.grasps.release_body(body)
@@ -433,6 +456,7 @@ class Simulation:
 
         ``bodies_only`` leaves ghosts, cameras and lights where they are.
         """
+        self._check_open()
         for subsystem in reversed(self._subsystems):
             if not (bodies_only and subsystem is self._mounts):
                 self._guarded(subsystem, "reset")
@@ -449,17 +473,26 @@ class Simulation:
         Bullet keeps contacts that nobody can read. A snapshot drops them here, too, as `restore` does: a run that
         is snapshot goes on with other last bits than one that is not.
         """
+        self._check_open()
         parts = {
             "clock": self._clock,
             "resting": self._resting,
             **{f"{n}": s.snapshot() for n, s in enumerate(self._subsystems)},
         }
-        taken = Snapshot(copied(parts), self.state.copy())
+        taken = Snapshot(copied(parts), self.state.copy(), self._scene_digest)
         self.restore(taken)
         return taken
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Continue from a snapshot of this scene, taken here or elsewhere."""
+        """Continue from a snapshot of this scene, taken here or elsewhere.
+
+        Raises ValueError, and changes nothing, for a snapshot of another scene.
+        """
+        self._check_open()
+        if not isinstance(snapshot, Snapshot):
+            raise TypeError(f"a {type(snapshot).__name__} is no snapshot; give what 'snapshot' returned")
+        if snapshot.scene != self._scene_digest:
+            raise ValueError("the snapshot is of another scene; load the scene that it was taken of")
         parts = copied(dict(snapshot.parts))
         self._clock, self._resting = parts["clock"], parts["resting"]
         for n, subsystem in reversed(list(enumerate(self._subsystems))):
@@ -472,6 +505,7 @@ class Simulation:
 
         ``clock=False`` leaves out time and the number of resets, to compare with a run that began elsewhere.
         """
+        self._check_open()
         digest = hashlib.sha256()
         left_out = ("wall_time", "stamp", "update", *(() if clock else ("tick", "sim_time", "resets")))
         for name in sorted(self.state.dtype.names or ()):
@@ -483,9 +517,19 @@ class Simulation:
         return digest.hexdigest()
 
     def close(self) -> None:
-        """Let plug-ins end, and give the physics engine back."""
+        """Let plug-ins end, and give the physics engine back; whatever needs it raises RuntimeError from then on."""
+        self._closed = True
         self._plugins.close()
         self._world.close()
+
+    def _check_open(self) -> None:
+        """Raise RuntimeError after `close`: compiled code holds addresses of the engine that is gone."""
+        if self._closed:
+            raise RuntimeError("the simulation is closed; make a new one")
+
+    def __reduce__(self) -> NoReturn:
+        """Copies and pickles are refused, for two would share one engine."""
+        raise TypeError("a simulation cannot be copied or pickled; restore its 'snapshot' in another of the same scene")
 
 
 @dataclass
@@ -510,6 +554,14 @@ class Clock:
         """Write counts and time."""
         state["tick"], state["resets"], state["sim_time"] = self.tick, self.resets, self.tick * dt
         state["update"] = self.tick // ticks_per_update
+
+
+def _digest_of(scene: Scene, state: StateRecord) -> str:
+    """SHA-256 of what a state's rows stand for: the objects of a scene in their order, and how many there are."""
+    objects = (scene.bodies, scene.joints, scene.ghosts, scene.sensors, scene.actuators, scene.cameras, scene.lights)
+    names = [[item.identity.identifier for item in items] for items in objects]
+    arms = [arm.name for arm in scene.arms]
+    return hashlib.sha256(repr((names, arms, state.dtype.descr)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _digest(value: Any, update: Callable[[bytes], object]) -> None:

@@ -10,6 +10,7 @@ from ligature.arms.ecm import build_ecm
 from ligature.arms.mtm import build_mtm
 from ligature.arms.psm import build_psm
 from ligature.arms.records import ArmRecords
+from ligature.model.lookup import UnknownNameError
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import StateRecord
 from ligature.model.subsystem import Subsystem
@@ -41,7 +42,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def __getitem__(self, name: str) -> Arm:
         if name not in self._by_name:
             known = ", ".join(self._by_name) or "none"
-            raise KeyError(f"unknown arm '{name}'; choose one of {known}")
+            raise UnknownNameError(f"unknown arm '{name}'; choose one of {known}")
         return self._by_name[name]
 
     def __iter__(self) -> Iterator[str]:

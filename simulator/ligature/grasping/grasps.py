@@ -20,6 +20,7 @@ from ligature.grasping.fingers import LEAST_LEVER, TOUCH, Facing, Fingers
 from ligature.grasping.grasp import Patch, warm_up
 from ligature.grasping.impulses import BodyGrasp, ImpulseExchange, begin
 from ligature.model.frames import inverse, pose7_matrix
+from ligature.model.lookup import UnknownNameError
 from ligature.model.scene import Jaw, Scene
 from ligature.model.state import FieldViews, StateRecord
 from ligature.model.subsystem import Subsystem, kept, put_back
@@ -119,7 +120,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             if jaw.name == name:
                 return self._held(index)
         known = ", ".join(jaw.name for jaw in self._scene.jaws) or "none"
-        raise KeyError(f"jaw '{name}' is missing; the scene has {known}")
+        raise UnknownNameError(f"jaw '{name}' is missing; the scene has {known}")
 
     def __iter__(self) -> Iterator[str]:
         return (jaw.name for jaw in self._scene.jaws)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ligature.model.lookup import UnknownNameError
 from ligature.model.scene import Camera
 
 
@@ -61,7 +62,7 @@ def seen_through(camera: Camera, name: str) -> Camera:
     """
     scope = ENDOSCOPES.get(name)
     if scope is None:
-        raise KeyError(f"unknown endoscope '{name}'; choose one of {', '.join(ENDOSCOPES)}")
+        raise UnknownNameError(f"unknown endoscope '{name}'; choose one of {', '.join(ENDOSCOPES)}")
     return replace(
         camera,
         field_of_view=scope.field_of_view,

@@ -1,5 +1,12 @@
-"""The format's look-up by text, by the name that the rooms above know it."""
+"""The format's look-up by text, by the name that the rooms above know it, and what a name that finds nothing raises."""
 
 from ligature.adf.references import candidates, find_by_text
 
-__all__ = ["candidates", "find_by_text"]
+__all__ = ["UnknownNameError", "candidates", "find_by_text"]
+
+
+class UnknownNameError(KeyError):
+    """A name that stands for nothing; its text is the message, where that of a `KeyError` is in quotation marks."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
