@@ -208,3 +208,20 @@ def test_damping_slows_the_fall_as_bullet_does(tmp_path: Path) -> None:
         v = (v - 9.8e-3) * (1.0 - share)
         z += v * 1e-3
     assert simulation.state["tissue_node"][0, :, 2].mean() - before == pytest.approx(z, rel=0.01)
+
+
+@settings(shapes, max_examples=25)
+@given(mass=st.floats(-300, 5), young=st.floats(-6, 11), poisson=st.sampled_from([0.0, 0.3, 0.45, 0.499]))
+def test_what_check_passes_can_be_simulated_at_any_mass_and_stiffness(
+    tmp_path: Path, mass: float, young: float, poisson: float
+) -> None:
+    more = f"  ligature tissue: {{youngs modulus: {10**young:e}, poisson ratio: {poisson}, cell size: 0.05}}\n"
+    try:
+        scene = ligature.load(write(tmp_path, trimesh.creation.box((0.1, 0.1, 0.1)), "", 10**mass, more))
+    except ligature.SceneError as refused:
+        assert all(d.mark is not None and d.hint for d in refused.diagnostics), refused
+        return
+    simulation = Simulation(scene)
+    simulation.step(20)
+    assert np.isfinite(simulation.state["tissue_node"]).all() and not simulation.problems
+    simulation.close()

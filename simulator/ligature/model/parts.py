@@ -25,7 +25,7 @@ from ligature.model.scene import (
     SensorType,
 )
 from ligature.model.shapes import Collider, ShaderFiles
-from ligature.model.tissue import inertial_of, tissue_of
+from ligature.model.tissue import check_density, inertial_of, tissue_of
 
 _INERTIAL_KEYS = ("inertia", "inertial offset", "gravity")
 
@@ -45,6 +45,7 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
     if tissue is not None:
         mass = element.number("mass") if inertial_block else float(tissue.cell_masses.sum())
         tissue = tissue.with_mass(mass)
+        check_density(element, tissue)
         T_body_inertial, inertia = inertial_of(tissue, mass, offset if inertial_block else None)
         inertia = own if inertial_block and own is not None else inertia
         shapes = ()

@@ -33,7 +33,7 @@ from ligature.model.material import TissueMaterial
 from ligature.model.scene import Body
 from ligature.model.shapes import ShaderFiles
 from ligature.model.soft import TissueForm
-from ligature.model.tissue import form_of, inertial_of, material_of
+from ligature.model.tissue import check_density, form_of, inertial_of, material_of
 
 STEP = 1e-3
 """Seconds between steps for which AMBF's stiffnesses hold."""
@@ -63,6 +63,7 @@ def soft_body_of(
         raise _error(element, "mass", f"has a mass of {mass:g} kg", "give kilograms above 0; hold it by 'fixed nodes'")
     vertices, faces, points = _surface(element, context)
     form = form_of(element, vertices, faces, _material(element, context, vertices, faces, mass)).scaled(mass)
+    check_density(element, form)
     held = _fixed_nodes(element, context, points)
     if len(held) > MOST_PINS:
         form = replace(form, fixed=_nearest(form, held))

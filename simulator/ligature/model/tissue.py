@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
 MOST_NODES = 6000
 """Most nodes of a body: with more, a step takes longer than the four ticks that it stands for."""
+SETTLING = 1e-3
+"""Seconds in which elastic forces are to be felt against the mass: a tick."""
+STIFF_OVER_HEAVY = 1e10
+"""Most elastic over inertial forces in `SETTLING`; from 10¹³ on elimination fails for a Poisson's ratio of 0.499."""
 MOST_AROUND = 20
 """Nodes of the grid around a shape, for each of `MOST_NODES`: of a larger grid nothing is sampled."""
 
@@ -74,6 +78,18 @@ def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: T
     fixed = _fixed(element, grid)
     stated = any(element.has(f"ligature tissue.{key}") for key in ("density", "material"))
     return TissueForm(grid, materials, fixed, own_density=stated, slits=tuple(slits))
+
+
+def check_density(element: Element, form: TissueForm) -> None:
+    """Raise `GeometryError` for tissue so light for its stiffness that rounding hides its mass from a step's matrix."""
+    material = max(form.materials, key=lambda m: m.youngs * (1.0 + m.damping / SETTLING) / m.density)
+    stiff = material.youngs * (1.0 + material.damping / SETTLING) * SETTLING**2
+    least = stiff / (STIFF_OVER_HEAVY * float(form.grid.sizes.min()) ** 2)
+    if form.fixed.any() or material.density >= least:
+        return
+    key = "ligature tissue.density" if element.has("ligature tissue.density") else "mass"
+    what = f"has {material.density:.3g} kg/m³, too little for a Young's modulus of {material.youngs:.3g} Pa"
+    raise _error(element, key, what, f"give a larger mass, softer tissue, or at least {least:.3g} kg/m³")
 
 
 def inertial_of(form: TissueForm, mass: float, T_body_inertial: Array | None) -> tuple[Array, Array]:
