@@ -8,6 +8,11 @@ import stat
 from pathlib import Path
 
 
+def reason(error: OSError) -> str:
+    """What the system says is wrong, without the number and the path that Python adds."""
+    return error.strerror or str(error)
+
+
 def real_path(path: Path) -> Path:
     """``path`` absolute, with links followed as far as they lead: opening says what is wrong with a circle of links."""
     return Path(os.path.realpath(path))

@@ -25,6 +25,14 @@ def test_check_of_a_good_scene_ends_with_zero() -> None:
     assert "40 bodies from '/ambf/env/phantom/BODY Thread' on are simulated as one elastic rod" in done.stdout
 
 
+def test_the_package_runs_as_the_command_of_its_interpreter(tmp_path: Path) -> None:
+    words = ["check", str(tmp_path / "none.yaml")]
+    done = subprocess.run([sys.executable, "-m", "ligature", *words], capture_output=True, text=True, timeout=120)
+    named = ligature(*words)
+    assert (done.returncode, done.stdout, done.stderr) == (named.returncode, named.stdout, named.stderr)
+    assert done.returncode == 1 and "does not exist" in done.stdout
+
+
 def test_check_names_file_line_and_column(tmp_path: Path) -> None:
     bad = tmp_path / "bad.yaml"
     bad.write_text("bodies: [BODY a]\nBODY a:\n  name: a\n  mass: heavy\n")
@@ -136,7 +144,7 @@ def test_render_names_the_cameras_there_are(tmp_path: Path) -> None:
 def test_render_refuses_what_it_cannot_write(tmp_path: Path) -> None:
     assert "npy, png, exr" in ligature("render", SMALL, "--camera", "cameraL", "--format", "gif").stderr
     assert "five numbers" in ligature("render", SMALL, "--camera", "cameraL", "--distortion", "1,2").stderr
-    assert "between 0 and 10" in ligature("render", SMALL, "--camera", "cameraL", "--noise", "nan").stderr
+    assert "between 0 and 10" in ligature("render", SMALL, "--camera", "cameraL", "--noise", "11").stderr
     assert "finite" in ligature("render", SMALL, "--camera", "cameraL", "--seconds", "nan").stderr
 
 

@@ -65,7 +65,50 @@ def test_commands_say_what_is_wrong_with_a_path(
         command.ligature()
     out, err = capfd.readouterr()
     assert ended.value.code in (1, 2), out + err
-    assert (out + err).strip() and "Traceback" not in out + err
+    assert (out + err).strip() and "Traceback" not in out + err and "[Errno" not in out + err
+
+
+WRITERS = {
+    "decompose": ["decompose", "tri.obj", "-o", "OUT"],
+    "poses": ["poses", "box.yaml", "--seconds", "0.001", "--out", "OUT"],
+    "convert": ["convert", "box.urdf", "-o", "OUT"],
+}
+OUTS: dict[str, Callable[[Path], str]] = {
+    "no ending": lambda _: "written",
+    "no folder": lambda _: "none/written.obj",
+    "folder": lambda folder: (folder / "folder.obj").mkdir() or "folder.obj",
+    "this folder": lambda _: ".",
+    "below a file": lambda folder: (folder / "file").write_text("") and "" or "file/written.obj",
+    "no name": lambda _: "",
+    "system": lambda _: "/proc/written.obj",
+    "long name": lambda _: "x" * 300 + ".obj",
+}
+BOX = "bodies: [A]\nA: {name: a, mass: 0, shape: BOX, geometry: {x: 1, y: 1, z: 1}}\n"
+URDF = "<robot name='r'><link name='a'/></robot>"
+TRI = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize("out", OUTS.values(), ids=OUTS)
+@pytest.mark.parametrize("words", WRITERS.values(), ids=WRITERS)
+def test_commands_write_the_file_of_that_name_or_report_why_not(
+    words: list[str], out: Callable[[Path], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    for name, text in {"box.yaml": BOX, "box.urdf": URDF, "tri.obj": TRI}.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    place = out(tmp_path)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+    monkeypatch.setattr(sys, "argv", ["ligature", *(place if word == "OUT" else word for word in words)])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    printed = "".join(capfd.readouterr())
+    assert "Traceback" not in printed and "[Errno" not in printed
+    if not ended.value.code:
+        assert (tmp_path / place).is_file(), printed
+    else:
+        assert ended.value.code in (1, 2) and printed.strip()
+        assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()} == before, printed
 
 
 @pytest.mark.parametrize("scene", ["none.yaml", "x" * 300])

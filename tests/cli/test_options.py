@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
-from ligature.cli.options import RunOptions, arm_entry
+from hypothesis import given
+from hypothesis import strategies as st
+from ligature.cli.options import RunOptions, arm_entry, name_prefix
 from ligature.model.scene import ArmKind
 
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
@@ -43,3 +46,13 @@ def test_what_is_no_arm_is_refused_with_the_right_form(text: str) -> None:
 def test_arms_of_the_command_line_replace_those_of_the_scene() -> None:
     scene = RunOptions(str(SMALL), arms=("LEFT=psm:psm2/BODY base link:420006", "MTML=mtm")).load()
     assert [(arm.name, arm.kind) for arm in scene.arms] == [("LEFT", ArmKind.PSM), ("MTML", ArmKind.MTM)]
+
+
+@given(st.text(max_size=6))
+def test_a_prefix_is_one_that_topics_of_ros_may_begin_with(text: str) -> None:
+    topic = re.compile(r"/[A-Za-z0-9_/]*")  # what a master registers, ROS names specification; digits behind the '/'
+    if topic.fullmatch(f"/{text}"):
+        assert name_prefix(text) == text
+    else:
+        with pytest.raises(ValueError, match="cannot begin names of ROS"):
+            name_prefix(text)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError
 from ligature.adf.nodes import parse
-from ligature.paths import real_path
+from ligature.paths import real_path, reason
 
 WRITERS = 16
 """Files that are written at a time."""
@@ -51,7 +51,7 @@ def save_all(files: Mapping[Path, bytes], roots: Collection[Path] | None = None)
     except OSError as error:
         _take_back(placed, kept, [name for name, _ in staged], folders)
         path = Path(error.filename2 or error.filename or next(iter(changed)))
-        raise SaveError(f"'{path}' cannot be written: {error.strerror or error}") from error
+        raise SaveError(f"'{path}' cannot be written: {reason(error)}") from error
     for old in kept.values():
         with suppress(OSError):
             os.unlink(old)

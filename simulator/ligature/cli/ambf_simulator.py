@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, rate_notes
+from ligature.cli.numbers import LARGEST
+from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, name_prefix, rate_notes
 from ligature.cli.supervisor import supervise
 
 MAX_UPDATE_RATE = 1000.0
@@ -93,13 +94,17 @@ def options_of(arguments: list[str]) -> RunOptions:
         flags.error(f"-n {given.n}: the number of devices must be 0 or more")
     if given.n is not None and not given.i:
         devices = tuple(range(given.n))
-    if not 0.0 <= given.d < float("inf"):
+    if not 0.0 <= given.d <= LARGEST:
         flags.error("-d must be a rate in Hz, at least 0")
     try:
         only = arm_names(given.only)
     except ValueError as error:
         flags.error(f"--only {error}")
-    if not given.p >= 1 or not 0 < given.s < float("inf"):
+    try:
+        name_prefix(given.ns)
+    except ValueError as error:
+        flags.error(f"--ns {error}")
+    if not given.p >= 1 or not 0 < given.s <= LARGEST:
         flags.error("-p must be at least 1 update per second, and -s larger than 0")
     for name in ("override_min_comm_freq", "override_max_comm_freq"):
         frequency = getattr(given, name)

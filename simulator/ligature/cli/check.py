@@ -10,6 +10,7 @@ from rich.console import Console
 
 import ligature
 from ligature.adf import AdfError, Diagnostic, Document, ResolutionError, Resolver, Severity, read_any
+from ligature.cli.numbers import counted
 from ligature.model import reach
 from ligature.model.scene import Scene
 from ligature.physics import overlaps, springs
@@ -35,7 +36,7 @@ def check(
                 console.print(str(diagnostic), style=_STYLES[diagnostic.severity], markup=False)
         errors = sum(d.severity >= Severity.ERROR for d in found)
         warnings = sum(d.severity is Severity.WARNING for d in found)
-        console.print(f"{file}: {errors} errors, {warnings} warnings", markup=False)
+        console.print(f"{file}: {counted(errors, 'error')}, {counted(warnings, 'warning')}", markup=False)
         status = status or int(errors > 0)
     return status
 

@@ -15,8 +15,10 @@ from rich.console import Console
 
 import ligature
 from ligature.bundle import SCENES
+from ligature.cli.numbers import counted
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.piercing import Needle
+from ligature.paths import reason
 from ligature.process import end_with_parent
 from ligature.robots.arm import Kinematics
 from ligature.robots.ecm import Ecm
@@ -42,7 +44,9 @@ def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
     """Compile what ``scenes`` need, or what most need; returns 1 when one of them cannot run."""
     scenes = scenes or COMPILED_SCENES
     begin = time.monotonic()
-    console.print(f"compiling the kernels of {len(scenes)} scenes in parallel; this takes 2 to 4 minutes, once")
+    console.print(
+        f"compiling the kernels of {counted(len(scenes), 'scene')} in parallel; this takes 2 to 4 minutes, once"
+    )
     running = {scene: _start(scene, console) for scene in scenes}
     status = 0
     for scene, (process, reader) in running.items():
@@ -132,5 +136,7 @@ def _draw(simulation: ligature.Simulation) -> None:
 if __name__ == "__main__":
     try:
         run_for_a_moment(Path(sys.argv[1]))
-    except (ligature.SceneError, OSError) as error:
+    except ligature.SceneError as error:
         sys.exit(str(error))
+    except OSError as error:
+        sys.exit(reason(error))

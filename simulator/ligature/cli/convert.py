@@ -16,6 +16,7 @@ from ligature.authoring.objfile import MeshWriteError, Paint, Surface, obj_texts
 from ligature.authoring.robot import exported, read_sdf, read_urdf, sdf_text, to_adf, urdf_text
 from ligature.authoring.save import SaveError, checked_text, save_all
 from ligature.authoring.xml_files import XmlError, check_xml
+from ligature.cli.numbers import counted
 from ligature.paths import real_path
 
 MODELS = (".yaml", ".yml", ".ambf")
@@ -55,7 +56,9 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
         console.print(f"note: {note}", style="yellow", markup=False)
     kinds = [item.kind for item in converted.parts.items]
     console.print(
-        f"{out}: {kinds.count('body')} bodies, {kinds.count('joint')} joints, {len(written)} files", markup=False
+        f"{out}: {counted(kinds.count('body'), 'body', 'bodies')}, {counted(kinds.count('joint'), 'joint')}, "
+        f"{counted(len(written), 'file')}",
+        markup=False,
     )
     return 0
 
@@ -105,7 +108,9 @@ def _export(source: Path, out: Path, console: Console) -> int:
     for note in (*done.notes, *notes):
         console.print(f"note: {note}", style="yellow", markup=False)
     links, joints = len(done.robot.links), len(done.robot.joints)
-    console.print(f"{out}: {links} links, {joints} joints, {len(written)} files", markup=False)
+    console.print(
+        f"{out}: {counted(links, 'link')}, {counted(joints, 'joint')}, {counted(len(written), 'file')}", markup=False
+    )
     return 0
 
 

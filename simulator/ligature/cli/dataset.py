@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from ligature.cli.numbers import counted
 from ligature.datasets.probe import probe
 from ligature.datasets.store import DatasetError, damaged, episode_names, join, opened
 
@@ -23,7 +24,7 @@ def info(file: Path, console: Console) -> int:
             closed = "" if attributes.get("closed", True) else "; 'ligature dataset join' makes one file of it"
             write(f"{attributes['format']} of Ligature {attributes['version']}, scene {attributes['scene']}{closed}")
             arms = ", ".join(found.get("arms", ()))
-            write(f"{len(names)} episodes at {attributes['rate']:g} samples a second, arms {arms}")
+            write(f"{counted(len(names), 'episode')} at {attributes['rate']:g} samples a second, arms {arms}")
             for name in names:
                 write(f"{name}: {_episode(found[name], list(map(str, attributes['phases'])))}")
 
@@ -41,7 +42,7 @@ def _episode(episode: Any, phases: list[str]) -> str:
 
 def join_episodes(file: Path, console: Console) -> int:
     """Make one file of a dataset whose writer was killed."""
-    return _reported(lambda: _printer(console)(f"{file}: {join(file)} episodes in one file"), file, console)
+    return _reported(lambda: _printer(console)(f"{file}: {counted(join(file), 'episode')} in one file"), file, console)
 
 
 def export(source: Path, target: Path, format: str, codec: str, license: str, console: Console) -> int:

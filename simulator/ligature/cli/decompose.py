@@ -7,6 +7,8 @@ from pathlib import Path
 from rich.console import Console
 
 from ligature.adf import AdfError, Resolver
+from ligature.authoring.save import SaveError, save_all
+from ligature.cli.numbers import counted
 from ligature.mesh import load_mesh
 from ligature.mesh.decompose import decompose as cut
 from ligature.mesh.decompose import obj_text
@@ -16,22 +18,24 @@ from ligature.paths import real_path
 def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, console: Console) -> int:
     """Write ``out`` (default: beside the mesh) and its MTL; returns the exit status."""
     target = out or mesh.with_name(f"{mesh.stem}_collision.obj")
-    library = target.with_suffix(".mtl")
+    library = target.parent / f"{target.stem}.mtl"
     try:
         result = cut(load_mesh(real_path(mesh), Resolver([real_path(mesh).parent])), threshold, max_hulls)
         text, materials = obj_text(result.hulls, library.name)
-        library.write_text(materials, encoding="utf-8")
-        target.write_text(text, encoding="utf-8")
+        save_all({real_path(library): materials.encode(), real_path(target): text.encode()})
+    except SaveError as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
     except AdfError as error:
         console.print(str(error.diagnostics[0]), style="red", markup=False)
         return 1
-    except (ValueError, OSError) as error:
+    except ValueError as error:
         console.print(f"{mesh}: {error}", style="red", markup=False)
         return 1
     share = result.volume_error
     volume = "volume unknown (the mesh is not closed)" if share is None else f"volume error {100 * share:.2f} %"
     console.print(
-        f"{target}: {len(result.hulls)} hulls, {volume}, Hausdorff distance {1e3 * result.distance:.3f} mm",
+        f"{target}: {counted(len(result.hulls), 'hull')}, {volume}, Hausdorff distance {1e3 * result.distance:.3f} mm",
         markup=False,
     )
     console.print("use it with 'collision mesh' and 'collision mesh type: CONVEX_HULL'", style="dim")

@@ -107,7 +107,10 @@ def inertia(file: Path, density: float, mass: float | None, console: Console) ->
     if file.suffix.lower() in EXTENSIONS:
         try:
             solid = mass_properties(*joined(load_mesh(real_path(file), resolver).parts), density)
-        except (AdfError, ValueError) as error:
+        except AdfError as error:
+            console.print(str(error), style="red", markup=False)
+            return 1
+        except ValueError as error:
             console.print(f"{file}: {error}", style="red", markup=False)
             return 1
         _print_solid(file.name, solid if mass is None else solid.with_mass(mass), console)

@@ -44,7 +44,7 @@ def evaluate(
             shown = _pictures(policy, options, episodes[:pictures], steps, out)
             files = [write_json(found, out / "evaluation.json"), write_page(found, shown, out / "index.html")]
             console.print("\n".join(map(str, files)), markup=False)
-    except (PolicyError, ValueError, OSError) as error:
+    except (PolicyError, ValueError) as error:
         console.print(str(error), style="red", markup=False)
         return 2
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import math
 import os
 from pathlib import Path
 from typing import Annotated, Optional
@@ -13,12 +12,13 @@ from rich.console import Console
 
 from ligature.bundle import launch_file, scene_names
 from ligature.cli.missing import remedy
-from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, rate_notes
+from ligature.cli.numbers import Commands
+from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, name_prefix, rate_notes
 from ligature.cli.sampling import Sampling, picture_size
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import requested
 
-app = typer.Typer(
+app = Commands(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -26,7 +26,7 @@ app = typer.Typer(
 )
 
 
-dataset_app = typer.Typer(no_args_is_help=True, help="Inspect datasets and export them to LeRobot's formats.")
+dataset_app = Commands(no_args_is_help=True, help="Inspect datasets and export them to LeRobot's formats.")
 app.add_typer(dataset_app, name="dataset")
 
 
@@ -177,6 +177,7 @@ def run(
             arm_entry(text)
         requested(soft or ())
         names_of_arms = arm_names(only)
+        name_prefix(namespace)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     options = RunOptions(
@@ -303,8 +304,6 @@ def render(
     kinds = [kind for kind in annotations.split(",") if kind]
     if not set(kinds) <= set(ANNOTATIONS):
         raise typer.BadParameter(f"--annotations is any of {', '.join(ANNOTATIONS)}, not '{annotations}'")
-    if not math.isfinite(seconds):
-        raise typer.BadParameter(f"--seconds is a finite number, not '{seconds}'")
     try:
         sensor = ImageSensor(exposure, noise, _five_numbers(distortion), depth_noise, seed)
     except ValueError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import asdict, dataclass, replace
 from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
@@ -161,6 +162,13 @@ def arm_entry(text: str) -> dict[str, str]:
     if body:
         found["tip" if kind == "camera" else "base"] = body
     return {**found, "tool": tool} if tool else found
+
+
+def name_prefix(text: str) -> str:
+    """``text``, unless names of ROS cannot begin with it: then ValueError."""
+    if not re.fullmatch(r"[A-Za-z0-9_/]*", text, re.ASCII):
+        raise ValueError(f"'{text}' cannot begin names of ROS; write letters, digits, '_' and '/', such as /left")
+    return text
 
 
 def arm_names(text: str) -> tuple[str, ...]:

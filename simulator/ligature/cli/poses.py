@@ -11,6 +11,7 @@ from rich.console import Console
 
 import ligature
 from ligature.adf import AdfError
+from ligature.cli.numbers import counted
 
 PROGRESS_SECONDS = 0.5
 """Seconds between two lines ``N of M frames``, which editors show as progress."""
@@ -48,6 +49,7 @@ def poses(
             console.print(f"{len(frames)} of {len(ticks)} frames", markup=False)
             reported = time.monotonic()
     times = ticks * 1e-3
-    np.savez(out, identifiers=np.array(names), times=times, poses=np.array(frames))
-    console.print(f"{out}: {len(names)} bodies, {len(frames)} frames", markup=False)
+    with out.open("wb") as written:  # by its name alone, savez would write to another where that has no '.npz'
+        np.savez(written, identifiers=np.array(names), times=times, poses=np.array(frames))
+    console.print(f"{out}: {counted(len(names), 'body', 'bodies')}, {counted(len(frames), 'frame')}", markup=False)
     return 0

@@ -18,6 +18,7 @@ from ligature.bus.record import Excerpt, Header, Journal, Moment, RecordWriter
 from ligature.bus.recording import file_name
 from ligature.cli.options import RunOptions
 from ligature.model.commands import Command
+from ligature.paths import reason
 from ligature.process import report
 from ligature.simulation import Simulation
 
@@ -49,13 +50,13 @@ class Recorder:
             try:
                 self._journal = Journal(tempfile.TemporaryFile(dir="."), header)  # noqa: SIM115 (open while it runs)
             except OSError as error:
-                self._why_not = f"{_why(error)}: '{Path.cwd()}'"
+                self._why_not = f"{reason(error)}: '{Path.cwd()}'"
 
     def _begin_record(self, path: Path, header: Header) -> None:
         try:
             self._journal = self._writer = RecordWriter(path, header)
         except OSError as error:
-            report("error", f"cannot record the run: {_why(error)}: '{path}'")
+            report("error", f"cannot record the run: {reason(error)}: '{path}'")
             sys.exit(1)
 
     # --- while the run goes on ------------------------------------------------------------------
@@ -113,7 +114,7 @@ class Recorder:
             path.parent.mkdir(exist_ok=True)
             self._excerpt = Excerpt(path, self._journal, self._moment(self._journal, update))
         except OSError as error:
-            self._report(f"cannot record: {_why(error)}: '{path}'", True)
+            self._report(f"cannot record: {reason(error)}: '{path}'", True)
             return
         self._since = self._simulation.time
         self._block.figures["recording"] = 1
@@ -139,7 +140,7 @@ class Recorder:
         try:
             excerpt.finish(moment)
         except OSError as error:
-            self._copied.append((f"the recording failed: {_why(error)}: '{excerpt.path}'", True))
+            self._copied.append((f"the recording failed: {reason(error)}: '{excerpt.path}'", True))
         else:
             self._copied.append((f"recorded {seconds:.1f} s to '{excerpt.path}'", False))
 
@@ -151,10 +152,10 @@ class Recorder:
         assert self._journal is not None
         if self._writer is not None:
             part = self._writer.abandon()
-            report("error", f"recording of the run stopped: {_why(error)}; '{part}' holds the part before")
+            report("error", f"recording of the run stopped: {reason(error)}; '{part}' holds the part before")
         self._journal.close()
         self._journal = self._writer = None
-        self._why_not = _why(error)
+        self._why_not = reason(error)
         if self._excerpt is not None:
             self._excerpt.drop()
             self._report(f"the recording failed: {self._why_not}: '{self._excerpt.path}'", True)
@@ -166,7 +167,3 @@ class Recorder:
         self._block.events.write(RUN, EVENT, text)
         if bad:
             report("warning", text)
-
-
-def _why(error: OSError) -> str:
-    return error.strerror or str(error)

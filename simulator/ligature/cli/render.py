@@ -54,8 +54,8 @@ def render(
         for diagnostic in error.diagnostics:
             console.print(str(diagnostic), style="red", markup=False)
         return 2
-    except (KeyError, ValueError, RenderUnavailable, OSError) as error:
-        console.print(str(error.args[0] if isinstance(error, KeyError) else error), style="red", markup=False)
+    except (KeyError, ValueError, RenderUnavailable) as error:
+        console.print(str(error), style="red", markup=False)
         return 1
     white = saturated_share(frame.rgb)
     if white > MAX_SATURATED:

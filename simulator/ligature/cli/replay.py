@@ -11,9 +11,11 @@ from rich.console import Console
 import ligature
 from ligature.bus.record import Record, is_record
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.cli.numbers import counted
 from ligature.cli.options import RunOptions
 from ligature.cli.resimulation import TICK, resimulate
 from ligature.cli.sampling import Sampled, Sampling
+from ligature.paths import reason
 
 
 def replay(
@@ -36,7 +38,7 @@ def replay(
         for diagnostic in error.diagnostics:
             console.print(str(diagnostic), style="red", markup=False)
     except OSError as error:
-        console.print(f"{file}: {error.strerror or error}", style="red", markup=False)
+        console.print(f"{file}: {reason(error)}", style="red", markup=False)
     except (ValueError, RuntimeError) as error:
         console.print(str(error), style="red", markup=False)
     return 1
@@ -44,7 +46,9 @@ def replay(
 
 def _again(record: Record, scene: Path | None, dataset: Sampled | None, console: Console, allow_plugins: bool) -> int:
     rate = RunOptions.from_text(record.header.options).rate
-    console.print(f"{len(record.commands)} commands, {record.updates / rate:.3f} s of simulated time", markup=False)
+    console.print(
+        f"{counted(len(record.commands), 'command')}, {record.updates / rate:.3f} s of simulated time", markup=False
+    )
     clock = time.perf_counter()
     if dataset is None:
         simulation = resimulate(record, scene, allow_plugins=allow_plugins)
@@ -54,7 +58,9 @@ def _again(record: Record, scene: Path | None, dataset: Sampled | None, console:
         simulation, outcome = sampled(record, scene, dataset)
         console.print(outcome, markup=False)
     took, found = time.perf_counter() - clock, simulation.state_hash()
-    console.print(f"{len(record.commands)} commands, {simulation.time:.3f} s simulated in {took:.1f} s", markup=False)
+    console.print(
+        f"{counted(len(record.commands), 'command')}, {simulation.time:.3f} s simulated in {took:.1f} s", markup=False
+    )
     if record.begun:
         begin = record.start * simulation.ticks_per_update * TICK
         console.print(f"the recording covers the last {simulation.time - begin:.3f} s", markup=False)
@@ -84,7 +90,7 @@ def _sampled_bag(file: Path, scene: Path | None, dataset: Sampled, console: Cons
     text = dataset.text or dataset.task
     count = record_bag(file, dataset.path, sampling.rate, cameras, sampling.size, text, success, why)
     outcome = "not judged" if success is None else f"a {'success' if success else 'failure'}{why and f': {why}'}"
-    console.print(f"{count} samples at {sampling.rate:g} a second; the episode is {outcome}", markup=False)
+    console.print(f"{counted(count, 'sample')} at {sampling.rate:g} a second; the episode is {outcome}", markup=False)
     return 0
 
 
@@ -100,5 +106,5 @@ def _play(file: Path, joints: str, speed: float, console: Console) -> int:
     from ligature.ros.playback import play
 
     sent = play(file, joints, speed, lambda text: console.print(text, markup=False))
-    console.print(f"{sent} commands sent", markup=False)
+    console.print(f"{counted(sent, 'command')} sent", markup=False)
     return 0

@@ -14,6 +14,7 @@ from ligature.bus.stop import stop_on_signal
 from ligature.cli.resimulation import resimulate
 from ligature.cockpit.address import TOKEN_VARIABLE, read_address
 from ligature.cockpit.replay_page import Reel, ReplayPage
+from ligature.paths import reason
 
 
 def show(files: list[Path], scene: Path | None, at: str, console: Console) -> int:
@@ -25,8 +26,13 @@ def show(files: list[Path], scene: Path | None, at: str, console: Console) -> in
         for diagnostic in error.diagnostics:
             console.print(str(diagnostic), style="red", markup=False)
         return 1
-    except (OSError, ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError) as error:
         console.print(str(error), style="red", markup=False)
+        return 1
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        console.print(reason(error), style="red", markup=False)
         return 1
     console.print(f"replay ready: {page.url}", markup=False)
     stop = stop_on_signal((signal.SIGINT, signal.SIGTERM), 10.0)

@@ -12,6 +12,7 @@ from rich.console import Console
 import ligature
 from ligature.bus.record import Record, is_record
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.paths import reason
 
 
 def score(task: str, file: Path | None, scene: Path | None, timeout: float, json: bool, console: Console) -> int:
@@ -27,7 +28,7 @@ def score(task: str, file: Path | None, scene: Path | None, timeout: float, json
         console.print(str(error.diagnostics[0]), style="red", markup=False)
         return 2
     except OSError as error:
-        console.print(f"{file}: {error.strerror or error}", style="red", markup=False)
+        console.print(f"{file}: {reason(error)}", style="red", markup=False)
         return 2
     except (ValueError, RuntimeError) as error:
         console.print(str(error), style="red", markup=False)

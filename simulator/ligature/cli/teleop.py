@@ -30,7 +30,7 @@ def teleop(
         wanted = _configuration(file, ready, devices)
         if timeout is not None:
             wanted = config.with_timeout(wanted, timeout)
-    except (AdfError, OSError, ValueError) as error:
+    except (AdfError, ValueError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
     for note in wanted.notes:

@@ -20,6 +20,7 @@ from ligature.datasets.labels import ACTIVITIES, MOVING
 from ligature.datasets.rows import EpisodeRows, add_actions
 from ligature.datasets.store import DatasetError, EpisodeStore
 from ligature.datasets.writer import FORMAT, JOINT_ROWS, POSE, WRENCH
+from ligature.paths import reason
 from ligature.ros.bags import BagError
 from ligature.ros.tracks import Session, first_stamp, intrinsics, pictures, session
 
@@ -70,7 +71,7 @@ def record_bag(
     try:
         store = EpisodeStore(out, lambda file: _describe(file, found, rate, text))
     except OSError as error:
-        raise DatasetError(f"cannot write the dataset '{out}': {error}") from error
+        raise DatasetError(f"cannot write the dataset '{out}': {reason(error)}") from error
     try:
         with interrupted_once():
             episode = store.begin()

@@ -18,7 +18,7 @@ from typing import Any
 import h5py
 
 from ligature.datasets.soundness import Unsound, check
-from ligature.paths import regular_file
+from ligature.paths import reason, regular_file
 
 Describe = Callable[[h5py.File], None]
 """Writes into a file what holds for all episodes."""
@@ -183,7 +183,7 @@ def opened(path: Path) -> h5py.File:
     try:
         file = h5py.File(regular_file(path), "r")
     except OSError as error:
-        raise DatasetError(f"cannot read the dataset '{path}': {error}") from error
+        raise DatasetError(f"cannot read the dataset '{path}': {reason(error)}") from error
     try:
         if not str(file.attrs.get("format", "")).startswith("ligature dataset"):
             raise DatasetError(f"'{path}' is an HDF5 file, but not a Ligature dataset")

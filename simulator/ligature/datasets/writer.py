@@ -23,6 +23,7 @@ from ligature.datasets.rows import EpisodeRows, add_actions
 from ligature.datasets.store import DatasetError, EpisodeStore
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
+from ligature.paths import reason
 
 if TYPE_CHECKING:  # datasets of motion need no OpenGL
     from ligature.render.target import Exposure
@@ -98,7 +99,7 @@ class DatasetWriter:
         try:
             self._store = EpisodeStore(path, self._describe)
         except OSError as error:
-            raise DatasetError(f"cannot write the dataset '{path}': {error}") from error
+            raise DatasetError(f"cannot write the dataset '{path}': {reason(error)}") from error
 
     def _describe(self, file: h5py.File) -> None:
         """What holds for all episodes."""

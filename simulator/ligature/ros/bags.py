@@ -17,6 +17,7 @@ from ligature import definitions
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
+from ligature.paths import reason
 from ligature.ros import conversion, names
 from ligature.tasks.attempt import TASKS, Attempt, Score
 
@@ -78,7 +79,7 @@ def _blamed(path: Path | str, bag: rosbag.Bag | None = None) -> Iterator[None]:
     except BagError as error:
         raise BagError(f"{path}{_place(bag)}: {error}") from None
     except OSError as error:
-        raise BagError(f"{path}{_place(bag)}: {error.strerror or error}") from None
+        raise BagError(f"{path}{_place(bag)}: {reason(error)}") from None
     except Exception as error:
         raise BagError(f"{path}{_place(bag)}: a damaged bag: {type(error).__name__}: {str(error)[:200]}") from None
 

@@ -23,6 +23,7 @@ from ligature.datasets.lerobot.features import Column, Robot, columns
 from ligature.datasets.lerobot.tables import GrowingTables, table_of, write_lines, write_rows, write_tasks
 from ligature.datasets.lerobot.video import CODECS, Codec, description, encode
 from ligature.datasets.store import DatasetError, episode_names, opened
+from ligature.paths import reason
 
 FORMATS = ("lerobot-3.0", "lerobot-2.1")
 CHUNK, DATA_MEGABYTES, VIDEO_MEGABYTES = 1000, 100, 200
@@ -91,7 +92,7 @@ def export(source: Path, target: Path, format: str, codec: str = "h264", license
             _Export(file, part, format, CODECS[codec], license, log).run()
             part.replace(target)
         except OSError as error:
-            raise DatasetError(f"cannot write '{target}': {error}") from error
+            raise DatasetError(f"cannot write '{target}': {reason(error)}") from error
         finally:
             shutil.rmtree(part, ignore_errors=True)
 
