@@ -14,8 +14,14 @@ def reason(error: OSError) -> str:
 
 
 def real_path(path: Path) -> Path:
-    """``path`` absolute, with links followed as far as they lead: opening says what is wrong with a circle of links."""
-    return Path(os.path.realpath(path))
+    """``path`` absolute, with links followed as far as they lead: opening says what is wrong with a circle of links.
+
+    Raises FileNotFoundError for a relative path where the working directory was deleted.
+    """
+    try:
+        return Path(os.path.realpath(path))
+    except FileNotFoundError:
+        raise FileNotFoundError(errno.ENOENT, "the folder that you are in was deleted", str(path)) from None
 
 
 def regular_file(path: Path) -> Path:

@@ -85,3 +85,30 @@ def test_a_reader_that_leaves_is_no_error(
     done = started(COMMANDS["help"], folder, f">&{pipe}", command, (pipe,))
     os.close(pipe)
     assert done.returncode in (0, 1) and done.stderr == ""
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+@pytest.mark.parametrize(
+    "words", [COMMANDS[name] for name in ("help", "check", "inertia")], ids=("help", "check", "inertia")
+)
+def test_a_terminal_without_unicode_gets_every_line(
+    words: list[str], encoding: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "scene.yaml").write_text(BODY.replace("B", "手術é"), encoding="utf-8")
+    monkeypatch.setenv("PYTHONIOENCODING", encoding)
+    done = started(words, folder, "| LC_ALL=C cat -v")
+    assert "Traceback" not in done.stdout + done.stderr and "Error" not in done.stderr
+    assert done.stdout.strip()
+
+
+@pytest.mark.parametrize("words", [["check", "x.yaml"], ["fmt", "x.yaml"], ["inertia", "x.obj"], ["decompose", "x.obj"],
+                                   ["convert", "x.urdf", "-o", "y.yaml"], ["diff", "x.yaml", "y.yaml"]], ids=" ".join)  # fmt: skip
+def test_a_deleted_working_folder_is_reported_in_words(words: list[str], folder: Path) -> None:
+    gone = folder / "gone"
+    gone.mkdir()
+    done = subprocess.run(
+        ["bash", "-c", 'cd gone && rmdir ../gone && exec "$@"', "bash", sys.executable, "-c", START, *words],
+        cwd=folder, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode in (1, 2), done.stdout + done.stderr
+    assert (done.stdout + done.stderr).strip() and "Traceback" not in done.stdout + done.stderr

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import importlib
+import io
 import os
 import signal
 import sys
@@ -83,6 +84,8 @@ def _open_streams() -> None:
         if getattr(sys, name) is None:
             open_null(number)
             setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as errors: a terminal without UTF-8 lacks '³' and names
 
 
 def open_null(number: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,7 +50,8 @@ def poses(
             console.print(f"{len(frames)} of {len(ticks)} frames", markup=False)
             reported = time.monotonic()
     times = ticks * 1e-3
-    with out.open("wb") as written:  # by its name alone, savez would write to another where that has no '.npz'
-        np.savez(written, identifiers=np.array(names), times=times, poses=np.array(frames))
+    data = io.BytesIO()
+    np.savez(data, identifiers=np.array(names), times=times, poses=np.array(frames))
+    out.write_bytes(data.getbuffer())
     console.print(f"{out}: {counted(len(names), 'body', 'bodies')}, {counted(len(frames), 'frame')}", markup=False)
     return 0
