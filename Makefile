@@ -16,7 +16,7 @@ PAGE_MESSAGES ?= 3000
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
 
-.PHONY: run demo film test test-slow setup developers lint types check-imports unit fuzz bench curves contact-sheet soak docs site wheel addon test-blender blender-module clean
+.PHONY: run demo film test test-slow setup developers lint types check-imports unit fuzz bench curves contact-sheet lerobot-reader soak docs site wheel addon test-blender blender-module clean
 
 run: setup
 	.venv/bin/ligature run $(SCENE)
@@ -113,6 +113,14 @@ curves: developers
 	done
 	$(PYTHON) examples/learning_curves.py docs/pictures/learning_curves.png "episodes shown" \
 	  $(foreach task,reach pick insert,$(task)=$(CURVES)/$(task)_0.csv,$(CURVES)/$(task)_1.csv,$(CURVES)/$(task)_2.csv)
+
+# LeRobot's own reader on exports, in an environment of its own: numpy 2, torch, Python 3.12; 5.4 GB
+LEROBOT := build/lerobot
+lerobot-reader: developers
+	@test -x $(LEROBOT)/bin/python || command -v python3.12 >/dev/null || { echo "LeRobot needs Python 3.12; install python3.12"; exit 1; }
+	@test -x $(LEROBOT)/bin/lerobot-info || { python3.12 -m venv $(LEROBOT) && $(STEP) "installing LeRobot, 5.4 GB, some minutes" \
+		$(LEROBOT)/bin/pip --disable-pip-version-check install --progress-bar off 'lerobot[dataset]==0.6.1'; }
+	$(PYTHON) -m pytest tests/datasets/test_lerobot_reader.py
 
 # every scene drawn with and without shaders of its own, in build/contact_sheet.png
 contact-sheet: setup

@@ -16,17 +16,41 @@ from ligature.datasets import DatasetError, DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
 from ligature.environments import SuturingEnv, env_id
 from ligature.environments.experts import EXPERTS, demonstrate
+from ligature.environments.goals import Suture
 from ligature.environments.suturing import CONTROL
 
 MOST = 400
 """Actions of an episode."""
+
+PHASES = {"insert": "drive", "puncture": "drive", "pick": "pick_up", "pull_through": "pull_out"}
+"""What a task of one phase is, where it is not called as the task."""
+
+GESTURES = {"pick_up": "G12", "hand_over": "G4", "drive": "G3", "pull_out": "G6"}
+"""What JIGSAWS calls phases: PSM1, on the left, picks up and pulls, PSM2 drives."""
+
+
+def phases(task: str) -> tuple[str, ...]:
+    """What a demonstration of a task is made of."""
+    return ("drive", "take", "pull_out") if task == "suture" else (PHASES.get(task, task),)
+
+
+def phase(env: SuturingEnv) -> tuple[str, list[str]]:
+    """What is done now, and the arms that do it."""
+    arms = [arm.name for arm in env.arms]
+    if not isinstance(env.goal, Suture):
+        return phases(env.task)[0], arms
+    driver, puller = arms
+    if not env.goal.driven:
+        return "drive", [driver]
+    return ("pull_out", [puller]) if env.goal.taken else ("take", arms)
 
 
 def record(env: SuturingEnv, writer: DatasetWriter, seed: int, noise: float) -> bool:
     """One episode, with what the environment observes and what the expert does then; whether it succeeded."""
 
     def look(observation: np.ndarray, action: np.ndarray) -> None:
-        writer.sample(env.task, extra={"environment_state": observation, "expert_action": action})
+        name, arms = phase(env)
+        writer.sample(name, arms, extra={"environment_state": observation, "expert_action": action})
 
     try:
         _, info = demonstrate(env, seed, noise, look)
@@ -49,13 +73,14 @@ def main() -> int:
     )
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
     given = arguments.parse_args()
-    env = SuturingEnv(given.task, max_steps=MOST)
+    env, steps = SuturingEnv(given.task, max_steps=MOST), phases(given.task)
     begin, done, ended = time.perf_counter(), 0, 0
     try:
         with interrupted_once():
             try:
                 with DatasetWriter(
-                    given.out, env.simulation, given.camera, (640, 480), 1.0 / CONTROL, (given.task,), env.goal.text,
+                    given.out, env.simulation, given.camera, (640, 480), 1.0 / CONTROL, steps, env.goal.text,
+                    {name: GESTURES[name] for name in steps if name in GESTURES},
                     remarks={"source": "scripted expert", "environment": env_id(given.task)},
                 ) as writer:  # fmt: skip
                     for seed in range(given.seed, given.seed + given.episodes):

@@ -391,6 +391,10 @@ class Simulation:
         """Needles and threads in tissue holes, as after the last tick; ``scene.holes`` names the holes."""
         return self._suture.holes.insertions
 
+    def touched(self, body: int) -> frozenset[int]:
+        """Rigid bodies that ``body`` touches, as after the last tick."""
+        return frozenset(contact.body for contact in self._world.queries.contacts(body, 0.0))
+
     # --- commands ---------------------------------------------------------------------------
 
     def apply(self, command: Command) -> None:

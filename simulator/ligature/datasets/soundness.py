@@ -34,6 +34,7 @@ ARRAYS: dict[str, str] = {"time": "n", "phase": "n"}
 ARM_ARRAYS: dict[str, str] = {
     "measured_js": "n 3 j", "setpoint_js": "n 3 j", "action_js": "n j", "local_measured_cp": "n 7",
     "local_setpoint_cp": "n 7", "local_action_cp": "n 7", "spatial_measured_cf": "n 6", "phase": "n", "activity": "n",
+    "events": "n 3",
 }  # fmt: skip
 
 JAW_ARRAYS: dict[str, str] = {
@@ -42,8 +43,8 @@ JAW_ARRAYS: dict[str, str] = {
 """Of an instrument."""
 
 OTHER_ARRAYS: dict[str, str] = {
-    "needle/pose": "n 7", "needle/twist": "n 6", "needle/tissue_force": "n 3", "thread/points": "n e 3",
-    "thread/tension": "n e",
+    "needle/pose": "n 7", "needle/twist": "n 6", "needle/tissue_force": "n 3", "needle/events": "n 3",
+    "thread/points": "n e 3", "thread/tension": "n e",
 }  # fmt: skip
 """Where the episode has the group that the name begins with."""
 
@@ -51,6 +52,9 @@ CAMERA_ARRAYS: dict[str, str] = {"pose": "n 7", "intrinsics": "n 3 3", "rgb": "n
 
 NOT_REPORTED = frozenset({"spatial_measured_cf", "force", "twist", "tissue_force"})
 """Arrays that a dataset of a recording may lack, as cameras the pose: what was recorded reports them to nobody."""
+
+LATER = frozenset({"events"})
+"""Arrays that datasets of earlier releases lack."""
 
 PHASES = frozenset({"phase"})
 """Arrays of numbers of phases."""
@@ -198,17 +202,14 @@ class _Episode:
     def _array(self, name: str, shape: str) -> None:
         place, last = f"{self._name}/{name}", name.rpartition("/")[2]
         array = self._group.get(name)
-        if (
-            array is None
-            and self._recorded
-            and (last in NOT_REPORTED or name.startswith("cameras/") and last == "pose")
-        ):
+        unreported = last in NOT_REPORTED or name.startswith("cameras/") and last == "pose"
+        if array is None and (last in LATER or self._recorded and unreported):
             return
         if not isinstance(array, h5py.Dataset):
             raise Unsound(f"'{place}' is missing or not an array")
         wanted, found = shape.split(), array.shape or ()
         free = wanted[-1] == "…"
-        kinds = WHOLE if last in ("phase", "activity") else NUMBERS
+        kinds = WHOLE if last in ("phase", "activity", "events") else NUMBERS
         fits = len(found) >= 1 if free else len(found) == len(wanted)
         for letter, length in zip(wanted, found, strict=False):
             if not letter.isdigit() and letter != "…":

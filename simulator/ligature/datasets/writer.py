@@ -17,6 +17,7 @@ import numpy as np
 
 import ligature
 from ligature.camera_simulation import Simulation
+from ligature.datasets.events import ARM_EVENTS, NEEDLE_EVENTS, EventWatch
 from ligature.datasets.interrupts import uninterrupted
 from ligature.datasets.labels import ACTIVITIES, GESTURES, ActivityWatch
 from ligature.datasets.rows import EpisodeRows, add_actions
@@ -91,7 +92,7 @@ class DatasetWriter:
         self._cameras = {name: simulation.cameras[name] for name in cameras}
         self._phases, self._task = ("", *phases), task
         self._gestures, self._remarks = dict(gestures or {}), dict(remarks or {})
-        self._watch = ActivityWatch(simulation.scene)
+        self._watch, self._events = ActivityWatch(simulation.scene), EventWatch(simulation)
         self._episode: h5py.File | None = None
         self._rows: EpisodeRows | None = None
         self._exposures: dict[str, Exposure] = {}
@@ -164,6 +165,7 @@ class DatasetWriter:
         self._episode = self._store.begin()
         self._rows, self._exposures = EpisodeRows(self._episode), {}
         self._samples, self._due = 0, time
+        self._events.begin()
 
     def end_episode(self, success: bool, **remarks: float | int | str) -> None:
         """End the episode, with ``success`` and ``remarks`` as its attributes; from now on it is on the disk.
@@ -198,12 +200,14 @@ class DatasetWriter:
         scene, label = simulation.scene, self._phases.index(phase)
         yield "time", simulation.time, {"dtype": "f8", "units": "s"}
         yield "phase", label, {"dtype": "u1"}
-        activities = self._watch.activities(state)
-        for arm, record, activity in zip(scene.arms, state["arm"], activities, strict=True):
+        activities, events = self._watch.activities(state), self._events.observe()
+        each = zip(scene.arms, state["arm"], activities, events.arms, strict=True)
+        for arm, record, activity, happened in each:
             if arm.joints:
                 yield from self._motion(arm, record)
                 yield f"arms/{arm.name}/phase", label if doers is None or arm.name in doers else 0, {"dtype": "u1"}
                 yield f"arms/{arm.name}/activity", activity, {"dtype": "u1"}
+                yield f"arms/{arm.name}/events", happened, {"dtype": "u1", "units": "1", "axes": ", ".join(ARM_EVENTS)}
         for index, jaw in enumerate(scene.jaws):
             if jaw.name in simulation.arms:
                 yield f"arms/{jaw.name}/jaw/force", state["jaw_force"][index], {"dtype": "f4", "units": "N"}
@@ -217,6 +221,7 @@ class DatasetWriter:
             n = int(state["insertion_count"])
             force = state["insertion_force"][:n][state["insertion_body"][:n] == needle.body].sum(axis=0)
             yield "needle/tissue_force", force, {"dtype": "f4", "units": "N"}
+            yield "needle/events", events.needle, {"dtype": "u1", "units": "1", "axes": ", ".join(NEEDLE_EVENTS)}
         for rod in scene.rods[:1]:
             yield "thread/points", state["body_pose"][list(rod.bodies), :3], {"dtype": "f4", "units": "m"}
             yield "thread/tension", state["rod_tension"][list(rod.bodies)], {"dtype": "f4", "units": "N"}

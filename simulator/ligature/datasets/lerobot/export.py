@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.datasets.events import listed
 from ligature.datasets.lerobot import statistics
 from ligature.datasets.lerobot.card import card
 from ligature.datasets.lerobot.features import Column, Robot, columns
@@ -47,6 +48,7 @@ class _Written:
     numbers: dict[str, list[NDArray[Any]]] = field(default_factory=dict)
     tasks: list[str] = field(default_factory=list)
     features: dict[str, dict[str, Any]] = field(default_factory=dict)
+    events: list[dict[str, Any]] = field(default_factory=list)
     frames: int = 0
 
     def task(self, text: str) -> int:
@@ -155,6 +157,7 @@ class _Export:
         info = self._info(splits)
         (meta / "info.json").write_text(json.dumps(info, indent=4), encoding="utf-8")
         (meta / "calibration.json").write_text(json.dumps(self._calibration(), indent=1), encoding="utf-8")
+        write_lines(meta / "events.jsonl", self._written.events)
         self._write_meta(meta)
         text = card(self._file, info, ordered, self._constant, self._license)
         (self._root / "README.md").write_text(text, encoding="utf-8")
@@ -198,6 +201,10 @@ class _Export:
         for key, values in counters.items():
             written.numbers.setdefault(key, []).append(values[:, None])
         self._describe(found, counters)
+        written.events += [
+            {"episode_index": number, "frame_index": k, "timestamp": k / self._fps, "event": event, "of": who}
+            for k, event, who in listed(episode)
+        ]
         for camera in sorted(episode.get("cameras", {})):
             key = f"observation.images.{camera}"
             stats[key] = self._film(key, number, episode[f"cameras/{camera}/rgb"])

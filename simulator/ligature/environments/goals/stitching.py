@@ -71,6 +71,11 @@ class Suture(Insert):
         """Whether the driver has driven the needle through, as far as `Insert` asks for."""
         return bool(self._driven)
 
+    @property
+    def taken(self) -> bool:
+        """Whether the puller alone has had the needle since."""
+        return bool(self._taken)
+
     def pulled(self) -> Pulled:
         """What is through the holes now."""
         return self._seam.look()
