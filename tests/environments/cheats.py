@@ -1,6 +1,6 @@
 """Policies that try to get an environment's reward without the deed, and experts that do the deed.
 
-``python -m tests.environments.cheats`` prints the table of docs/learning.md. Policies use the actions that an agent has,
+``python -m tests.environments.cheats`` prints the table of docs/cheats.md. Policies use the actions that an agent has,
 and the ground truth of the simulation to find what they cheat with. World axes, metres, radians.
 """
 
@@ -15,8 +15,8 @@ from ligature.environments import SuturingEnv
 from ligature.environments.experts import EXPERTS, Policy
 from ligature.environments.goals import Insert
 from ligature.environments.hand import OPEN, SHUT, Hand
-from ligature.model.frames import frame, inverse
-from ligature.tasks.throws import PAD, UP
+from ligature.model.frames import axis_rotation, frame, inverse
+from ligature.tasks.throws import UP
 
 from tests.environments import more_cheats as more
 
@@ -60,22 +60,23 @@ def stop_short(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from hand.stay(100, 0.0)
 
 
+def touch_and_go(hand: Hand, observation: Array) -> Iterator[Array]:
+    """stay at the target for 0.1 s again and again"""
+    at, way = observation[30:33], observation[30:33] - observation[27:30]
+    aside = 0.005 * way / np.linalg.norm(way)
+    for _ in range(12):
+        yield from hand.go(frame(hand.tool[:3, :3], at), 0.0)
+        yield from hand.stay(5, 0.0)
+        yield from hand.go(frame(hand.tool[:3, :3], at - aside), 0.0)
+        yield from hand.stay(3, 0.0)
+
+
 # --- pick -----------------------------------------------------------------------------------
 
 
 def lift_by_thread(hand: Hand, observation: Array) -> Iterator[Array]:
     """grasp the thread beside the needle and lift both"""
-    bodies = list(hand.simulation.scene.rods[0].bodies)
-    points = hand.simulation.state["body_pose"][0, bodies, :3]
-    tail = hand.env.goal.scenery.needle_points(hand.simulation.state["body_pose"][0])[0]
-    nearest = int(np.argmin(np.linalg.norm(points - tail, axis=1)))
-    k = int(np.clip(nearest + (3 if nearest < len(points) / 2 else -3), 1, len(points) - 2))
-    along = points[k + 1] - points[k - 1]
-    along = along - (along @ UP) * UP
-    x = along / np.linalg.norm(along)
-    x = x if x @ hand.tool[:3, 0] > 0.0 else -x
-    R = np.column_stack([x, np.cross(-UP, x), -UP])
-    yield from hand.take(frame(R, points[k] + PAD * UP))
+    yield from hand.take(more.on_the_thread(hand, 3))
     yield from hand.go(hand.moved(z=0.06), SHUT)
     yield from hand.stay(60, SHUT)
 
@@ -112,6 +113,15 @@ def hold_low(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from hand.take(hand.grasp())
     yield from hand.go(hand.moved(z=0.008), SHUT)
     yield from hand.stay(60, SHUT)
+
+
+def bounce(hand: Hand, observation: Array) -> Iterator[Array]:
+    """lift the needle and lower it again and again, up for 0.3 s each time"""
+    yield from hand.take(hand.grasp())
+    for _ in range(6):
+        yield from hand.go(hand.moved(z=0.027), SHUT)
+        yield from hand.stay(8, SHUT)
+        yield from hand.go(hand.moved(z=-0.027), SHUT)
 
 
 # --- insert and puncture --------------------------------------------------------------------
@@ -160,6 +170,20 @@ def beside(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from drive(hand, observation, np.array([0.0, 0.008, 0.0]))
 
 
+def from_the_exit(hand: Hand, observation: Array) -> Iterator[Array]:
+    """drive the needle in at the exit and out at the entry"""
+    goal = hand.env.goal
+    first, last = goal._ends()
+    middle, turn = 0.5 * (first + last), axis_rotation(UP, np.pi)
+    swapped = frame(np.eye(3), middle) @ frame(turn, np.zeros(3)) @ frame(np.eye(3), -middle)
+    T_arc_tool = inverse(hand.needle_arc) @ hand.tool
+    yield from hand.go(hand.moved(z=0.02), SHUT)
+    over = frame(np.eye(3), 0.02 * UP) @ swapped @ goal.throw.arc_at(-0.4, goal.arc) @ T_arc_tool
+    yield from hand.go(over, SHUT, most=160)
+    for angle in np.arange(-0.4, 2.6, 0.06):
+        yield from hand.go(swapped @ goal.throw.arc_at(float(angle), goal.arc) @ T_arc_tool, SHUT, most=6)
+
+
 def leave_it_in(hand: Hand, observation: Array) -> Iterator[Array]:
     """drive the needle half way in and let go"""
     yield from drive(hand, observation, end=0.7)
@@ -179,10 +203,10 @@ QUICK = 3
 """How many, the last of each list, `make test` rolls; the slow tests roll all."""
 
 CHEATS: dict[str, tuple[Policy, ...]] = {
-    "reach": (still, flail, fly_through, shake, stop_short),
-    "pick": (still, flail, close_in_the_air, sweep, lift_by_thread, toss, hold_low),
-    "insert": (still, flail, backwards, beside, let_go, over_the_top, leave_it_in),
-    "puncture": (still, backwards, beside, peck, let_go, over_the_top, leave_it_in),
+    "reach": (still, flail, fly_through, shake, touch_and_go, stop_short),
+    "pick": (still, flail, close_in_the_air, sweep, bounce, lift_by_thread, toss, hold_low),
+    "insert": (still, flail, backwards, beside, from_the_exit, let_go, over_the_top, leave_it_in),
+    "puncture": (still, backwards, beside, from_the_exit, peck, let_go, over_the_top, leave_it_in),
     "hand_over": (still, flail, *more.HAND_OVER),
     "pull_through": (still, flail, *more.PULL_THROUGH),
     "peg_transfer": (still, flail, *more.PEG_TRANSFER),

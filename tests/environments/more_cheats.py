@@ -10,9 +10,24 @@ from ligature.environments.goals import Suture, holds
 from ligature.environments.hand import OPEN, SHUT, TIGHT, Hand
 from ligature.environments.scripts import AJAR, grasp_side, pull_through, take_over
 from ligature.model.frames import frame, inverse
-from ligature.tasks.throws import UP, drawn_back
+from ligature.tasks.throws import PAD, UP, drawn_back
 
 Array = np.ndarray
+
+
+def on_the_thread(hand: Hand, number: int) -> Array:
+    """Pose (4, 4) of the upright tool at which its jaws close on the thread, so many elements from the needle."""
+    bodies = list(hand.simulation.scene.rods[0].bodies)
+    points = hand.simulation.state["body_pose"][0, bodies, :3]
+    tail = hand.env.goal.scenery.needle_points(hand.simulation.state["body_pose"][0])[0]
+    nearest = int(np.argmin(np.linalg.norm(points - tail, axis=1)))
+    k = int(np.clip(nearest + (number if nearest < len(points) / 2 else -number), 1, len(points) - 2))
+    along = points[k + 1] - points[k - 1]
+    along = along - (along @ UP) * UP
+    x = along / np.linalg.norm(along)
+    x = x if x @ hand.tool[:3, 0] > 0.0 else -x
+    return frame(np.column_stack([x, np.cross(-UP, x), -UP]), points[k] + PAD * UP)
+
 
 # --- hand_over ------------------------------------------------------------------------------
 
@@ -46,6 +61,15 @@ def take_air(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from hand.stay(12, OPEN)
     yield from hand.go(drawn_back(hand.tool, 0.035), OPEN)
     yield from taker.stay(40, SHUT)
+
+
+def take_the_thread(hand: Hand, observation: Array) -> Iterator[Array]:
+    """take the thread with the other hand, and let go of the needle"""
+    taker = hand.other(1)
+    yield from taker.take(on_the_thread(taker, 3))
+    yield from hand.stay(12, OPEN)
+    yield from hand.go(drawn_back(hand.tool, 0.035), OPEN)
+    yield from taker.stay(60, SHUT)
 
 
 def swing_away(hand: Hand, observation: Array) -> Iterator[Array]:
@@ -87,6 +111,13 @@ def pull_and_let_go(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from hand.stay(60, OPEN)
 
 
+def pull_the_thread_back(hand: Hand, observation: Array) -> Iterator[Array]:
+    """pull the thread before the entry instead of the needle"""
+    yield from hand.take(on_the_thread(hand, 4))
+    yield from hand.go(hand.moved(z=0.05), SHUT)
+    yield from hand.stay(60, SHUT)
+
+
 def lift_nothing(hand: Hand, observation: Array) -> Iterator[Array]:
     """close the jaws 5 mm behind the needle and lift them"""
     yield from hand.take(drawn_back(hand.needle_arc @ hand.env.goal.grasp(), 0.005))
@@ -112,6 +143,18 @@ def keep_it(hand: Hand, observation: Array) -> Iterator[Array]:
     """lower the block over the post and never let go"""
     yield from carried(hand, 1, 4)
     yield from hand.stay(80, SHUT)
+
+
+def knock_it_off(hand: Hand, observation: Array) -> Iterator[Array]:
+    """push the block with shut jaws, towards the other post"""
+    way = hand.env.goal.way()
+    start, end = way[0][:3, 3], way[-1][:3, 3]
+    push = (end - start) / np.linalg.norm(end - start)
+    R = hand.tool[:3, :3]
+    yield from hand.go(frame(R, start - 0.02 * push + 0.02 * UP), SHUT)
+    yield from hand.go(frame(R, start - 0.02 * push + 0.003 * UP), SHUT)
+    yield from hand.go(frame(R, end + 0.003 * UP), SHUT)
+    yield from hand.stay(30, SHUT)
 
 
 def put_back(hand: Hand, observation: Array) -> Iterator[Array]:
@@ -208,9 +251,9 @@ def sew_and_drop(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from hand.other(1).stay(60, OPEN)
 
 
-HAND_OVER = (swing_away, drop, both_keep_it, stay_there, take_air)
-PULL_THROUGH = (lift_nothing, push_back, hold_in_place, needle_alone, pull_and_let_go)
-PEG_TRANSFER = (put_back, hold_over, keep_it, put_beside)
+HAND_OVER = (swing_away, take_the_thread, drop, both_keep_it, stay_there, take_air)
+PULL_THROUGH = (lift_nothing, pull_the_thread_back, push_back, hold_in_place, needle_alone, pull_and_let_go)
+PEG_TRANSFER = (knock_it_off, put_back, hold_over, keep_it, put_beside)
 SUTURE = (
     leave_it_there, pass_it_in_the_air, keep_both_hands_on_it, take_it_back_out, draw_out_the_needle_alone, sew_and_drop,
 )  # fmt: skip

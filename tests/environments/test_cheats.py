@@ -20,7 +20,7 @@ from tests.environments.cheats import CHEATS, MOST, QUICK, described, roll
 OPENING = 48
 """The number of an observation that has the set-point of the jaw."""
 
-LEARNING = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
+TABLE = Path(__file__).resolve().parents[2] / "docs" / "cheats.md"
 
 
 @pytest.fixture(scope="module", params=sorted(CHEATS))
@@ -52,6 +52,57 @@ def test_no_cheat_succeeds(env: SuturingEnv) -> None:
         assert found.total < found.deed - 1.0, (policy.__name__, found)
 
 
+@settings(max_examples=3, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_dense_reward_is_what_is_gained_of_the_way_so_that_no_circle_pays(env: SuturingEnv, seed: int) -> None:
+    """The sum of rewards is the way that is shorter now, whatever was done between, also over saves and restores."""
+    rng = np.random.default_rng(seed)
+    _, info = env.reset(seed=seed)
+    begin, total, kept = info["distance"], 0.0, None
+    for k in range(60):
+        _, reward, ended, _, info = env.step(rng.uniform(-1.0, 1.0, env.action_space.shape))
+        total += reward
+        assert total == pytest.approx(100.0 * (begin - info["distance"]) + info["is_success"], abs=1e-9)
+        if k == 20:
+            kept = env.save(), total, info["distance"]
+        if k == 40 and kept is not None:
+            state, total, left = kept
+            env.restore(state)
+            assert env._progress is not None and env._progress.left == left
+        if ended:
+            break
+
+
+def test_an_episode_that_has_ended_pays_nothing_more(env: SuturingEnv) -> None:
+    found = roll(env, EXPERTS[task_of(env)], 11)
+    assert found.success
+    for k in range(30):  # let go, and move away
+        action = np.where(np.arange(env.action_space.shape[0]) % 7 == JAW, 1.0, 0.3 * (k % 2))
+        _, reward, ended, _, info = env.step(action)
+        assert reward == 0.0 and ended and info["is_success"]
+
+
+@pytest.mark.slow
+def test_blind_search_by_reward_finds_no_success(env: SuturingEnv) -> None:
+    """From each moment the best of four random pushes, by dense reward: tasks with a needle want more than that."""
+    if env.task == "reach":
+        return
+    rng = np.random.default_rng(3)
+    _, info = env.reset(seed=3)
+    for _ in range(40):
+        start, best = env.save(), None
+        for _ in range(4):
+            env.restore(start)
+            push, total = rng.uniform(-1.0, 1.0, env.action_space.shape), 0.0
+            for _ in range(5):
+                _, reward, ended, _, info = env.step(push)
+                total += reward
+                assert not info["is_success"]
+            if not ended and (best is None or total > best[0]):
+                best = total, env.save()
+        env.restore(start if best is None else best[1])
+
+
 @pytest.mark.slow
 def test_experts_succeed_and_cheats_fail_wherever_the_needle_lies(env: SuturingEnv) -> None:
     task, seeds = task_of(env), range(20, 40)
@@ -63,7 +114,7 @@ def test_experts_succeed_and_cheats_fail_wherever_the_needle_lies(env: SuturingE
 
 
 def test_the_documents_list_every_cheat() -> None:
-    text = LEARNING.read_text("utf-8")
+    text = TABLE.read_text("utf-8")
     missing = [described(p) for cheats in CHEATS.values() for p in cheats if f"| {described(p)} |" not in text]
     assert not missing
 

@@ -201,3 +201,31 @@ def test_the_command_writes_what_it_prints(network: Path, tmp_path: Path) -> Non
 def test_the_command_says_what_is_wrong(arguments: list[str], message: str) -> None:
     done = CliRunner().invoke(app, ["evaluate", *arguments, "--episodes", "1"])
     assert done.exit_code == 2 and message in done.output, done.output
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("raise ValueError('no weights')", r"no policy '.*mine.py:policy': ValueError at .*mine.py:1: no weights"),
+        ("def (", r"no policy '.*mine.py:policy': SyntaxError: invalid syntax \(mine.py, line 1\)"),
+        ("policy = lambda env, seed: 5", "a policy returns a function from observation to action, not 5"),
+        ("policy = lambda: None", r"the policy raised TypeError at .*takes 0 positional arguments"),
+        ("policy = lambda env, seed:\\\n lambda seen: 1 // 0", r"the policy raised ZeroDivisionError at .*mine.py:2: "),
+    ],
+)
+def test_what_a_users_code_raises_is_reported_with_its_place(
+    env: SuturingEnv, tmp_path: Path, code: str, message: str
+) -> None:
+    (tmp_path / "mine.py").write_text(code)
+    with pytest.raises(PolicyError, match=message):
+        run_episode(env, load_policy(f"{tmp_path / 'mine.py'}:policy"), 1, 5)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=200))
+def test_the_interval_of_success_is_wilsons_by_his_formula(done: list[bool]) -> None:
+    """Wilson, Journal of the American Statistical Association 22 (1927): roots of a quadratic, written out."""
+    found = summary([episode(k, success) for k, success in enumerate(done)])["success"]
+    n, share, z = len(done), sum(done) / len(done), 1.959963984540054
+    middle, half = share + z * z / (2 * n), z * np.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
+    low, high = (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
+    assert (found["low"], found["high"]) == pytest.approx((low, high), abs=1e-9)

@@ -426,3 +426,64 @@ def test_episodes_of_made_environments_are_cut_where_the_specification_has_it() 
     env.close()
     with pytest.raises(ValueError, match="gymnasium.make has 'max_episode_steps'"):
         gymnasium.make("ligature/Reach-v0", max_steps=3)
+
+
+def test_a_closed_environment_reports_that_whatever_is_asked_of_it() -> None:
+    env = SuturingEnv("reach", render_mode="rgb_array")
+    env.reset(seed=1)
+    state = env.save()
+    env.close()
+    env.close()
+    still = np.zeros(7)
+    for ask in (
+        lambda: env.step(still), env.reset, env.save, env.render, lambda: env.restore(state),
+        lambda: copy.deepcopy(env), lambda: pickle.dumps(env),
+    ):  # fmt: skip
+        with pytest.raises(RuntimeError, match="the environment is closed: make another one"):
+            ask()
+
+
+@pytest.mark.parametrize("action", [np.zeros(6), np.zeros(8), np.zeros((1, 7)), 0.0, None, ["a"] * 7, {}, [[0.0]] * 7])
+def test_what_is_no_action_is_rejected(action: object) -> None:
+    env = SuturingEnv("reach")
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match="an action is 7 numbers"):
+        env.step(action)
+    env.close()
+
+
+def test_an_action_is_its_numbers_whatever_their_type() -> None:
+    """Lists, whole numbers and halves; beyond -1 and 1 counts as these, NaN as 0."""
+    env, found = SuturingEnv("reach"), []
+    plain = np.array([1, -1, 0, 1, 0, 0, -1])
+    far = np.array([np.inf, -7.0, np.nan, 1.0, 0.0, np.nan, -np.inf])
+    for action in (
+        plain,
+        plain.tolist(),
+        plain.astype(np.float32),
+        plain.astype(np.float16),
+        plain.astype(np.int8),
+        far,
+    ):
+        env.reset(seed=4)
+        observations = [env.step(action)[0] for _ in range(5)]
+        found.append(np.array(observations))
+    env.close()
+    assert all((each == found[0]).all() for each in found)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"size": (0, 84)}, ValueError, "size is a width and a height in pixels"),
+        ({"size": (84,)}, ValueError, "size is a width and a height in pixels"),
+        ({"size": "84"}, ValueError, "size is a width and a height in pixels"),
+        ({"max_steps": 0}, ValueError, "max_steps is a number of actions, at least 1"),
+        ({"max_steps": 1.5}, ValueError, "max_steps is a number of actions, at least 1"),
+        ({"render_mode": "human"}, ValueError, "render_mode must be None or rgb_array"),
+        ({"observation": "image", "camera": "far"}, KeyError, "'far' does not name exactly one camera; there are"),
+    ],
+)
+def test_options_that_cannot_be_are_rejected_at_once(options: dict, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        SuturingEnv("reach", **options)

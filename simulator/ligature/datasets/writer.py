@@ -1,4 +1,4 @@
-"""Writes a running simulation to an HDF5 dataset, episode by episode; docs/learning.md shows the layout.
+"""Writes a running simulation to an HDF5 dataset, episode by episode; docs/datasets.md shows the layout.
 
 Metres, radians, seconds, newtons; poses are x y z qx qy qz qw in world axes unless a name sets otherwise. An episode
 that has ended is on the disk (`ligature.datasets.store`), whatever interrupts the next one.

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import binomtest, bootstrap
 
 from ligature.environments.layout import ACTION
-from ligature.environments.policies import Policy, checked, load_policy
+from ligature.environments.policies import Policy, asked, checked, load_policy
 from ligature.environments.suturing import CONTROL, SuturingEnv
 
 CONFIDENCE = 0.95
@@ -75,7 +75,7 @@ def run_episode(
     ``look`` is called with the number of actions at the start and after each.
     """
     observation, info = env.reset(seed=seed)
-    act = policy(env, seed)
+    act = asked(policy, env, seed)
     reward = way = peak = tissue = 0.0
     at, ended, steps, width = env.tool_positions, False, 0, len(env.arms) * ACTION
     look(0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
+import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -126,6 +127,8 @@ def _function(place: str, name: str) -> Policy:
         found = getattr(_module(place), name)
     except (ImportError, AttributeError, OSError) as error:
         raise PolicyError(f"no policy '{place}:{name}': {error}") from error
+    except Exception as error:  # whatever the code of a user raises as it is imported
+        raise PolicyError(f"no policy '{place}:{name}': {_raised(error)}") from error
     if not callable(found):
         raise PolicyError(f"'{place}:{name}' is not a function")
     return found  # type: ignore[no-any-return]
@@ -143,6 +146,31 @@ def _module(place: str) -> Any:
     sys.modules[path.stem] = module  # dataclasses and pickle look for the module of a class there
     spec.loader.exec_module(module)
     return module
+
+
+def asked(policy: Policy, env: SuturingEnv, seed: int) -> Act:
+    """What acts in an episode that has begun; PolicyError, also from it later, names where a user's code raised."""
+    act = _guarded(policy, env, seed)
+    if not callable(act):
+        raise PolicyError(f"a policy returns a function from observation to action, not {act!r}")
+    return lambda observation: _guarded(act, observation)  # type: ignore[no-any-return]
+
+
+def _guarded(function: Callable[..., Any], *arguments: Any) -> Any:
+    try:
+        return function(*arguments)
+    except PolicyError:
+        raise
+    except Exception as error:
+        raise PolicyError(f"the policy raised {_raised(error)}") from error
+
+
+def _raised(error: Exception) -> str:
+    """What was raised, and where."""
+    if isinstance(error, SyntaxError):
+        return f"SyntaxError: {error}"
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__} at {last.filename}:{last.lineno}: {error}"
 
 
 def checked(action: Any, width: int = ACTION) -> NDArray[np.float32]:

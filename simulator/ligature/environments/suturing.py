@@ -159,6 +159,16 @@ driven, and taken by the second arm (``suture``) | |
         ):  # fmt: skip
             if value not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
+        if (
+            len(np.shape(size)) != 1
+            or len(size) != 2
+            or not all(isinstance(n, int | np.integer) and n > 0 for n in size)
+        ):
+            raise ValueError(f"size is a width and a height in pixels, at least 1 each, not {size!r}")
+        if max_steps is not None and (not isinstance(max_steps, int | np.integer) or max_steps < 1):
+            raise ValueError(f"max_steps is a number of actions, at least 1, or None for no end, not {max_steps!r}")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode must be None or rgb_array, not {render_mode!r}")
         self._randomisation = self._options["randomise"] = Randomisation.of(randomise)
         names = _arms(task, arm)
         self._scene = _scene(task, names) if scene is None else load(scene)
@@ -188,6 +198,8 @@ driven, and taken by the second arm (``suture``) | |
             self._ticks = round(CONTROL / self._simulation.dt)
             self._goal: Goal = GOALS[self.task](self._simulation, self._arms)
             self._settled = self._start()
+            if self._observation != "state" or self.render_mode is not None:
+                self._simulation.cameras[self._camera]  # KeyError names those that there are
         except Exception:
             self._simulation.close()
             raise
@@ -294,6 +306,7 @@ driven, and taken by the second arm (``suture``) | |
             raise ValueError(
                 f"reset takes no options, but got {', '.join(map(repr, options))}; pass options to the class"
             )
+        self._check_open()
         super().reset(seed=seed)
         if self._randomisation is not None:
             self._vary(self._randomisation)
@@ -328,25 +341,46 @@ driven, and taken by the second arm (``suture``) | |
         self._drawn, self._channel, self._dressed = drawn, Channel(drawn, len(self._arms)), False
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Act for 20 ms."""
+        """Act for 20 ms; NaN means 0, and what is beyond -1 and 1 these.
+
+        After the task is done or lost the world goes on, but nothing is paid any more. Raises ValueError for what is no
+        action, RuntimeError before `reset` and after `close`.
+        """
+        self._check_open()
         if self._progress is None:
             raise RuntimeError("no episode has begun: call reset() before step()")
-        wanted = np.array(action, dtype=float)
-        wanted[np.isnan(wanted)] = 0.0
-        wanted = np.minimum(np.maximum(wanted, -1.0), 1.0)
+        wanted = self._numbers_of(action)
         if self._channel is not None:
             wanted = self._channel.act(wanted)
         answers = [hand.act(wanted[layout.ACTION * k : layout.ACTION * (k + 1)]) for k, hand in enumerate(self._hands)]
         self._simulation.step(self._ticks)
         self._count += 1
-        before, self._progress = self._progress, self._goal.observe()
+        before = self._progress
+        if not before.ended:
+            self._progress = self._goal.observe()
         left, done, lost = self._progress
-        reward = SUCCESS_REWARD * done + (100.0 * (before.left - left) if self._dense else 0.0)
+        reward = SUCCESS_REWARD * (done and not before.done) + (100.0 * (before.left - left) if self._dense else 0.0)
         cut = self._most is not None and self._count >= self._most
         rejected, bounded = "; ".join(filter(None, (text for text, _ in answers))), any(held for _, held in answers)
         return self._seen(), float(reward), done or bool(lost), cut, {
             **self._info(), "refused": rejected, "bounded": bounded,
         }  # fmt: skip
+
+    def _numbers_of(self, action: Any) -> Array:
+        """An action as numbers from -1 to 1."""
+        width = layout.action_width(len(self._arms))
+        try:
+            found = np.array(action, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"an action is {width} numbers: {error}") from error
+        if found.shape != (width,):
+            raise ValueError(f"an action is {width} numbers, not of the shape {found.shape}")
+        found[np.isnan(found)] = 0.0
+        return np.minimum(np.maximum(found, -1.0), 1.0)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise RuntimeError("the environment is closed: make another one")
 
     # --- keeping a moment -------------------------------------------------------------------
 
@@ -356,6 +390,7 @@ driven, and taken by the second arm (``suture``) | |
         Bullet keeps contacts that nobody can read; this drops them here too, so that an episode goes on with the same
         last bits as all that are restored from it, and with others than one that was never saved.
         """
+        self._check_open()
         if self._progress is None:
             raise RuntimeError("no episode has begun: call reset() before save()")
         return EnvState(
@@ -368,6 +403,7 @@ driven, and taken by the second arm (``suture``) | |
 
         Raises ValueError for a state of another task, scene, arm or randomisation.
         """
+        self._check_open()
         for name in ("task", "scene", "arm", "randomise"):
             if state.options[name] != self._options[name]:
                 raise ValueError(f"the state has {name}={state.options[name]!r}, not {self._options[name]!r}")
@@ -382,12 +418,13 @@ driven, and taken by the second arm (``suture``) | |
 
     def __deepcopy__(self, memo: dict[int, Any]) -> SuturingEnv:
         """A copy of the simulation that continues identically."""
-        return _made(self._options, None if self._progress is None else self.save())
+        return _made(*self.__reduce__()[1])
 
     def __copy__(self) -> SuturingEnv:
         raise TypeError("two environments cannot share one simulation: use copy.deepcopy, or save and restore")
 
     def __reduce__(self) -> tuple[Any, ...]:
+        self._check_open()
         return _made, (self._options, None if self._progress is None else self.save())
 
     def _seen(self) -> Any:
@@ -432,6 +469,7 @@ driven, and taken by the second arm (``suture``) | |
 
     def render(self) -> Any:
         """A picture (480, 640, 3) of the camera."""
+        self._check_open()
         return self._picture((640, 480)) if self.render_mode == "rgb_array" else None
 
     def _picture(self, size: tuple[int, int]) -> NDArray[np.uint8]:

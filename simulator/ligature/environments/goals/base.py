@@ -53,6 +53,11 @@ class Progress(NamedTuple):
     done: bool = False
     lost: str = ""
 
+    @property
+    def ended(self) -> bool:
+        """Whether it is done or lost: nothing more is paid."""
+        return self.done or bool(self.lost)
+
 
 class Dwell:
     """For how long something has been so without a break, in simulated seconds."""
