@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import ligature
@@ -23,8 +24,8 @@ TURNING, MOVING = 0.05, 0.01
 SHARE = 0.05
 """The same as a share of the largest speed of the time: a body's path is an arc, whose chords are compared."""
 
-CREEPING = {92, 132, 217, 227}
-"""Double parallelograms that roundings lock: they creep until a gap reaches `projection.PLAY`, and are thrown back."""
+LOCKED = (92, 132, 217, 227)
+"""Double parallelograms that roundings lock: a loop of theirs asks for centimetres where it is open by micrometres."""
 
 TICKS, DT = 50, 1e-3
 
@@ -63,7 +64,7 @@ def mechanism(number: int, folder: Path) -> Simulation:
     return Simulation(ligature.load(file))
 
 
-def misses(numbers: range, folder: Path) -> dict[int, Array]:
+def misses(numbers: Iterable[int], folder: Path) -> dict[int, Array]:
     """The linkages whose twists are not those of their poses, and by how much."""
     found = {}
     for number in numbers:
@@ -78,12 +79,12 @@ def misses(numbers: range, folder: Path) -> dict[int, Array]:
 
 
 def test_linkages_move_with_the_twists_that_are_reported(tmp_path: Path) -> None:
-    assert not misses(range(15), tmp_path)
+    assert not misses((*range(13), *LOCKED[:2]), tmp_path)
 
 
 @pytest.mark.slow
 def test_every_linkage_moves_with_the_twists_that_are_reported(tmp_path: Path) -> None:
-    assert set(misses(range(15, 300), tmp_path)) == CREEPING
+    assert not misses(range(13, 300), tmp_path)
 
 
 @pytest.mark.parametrize("name", LOOPS)

@@ -59,13 +59,13 @@ THROWN = 3e-5
 """Way (m, rad) of a coordinate up to which a projection may go further than the speeds had led to."""
 
 FLAT = 100.0
-"""Way of a coordinate per gap that is closed, above which a place is flat."""
+"""Way of a coordinate per gap that is closed, above which a place is flat; rows below it are firm."""
 
 TORN = 0.02
 """Gap (m, rad) from which on a loop closes at a pace: what turns by 0.2 rad in a tick opens it by less."""
 
 STEPS = 8
-"""Gauss-Newton steps of a projection at most; one or two are usual."""
+"""Gauss-Newton steps of a projection at most, and as many along flat ways; one or two are usual."""
 
 CURVED = 1e-4
 """Change of a coordinate (m, rad) from which on mass matrix and Jacobian are computed anew."""
@@ -129,6 +129,7 @@ class Loops(NamedTuple):
     J: Array  # (k, n)
     row_of: Integers  # (k,) the rows of J that count
     rank: Integers  # (1,) how many of them belong to closures; rows of single coordinates follow
+    firm: Integers  # (1,) how many of these, the first ones, a way of less than `FLAT` times their gap closes
     B: Array  # (k, n) these rows times the inverse factor, each divided by `scale`
     scale: Array  # (k,)
     A: Array  # (k, k) B Bᵀ and its factor
@@ -153,8 +154,8 @@ def loops(mechanisms: int, trees: int, closures: int, rows: int, axes: int, most
         end_row=z((closures, 2), whole), end_frame=z((closures, 2, 7)), point=z(closures, no), low=z(axes),
         high=z(axes), gap=z(closures), moved=z(mechanisms, whole), end=z((2, 7)), error=z(k), inertia=z((rows, 10)),
         axis=z((n, 6)), first=z(n, whole), linear=z(n, no), M=z((n, n)), J=z((k, n)), row_of=z(k, whole),
-        rank=z(1, whole), B=z((k, n)), scale=z(k), A=z((k, k)), multiplier=z(k), step=z(n), shift=z(n), place=z(n),
-        bound=z((n, 2)), speed=z(n), wanted=wanted, wanted_at=np.array([wanted.ctypes.data]),
+        rank=z(1, whole), firm=z(1, whole), B=z((k, n)), scale=z(k), A=z((k, k)), multiplier=z(k), step=z(n),
+        shift=z(n), place=z(n), bound=z((n, 2)), speed=z(n), wanted=wanted, wanted_at=np.array([wanted.ctypes.data]),
     )  # fmt: skip
 
 
@@ -215,8 +216,15 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
     _gather(trees, loops, m)
     begun, share = widest, 1.0 if widest <= TORN else most / widest
     moved = math.inf
-    for _ in range(STEPS):
-        if not (_prepare(trees, loops, m, rows) and _step(loops, n, rows, share)):
+    flat, firmly, steps = False, share == 1.0, STEPS  # firm rows first: what is left then is the gap of a flat place
+    while steps > 0:
+        steps -= 1
+        if not _prepare(trees, loops, m, rows):
+            return False
+        flat = loops.firm[0] < loops.rank[0]
+        if firmly and flat:
+            loops.rank[0] = loops.firm[0]
+        if not _step(loops, n, rows, share):
             return False
         moved = 0.0
         for i in range(n):
@@ -227,7 +235,14 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
             loops.shift[i] += part * loops.step[i]
         _link(trees, loops, m)
         before, widest = widest, _measure(trees, loops, m)
-        if widest <= DONE or share < 1.0 or PROGRESS * before < widest <= HELD_TWICE:
+        if widest <= DONE or share < 1.0:
+            break
+        if firmly and flat:
+            if moved <= THROWN:
+                firmly, begun, steps = False, widest, STEPS
+                for i in range(n):
+                    loops.shift[i] = 0.0
+        elif PROGRESS * before < widest <= HELD_TWICE:
             break
     back = _excess(loops, n, begun, dt) if begun <= PLAY else 0.0
     if back > 0.0:
@@ -237,7 +252,7 @@ def _project(trees: Trees, loops: Loops, m: int, widest: float, most: float, dt:
         _move(trees, loops, m, -back)
         _link(trees, loops, m)
         _measure(trees, loops, m)
-    if (moved > CURVED or back > 0.0) and not _prepare(trees, loops, m, rows):
+    if (moved > CURVED or back > 0.0 or (firmly and flat)) and not _prepare(trees, loops, m, rows):
         return False
     if back > 0.0:  # what is not flat closes nevertheless
         if not _step(loops, n, rows, 1.0):
@@ -538,7 +553,7 @@ def _factor(A: Array, first: Integers, n: int) -> bool:
 
 @inlined
 def _select(loops: Loops, m: int, rows: int) -> None:
-    """Fill `row_of` with the rows of J that hold something which those before them do not, and `rank`.
+    """Fill `row_of` with the rows of J that hold something which those before them do not, `rank` and `firm`.
 
     Pivoted Cholesky factorisation of the Gram matrix, lengths divided by the size of the mechanism: what joints hold
     twice, up to roundings, or not at all in a flat place, is left out of both projections.
@@ -549,7 +564,7 @@ def _select(loops: Loops, m: int, rows: int) -> None:
         for a in range(n):
             u = J[i, a] * (size if loops.linear[a] else 1.0) / (size if i % 6 < 3 else 1.0)
             left[i] += u * u
-    loops.rank[0] = 0
+    loops.rank[0], loops.firm[0] = 0, 0
     for rank in range(min(rows, n)):
         best = 0
         for i in range(rows):
@@ -559,6 +574,8 @@ def _select(loops: Loops, m: int, rows: int) -> None:
             break
         loops.rank[0] = rank + 1
         root = math.sqrt(left[best])
+        if FLAT * root > 1.0:
+            loops.firm[0] = rank + 1
         for i in range(rows):
             s = 0.0
             for a in range(n):
