@@ -1,4 +1,4 @@
-"""Knots to lay into threads, and what tells them apart whatever their shape."""
+"""Knots to lay into threads; `ligature.tasks.knots` tells them apart."""
 
 from __future__ import annotations
 
@@ -68,44 +68,3 @@ def room(points: Array) -> float:
     d = np.linalg.norm(p[:, None] - p[None], axis=2)
     apart = np.abs(s[:, None] - s[None])
     return float(d[apart > 1.8 * np.maximum(d, 1e-12)].min(initial=np.inf))
-
-
-def determinant(points: Array, seed: int = 0) -> int:
-    """The knot's determinant, |Delta(-1)|, of a closed polygon (n, 3): 1 without a knot, 3 for a trefoil.
-
-    From the crossings of its shadow on a random plane (Livingston, Knot Theory, 1993, chapter 3): in each, twice the
-    arc that passes over less both that end below.
-    """
-    turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    a = points @ turn
-    d, n = np.roll(a, -1, axis=0) - a, len(points)
-    crossings: list[tuple[float, float]] = []
-    for i in range(n):
-        j = np.arange(i + 2, n if i else n - 1)
-        r, s, q = d[i], d[j], a[j] - a[i]
-        with np.errstate(all="ignore"):
-            per = r[0] * s[:, 1] - r[1] * s[:, 0]
-            t, u = (q[:, 0] * s[:, 1] - q[:, 1] * s[:, 0]) / per, (q[:, 0] * r[1] - q[:, 1] * r[0]) / per
-            cross = np.abs(per) > 1e-9 * np.linalg.norm(r) * np.linalg.norm(s, axis=1)
-        for k in np.flatnonzero(cross & (t >= 0.0) & (t < 1.0) & (u >= 0.0) & (u < 1.0)):
-            below = a[i, 2] + t[k] * r[2] < a[j[k], 2] + u[k] * s[k, 2]
-            first, second = i + float(t[k]), float(j[k] + u[k])
-            crossings.append((first, second) if below else (second, first))
-    m = len(crossings)
-    if m < 3:
-        return 1
-    unders = np.sort([under for under, _ in crossings])
-    rows = np.zeros((m, m))
-    for row, (under, over) in enumerate(crossings):
-        i = int(np.searchsorted(unders, under))
-        rows[row, int(np.searchsorted(unders, over)) % m] += 2.0
-        rows[row, i] -= 1.0
-        rows[row, (i + 1) % m] -= 1.0
-    return abs(round(float(np.linalg.det(rows[1:, 1:]))))
-
-
-def closed(points: Array, far: float = 1.0) -> Array:
-    """An open thread (n, 3) closed far around the knot: its first end lies before it along y, its last one behind it."""
-    middle = points.mean(axis=0)
-    way = middle + far * np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 2.0], [0.0, -1.0, 2.0], [0.0, -1.0, 0.0]])
-    return np.vstack([points, way])

@@ -1,0 +1,76 @@
+"""The program that makes a throw around a vessel with two arms."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import ligature
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+sys.path.insert(0, str(EXAMPLES))
+
+import knot_throw  # noqa: E402
+
+
+@given(st.floats(-2.0, -1.2), st.floats(0.01, 0.05), st.floats(1.1, 3.0), st.floats(0.011, 0.045))
+def test_a_taut_thread_around_the_jaws_is_half_the_hull_of_its_ends_and_the_jaws(
+    at: float, away: float, angle: float, radius: float
+) -> None:
+    """Up to half a turn: the shortest way around a circle is the part of the convex hull on that side."""
+    anchor, end = (r * np.array([np.cos(a), np.sin(a)]) for r, a in ((away, at), (radius, angle)))
+    found = knot_throw.length_around(anchor, angle, radius)
+    around = np.linspace(0.0, 2.0 * np.pi, 4000)
+    circle = knot_throw.FINGER * np.column_stack([np.cos(around), np.sin(around)])
+    points = np.vstack([anchor, end, circle])
+    hull = points[ConvexHull(points).vertices]  # counter-clockwise
+    start = int(np.flatnonzero((hull == anchor).all(axis=1))[0])
+    way = np.roll(hull, -start, axis=0)
+    stop = int(np.flatnonzero((way == end).all(axis=1))[0])
+    length = float(np.linalg.norm(np.diff(way[: stop + 1], axis=0), axis=1).sum())
+    assert found == pytest.approx(length, rel=2e-3)
+
+
+@given(st.floats(0.02, 0.045), st.floats(1.0, 7.3), st.floats(0.05, 0.1))
+def test_the_left_tool_never_draws_the_thread_taut_but_where_it_must_keep_clear(
+    height: float, angle: float, length: float
+) -> None:
+    anchor = np.array([0.003, -height])
+    radius = knot_throw.radius_for(anchor, angle, length)
+    assert radius >= knot_throw.THINNEST
+    assert radius == knot_throw.THINNEST or knot_throw.length_around(anchor, angle, radius) <= length
+
+
+def test_a_thread_that_nobody_wraps_has_no_throw() -> None:
+    simulation = ligature.Simulation(ligature.load(knot_throw.SCENE))
+    score = knot_throw.Knotter(simulation).score()
+    assert (score.determinant, score.success) == (1, False)
+
+
+def test_another_seed_lays_the_thread_elsewhere_along_the_vessel() -> None:
+    scene = ligature.load(knot_throw.SCENE)
+    other = knot_throw.scattered(scene, 5)
+    moved = np.array(
+        [other.bodies[b].T_world_body[:3, 3] - scene.bodies[b].T_world_body[:3, 3] for b in scene.rods[0].bodies]
+    )
+    assert 0.0 < abs(moved[0, 0]) <= knot_throw.SHIFT
+    assert np.allclose(moved, moved[0]) and np.allclose(moved[:, 1:], 0.0)
+
+
+def _made(seed: int) -> None:
+    simulation = ligature.Simulation(knot_throw.scattered(ligature.load(knot_throw.SCENE), seed))
+    score, stopped = knot_throw.operate(simulation)
+    assert stopped == ""
+    assert score.success, score.lines()
+    assert score.drawn > 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_two_arms_make_a_throw_around_the_vessel() -> None:
+    _made(0)

@@ -1,0 +1,74 @@
+"""What counts as a throw around a vessel, and what does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ligature.tasks.knots import ThrowScore, turns
+
+from tests.suture.knots import square_knot, wound
+
+CENTRE = np.array([0.03, 0.23, 0.72])
+RADIUS = 0.0032
+
+
+def score(points, hands_empty=True):
+    return ThrowScore.of(np.asarray(points), CENTRE, 1.0, hands_empty, 10.0)
+
+
+def below():
+    """A thread that lies straight below the vessel."""
+    y = np.linspace(-0.04, 0.08, 120)
+    return CENTRE + np.column_stack([0.0 * y, y, np.full_like(y, -RADIUS)])
+
+
+def coil(count):
+    """A thread that turns around the vessel ``count`` times without a knot, its ends along y."""
+    angle = np.linspace(np.pi / 2, np.pi / 2 - 2.0 * np.pi * count, 400)
+    ring = np.column_stack([np.linspace(-0.004, 0.004, 400), RADIUS * np.cos(angle), RADIUS * np.sin(angle)])
+    away = np.linspace(0.0, 0.04, 40)[1:, None] * [0.0, 1.0, 0.0]
+    return CENTRE + np.vstack([ring[0] - away[::-1], ring, ring[-1] + away])
+
+
+def test_a_thread_that_only_lies_below_the_vessel_is_no_throw():
+    found = score(below())
+    assert (found.determinant, found.success) == (1, False)
+    assert abs(found.turns) < 0.5
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_thread_that_is_wound_around_the_vessel_without_a_crossing_is_no_throw(count):
+    found = score(coil(count))
+    assert abs(found.turns) > 0.9
+    assert (found.determinant, found.success) == (1, False)
+
+
+@pytest.mark.parametrize("lift", [0.01, 0.02])
+def test_a_knot_beside_the_vessel_is_no_throw(lift):
+    found = score(CENTRE + 1e-3 * wound(2, 3, 3) + [0.0, 0.0, lift])
+    assert found.determinant == 3
+    assert not found.success
+
+
+def test_two_throws_are_not_one():
+    """A square knot has the determinant of two trefoils."""
+    assert score(CENTRE + 1e-3 * square_knot()[::4]).determinant != 3
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(-3.0, 3.0), st.integers(0, 2**16))
+def test_turns_are_those_of_the_thread_about_the_vessel(count, seed):
+    """Whatever its distance; a winding of so many turns has so many."""
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0.3, 0.3 + 2.0 * np.pi * count, 500)
+    away = 0.003 + 0.02 * np.abs(np.sin(rng.uniform(0.0, 3.0) * angle))
+    points = CENTRE + np.column_stack([rng.normal(size=500), away * np.cos(angle), away * np.sin(angle)])
+    assert turns(points, CENTRE) == pytest.approx(count, abs=1e-9)
+
+
+def test_hands_that_hold_the_throw_have_not_made_it():
+    free = ThrowScore(3, 1.3, 1.0, True, 10.0)
+    assert free.success
+    assert not ThrowScore(3, 1.3, 1.0, False, 10.0).success
