@@ -62,9 +62,6 @@ def _box(size: Array, p: Array, normal: Array) -> float:
             normal[i] = d if p[i] > 0.0 else -d
         if d > deepest:
             deepest, axis = d, i
-    if square == deepest * deepest and deepest > 0.0:  # over one face, the rule: neither root nor division
-        normal[axis] = 1.0 if p[axis] > 0.0 else -1.0
-        return deepest
     if square > 0.0:
         length = square**0.5
         for i in range(3):

@@ -35,12 +35,11 @@ class Impulses:
         A driven body feels it and moves as commanded.
         """
         total = self._total[body]
-        if body in self._bodies:
-            total[:3] += impulse
-            total[3:] += moment
-        else:
+        if body not in self._bodies:
             self._bodies.add(body)
-            total[:3], total[3:] = impulse, moment
+            total[:] = 0.0
+        total[:3] += impulse
+        total[3:] += moment
         if self._commands.pushable(body):
             self._load(body, impulse, moment)
 

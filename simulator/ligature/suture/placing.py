@@ -158,8 +158,8 @@ def _place_parts(
 
 
 @kernel
-def bound(points: Array, out: Array) -> None:
-    """Write corners (2, 3) of the box around ``points`` (n, 3) into ``out``."""
+def bounds(points: Array, out: Array) -> None:
+    """Corners ``out`` (2, 3) of the box around ``points`` (n, 3)."""
     for a in range(3):
         out[0, a], out[1, a] = points[0, a], points[0, a]
         for i in range(1, points.shape[0]):

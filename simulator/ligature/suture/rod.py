@@ -21,7 +21,7 @@ from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import Attachment, RodDescription, frame_quaternions
 from ligature.suture.passages import Passages, passages
-from ligature.suture.placing import bound, find_pushed, sound, write_elements
+from ligature.suture.placing import bounds, find_pushed, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.springs import read_other_loads, springs
 from ligature.suture.substeps import run_tick
@@ -162,6 +162,7 @@ class Rod:
         self._pulled: dict[int, tuple[Array, float, Array]] = {}
         self._external: dict[int, tuple[Array, Array]] = {}
         self._attached = [attachment.body for attachment in description.attachments]
+        self._corners = np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
         self.take_passages(passages(1), 0)
@@ -218,7 +219,6 @@ class Rod:
         self._constraint_rows = self._gather_constraints()
         self.tension[:], self.impulse[:] = 0.0, 0.0
         self.newton_steps, self.settled_soundly = 0, True
-        self._moved = True
         self._clear_touches()
 
     def _clear_touches(self) -> None:
@@ -250,7 +250,7 @@ class Rod:
         for name in TOUCHES_KEPT:
             getattr(touches, name)[:n] = snapshot[f"touch_{name}"]
         put_back(self, {name: snapshot[name] for name in _KEPT})
-        self._near, self._moved = None, True
+        self._near = None
         self._constraint_rows = self._gather_constraints()
 
     def finite(self) -> bool:
@@ -287,7 +287,6 @@ class Rod:
         nodes, own = self._nodes, self._own
         nodes.x[own], nodes.q[own] = poses[:, :3], poses[:, 3:]
         nodes.v[own], nodes.w[own] = twists[:, :3], twists[:, 3:]
-        self._moved = True
 
     def hangs_on(self, body: int) -> bool:
         """Whether ``body`` and nothing else holds the rod."""
@@ -300,7 +299,6 @@ class Rod:
         for i in range(own.start, own.stop):
             nodes.q[i] = matrix_quaternion(T[:3, :3] @ quaternion_matrix(nodes.q[i]))
         nodes.v[own], nodes.w[own] = 0.0, 0.0
-        self._moved = True
         for touches in self._touches:
             touches.count[0] = 0
 
@@ -404,11 +402,8 @@ class Rod:
 
     def box(self) -> Array:
         """Corners (2, 3) of a box around all centres of elements."""
-        corners: Array = self._arrays.corners
-        if self._moved:
-            bound(self.positions, corners)
-            self._moved = False
-        return corners
+        bounds(self.positions, self._corners)
+        return self._corners
 
     def place(self, body: int, pose: Array, twist: Array) -> None:
         """Set pose (7,) and twist (6,) of a partner's inertial frame at the start of the tick."""
@@ -508,8 +503,7 @@ class Rod:
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
         count = find_pushed(self.impulse, self._pushed_nodes, self._found)
-        pushed = [self._pushed[k] for k in self._found[:count].tolist()]
-        return [(body, self.impulse[node]) for body, node in pushed]
+        return [(body, self.impulse[node]) for body, node in (self._pushed[k] for k in self._found[:count].tolist())]
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds the impulse on each partner."""

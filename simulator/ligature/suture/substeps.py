@@ -16,7 +16,7 @@ from ligature.suture.contacts import detect
 from ligature.suture.crossing import free_share, shorten
 from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
 from ligature.suture.passages import Passages
-from ligature.suture.placing import bound, sound
+from ligature.suture.placing import sound
 from ligature.suture.plasticity import set_bends
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
@@ -24,7 +24,7 @@ from ligature.suture.rotations import cross, turn
 from ligature.suture.springs import Springs, add_spring_impulses, begin_springs, open_springs
 from ligature.suture.step import advance, finish
 from ligature.suture.tracking import open_passages
-from ligature.tables import copy_into, opener
+from ligature.tables import opener
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -45,6 +45,13 @@ MAX_STEPS = 16
 
 
 @inlined
+def _copy2(a: Array, b: Array) -> None:
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            b[i, k] = a[i, k]
+
+
+@inlined
 def _place(nodes: layout.Nodes, motion: Array, met: Integers) -> None:
     """Set the nodes ``met[:, 1]`` to the motion of their bodies, rows ``met[:, 0]`` of ``motion`` (b, 13)."""
     for m in range(met.shape[0]):
@@ -57,22 +64,22 @@ def _place(nodes: layout.Nodes, motion: Array, met: Integers) -> None:
 
 @inlined
 def _keep(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
-    copy_into(work.kept_x, nodes.x)
-    copy_into(work.kept_q, nodes.q)
-    copy_into(work.kept_v, nodes.v)
-    copy_into(work.kept_w, nodes.w)
-    copy_into(work.kept_angle, joints.angle)
-    copy_into(work.kept_load, joints.load)
+    _copy2(nodes.x, work.kept_x)
+    _copy2(nodes.q, work.kept_q)
+    _copy2(nodes.v, work.kept_v)
+    _copy2(nodes.w, work.kept_w)
+    _copy2(joints.angle, work.kept_angle)
+    _copy2(joints.load, work.kept_load)
 
 
 @inlined
 def _take_back(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
-    copy_into(nodes.x, work.kept_x)
-    copy_into(nodes.q, work.kept_q)
-    copy_into(nodes.v, work.kept_v)
-    copy_into(nodes.w, work.kept_w)
-    copy_into(joints.angle, work.kept_angle)
-    copy_into(joints.load, work.kept_load)
+    _copy2(work.kept_x, nodes.x)
+    _copy2(work.kept_q, nodes.q)
+    _copy2(work.kept_v, nodes.v)
+    _copy2(work.kept_w, nodes.w)
+    _copy2(work.kept_angle, joints.angle)
+    _copy2(work.kept_load, joints.load)
 
 
 @inlined
@@ -133,7 +140,7 @@ def run_tick(
     first, dt = rod.constants.first[0], rod.constants.dt[0]
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
-    copy_into(rod.shape_poses, shapes.pose)
+    _copy2(shapes.pose, rod.shape_poses)
     begin_passages(passages, owner)
     begin_springs(springs, nodes)
     for i in range(total):
@@ -145,9 +152,8 @@ def run_tick(
     steps = 0
     while done < MAX_PARTS:
         h = dt * size / MAX_PARTS
-        if size != scale:
-            _scale_loads(joints, (size / scale) ** 2)
-            scale = size
+        _scale_loads(joints, (size / scale) ** 2)
+        scale = size
         more, settled = _one_step(
             rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
         )
@@ -175,10 +181,8 @@ def run_tick(
         while done % (REFINEMENT * size) == 0:
             size *= REFINEMENT
     set_bends(joints)
-    copy_into(shapes.pose, rod.shape_poses)
-    if scale != MAX_PARTS:
-        _scale_loads(joints, (MAX_PARTS / scale) ** 2)
+    _copy2(rod.shape_poses, shapes.pose)
+    _scale_loads(joints, (MAX_PARTS / scale) ** 2)
     find_tension(first, n, joints, work, rod.tension, dt)
-    bound(nodes.x[first : first + elements], rod.corners)
     counts[2], counts[3] = steps, 1 if in_c else 0
     counts[4] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, rod.constants.max_speed[0]) else 0
