@@ -143,10 +143,25 @@ def act(handle: int, tree_table: Integers, axis_table: Integers, dt: float) -> N
             load_joints(trees, k)
         for i in range(begin, end):
             _bound(axes, trees, i, dt)
-        if handle != 0 and motors > 0:
+        trees.quiet[k] = trees.quiet[k] and _unchanged(axes, trees, k)
+        if handle == 0 or (trees.quiet[k] and trees.still[k]):
+            continue
+        if motors > 0:
             _send_motors(handle, trees, axes, k)
-        if handle != 0 and efforts > 0:
+        if efforts > 0:
             _send_efforts(handle, trees, axes, k)
+
+
+@inlined
+def _unchanged(axes: Axes, trees: Trees, k: int) -> bool:
+    """Whether Bullet has the motors of tree ``k``, and no effort acts on it."""
+    same = True
+    for i in range(trees.first[k], trees.first[k + 1]):
+        if axes.driven[i]:
+            same = same and axes.motor[i] == trees.last_motor[0, i] and axes.limit[i] == trees.last_motor[1, i]
+        if axes.pushed[i]:
+            same = same and trees.push[i] == 0.0
+    return same
 
 
 @inlined
@@ -225,6 +240,7 @@ def _send_motors(handle: int, trees: Trees, axes: Axes, k: int) -> None:
             set_velocity(command, at, axes.motor[i])
             set_gain(command, at, VELOCITY_GAIN)
             set_strength(command, at, axes.limit[i])
+            trees.last_motor[0, i], trees.last_motor[1, i] = axes.motor[i], axes.limit[i]
     submit(handle, command)
 
 

@@ -90,6 +90,7 @@ class Placement:
 
     def push(self, force: Array, point: Array | None = None) -> None:
         """Apply ``force`` (3,) at ``point`` (3,), default the centre of mass, for one tick."""
+        self.motions.rouse(self.tree)
         at = self.centre() if point is None else point
         pybullet.applyExternalForce(
             self.uid,
@@ -102,12 +103,14 @@ class Placement:
 
     def load(self, wrench: list[float]) -> None:
         """Apply force and torque (6,) at the centre of mass for one tick."""
+        self.motions.rouse(self.tree)
         at, uid, link, client = self.centre().tolist(), self.uid, self.link, self.client
         pybullet.applyExternalForce(uid, link, wrench[:3], at, pybullet.WORLD_FRAME, physicsClientId=client)
         pybullet.applyExternalTorque(uid, link, wrench[3:], pybullet.WORLD_FRAME, physicsClientId=client)
 
     def twist(self, torque: Array) -> None:
         """Apply ``torque`` (3,) for one tick."""
+        self.motions.rouse(self.tree)
         pybullet.applyExternalTorque(
             self.uid, self.link, torque.tolist(), pybullet.WORLD_FRAME, physicsClientId=self.client
         )

@@ -10,6 +10,9 @@ PyBullet.
 
 Bullet makes a box for every link, one without a shape too, and compares each with all others in every tick.
 `exclude_void` takes those that can never touch anything out of that; Bullet skips boxes without an owner.
+
+Bullet passes over a multibody whose colliders sleep: no acceleration, no motor, no limit. It puts nothing to sleep by
+itself here; `let_sleep` does so for one tick, and Bullet wakes what touches something that moves within that tick.
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from ligature.kernels import inlined
 
 Integers = NDArray[np.int64]
 
@@ -121,6 +126,18 @@ def whole_at(typing_context: Any, address: Any) -> Any:
     return types.int64(types.intp), build
 
 
+@intrinsic  # type: ignore[misc]
+def put_word(typing_context: Any, address: Any, value: Any) -> Any:
+    """Put the word of 64 bits ``value`` at an address."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = builder.inttoptr(arguments[0], ir.PointerType(ir.IntType(64)))
+        builder.store(arguments[1], place)
+        return context.get_dummy_value()
+
+    return types.void(types.intp, types.int64), build
+
+
 # --- handles ------------------------------------------------------------------------------------
 
 
@@ -182,6 +199,16 @@ _BOX = np.dtype(
 """A box of Bullet, `btSimpleBroadphaseProxy`; the k-th has the number k + 2."""
 
 
+_COLLIDER_BOX, _COLLIDER_STATE = 376, 424
+"""Where in what owns a box, a `btMultiBodyLinkCollider`, the address of its box is, and whether it sleeps."""
+
+_WAKES, _SLEEPS = 1, 2
+"""Bullet's `ACTIVE_TAG` and `ISLAND_SLEEPING`."""
+
+_MARK = 0x3FF0000000000000
+"""1.0, as a word: put after the state, where Bullet counts how long a collider rests and puts 0 as it wakes it."""
+
+
 def find_boxes(handle: int) -> int:
     """Address of the broad phase of a client that compares all pairs of boxes.
 
@@ -211,6 +238,37 @@ def exclude_void(boxes: int) -> int:
     void = (found["group"] == 0) & (found["mask"] == 0)
     found["owner"][void] = 0
     return int(void.sum())
+
+
+def find_sleepers(boxes: int) -> Integers:
+    """For each box of a broad phase, in order, where Bullet keeps whether its owner sleeps.
+
+    ``boxes`` is an address from `find_boxes`; all boxes still have their owners. There is none where this version of
+    PyBullet keeps it elsewhere.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    if not boxes:
+        return none
+    found = _boxes(boxes)
+    for k, owner in enumerate(found["owner"].tolist()):
+        box = found.ctypes.data + _BOX.itemsize * k
+        words = [_word(owner + at) for at in (_COLLIDER_BOX, _COLLIDER_STATE, _COLLIDER_STATE + 8)]
+        if not owner or words != [box, _WAKES, 0]:
+            return none
+    return found["owner"] + _COLLIDER_STATE
+
+
+@inlined
+def let_sleep(sleeper: int) -> None:
+    """Have what owns a box sleep in the coming tick, unless it touches what moves; see `slept`."""
+    put_word(sleeper, _SLEEPS)
+    put_word(sleeper + 8, _MARK)
+
+
+@inlined
+def slept(sleeper: int) -> bool:
+    """Whether what was to sleep in this tick did so."""
+    return real_at(sleeper + 8, 0) == 1.0
 
 
 def _boxes(at: int) -> NDArray[Any]:

@@ -62,6 +62,7 @@ class Collisions:
     def _set(self, body: int, other: int, collide: bool) -> None:
         a, b = self._engine.place_of[body], self._engine.place_of[other]
         pybullet.setCollisionFilterPair(a.uid, b.uid, a.link, b.link, int(collide), physicsClientId=self._engine.client)
+        self._engine.motions.rouse_all()
 
     def rebuild(self) -> None:
         """Begin anew in an engine that was rebuilt: only pairs of the scene do not collide."""

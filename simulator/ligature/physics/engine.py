@@ -18,7 +18,7 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
-from ligature.physics.bullet import connect, exclude_void, find_boxes
+from ligature.physics.bullet import connect, exclude_void, find_boxes, find_sleepers
 from ligature.physics.motions import Motions
 from ligature.physics.trees import Places
 from ligature.tables import table_of
@@ -109,7 +109,9 @@ class Engine:
         pybullet.setGravity(*self.gravity.tolist(), physicsClientId=self.client)
         self._restored: dict[tuple[int, Pose], Pose] = {}
         self.trees = [build(self.client, self.cache, scene, a, dt=self.dt) for a in scene.articulations]
-        self.motions = Motions(self.client, handle, self.trees)
+        self._colliders = [collider for tree in self.trees for collider in _colliders(self.client, tree)]
+        self._boxes = find_boxes(handle) if self.forgets else 0
+        self.motions = Motions(self.client, handle, self.trees, self._sleepers())
         self.place_of = {
             body: Placement(self.client, tree, scene.bodies[body], self.motions, k)
             for k, tree in enumerate(self.trees)
@@ -121,8 +123,6 @@ class Engine:
                 array[body] = value
         self.place_table = table_of(self.places)
         self.body_at = {(place.uid, place.link): body for body, place in self.place_of.items()}
-        self._colliders = [collider for tree in self.trees for collider in _colliders(self.client, tree)]
-        self._boxes = find_boxes(handle) if self.forgets else 0
         self.chunks: dict[int, list[tuple[int, int, int, int]]] = {}
         self.start = self.snapshot()
         self.restore(self.start)  # as every later start: Bullet turns what it makes by a last bit
@@ -142,6 +142,21 @@ class Engine:
             pybullet.setCollisionFilterGroupMask(uid, link, group, mask, physicsClientId=self.client)
         exclude_void(self._boxes)
         self.motions.begin()
+
+    def _sleepers(self) -> list[list[int]]:
+        """Where Bullet keeps whether the moving colliders of each tree sleep; none where they never may.
+
+        Gravity acts on a tree in every tick; loops and the chunks of volumes put bodies elsewhere.
+        """
+        found: dict[int, list[int]] = {tree.uid: [] for tree in self.trees}
+        places = find_sleepers(self._boxes)
+        restless = self.gravity.any() or self.scene.closures or self.scene.volumes
+        if len(places) == len(self._colliders) and not restless:
+            stands = {(tree.uid, -1) for tree in self.trees if tree.static}
+            for (uid, link, *_), place in zip(self._colliders, places.tolist(), strict=True):
+                if uid in found and (uid, link) not in stands:
+                    found[uid].append(place)
+        return list(found.values())
 
     def collide(self, uid: int, group: int, mask: int) -> None:
         """Set group and mask of the base of a multibody that was added to the scene's own."""

@@ -111,6 +111,7 @@ class Masses:
         pybullet.changeDynamics(
             place.uid, -1, mass=mass, localInertiaDiagonal=inertia.tolist(), physicsClientId=self._engine.client
         )
+        self._engine.motions.rouse(place.tree)
         arrays = self._engine.motions.trees
         arrays.mass[place.row], arrays.inertia[place.row] = mass, inertia
         extra = mass - place.body.mass

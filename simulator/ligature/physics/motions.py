@@ -40,11 +40,13 @@ class Motions:
         (r, 3) forces at the centres of mass, for `apply_gravity`.
     """
 
-    def __init__(self, client: int, handle: int, trees: Sequence[Tree]) -> None:
+    def __init__(self, client: int, handle: int, trees: Sequence[Tree], sleepers: Sequence[Sequence[int]]) -> None:
         self._client, self.handle = client, handle
         rows = np.cumsum([0, *(1 + len(tree.frames) for tree in trees)])
         axes = np.cumsum([0, *(len(tree.axes) for tree in trees)])
-        arrays = self.trees = kernels.trees(len(trees), int(rows[-1]), int(axes[-1]))
+        arrays = self.trees = kernels.trees(len(trees), int(rows[-1]), int(axes[-1]), sum(map(len, sleepers)))
+        arrays.sleepers[:] = [sleeper for found in sleepers for sleeper in found]
+        arrays.sleepers_begin[1:] = np.cumsum([len(found) for found in sleepers])
         arrays.uid[:] = [tree.uid for tree in trees]
         arrays.begin[:], arrays.first[:] = rows, axes
         arrays.going[:], arrays.turning[:] = [not tree.static for tree in trees], [bool(tree.axes) for tree in trees]
@@ -82,14 +84,25 @@ class Motions:
     def drive(self, tree: int, driven: NDArray[np.bool_]) -> None:
         """From now on motors drive the axes of a tree that are ``driven``: Bullet keeps the last effort of a motor."""
         self.trees.limp[self.slices[tree]] = ~driven
+        self.rouse(tree)
 
     def send(self, axis: int, effort: float | None) -> None:
         """From now on an axis of the world reports another effort than its motor's; None ends that."""
         self.trees.sent[axis], self.trees.sent_effort[axis] = effort is not None, effort or 0.0
+        self.rouse(int(np.searchsorted(self.trees.first, axis, side="right")) - 1)
 
     def measure(self, tree: int) -> None:
         """Fill `Trees.reaction` for the axes of a tree from now on."""
         self.trees.measured[tree] = True
+        self.rouse(tree)
+
+    def rouse(self, tree: int) -> None:
+        """Something acts on a tree: Bullet is not to pass over it in the coming tick."""
+        self.trees.quiet[tree] = False
+
+    def rouse_all(self) -> None:
+        """Something that is not a tree's own changes, as what collides or is welded."""
+        self.trees.quiet[:] = False
 
     # --- the tick ---------------------------------------------------------------------------
 
@@ -108,10 +121,12 @@ class Motions:
         self.forget_all()
 
     def forget(self, tree: int) -> None:
-        """A tree was put elsewhere."""
+        """A tree was put elsewhere; what rests on one that stands is to notice it."""
         self.trees.read[tree] = self.trees.linked[tree] = False
+        self.rouse(tree)
         if not self.trees.going[tree]:
             self._read_base(tree)
+            self.rouse_all()
 
     def forget_all(self) -> None:
         """Everything was put elsewhere."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import pybullet
 
+from ligature.physics.engine import Engine
+
 SHARE = 0.2
 """Part of an overlap that Bullet takes back in a tick, its default."""
 
@@ -19,10 +21,10 @@ EVERY = 10
 
 
 class Parting:
-    """The share of contacts of one Bullet client in ticks of ``dt``; `begin` after bodies were put somewhere."""
+    """The share of contacts of an engine's present client; `begin` after bodies were put somewhere."""
 
-    def __init__(self, client: int, dt: float) -> None:
-        self._client, self._dt = client, dt
+    def __init__(self, engine: Engine) -> None:
+        self._engine, self._client, self._dt = engine, engine.client, engine.dt
         self._ticks = 0
         self._share = SHARE
         self.begin()
@@ -47,6 +49,7 @@ class Parting:
         if share != self._share:
             self._share = share
             pybullet.setPhysicsEngineParameter(contactERP=share, physicsClientId=self._client)
+            self._engine.motions.rouse_all()
 
     def snapshot(self) -> tuple[int, float]:
         """What lasts from tick to tick."""

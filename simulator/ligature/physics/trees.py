@@ -25,9 +25,11 @@ from ligature.physics.bullet import (
     init_motion,
     init_state_request,
     init_step,
+    let_sleep,
     real_at,
     set_angular_velocity,
     set_linear_velocity,
+    slept,
     submit,
 )
 from ligature.tables import opener
@@ -53,6 +55,11 @@ class Trees(NamedTuple):
     measured: Flags  # (k,) whether Bullet measures what the joints carry
     read: Flags  # (k,) whether base and joints are those that Bullet has
     linked: Flags  # (k,) whether the links are where base and joints have them
+    quiet: Flags  # (k,) whether nothing but Bullet has acted on it since the last tick, and nothing acts otherwise
+    still: Flags  # (k,) whether the last tick, in which it was quiet, left it where it was, at rest
+    asleep: Flags  # (k,) whether Bullet passes over it in this tick
+    sleepers: Integers  # (c,) where Bullet keeps whether colliders sleep, tree by tree; none of trees that never may
+    sleepers_begin: Integers  # (k + 1,)
     ticks: Integers  # (1,) ticks since bodies were put where they began; before the first, no motor has an effort
     link: Integers  # (a,) Bullet's link of each axis
     limp: Flags  # (a,) whether no motor drives it
@@ -71,19 +78,23 @@ class Trees(NamedTuple):
     force: Array  # (r, 3) at the centres of mass
     load: Array  # (r, 6) scratch: force, and moment about the world's origin
     push: Array  # (a,)
+    before: Array  # (a,) scratch: positions before a tick
+    last_motor: Array  # (2, a) velocity and largest effort of the motors that Bullet has; NaN before it has any
     answer: Integers  # (5,) its own address, and where Bullet puts what `read_tree` asks for
     wanted: Array  # (9,) what is on its way to Bullet: a twist, or force, torque and point
     wanted_at: Integers  # (1,) its address
 
 
-def trees(count: int, rows: int, axes: int) -> Trees:
-    """Arrays for ``count`` trees with these numbers of rows and axes."""
+def trees(count: int, rows: int, axes: int, sleepers: int = 0) -> Trees:
+    """Arrays for ``count`` trees with these numbers of rows, axes and colliders that may sleep."""
     z, whole, no = np.zeros, np.int64, np.bool_
     answer, wanted = z(5, whole), z(9)
     answer[0] = answer.ctypes.data
     return Trees(
         uid=z(count, whole), begin=z(count + 1, whole), first=z(count + 1, whole), going=z(count, no),
         turning=z(count, no), measured=z(count, no), read=z(count, no), linked=z(count, no), ticks=z(1, whole),
+        quiet=z(count, no), still=z(count, no), asleep=z(count, no), sleepers=z(sleepers, whole),
+        sleepers_begin=z(count + 1, whole), before=z(axes), last_motor=np.full((2, axes), np.nan),
         link=z(axes, whole), limp=np.ones(axes, no), sent=z(axes, no), sent_effort=z(axes),
         rows=np.full((rows, 3), -1), fixed=z((rows, 17)), mass=z(rows), inertia=z((rows, 3)),
         pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)), speed=z((rows, 6)), joints=z((3, axes)),
@@ -97,7 +108,7 @@ open_trees = opener(trees(1, 1, 1))
 
 @inlined
 def read_tree(handle: int, trees: Trees, k: int) -> None:
-    """Read base and joints of tree ``k`` from Bullet; a base that stands is not read."""
+    """Read base and joints of tree ``k`` from Bullet, which have moved since; a base that stands is not read."""
     out = trees.answer[0]
     status = submit(handle, init_state_request(handle, trees.uid[k]))
     get_state(status, 0, 0, 0, 0, 0, out + 8, out + 16, out + 24, 0, out + 32, 0, 0)
@@ -131,20 +142,50 @@ def read_one(handle: int, table: Integers, k: int) -> None:
 def step_world(handle: int, table: Integers, limit: float) -> bool:
     """Advance Bullet by a tick, and read all trees; whether all speeds are finite and below ``limit``."""
     trees = open_trees(table)
+    for k in range(trees.uid.shape[0]):
+        trees.asleep[k] = trees.still[k] and trees.quiet[k]
+        if trees.asleep[k]:
+            for i in range(trees.sleepers_begin[k], trees.sleepers_begin[k + 1]):
+                let_sleep(trees.sleepers[i])
     submit(handle, init_step(handle))
+    for k in range(trees.uid.shape[0]):
+        trees.asleep[k] = trees.asleep[k] and slept(trees.sleepers[trees.sleepers_begin[k]])
     pass_tick(trees)
     for k in range(trees.uid.shape[0]):
         if not trees.read[k]:
-            read_tree(handle, trees, k)
+            _read_moved(handle, trees, k)
+        trees.quiet[k] = True
     return below(trees, limit)
 
 
 @inlined
+def _read_moved(handle: int, trees: Trees, k: int) -> None:
+    """Read tree ``k`` after a tick, and find out whether it moved in it."""
+    row, first, end = trees.begin[k], trees.first[k], trees.first[k + 1]
+    for a in range(7):
+        trees.wanted[a] = trees.pose[row, a]
+    for i in range(first, end):
+        trees.before[i] = trees.joints[0, i]
+    read_tree(handle, trees, k)
+    still = trees.quiet[k] and trees.sleepers_begin[k] < trees.sleepers_begin[k + 1]
+    for a in range(7):
+        still = still and trees.wanted[a] == trees.pose[row, a]
+    for a in range(6):
+        still = still and trees.twist[row, a] == 0.0
+    for i in range(first, end):
+        still = still and trees.before[i] == trees.joints[0, i] and trees.joints[1, i] == 0.0
+        if trees.measured[k]:  # Bullet adds to what joints carry, from 0 in every tick in which it does not sleep
+            for a in range(6):
+                still = still and trees.reaction[i, a] == 0.0
+    trees.still[k] = still
+
+
+@inlined
 def pass_tick(trees: Trees) -> None:
-    """A tick is over: what moves is elsewhere."""
+    """A tick is over: what does not sleep is elsewhere."""
     trees.ticks[0] += 1
     for k in range(trees.uid.shape[0]):
-        if trees.going[k] or trees.turning[k]:
+        if (trees.going[k] or trees.turning[k]) and not trees.asleep[k]:
             trees.read[k] = trees.linked[k] = False
 
 
@@ -206,6 +247,7 @@ def slow_down(handle: int, table: Integers, slowed: Integers, factors: Array) ->
             moves = moves or twist[a] != 0.0
             trees.wanted[a] = factors[i, a // 3] * twist[a]
         if moves:
+            trees.quiet[k] = False
             for a in range(6):
                 twist[a] = trees.wanted[a]
             command = init_motion(handle, trees.uid[k])
@@ -282,6 +324,7 @@ def push_bodies(handle: int, tree_table: Integers, place_table: Integers, bodies
 @inlined
 def _push(handle: int, trees: Trees, places: Places, body: int) -> int:
     """Bullet's command that applies the wanted force at the centre of mass of a body."""
+    trees.quiet[places.tree[body]] = False
     for a in range(3):
         trees.wanted[6 + a] = trees.pose[places.row[body], a]
     command = init_forces(handle)

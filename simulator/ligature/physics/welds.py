@@ -52,6 +52,7 @@ class Welds:
         """Remove a weld that `add` made."""
         weld = self._welds.pop(handle)
         pybullet.removeConstraint(weld.constraint, physicsClientId=self._engine.client)
+        self._engine.motions.rouse_all()
 
     @property
     def children(self) -> list[int]:
@@ -73,6 +74,7 @@ class Welds:
         """Take all welds out of Bullet, for `repeat` or `restore`."""
         for weld in self:
             pybullet.removeConstraint(weld.constraint, physicsClientId=self._engine.client)
+        self._engine.motions.rouse_all()
 
     def repeat(self) -> None:
         """Make all welds again in an engine that was rebuilt, or after `loosen`."""
@@ -91,6 +93,7 @@ class Welds:
             physicsClientId=client,
         )  # fmt: skip
         pybullet.changeConstraint(constraint, maxForce=WELD_FORCE, physicsClientId=client)
+        self._engine.motions.rouse_all()
         return int(constraint)
 
     def snapshot(self) -> tuple[int, dict[int, Weld]]:

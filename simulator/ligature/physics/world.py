@@ -136,7 +136,7 @@ class World(Subsystem):
         self._damping = Damping(engine)
         self._closures = Closures(engine)
         self._readout = Readout(engine.client, self.scene, engine.trees, engine.motions, engine.place_of)
-        self._parting = Parting(engine.client, self.dt)
+        self._parting = Parting(engine)
 
     def _begin(self) -> None:
         """Make ready to begin anew; in another Bullet client where this one would remember, or does not work.

@@ -1,0 +1,171 @@
+"""What is still sleeps in Bullet, which changes no bit: the same run in which nothing may sleep is the judge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import ligature
+import numpy as np
+import pytest
+from ligature import Simulation
+from ligature.model.commands import BodyCommand, CommandType
+from ligature.model.scene import Scene
+from ligature.physics import bullet, engine
+
+from tests.conftest import ROOT
+from tests.driving import Driver
+
+
+@pytest.fixture
+def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[[Scene], tuple[Simulation, Simulation]]:
+    """Two simulations of a scene, in the second of which nothing may sleep."""
+
+    def make(scene: Scene) -> tuple[Simulation, Simulation]:
+        first = Simulation(scene)
+        with monkeypatch.context() as patch:
+            patch.setattr(engine, "find_sleepers", lambda boxes: np.zeros(0, dtype=np.int64))
+            return first, Simulation(scene)
+
+    return make
+
+
+def _asleep(simulation: Simulation) -> list[bool]:
+    return simulation._world.engine.motions.trees.asleep.tolist()  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize("name", ["suturing_small", "needle_pick"])
+def test_arms_at_rest_sleep_and_wake_with_the_same_bits(
+    name: str, pair: Callable[[Scene], tuple[Simulation, Simulation]]
+) -> None:
+    scene = ligature.load(ROOT / "scenes" / name / "launch.yaml")
+    runs, slept = pair(scene), 0
+    taken = [simulation.snapshot() for simulation in runs]
+    for seed in range(3):
+        for simulation in runs:
+            Driver(scene, 30 + seed).run(simulation, 0, 40)
+        assert len({simulation.state_hash() for simulation in runs}) == 1
+        for simulation, snapshot in zip(runs, taken, strict=True):
+            simulation.reset() if seed else simulation.restore(snapshot)
+            simulation.step(60)
+        assert len({simulation.state_hash() for simulation in runs}) == 1
+        slept += sum(_asleep(runs[0]))
+        assert not any(_asleep(runs[1]))
+    assert slept, "nothing slept: PyBullet keeps it elsewhere, or something disturbs what is still"
+
+
+SMOOTH = (
+    "friction: {static: 0.4, rolling: 0}, restitution: 0.2, collision margin: 0.0001, inertial offset: {}, "
+    "gravity: {x: 0, y: 0, z: 0}, damping: {linear: 0.04, angular: 0.1}"
+)
+
+
+def _free_bodies(rng: np.random.Generator) -> str:
+    """A row of boxes and balls with gaps between them, a door on a hinge, and a wall that stands."""
+    names, parts = ["Wall", "Post", "Door"], []
+    parts.append(
+        f"Wall: {{name: Wall, mass: 0, collision shape: BOX, collision geometry: {{x: 0.02, y: 0.3, z: 0.3}}, {SMOOTH}, "
+        "location: {position: {x: -0.2, y: 0, z: 0}}}\n"
+    )
+    parts.append(
+        f"Post: {{name: Post, mass: 0, collision shape: BOX, collision geometry: {{x: 0.01, y: 0.01, z: 0.1}}, {SMOOTH}, "
+        "location: {position: {x: -0.1, y: -0.1, z: 0}}}\n"
+    )
+    parts.append(
+        f"Door: {{name: Door, mass: 0.3, collision shape: BOX, collision geometry: {{x: 0.01, y: 0.12, z: 0.1}}, {SMOOTH}, "
+        "inertia: {ix: 1e-4, iy: 1e-4, iz: 1e-4}, location: {position: {x: -0.1, y: 0, z: 0}}}\n"
+    )
+    x = 0.0
+    for k in range(4):
+        name, size = f"B{k}", float(rng.uniform(0.01, 0.03))
+        shape = (
+            f"collision shape: BOX, collision geometry: {{x: {size}, y: {size}, z: {size}}}"
+            if rng.integers(2)
+            else f"collision shape: SPHERE, collision geometry: {{radius: {size / 2}}}"
+        )
+        names.append(name)
+        x += size + float(rng.uniform(0.001, 0.004))
+        parts.append(
+            f"{name}: {{name: {name}, mass: {rng.uniform(0.05, 0.5)}, {shape}, {SMOOTH}, "
+            f"location: {{position: {{x: {x}, y: {rng.uniform(-0.002, 0.002)}, z: 0}}}}}}\n"
+        )
+        x += size / 2
+    joint = (
+        "joints: [Hinge]\nHinge: {name: Hinge, parent: Post, child: Door, type: revolute, "
+        "parent pivot: {x: 0, y: 0.01, z: 0}, child pivot: {x: 0, y: -0.09, z: 0}, parent axis: {x: 0, y: 0, z: 1}, "
+        "child axis: {x: 0, y: 0, z: 1}, joint limits: {low: -1.0, high: 1.0}, enable motor: 1}\n"
+    )
+    return f"namespace: /ambf/env/\nbodies: [{', '.join(names)}]\n" + "".join(parts) + joint
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_whatever_acts_on_what_is_still_wakes_it(
+    seed: int, tmp_path: Path, pair: Callable[[Scene], tuple[Simulation, Simulation]]
+) -> None:
+    rng = np.random.default_rng(seed)
+    (tmp_path / "model.yaml").write_text(_free_bodies(rng), encoding="utf-8")
+    scene = ligature.load(tmp_path / "model.yaml")
+    index = {body.identity.name: body.index for body in scene.bodies}
+    runs, welds, slept, woken = pair(scene), [[], []], 0, 0
+    for _ in range(12):
+        event = int(rng.integers(6))
+        free, other = (index[f"B{k}"] for k in rng.permutation(4)[:2])
+        aside = rng.uniform(-0.01, 0.01, 3)
+        push = np.concatenate([rng.uniform(-2, 2, 1), rng.uniform(-0.1, 0.1, 2), rng.uniform(-0.001, 0.001, 3)])
+        for simulation, held in zip(runs, welds, strict=True):
+            world = simulation._world
+            if event <= 1:
+                simulation.apply(BodyCommand(free, CommandType.FORCE, tuple(push.tolist())))
+            elif event == 2:
+                if held:
+                    world.welds.remove(held.pop())
+                else:
+                    T = np.linalg.inv(_frame(world.pose7(other))) @ _frame(world.pose7(free))
+                    T[:3, 3] += aside / 10
+                    held.append(world.welds.add(other, free, T, np.eye(4)))
+            elif event == 3:
+                pose = world.pose7(free)
+                pose[:3] += aside
+                world.set_pose(index["Wall"], pose)
+            elif event == 4:
+                simulation.apply(
+                    BodyCommand(index["Door"], CommandType.FORCE, (0.0,) * 6, (CommandType.FORCE,), (float(push[0]),))
+                )
+            else:
+                world.set_joint_position(0, float(aside[0] * 10))
+        for tick in range(50):
+            if tick == 3:
+                for simulation in runs:
+                    simulation.apply(BodyCommand(free, CommandType.FORCE, (0.0,) * 6))
+            before = _asleep(runs[0])
+            for simulation in runs:
+                simulation.step()
+            assert runs[0].state_hash() == runs[1].state_hash(), f"event {event}, tick {tick}"
+            now = _asleep(runs[0])
+            slept += sum(now)
+            woken += sum(a and not b for a, b in zip(before, now, strict=True))
+    assert slept > 100
+    assert woken > 3
+
+
+def _frame(pose: np.ndarray) -> np.ndarray:
+    """The frame (4, 4) of a pose (7,)."""
+    from scipy.spatial.transform import Rotation
+
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.from_quat(pose[3:]).as_matrix(), pose[:3]
+    return T
+
+
+def test_nothing_sleeps_where_bullet_keeps_it_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = ligature.load(ROOT / "scenes" / "needle_pick" / "launch.yaml")
+    monkeypatch.setattr(engine, "exclude_void", lambda boxes: 0)  # all boxes keep their owners
+    simulation = Simulation(scene)
+    boxes = simulation._world.engine._boxes
+    assert len(bullet.find_sleepers(boxes)) >= len(simulation._world.engine._colliders), "ghosts have boxes, too"
+    assert len(bullet.find_sleepers(0)) == 0
+    for name in ("_COLLIDER_BOX", "_COLLIDER_STATE"):
+        for shift in (-64, -8, 8, 16, 64):
+            with monkeypatch.context() as patch:
+                patch.setattr(bullet, name, getattr(bullet, name) + shift)
+                assert len(bullet.find_sleepers(boxes)) == 0, f"{name} {shift:+d}: another version of PyBullet"
