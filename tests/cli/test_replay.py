@@ -56,7 +56,7 @@ def test_a_record_ends_in_the_same_bits(recorded: Path) -> None:
 def test_a_record_becomes_a_dataset_of_the_run(recorded: Path, tmp_path: Path) -> None:
     console = Console(file=io.StringIO(), soft_wrap=True)
     assert replay(recorded, None, "", 1.0, console, Sampled(tmp_path / "run.h5")) == 0, console.file.getvalue()  # type: ignore[attr-defined]
-    assert "the episode is not judged: say with '--task'" in console.file.getvalue()  # type: ignore[attr-defined]
+    assert "the episode has no result: name its task with '--task'" in console.file.getvalue()  # type: ignore[attr-defined]
     with h5py.File(tmp_path / "run.h5") as file:
         episode = file["episode_0000"]
         assert not episode.attrs["judged"] and file.attrs["source"] == "recorded run"

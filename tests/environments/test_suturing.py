@@ -481,7 +481,7 @@ def test_an_action_is_its_numbers_whatever_their_type() -> None:
         ({"max_steps": 0}, ValueError, "max_steps is a number of actions, at least 1"),
         ({"max_steps": 1.5}, ValueError, "max_steps is a number of actions, at least 1"),
         ({"render_mode": "human"}, ValueError, "render_mode must be None or rgb_array"),
-        ({"observation": "image", "camera": "far"}, KeyError, "'far' does not name exactly one camera; there are"),
+        ({"observation": "image", "camera": "far"}, KeyError, "'far' does not name exactly one camera; choose one of"),
     ],
 )
 def test_options_that_cannot_be_are_rejected_at_once(options: dict, error: type[Exception], message: str) -> None:

@@ -90,12 +90,61 @@ def _free_bodies(rng: np.random.Generator) -> str:
             f"location: {{position: {{x: {x}, y: {rng.uniform(-0.002, 0.002)}, z: 0}}}}}}\n"
         )
         x += size / 2
+    # Bullet never wakes links that fixed joints hold to what stands, or to the first link of a tree
+    frame = rng.integers(3)  # the door hangs on its post, on a frame that is fixed to it, or has a handle fixed to it
+    hung, joints = ("Frame", "Hinge, Fix") if frame == 1 else ("Post", "Hinge, Fix" if frame else "Hinge")
+    if frame:
+        at, turn = ("{x: -0.1, y: -0.1, z: 0.1}", "Post") if frame == 1 else ("{x: -0.1, y: 0.06, z: 0.1}", "Door")
+        name = "Frame" if frame == 1 else "Handle"
+        names.append(name)
+        parts.append(
+            f"{name}: {{name: {name}, mass: 0.1, collision shape: BOX, collision geometry: {{x: 0.01, y: 0.01, z: 0.05}}, "
+            f"{SMOOTH}, inertia: {{ix: 1e-4, iy: 1e-4, iz: 1e-4}}, location: {{position: {at}}}}}\n"
+        )
     joint = (
-        "joints: [Hinge]\nHinge: {name: Hinge, parent: Post, child: Door, type: revolute, "
-        "parent pivot: {x: 0, y: 0.01, z: 0}, child pivot: {x: 0, y: -0.09, z: 0}, parent axis: {x: 0, y: 0, z: 1}, "
-        "child axis: {x: 0, y: 0, z: 1}, joint limits: {low: -1.0, high: 1.0}, enable motor: 1}\n"
+        f"joints: [{joints}]\nHinge: {{name: Hinge, parent: {hung}, child: Door, type: revolute, "
+        f"parent pivot: {{x: 0, y: 0.01, z: {-0.1 if frame == 1 else 0}}}, child pivot: {{x: 0, y: -0.09, z: 0}}, "
+        "parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}, joint limits: {low: -1.0, high: 1.0}, "
+        "enable motor: 1}\n"
     )
+    if frame:
+        pivot = "{x: 0, y: 0, z: 0.1}" if frame == 1 else "{x: 0, y: 0.06, z: 0.1}"
+        joint += (
+            f"Fix: {{name: Fix, parent: {turn}, child: {name}, type: fixed, parent pivot: {pivot}, "
+            "child pivot: {x: 0, y: 0, z: 0}, parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}}\n"
+        )
     return f"namespace: /ambf/env/\nbodies: [{', '.join(names)}]\n" + "".join(parts) + joint
+
+
+THROWN = """namespace: /ambf/env/
+bodies: [Ball, Post, Door, Part]
+Ball: {{name: Ball, mass: 0.1, collision shape: SPHERE, collision geometry: {{radius: 0.01}}, {smooth},
+  location: {{position: {{x: 0.1, y: 0.05, z: 0}}}}}}
+Post: {{name: Post, mass: 0, collision shape: BOX, collision geometry: {{x: 0.01, y: 0.01, z: 0.1}}, {smooth}}}
+Door: {{name: Door, mass: 0.3, collision shape: BOX, collision geometry: {{x: 0.01, y: 0.12, z: 0.1}}, {smooth},
+  inertia: {{ix: 1e-4, iy: 1e-4, iz: 1e-4}}, location: {{position: {{x: 0, y: 0.07, z: 0}}}}}}
+Part: {{name: Part, mass: 0.1, collision shape: BOX, collision geometry: {{x: 0.01, y: 0.01, z: 0.01}}, {smooth},
+  inertia: {{ix: 1e-4, iy: 1e-4, iz: 1e-4}}, location: {{position: {{x: 0, y: {part}, z: {high}}}}}}}
+joints: [Hinge, Fix]
+Hinge: {{name: Hinge, parent: {hung}, child: Door, type: revolute, parent pivot: {{x: 0, y: 0, z: {low}}},
+  child pivot: {{x: 0, y: -0.07, z: 0}}, parent axis: {{x: 0, y: 0, z: 1}}, child axis: {{x: 0, y: 0, z: 1}}}}
+Fix: {{name: Fix, parent: {held}, child: Part, type: fixed, parent pivot: {{x: 0, y: 0, z: {high}}},
+  child pivot: {{x: 0, y: 0, z: 0}}, parent axis: {{x: 0, y: 0, z: 1}}, child axis: {{x: 0, y: 0, z: 1}}}}
+"""
+
+
+@pytest.mark.parametrize(("hung", "held", "part"), [("Part", "Post", 0.0), ("Post", "Door", 0.07)])
+def test_a_door_with_a_fixed_joint_opens_as_a_ball_hits_it(hung: str, held: str, part: float, tmp_path: Path) -> None:
+    text = THROWN.format(smooth=SMOOTH, hung=hung, held=held, part=part, high=0.1, low=-0.1 if hung == "Part" else 0.0)
+    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+    simulation = Simulation(ligature.load(tmp_path / "model.yaml"))
+    simulation.step(20)
+    ball = simulation.bodies["Ball"]
+    ball.command_twist([-2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    simulation.step(5)
+    ball.release()
+    simulation.step(150)
+    assert abs(simulation.joints["Hinge"].position) > 0.05
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -199,8 +199,11 @@ _BOX = np.dtype(
 """A box of Bullet, `btSimpleBroadphaseProxy`; the k-th has the number k + 2."""
 
 
-_COLLIDER_BOX, _COLLIDER_STATE = 376, 424
-"""Where in what owns a box, a `btMultiBodyLinkCollider`, the address of its box is, and whether it sleeps."""
+_COLLIDER_BOX, _COLLIDER_FLAGS, _COLLIDER_STATE = 376, 408, 424
+"""Where in what owns a box, a `btMultiBodyLinkCollider`, the address of its box, its flags and whether it sleeps are."""
+
+_STANDS = 1
+"""Bullet's `CF_STATIC_OBJECT`: it never wakes such a collider."""
 
 _WAKES, _SLEEPS = 1, 2
 """Bullet's `ACTIVE_TAG` and `ISLAND_SLEEPING`."""
@@ -243,8 +246,8 @@ def exclude_void(boxes: int) -> int:
 def find_sleepers(boxes: int) -> Integers:
     """For each box of a broad phase, in order, where Bullet keeps whether its owner sleeps.
 
-    ``boxes`` is an address from `find_boxes`; all boxes still have their owners. There is none where this version of
-    PyBullet keeps it elsewhere.
+    It is 0 for an owner that stands. ``boxes`` is an address from `find_boxes`; all boxes still have their owners. There
+    is none where this version of PyBullet keeps it elsewhere.
     """
     none = np.zeros(0, dtype=np.int64)
     if not boxes:
@@ -255,7 +258,8 @@ def find_sleepers(boxes: int) -> Integers:
         words = [_word(owner + at) for at in (_COLLIDER_BOX, _COLLIDER_STATE, _COLLIDER_STATE + 8)]
         if not owner or words != [box, _WAKES, 0]:
             return none
-    return found["owner"] + _COLLIDER_STATE
+    stands = [bool((_word(owner + _COLLIDER_FLAGS) or 0) & _STANDS) for owner in found["owner"].tolist()]
+    return np.where(stands, 0, found["owner"] + _COLLIDER_STATE)
 
 
 @inlined

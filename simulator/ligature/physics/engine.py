@@ -156,7 +156,8 @@ class Engine:
             for (uid, link, *_), place in zip(self._colliders, places.tolist(), strict=True):
                 if uid in found and (uid, link) not in stands:
                     found[uid].append(place)
-        return list(found.values())
+        # Bullet takes a link as standing that a fixed joint holds to what stands or to the first link: it never wakes it
+        return [own if all(own) else [] for own in found.values()]
 
     def collide(self, uid: int, group: int, mask: int) -> None:
         """Set group and mask of the base of a multibody that was added to the scene's own."""

@@ -162,12 +162,16 @@ def step_world(handle: int, table: Integers, limit: float) -> bool:
 def _read_moved(handle: int, trees: Trees, k: int) -> None:
     """Read tree ``k`` after a tick, and find out whether it moved in it."""
     row, first, end = trees.begin[k], trees.first[k], trees.first[k + 1]
+    rested = True
     for a in range(7):
         trees.wanted[a] = trees.pose[row, a]
+    for a in range(6):
+        rested = rested and trees.twist[row, a] == 0.0
     for i in range(first, end):
         trees.before[i] = trees.joints[0, i]
+        rested = rested and trees.joints[1, i] == 0.0
     read_tree(handle, trees, k)
-    still = trees.quiet[k] and trees.sleepers_begin[k] < trees.sleepers_begin[k + 1]
+    still = rested and trees.quiet[k] and trees.sleepers_begin[k] < trees.sleepers_begin[k + 1]
     for a in range(7):
         still = still and trees.wanted[a] == trees.pose[row, a]
     for a in range(6):
