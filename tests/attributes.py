@@ -164,6 +164,11 @@ CACHES: dict[str, str] = {
     ),  # fmt: skip
     **dict.fromkeys(("Axes.motor", "Axes.limit"), "written by every tick before it is used"),
     **dict.fromkeys(("Trees.answer", "Trees.wanted_at"), "addresses of arrays"),
+    "Trees.sleepers": "addresses in Bullet's memory",
+    "Trees.before": "scratch",
+    "Trees.quiet": "a restore rouses all trees; the next tick decides anew",
+    **dict.fromkeys(("Trees.still", "Trees.asleep"), "decided anew by every tick, for trees that are quiet"),
+    "Trees.last_motor": "read for trees that are quiet alone: others are sent their motors",
     **dict.fromkeys(
         (
             "Engine.client",
@@ -198,6 +203,7 @@ CACHES: dict[str, str] = {
                 "J",
                 "row_of",
                 "rank",
+                "firm",
                 "B",
                 "scale",
                 "A",

@@ -490,7 +490,7 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot of this scene, taken here or elsewhere.
 
-        Raises ValueError, and changes nothing, for a snapshot of another scene.
+        Raises ValueError, and changes nothing, for a snapshot of a scene with other objects.
         """
         self._check_open()
         if not isinstance(snapshot, Snapshot):
@@ -532,7 +532,7 @@ class Simulation:
             raise RuntimeError("the simulation is closed; make a new one")
 
     def __reduce__(self) -> NoReturn:
-        """Copies and pickles are refused, for two would share one engine."""
+        """Copies and pickles are rejected, for two would share one engine."""
         raise TypeError("a simulation cannot be copied or pickled; restore its 'snapshot' in another of the same scene")
 
 

@@ -63,7 +63,7 @@ ROD = """<body name="rod" pos="0.2 0.1 1.5" euler="0 0.1 0"><joint name="swing" 
 
 def test_a_pendulum_has_the_rods_inertia_and_swings_with_its_period(load: Callable[..., tuple[Scene, str]]) -> None:
     scene, output = load(ROD)
-    assert "2 bodies, 1 joints" in output and "note" not in output  # the world's own body holds the joint
+    assert "2 bodies, 1 joint," in output and "note" not in output  # the world's own body holds the joint
     rod = next(b for b in scene.bodies if b.identity.key == "BODY rod")
     solid = capsule_properties(0.02, 0.54, 1000.0)
     assert rod.mass == pytest.approx(solid.mass, rel=1e-6)

@@ -68,8 +68,8 @@ def test_with_ros_nothing_is_missing() -> None:
 @pytest.mark.parametrize("module", sorted(missing.EXTRAS))
 def test_a_module_of_an_extra_is_reported_by_the_command_that_needs_it(module: str) -> None:
     code = (
-        f"import sys\nsys.modules[{module!r}] = None\nfrom ligature.cli import main\n"
-        f"def app():\n    import {module}\nmain.app = app\nmain.main()"
+        f"import sys\nsys.modules[{module!r}] = None\nfrom ligature.cli import command, main\n"
+        f"def app():\n    import {module}\nmain.app = app\ncommand.ligature()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 2 and "Traceback" not in done.stderr
@@ -77,6 +77,9 @@ def test_a_module_of_an_extra_is_reported_by_the_command_that_needs_it(module: s
 
 
 def test_an_error_of_our_own_is_not_taken_for_a_missing_package() -> None:
-    code = "from ligature.cli import main\ndef app():\n    import ligature.nowhere\nmain.app = app\nmain.main()"
+    code = (
+        "from ligature.cli import command, main\n"
+        "def app():\n    import ligature.nowhere\nmain.app = app\ncommand.ligature()"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 1 and "No module named 'ligature.nowhere'" in done.stderr

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import click
 import typer
 from typer.core import TyperCommand
 
@@ -26,13 +25,13 @@ def counted(number: int, one: str, more: str = "") -> str:
 class FiniteCommand(TyperCommand):
     """A command whose numbers are finite, at most `LARGEST`."""
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the words of a command line; raises `click.BadParameter` for a number that is not finite."""
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words of a command line; raises `typer.BadParameter` for a number that is not finite."""
         rest = super().parse_args(ctx, args)
         for parameter in self.params:
             value = ctx.params.get(parameter.name or "")
             if isinstance(value, float) and not math.fabs(value) <= LARGEST:
-                raise click.BadParameter(f"{value:g} is not a finite number up to {LARGEST:g}.", ctx, parameter)
+                raise typer.BadParameter(f"{value:g} is not a finite number up to {LARGEST:g}.", ctx, parameter)
         return rest
 
 

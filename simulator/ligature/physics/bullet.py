@@ -200,7 +200,7 @@ _BOX = np.dtype(
 
 
 _COLLIDER_BOX, _COLLIDER_FLAGS, _COLLIDER_STATE = 376, 408, 424
-"""Where in what owns a box, a `btMultiBodyLinkCollider`, the address of its box, its flags and whether it sleeps are."""
+"""Where in what owns a box, a `btMultiBodyLinkCollider`, address of the box, flags and state of sleep are."""
 
 _STANDS = 1
 """Bullet's `CF_STATIC_OBJECT`: it never wakes such a collider."""
@@ -246,8 +246,8 @@ def exclude_void(boxes: int) -> int:
 def find_sleepers(boxes: int) -> Integers:
     """For each box of a broad phase, in order, where Bullet keeps whether its owner sleeps.
 
-    It is 0 for an owner that stands. ``boxes`` is an address from `find_boxes`; all boxes still have their owners. There
-    is none where this version of PyBullet keeps it elsewhere.
+    It is 0 for an owner that stands. ``boxes`` is an address from `find_boxes`; all boxes still have their owners.
+    There is none where this version of PyBullet keeps it elsewhere.
     """
     none = np.zeros(0, dtype=np.int64)
     if not boxes:

@@ -156,7 +156,7 @@ class Engine:
             for (uid, link, *_), place in zip(self._colliders, places.tolist(), strict=True):
                 if uid in found and (uid, link) not in stands:
                     found[uid].append(place)
-        # Bullet takes a link as standing that a fixed joint holds to what stands or to the first link: it never wakes it
+        # Bullet takes a link that a fixed joint holds to what stands, or to the first link, as standing: it never wakes
         return [own if all(own) else [] for own in found.values()]
 
     def collide(self, uid: int, group: int, mask: int) -> None:

@@ -20,7 +20,7 @@ AROUND = 0.75
 
 
 def determinant(points: Array, seed: int = 0) -> int:
-    """The knot's determinant, |Delta(-1)|, of a closed polygon (n, 3): 1 without a knot, 3 for a trefoil.
+    """The determinant of the knot of a closed polygon (n, 3): 1 without a knot, 3 for a trefoil.
 
     From the crossings of its shadow on a random plane (Livingston, Knot Theory, 1993, chapter 3): in each, twice the
     arc that passes over less both that end below.

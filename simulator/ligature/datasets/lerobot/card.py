@@ -71,8 +71,8 @@ def card(
         *(f"| {k} | {phase or 'none'} | {gesture} |" for k, (phase, gesture) in enumerate(_phases(file))), "",
         "| number | activity of an arm |", "|---|---|",
         *(f"| {k} | {name} |" for k, name in enumerate(map(str, attributes["activities"]))), "",
-        "Grasps, releases, contacts, punctures, exits and drops are in `meta/events.jsonl`, a line each, at the first "
-        "sample at or after them.", "",
+        "Grasps, releases, contacts, punctures, exits and drops are in `meta/events.jsonl`, where the dataset has "
+        "them: a line each, at the first sample at or after them.", "",
         "## Limits", "",
         origin.limits, "",
     ]  # fmt: skip
