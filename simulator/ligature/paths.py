@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def reason(error: OSError) -> str:
-    """What the system says is wrong, without the number and the path that Python adds."""
+    """What the system reports, without the number and the path that Python adds."""
     return error.strerror or str(error)
 
 

@@ -56,7 +56,7 @@ def _run(module: str) -> None:
 
 
 def _end(error: OSError) -> NoReturn:
-    """End the command for what a file system says of a path of the user's, or of what is printed."""
+    """End the command for what a file system reports about a path of the user's, or of what is printed."""
     if error.filename is not None:  # too long a name, a full disk, no permission
         name = os.fsdecode(error.filename)
         _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")

@@ -92,8 +92,8 @@ class EventWatch:
 def _passed(before: _Moment, now: _Moment) -> tuple[bool, bool]:
     """Whether the needle's tip went in, and out, since.
 
-    Rigid holes: the first one that has it is where it went in, a further one where it came out. Soft tissue lists the
-    places of both: the first, third, ... went in.
+    Rigid holes: the first one that has it is where it went in, a further one where it came out, also where it goes on
+    to the next bite before it has left the last. Soft tissue lists the places of both: the first, third, ... went in.
     """
     rigid, had = ({hole for hole in moment.holes if hole >= 0} for moment in (now, before))
     new = rigid - had
