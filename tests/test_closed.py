@@ -73,15 +73,16 @@ def _box(folder: Path, names: list[str], x: float = 0.0) -> Path:
         lambda s: s.step(),
         lambda s: s.reset(),
         lambda s: s.snapshot(),
-        lambda s: s.state_hash(),
         lambda s: next(iter(s.bodies.values())).set_pose([0, 0, 0, 0, 0, 0, 1]),
         lambda s: next(iter(s.bodies.values())).release(),
     ],
 )
 def test_a_closed_simulation_reports_it(act: Callable[[Simulation], object], tmp_path: Path) -> None:
     simulation = Simulation(ligature.load(_box(tmp_path, ["a"])))
+    before = simulation.state_hash()
     simulation.close()
     simulation.close()
+    assert simulation.state_hash() == before
     with pytest.raises(RuntimeError, match="the simulation is closed"):
         act(simulation)
 

@@ -509,7 +509,6 @@ class Simulation:
 
         ``clock=False`` leaves out time and the number of resets, to compare with a run that began elsewhere.
         """
-        self._check_open()
         digest = hashlib.sha256()
         left_out = ("wall_time", "stamp", "update", *(() if clock else ("tick", "sim_time", "resets")))
         for name in sorted(self.state.dtype.names or ()):
@@ -521,7 +520,7 @@ class Simulation:
         return digest.hexdigest()
 
     def close(self) -> None:
-        """Let plug-ins end, and give the physics engine back; whatever needs it raises RuntimeError from then on."""
+        """End plug-ins and free the physics engine. Whatever needs it raises RuntimeError afterwards; the state remains."""
         self._closed = True
         self._plugins.close()
         self._world.close()
