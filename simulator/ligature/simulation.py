@@ -520,7 +520,7 @@ class Simulation:
         return digest.hexdigest()
 
     def close(self) -> None:
-        """End plug-ins and free the physics engine. Whatever needs it raises RuntimeError afterwards; the state remains."""
+        """End plug-ins and free the physics engine: what needs it raises RuntimeError afterwards; the state remains."""
         self._closed = True
         self._plugins.close()
         self._world.close()
