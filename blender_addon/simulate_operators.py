@@ -98,7 +98,7 @@ def progress(words):
         return f"Simulating: frame {frame} of {frames}", frame / frames
     if "compiling" in words:
         return "Compiling the simulator for this machine: 2 to 4 minutes, once", None
-    return "Starting the simulator; after an installation it compiles first, for 1 to 2 minutes", None
+    return "Starting the simulator; after an installation it compiles first, for 2 to 4 minutes", None
 
 
 def play(scene, identifiers, poses):
