@@ -24,6 +24,7 @@ from ligature.model.commands import (
     BodyCommand,
     Command,
     CommandType,
+    MarkPhase,
     ParentCommand,
     PlaceCommand,
     PluginCommand,
@@ -285,6 +286,7 @@ class Simulation:
             ArmCommand: self.arms.apply,
             PluginCommand: self._plugins.receive,
             WatchContacts: lambda c: self._touches.watch(c.enabled),
+            MarkPhase: lambda _: None,  # for who keeps the commands
             Release: self._release,
             Reset: lambda c: self.reset(bodies_only=c.bodies_only),
         }

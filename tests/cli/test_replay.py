@@ -14,6 +14,7 @@ from ligature.bus.record import Header, Record, RecordWriter
 from ligature.cli.options import RunOptions
 from ligature.cli.replay import replay
 from ligature.cli.sampling import Sampled, Sampling
+from ligature.model.commands import MarkPhase
 from ligature.robots.commands import VERBS, PlaceJp, ServoJp
 from rich.console import Console
 
@@ -81,6 +82,34 @@ def test_the_operator_says_how_a_run_went(recorded: Path, tmp_path: Path, succes
         assert episode["cameras/cameraR/rgb"].shape == (episode.attrs["samples"], 48, 64, 3)
         phases = [file.attrs["phases"][k] for k in episode["phase"][:]]
         assert set(phases) == {"idle"}, "an arm that was put somewhere, and is not homed, does not move"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_phases_that_the_operator_marked_label_the_samples(recorded: Path, tmp_path: Path, seed: int) -> None:
+    """Marks at random updates, some twice in one, with repetitions and ends: each sample has the newest before it."""
+    rng = np.random.default_rng(seed)
+    names = ["G1 reach", "g3 push", "rest", "", "G99 not a gesture"]
+    marks = sorted(
+        (int(update), names[k]) for update, k in zip(rng.integers(1, 99, 12), rng.integers(0, 5, 12), strict=True)
+    )
+    record, path = Record.read(recorded), tmp_path / "marked.record"
+    writer = RecordWriter(path, record.header)
+    entries = [*((u, i, c) for i, (u, c) in enumerate(record.commands)), *((u, 100, MarkPhase(p)) for u, p in marks)]
+    for update, _, command in sorted(entries, key=lambda entry: entry[:2]):
+        writer.write(update, command)
+    writer.finish(record.updates, record.end)
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    dataset = Sampled(tmp_path / "run.h5", Sampling(500.0, (64, 48), ()))
+    assert replay(path, None, "", 1.0, console, dataset) == 0, "marks change no bit"
+    with h5py.File(dataset.path) as file:
+        episode, phases = file["episode_0000"], list(file.attrs["phases"])
+        found = [phases[k] for k in episode["phase"][:]]
+        for time, phase in zip(episode["time"][:], found, strict=True):
+            before = [p for u, p in marks if u <= round(time / 2e-3)]
+            assert phase == (before[-1] if before else "")
+        assert set(episode["arms/PSM2/phase"][:]) == set(episode["phase"][:])
+        wanted = {"G1 reach": "G1", "g3 push": "G3", "rest": "", "": "", "G99 not a gesture": ""}
+        assert list(file.attrs["gestures"]) == [wanted[phase] for phase in phases]
 
 
 def test_a_changed_command_ends_in_other_bits(recorded: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ligature.bus.record import Record
 from ligature.cli.resimulation import resimulate
+from ligature.model.commands import MarkPhase
 
 from tests.cockpit.conftest import TIMEOUT, Person, Served, projected, tip, until
 from tests.waiting import stays, steady
@@ -70,10 +71,12 @@ def test_what_the_page_records_is_simulated_again_bit_for_bit(served: Served, op
     before = served.arm("PSM1")["measured_js"][0, 0]
     operator.drags(operator.slider("yaw °"), 8)
     until(lambda: abs(served.arm("PSM1")["measured_js"][0, 0] - before) > np.deg2rad(1.0), "the arm has moved")
+    until(lambda: marked(operator, "G3 push", "phase: G3 push"), "the page shows the phase")
     operator.clicks("Record")
     operator.sees("s to 'recordings/mine.record'")
     until(lambda: not operator.ticked("Record"), "the page shows that the recording has ended")
     record = Record.read(folder / "recordings" / "mine.record")
+    assert "G3 push" in [command.phase for _, command in record.commands if isinstance(command, MarkPhase)]
     again = resimulate(record, None)
     assert again.state_hash() == record.end
     assert again.state["arm"][0][served.names.index("PSM1")]["homed"]
@@ -81,6 +84,15 @@ def test_what_the_page_records_is_simulated_again_bit_for_bit(served: Served, op
     operator.clicks("Record")
     operator.sees("cannot record: 'recordings/mine.record' exists already; choose another name")
     assert [path.name for path in folder.rglob("*.*")] == ["mine.record"]
+
+
+def marked(operator: Person, phase: str, answer: str) -> bool:
+    """Whether the page answers so when that phase is marked."""
+    operator.writes("Phase", phase)
+    operator.clicks("Mark the phase")
+    with suppress(AssertionError):
+        until(lambda: answer in operator.text, answer, 10.0)
+    return answer in operator.text
 
 
 def test_the_gizmo_moves_the_tip(served: Served, operator: Person) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +143,51 @@ def without(bag: Path, path: Path, *topics: str) -> Path:
             if topic not in topics:
                 target.write(topic, message, stamp)
     return path
+
+
+def marked(bag: Path, path: Path, marks: Sequence[tuple[float, str]]) -> Path:
+    """The bag with phases marked some seconds after its beginning."""
+    from std_msgs.msg import String
+
+    with rosbag.Bag(str(without(bag, path))) as source:
+        first = source.get_start_time()
+    with rosbag.Bag(str(path), "a") as target:
+        for after, phase in marks:
+            target.write("/ligature/phase", String(phase), rospy.Time.from_sec(first + after))
+    return path
+
+
+def test_phases_that_the_operator_marked_label_a_bags_samples(made: tuple[Path, Path], tmp_path: Path) -> None:
+    bag = marked(made[0], tmp_path / "marked.bag", [(0.5, "G2 position"), (1.01, "wait"), (1.5, "G2 position")])
+    record_bag(bag, tmp_path / "bag.h5", RATE, size=SIZE, text="wave both arms", success=True)
+    with h5py.File(tmp_path / "bag.h5") as file:
+        assert (list(file.attrs["phases"]), list(file.attrs["gestures"])) == (
+            ["", "G2 position", "wait"],
+            ["", "G2", ""],
+        )
+        times, phases = file["episode_0000/time"][:], file["episode_0000/phase"][:]
+        changes = times[1:][np.diff(phases.astype(int)) != 0]
+        assert changes == pytest.approx([0.5, 1.01, 1.5], abs=1.01 / RATE)
+        assert [phases[0], *phases[1:][np.diff(phases.astype(int)) != 0]] == [0, 1, 2, 1]
+        assert (file["episode_0000/arms/PSM1/phase"][:] == phases).all()
+    sound(tmp_path / "bag.h5", tmp_path, OF_A_NEEDLE_AT_REST)
+
+
+@pytest.mark.parametrize(
+    ("marks", "message"),
+    [
+        (
+            [(0.1 + 0.001 * k, f"phase {k}") for k in range(256)],
+            "256 different phases were marked; a dataset has at most",
+        ),
+        ([(0.5, "two\nlines")], "a phase is printable text"),
+        ([(0.5, "x" * 300)], "a text has at most 200 bytes"),
+    ],
+)
+def test_phases_that_no_dataset_can_have_are_an_error(
+    made: tuple[Path, Path], tmp_path: Path, marks: list[tuple[float, str]], message: str
+) -> None:
+    assert message in reported(marked(made[0], tmp_path / "marked.bag", marks), tmp_path / "out.h5")
 
 
 def reported(bag: Path, out: Path, **options: Any) -> str:

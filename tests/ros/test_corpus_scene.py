@@ -21,6 +21,7 @@ EXTRA = {
     "/ligature/ready": "std_msgs/Bool",
     "/ligature/paused": "std_msgs/Bool",
     "/ligature/set_speed": "std_msgs/Float64",
+    "/ligature/phase": "std_msgs/String",
     "/ambf/env/World/Command/ResetBodies": "std_msgs/Empty",
     "/ambf/env/phantom/BlackGround1/State": "ambf_msgs/RigidBodyState",
     "/ambf/env/phantom/BlackGround1/Command": "ambf_msgs/RigidBodyCmd",

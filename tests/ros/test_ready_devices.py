@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ligature.model.frames import inverse, pose7_matrix
-from ligature.teleop.ready import names
+from ligature.teleop.ready import names, of_devices
 
 from tests.ros.conftest import BIN, Program
 from tests.waiting import until
@@ -132,6 +132,9 @@ class Terminal:
         with contextlib.suppress(BlockingIOError):  # what the device shows
             os.read(self._user, 1000)
 
+    def types(self, text: str) -> None:
+        os.write(self._user, text.encode())
+
     def close(self) -> None:
         os.close(self._user)
         os.close(self._end)
@@ -151,6 +154,18 @@ DRIVERS: dict[str, Callable[[Any, dict[str, Any]], Any]] = {
 PERIOD = 0.01
 WAY = 0.006
 """Metres that the tip is to go."""
+
+
+def marks_phases(terminal: Terminal, heard: Any, device: str) -> None:
+    """Keys of a terminal go forth and back through the phases of the device's configuration, and round."""
+    phases = of_devices([device]).phases
+    assert len(phases) > 2
+    keys = "p" * (len(phases) + 1) + "PPp"
+    wanted = [*phases, phases[0], phases[-1], phases[-2], phases[-1]]
+    for count, key in enumerate(keys, 1):
+        terminal.types(key)
+        until(lambda count=count: len(heard.messages) == count, lambda: f"{[m.data for m in heard.messages]}")
+    assert [message.data for message in heard.messages] == wanted
 
 
 def test_every_ready_device_has_a_driver_here() -> None:
@@ -193,6 +208,8 @@ def test_an_instrument_goes_to_the_right_with_its_user(
         assert np.linalg.norm(moved[1:]) < 0.2 * WAY, f"{device}: it went to {moved}"
         turned = inverse(begin) @ pose7_matrix(psm.setpoint_cp())
         assert np.trace(turned[:3, :3]) > 3.0 - 1e-3, "it did not turn"
+        if isinstance(driver, Terminal):
+            marks_phases(driver, listen("/ligature/phase", String), device)
     finally:
         program.end(20.0)
         driver.close()

@@ -72,6 +72,20 @@ def moved(node: Any) -> None:
     report.unregister()
 
 
+PHASES = ("G1 reach", "rest", "")
+
+
+def marked(node: Any) -> Any:
+    """Mark phases, and send between them what is none; returns the topic, which must stay until all has arrived."""
+    from std_msgs.msg import String
+
+    topic = node.Publisher("/ligature/phase", String, queue_size=10)
+    until(lambda: topic.get_num_connections() >= 2, "the simulator and the recorder")
+    for text in (PHASES[0], "two\nlines", f" {PHASES[1]} ", "x" * 300, PHASES[2]):
+        topic.publish(text)
+    return topic
+
+
 def away(node: Any) -> None:
     """PSM1 goes somewhere else."""
     from tests.ros.crtk import Psm
@@ -94,7 +108,9 @@ def session(ros_env: dict[str, str], node: Any, tmp_path_factory: pytest.TempPat
         recorder.wait_for("recording to")
         part = folder / "session.part.bag.active"
         until(part.exists, "the bag", 30.0)
+        phases = marked(node)
         moved(node)
+        phases.unregister()
         live = found.ligature("score", "insertion", "--json")
         assert live.returncode == 1, live.stdout + live.stderr
         assert json.loads(live.stdout)["measures"]["path_length_PSM1"] > 0.01
@@ -121,6 +137,17 @@ def test_the_bag_holds_everything(session: Session) -> None:
         "/ligature/tasks/insertion/score", "/surgical_robotics_challenge/completion_report/testers/task2",
     }  # fmt: skip
     assert wanted <= set(topics)
+
+
+def test_record_and_bag_hold_the_phases_that_were_marked(session: Session) -> None:
+    import rosbag
+    from ligature.bus.record import Record
+    from ligature.model.commands import MarkPhase
+
+    marks = [command.phase for _, command in Record.read(session.record).commands if isinstance(command, MarkPhase)]
+    assert marks == list(PHASES), "what is no phase is not among them"
+    with rosbag.Bag(str(session.bag)) as bag:
+        assert [message.data for _, message, _ in bag.read_messages(["/ligature/phase"])][:1] == [PHASES[0]]
 
 
 def test_the_record_simulated_again_ends_in_the_same_bits(session: Session) -> None:

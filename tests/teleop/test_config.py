@@ -48,6 +48,30 @@ def test_more_devices_than_arms_wait_until_they_are_reported_whom_to_drive() -> 
     assert read(GOOD).begins_with("pad") == ""
 
 
+def test_buttons_and_a_pedal_mark_phases_of_the_work() -> None:
+    text = GOOD.replace("{grey: clutch}", "{grey: phase, white: phase back}")
+    config = read(text + "phases: [G1 reach, drive]\nphase pedal: /footpedals/coag\n")
+    assert (config.phases, config.phase_pedal) == (("G1 reach", "drive"), "footpedals/coag")
+    assert (read(GOOD).phases, read(GOOD).phase_pedal) == ((), "")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (GOOD.replace("grey: clutch", "grey: phase"), "a button of pen marks phases, and there are none"),
+        (GOOD + "phase pedal: footpedals/coag\n", "the pedal marks phases, and there are none"),
+        (GOOD + "phases: reach\n", "phases must be a list"),
+        (GOOD + "phases: [reach, reach]\n", "'reach' is empty or listed twice"),
+        (GOOD + "phases: ['']\n", "'' is empty or listed twice"),
+        (GOOD + 'phases: ["a\\nb"]\n', "a phase is printable text"),
+        (GOOD + f"phases: [{'x' * 300}]\n", "a text has at most 200 bytes"),
+    ],
+)
+def test_phases_that_cannot_be_marked_are_an_error(text: str, message: str) -> None:
+    with pytest.raises(AdfError, match=message):
+        read(text)
+
+
 def test_a_fixed_camera_stands_in_the_world() -> None:
     config = read(GOOD.replace("camera: ECM", "camera: {position: [0, 0, 1], rpy: [3.14159265, 0, 0]}"))
     assert config.camera == ""

@@ -20,6 +20,9 @@ SLOTS = 1024
 RUN = -1
 """Number of an event that is about the run and no arm."""
 
+PHASE = "phase"
+"""Name of the event that an operator marked a phase of the work."""
+
 _CHARACTER = 12
 """Most bytes that JSON takes for a character: two escaped halves for one beyond the basic plane."""
 

@@ -14,10 +14,11 @@ import numpy as np
 
 from ligature.adf import Severity
 from ligature.bus import Block, Mailbox, Pace, Pacer, Recording, Throttle
+from ligature.bus.events import PHASE, RUN
 from ligature.cli.options import RunOptions
 from ligature.cli.process import Run, run_process
 from ligature.cli.recorder import Recorder
-from ligature.model.commands import Command
+from ligature.model.commands import Command, MarkPhase
 from ligature.model.messages import Message, handle
 from ligature.process import report
 from ligature.simulation import Simulation
@@ -92,6 +93,7 @@ class Loop:
             Throttle: self._pacer.throttle,
             Pace: self._pacer.pace,
             Recording: self._record,
+            MarkPhase: self._mark_phase,
             Command: self._simulate,
         }
         self._start = self._mark = time.monotonic()
@@ -142,6 +144,10 @@ class Loop:
 
     def _record(self, message: Recording) -> None:
         self._recorder.obey(self._updates + 1, message)
+
+    def _mark_phase(self, mark: MarkPhase) -> None:
+        self._simulate(mark)
+        self._block.events.write(RUN, PHASE, mark.phase)
 
     def _simulate(self, command: Command) -> None:
         try:

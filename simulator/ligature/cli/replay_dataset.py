@@ -12,7 +12,8 @@ from ligature.cli.resimulation import looks, resimulate
 from ligature.cli.sampling import Sampled
 from ligature.datasets import DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
-from ligature.datasets.labels import ACTIVITIES, ActivityWatch, phase_of
+from ligature.datasets.labels import ACTIVITIES, ActivityWatch, MarkedPhases, phase_of
+from ligature.model.commands import MarkPhase
 from ligature.tasks import Attempt
 
 NEEDS_REPORT = "pose_estimation"
@@ -22,8 +23,9 @@ NEEDS_REPORT = "pose_estimation"
 class _Sampler:
     """Watches a run that is simulated again; its writer belongs to ``files``."""
 
-    def __init__(self, dataset: Sampled, task: str, source: str, files: ExitStack) -> None:
+    def __init__(self, dataset: Sampled, task: str, source: str, marked: MarkedPhases, files: ExitStack) -> None:
         self._dataset, self._task, self._source, self._files = dataset, task, source, files
+        self._marked = marked
         self._writer: DatasetWriter | None = None
         self._attempt: Attempt | None = None
 
@@ -35,15 +37,21 @@ class _Sampler:
         state = simulation.state[0]
         if self._attempt is not None and looks(simulation):
             self._attempt.observe(state)
-        self._writer.sample(phase_of(self._activities.activities(state)))
+        self._writer.sample(self._phase(simulation))
+
+    def _phase(self, simulation: ligature.Simulation) -> str:
+        """What the operator marked; where nobody marked anything, what the arms do."""
+        if self._marked.names:
+            return self._marked.at(_updates(simulation))
+        return phase_of(self._activities.activities(simulation.state[0]))
 
     def _begin(self, simulation: ligature.Simulation) -> None:
         given, sampling = self._dataset, self._dataset.sampling
         self._attempt = Attempt(simulation.scene, self._task) if self._task else None
         self._activities = ActivityWatch(simulation.scene)
         writer = DatasetWriter(
-            given.path, simulation, sampling.cameras, sampling.size, sampling.rate, ACTIVITIES,
-            given.text or self._task, remarks={"source": self._source},
+            given.path, simulation, sampling.cameras, sampling.size, sampling.rate, self._marked.names or ACTIVITIES,
+            given.text or self._task, self._marked.gestures, {"source": self._source},
         )  # fmt: skip
         self._writer = self._files.enter_context(writer)
 
@@ -65,6 +73,11 @@ class _Sampler:
         return f"the episode is a {'success' if found else 'failure'}{': ' + why if why else ''}"
 
 
+def _updates(simulation: ligature.Simulation) -> int:
+    """Updates since the start of the run, as records count them."""
+    return round(simulation.time / simulation.dt) // simulation.ticks_per_update
+
+
 def sampled(record: Record, scene: Path | None, dataset: Sampled) -> tuple[ligature.Simulation, str]:
     """Simulate ``record`` again into ``dataset``; returns the simulation at its end, and how the episode went."""
     if dataset.task == NEEDS_REPORT:
@@ -72,6 +85,7 @@ def sampled(record: Record, scene: Path | None, dataset: Sampled) -> tuple[ligat
     recorded = RunOptions.from_text(record.header.options).task
     task = dataset.task or (recorded if recorded != NEEDS_REPORT else "")
     with interrupted_once(), ExitStack() as files:
-        sampler = _Sampler(dataset, task, "recorded run", files)
+        marks = [(update, command.phase) for update, command in record.commands if isinstance(command, MarkPhase)]
+        sampler = _Sampler(dataset, task, "recorded run", MarkedPhases(marks), files)
         simulation = resimulate(record, scene, sampler.watch)
         return simulation, sampler.finish()

@@ -40,6 +40,8 @@ def teleop(
             waits = "waits, and " if leader in wanted.waiting else ""
             followers = ", ".join(arms) or "the camera alone"
             console.print(f"{leader} ({wanted.devices[leader].kind}) {waits}drives {followers}", markup=False)
+        if wanted.phases:
+            console.print(f"phases: {', '.join(wanted.phases)}", markup=False)
         return 0
     uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if not master_answers(uri):

@@ -16,7 +16,7 @@ import numpy as np
 from viser import ClientHandle
 
 from ligature.bus import Block, Outbox
-from ligature.bus.events import RUN
+from ligature.bus.events import PHASE, RUN
 from ligature.cockpit.address import Address
 from ligature.cockpit.arm_facts import ArmFacts
 from ligature.cockpit.arm_panel import ArmControls, ArmStatus
@@ -99,6 +99,7 @@ class Cockpit:
         self._clockwork = Clockwork(self._outbox.push)
         self._speed = "1"
         self._record_as, self._recorded, self._reported = "", "", ""
+        self._phase = ""
         facts = [ArmFacts.of(scene, index) for index in range(len(scene.arms))]
         self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
         self._hands = Hands(facts, self._pursuits)
@@ -209,7 +210,14 @@ class Cockpit:
             for status in self._arms
         ]
         self._run_controls = SimulationControls(
-            client, self._panel, self._clockwork.paused, self._speed, self._recording, self._record_as, act
+            client,
+            self._panel,
+            self._clockwork.paused,
+            self._speed,
+            self._recording,
+            self._record_as,
+            self._phase,
+            act,
         )
         if self._sights:
             names = tuple(self._sights)
@@ -375,6 +383,8 @@ class Cockpit:
             self._record_as = str(value)
         elif word == "record":
             self._record(bool(value))
+        elif word == "phase":
+            self._mark(str(value))
         elif word == "sight":
             self._sight = value
         elif word == "cut":
@@ -493,6 +503,12 @@ class Cockpit:
         except ValueError as error:
             self._recorded = f"cannot record: {error}"
 
+    def _mark(self, phase: str) -> None:
+        try:
+            self._clockwork.mark(phase)
+        except ValueError as error:
+            self._recorded = f"cannot mark the phase: {error}"
+
     # --- what is shown -------------------------------------------------------------------------
 
     def _show_stage(self, now: float) -> float:
@@ -508,7 +524,9 @@ class Cockpit:
     def _show_words(self, now: float) -> float:
         state = self._state[0]
         for event in self._block.events.read():
-            if event.arm == RUN:
+            if event.arm == RUN and event.name == PHASE:
+                self._phase = str(event.value)
+            elif event.arm == RUN:
                 self._recorded = str(event.value)
             elif event.name in REPORTED:
                 self._arms[event.arm].note = str(event.value)
@@ -565,6 +583,8 @@ class Cockpit:
         p50, p99 = 1e3 * float(figures["tick_p50"][0]), 1e3 * float(figures["tick_p99"][0])
         lines = [f"update {p50:.2f} ms, p99 {p99:.2f} ms · {behind(float(figures['behind'][0]))}"]
         lines.append(f"commands {int(figures['received'][0])}, rejected {int(figures['rejected'][0])}")
+        if self._phase:
+            lines.append(f"phase: {self._phase}")
         if self._recorded or self._recording:
             lines.append(self._recorded or "recording")
         return lines

@@ -12,7 +12,7 @@ from viser import ClientHandle, GuiEvent, ViserServer
 from ligature.bus import Pace, Recording, Throttle
 from ligature.bus.codec import Message
 from ligature.bus.recording import SUFFIX, file_name
-from ligature.model.commands import Reset
+from ligature.model.commands import MarkPhase, Reset
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 STEPS = ("Step 1", "Step 10", "Step 100")
@@ -53,6 +53,12 @@ class Clockwork:
         """Record to the file ``name``, or to one with the date; raises ValueError for what is no name."""
         self._send(Recording(file_name(name) or time.strftime(f"%Y-%m-%d-%H%M%S{SUFFIX}")))
 
+    def mark(self, phase: str) -> None:
+        """Mark that a phase of the work begins; raises ValueError for what is no name of one."""
+        mark = MarkPhase(phase.strip())
+        mark.check()
+        self._send(mark)
+
     def end_record(self) -> None:
         """Record no longer."""
         self._send(Recording(""))
@@ -80,7 +86,7 @@ class SimulationControls:
 
     def __init__(
         self, client: ClientHandle, panel: SimulationPanel, paused: bool, speed: str, recording: bool,
-        record_as: str, act: Callable[[str, Any], None],
+        record_as: str, phase: str, act: Callable[[str, Any], None],
     ) -> None:  # fmt: skip
         self._act = act
         gui = client.gui
@@ -97,14 +103,19 @@ class SimulationControls:
             self._recorded: Any = gui.add_checkbox(
                 "Record", recording, hint="'ligature replay' simulates the recording again, bit for bit"
             )
+            self._phase: Any = gui.add_text(
+                "Phase", phase, hint="Phase of the work that begins next, such as 'G3 push the needle'; empty for none"
+            )
+            mark = gui.add_button("Mark the phase", hint="From now on recordings and their datasets have this label")
         self._paused.on_update(self._of("pause"))
         steps.on_click(self._of("step"))
         self._speed.on_update(self._of("speed"))
         reset.on_click(self._of("reset"))
         name.on_update(self._of("record as"))
         self._recorded.on_update(self._of("record"))
+        mark.on_click(self._mark)
         self._asked = 0.0
-        self._handles: list[Any] = [self._paused, steps, self._speed, reset, name, self._recorded]
+        self._handles: list[Any] = [self._paused, steps, self._speed, reset, name, self._recorded, self._phase, mark]
 
     def _of(self, word: str) -> Any:
         async def take(event: GuiEvent[Any]) -> None:
@@ -114,6 +125,10 @@ class SimulationControls:
                 self._act(word, event.target.value)
 
         return take
+
+    async def _mark(self, event: GuiEvent[Any]) -> None:
+        if event.client_id is not None:
+            self._act("phase", self._phase.value)
 
     def show_recording(self, recording: bool) -> None:
         """Whether the simulation records, once it has had time to do what was asked for."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import ligature
 from ligature.datasets.interrupts import interrupted_once
-from ligature.datasets.labels import ACTIVITIES, MOVING
+from ligature.datasets.labels import ACTIVITIES, MOVING, MarkedPhases
 from ligature.datasets.rows import EpisodeRows, add_actions
 from ligature.datasets.store import DatasetError, EpisodeStore
 from ligature.datasets.writer import FORMAT, JOINT_ROWS, POSE, WRENCH
@@ -120,7 +120,9 @@ def _describe(file: h5py.File, found: Session, rate: float, text: str) -> None:
     attributes = file.attrs
     attributes["format"], attributes["version"] = FORMAT, ligature.__version__
     attributes["scene"], attributes["rate"], attributes["task"] = "", rate, text
-    attributes["phases"], attributes["gestures"], attributes["activities"] = [""], [""], list(ACTIVITIES[:2])
+    marked = MarkedPhases(found.phases)
+    attributes["phases"], attributes["activities"] = ["", *marked.names], list(ACTIVITIES[:2])
+    attributes["gestures"] = ["", *(marked.gestures.get(phase, "") for phase in marked.names)]
     attributes["source"], attributes["recorded"] = "bag", True
     for name, arm in found.arms.items():
         about = file.create_group(f"arms/{name}").attrs
@@ -135,7 +137,10 @@ def _write_motion(episode: h5py.File, found: Session, stamps: Array, times: Arra
         episode.create_dataset(name, data=values, dtype=dtype).attrs.update(notes)
 
     add("time", times, "f8", units="s")
-    add("phase", np.zeros(len(times)), "u1")
+    marked = MarkedPhases(found.phases)
+    numbers = {phase: number for number, phase in enumerate(("", *marked.names))}
+    phases = [numbers[marked.at(stamp)] for stamp in stamps]
+    add("phase", phases, "u1")
     for name, arm in found.arms.items():
         for what, track in arm.tracks.items():
             joints, pose = what.endswith("_js"), what.endswith("_cp")
@@ -150,7 +155,7 @@ def _write_motion(episode: h5py.File, found: Session, stamps: Array, times: Arra
                 units=units,
                 axes=JOINT_ROWS if joints else POSE if pose else WRENCH,
             )
-        add(f"arms/{name}/phase", np.zeros(len(times)), "u1")
+        add(f"arms/{name}/phase", phases, "u1")
         add(f"arms/{name}/activity", _moves(arm.tracks["local_measured_cp"].at(stamps)[:, :3], times), "u1")
     if found.needle is not None:
         add("needle/pose", found.needle.at(stamps), "f4", units="m", axes=POSE)

@@ -6,7 +6,8 @@ MICCAI 2014, table 2).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import bisect
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,10 @@ GESTURES: Mapping[str, str] = {
 """Gestures of JIGSAWS by their numbers there, in our words."""
 
 
+MOST_PHASES = 255
+"""Of a dataset: a sample has the number of its phase in one byte."""
+
+
 class ActivityWatch:
     """Reads from states of ``scene`` what each of its arms does."""
 
@@ -61,6 +66,32 @@ class ActivityWatch:
         if body >= 0:
             return 4 if body in self._thread else 5
         return int(float(np.linalg.norm(state["arm"][arm]["local_measured_cv"][:3])) > MOVING)
+
+
+class MarkedPhases:
+    """Phases that an operator marked, in the order of their ``marks``: when each began, and its name, "" for none.
+
+    The first word of a phase may be the number of a gesture, as in "G3 push the needle". Raises ValueError for more
+    phases than a dataset can have.
+    """
+
+    def __init__(self, marks: Sequence[tuple[float, str]]) -> None:
+        self._times = [time for time, _ in marks]
+        self._marked = [phase for _, phase in marks]
+        self.names = tuple(dict.fromkeys(phase for phase in self._marked if phase))
+        if len(self.names) > MOST_PHASES:
+            raise ValueError(f"{len(self.names)} different phases were marked; a dataset has at most {MOST_PHASES}")
+
+    @property
+    def gestures(self) -> dict[str, str]:
+        """Gestures of JIGSAWS by the names of the phases that name one."""
+        numbers = {phase: phase.split()[0].upper() for phase in self.names}
+        return {phase: number for phase, number in numbers.items() if number in GESTURES}
+
+    def at(self, time: float) -> str:
+        """The phase at ``time``; empty before the first."""
+        place = bisect.bisect_right(self._times, time)
+        return self._marked[place - 1] if place else ""
 
 
 def phase_of(activities: list[int]) -> str:

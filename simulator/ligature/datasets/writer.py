@@ -19,7 +19,7 @@ import ligature
 from ligature.camera_simulation import Simulation
 from ligature.datasets.events import ARM_EVENTS, NEEDLE_EVENTS, EventWatch
 from ligature.datasets.interrupts import uninterrupted
-from ligature.datasets.labels import ACTIVITIES, GESTURES, ActivityWatch
+from ligature.datasets.labels import ACTIVITIES, GESTURES, MOST_PHASES, ActivityWatch
 from ligature.datasets.rows import EpisodeRows, add_actions
 from ligature.datasets.store import DatasetError, EpisodeStore
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
@@ -312,8 +312,8 @@ def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: 
         raise ValueError(f"rate must be above 0 and at most 1000 samples per simulated second, not {rate:g}")
     if min(size) < 1:
         raise ValueError(f"size is a width and a height in pixels, at least 1 each, not {size}")
-    if len(phases) > 255:
-        raise ValueError(f"a dataset has at most 255 phases, not {len(phases)}")
+    if len(phases) > MOST_PHASES:
+        raise ValueError(f"a dataset has at most {MOST_PHASES} phases, not {len(phases)}")
     for phase, gesture in gestures.items():
         if phase not in phases or gesture not in GESTURES:
             raise ValueError(

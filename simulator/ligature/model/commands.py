@@ -170,6 +170,20 @@ class WatchContacts(Command, code=9):
 
 
 @dataclass(frozen=True)
+class MarkPhase(Command, code=13):
+    """The operator tells which ``phase`` of the work begins; an empty text ends the present one.
+
+    Nothing in the simulation changes: records keep the mark, and datasets made from them have it as a label.
+    """
+
+    phase: str = wire(Text())
+
+    def check_together(self, counts: Mapping[str, int] | None) -> None:  # noqa: D102
+        if not self.phase.isprintable() or self.phase != self.phase.strip():
+            raise ValueError(f"a phase is printable text without spaces around it, not {self.phase[:40]!r}")
+
+
+@dataclass(frozen=True)
 class PluginCommand(Command, code=12):
     """Numbers for topic number ``topic`` of those that plug-in number ``plugin`` of the scene subscribes."""
 

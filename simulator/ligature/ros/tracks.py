@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pixels
 
+from ligature.model.commands import MarkPhase
 from ligature.ros import conversion
 from ligature.ros.bags import BagError, messages, opened, topics
 
@@ -24,6 +25,9 @@ CLOCK = "/World/State"
 """End of the topic that has simulated time."""
 
 NEEDLE = "/Needle/State"
+
+PHASE = "/ligature/phase"
+"""End of the topic by which operators mark phases."""
 
 EARLY = 1e-5
 """Seconds by which a message may be later than a sample that has it: stamps and simulated times are rounded."""
@@ -56,7 +60,8 @@ class ArmTracks:
 class Session:
     """Arms by their names, why others were left out, the needle's pose (n, 7), topics of cameras, and the clock.
 
-    ``clock`` has simulated seconds by stamps; without it stamps are the time.
+    ``clock`` has simulated seconds by stamps; without it stamps are the time. ``phases`` are the stamps and names of
+    those that the operator marked.
     """
 
     arms: Mapping[str, ArmTracks]
@@ -64,6 +69,7 @@ class Session:
     needle: Track | None
     cameras: Mapping[str, str]
     clock: Track | None
+    phases: tuple[tuple[float, str], ...] = ()
 
     def span(self) -> tuple[float, float]:
         """From when to when all arms report."""
@@ -131,6 +137,8 @@ def session(path: Path) -> Session:
         needle, clock = (min((t for t in found if t.endswith(end)), default="") for end in (NEEDLE, CLOCK))
         reads |= {topic: read for topic, read in ((needle, _pose), (clock, _sim_time)) if topic}
         tracks, joints = _tracks(path, messages(bag, list(reads)), reads)
+        marked = sorted(topic for topic in found if topic.endswith(PHASE))
+        phases = _phases(path, messages(bag, marked)) if marked else ()
     empty = [topic for each in arms.values() for topic in each.values() if topic not in tracks]
     if empty:
         raise BagError(f"{path}: has no message on {', '.join(empty)}")
@@ -140,7 +148,7 @@ def session(path: Path) -> Session:
             for name, each in arms.items()
         },
         {name: what for name, what in lacking.items() if what},
-        tracks.get(needle), _cameras(found), _clock(tracks.get(clock)),
+        tracks.get(needle), _cameras(found), _clock(tracks.get(clock)), phases,
     )  # fmt: skip
 
 
@@ -178,6 +186,21 @@ def _tracks(
         k = found[topic].values.shape[-1]
         joints[topic] = names if len(names) == k else tuple(f"joint_{j}" for j in range(k))
     return found, joints
+
+
+def _phases(path: Path, rows: Iterator[tuple[str, Any, float]]) -> tuple[tuple[float, str], ...]:
+    """When which phase was marked."""
+    marks = []
+    for topic, message, stamp in rows:
+        try:
+            mark = MarkPhase(message.data.strip())
+            mark.check()
+        except AttributeError:
+            raise BagError(f"{path}: {topic} has messages of the type {message._type}, not std_msgs/String") from None
+        except ValueError as error:
+            raise BagError(f"{path}: {topic}, {stamp:.3f} s: {error}") from None
+        marks.append((stamp, mark.phase))
+    return tuple(marks)
 
 
 def _stamp(message: Any, received: float) -> float:

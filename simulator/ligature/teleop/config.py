@@ -17,12 +17,13 @@ from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.nodes import Mapping as Block
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
 from ligature.adf.scalars import flag, number
+from ligature.model.commands import MarkPhase
 from ligature.model.frames import frame, rpy_matrix
 from ligature.paths import regular_file
 from ligature.teleop.calibration import Calibration, Unclear, axes_of_angles, axes_of_words
 from ligature.teleop.devices import KINDS, module
 from ligature.teleop.feedback import FeedbackSettings
-from ligature.teleop.handset import ACTIONS
+from ligature.teleop.handset import ACTIONS, MARKS
 from ligature.teleop.pairing import Settings
 
 Array = NDArray[np.float64]
@@ -76,7 +77,8 @@ class TeleopConfig:
     ``pairs`` are the followers that each device may drive, the first one first; those ``waiting`` drive none until they
     are selected. ``camera`` is the arm whose tip makes the view, or, when there is none, ``T_world_camera`` (4, 4) the
     view in the world. ``rcm_guard`` is the least distance of a tip from its remote centre in metres. ``notes`` are
-    lines for the user. ``proxies`` are the followers that are no arms.
+    lines for the user. ``phases`` are those of the work, which buttons mark one after the other, and so does the pedal
+    with the topic ``phase_pedal``. ``proxies`` are the followers that are no arms.
     """
 
     devices: Mapping[str, DeviceSpec]
@@ -89,6 +91,8 @@ class TeleopConfig:
     rcm_guard: float = 0.05
     notes: tuple[str, ...] = ()
     waiting: frozenset[str] = frozenset()
+    phases: tuple[str, ...] = ()
+    phase_pedal: str = ""
     proxies: Mapping[str, ProxySpec] = field(default_factory=dict)
 
     def begins_with(self, leader: str) -> str:
@@ -190,8 +194,8 @@ class _Reader:
     # --- parts
 
     def config(self, root: Block) -> TeleopConfig:
-        self.known(root, ("devices", "pairs", "settings", "camera", "camera scale", "enabled", "prefix", "rcm guard"),
-                   "a teleoperation")  # fmt: skip
+        self.known(root, ("devices", "pairs", "settings", "camera", "camera scale", "enabled", "prefix", "rcm guard",
+                          "phases", "phase pedal"), "a teleoperation")  # fmt: skip
         settings = self.settings(root, Settings())
         found = root.get("devices")
         if found is None:
@@ -211,6 +215,7 @@ class _Reader:
             extra["prefix"] = "/" + "".join(f"{part}/" for part in self.text(node, "prefix").split("/") if part)
         if (node := root.get("rcm guard")) is not None:
             extra["rcm_guard"] = self.number(node, "rcm guard", 0.0, 0.2)
+        extra.update(self.phases(root, devices))
         pairs, waiting = self.pairs(root, devices)
         return TeleopConfig(devices, pairs, waiting=waiting, notes=tuple(self._notes), **extra)
 
@@ -238,6 +243,30 @@ class _Reader:
                     )  # fmt: skip
             pairs[name] = followers
         return pairs, frozenset(waiting)
+
+    def phases(self, root: Block, devices: Mapping[str, DeviceSpec]) -> dict[str, Any]:
+        """The list of phases, and the pedal that marks them."""
+        listed, pedal = root.get("phases"), root.get("phase pedal")
+        phases = []
+        for node in self.items(listed, "phases") if listed is not None else []:
+            phases.append(self.text(node, "a phase").strip())
+            try:
+                MarkPhase(phases[-1]).check()
+            except ValueError as error:
+                raise self.fail(node.mark, str(error)) from None
+            if not phases[-1] or phases[-1] in phases[:-1]:
+                raise self.fail(node.mark, f"the phase '{phases[-1]}' is empty or listed twice", "name each phase once")
+        marking = next((name for name, spec in devices.items() if set(MARKS) & set(spec.buttons.values())), "")
+        if not phases and (pedal is not None or marking):
+            raise self.fail(
+                root.mark if pedal is None else pedal.mark,
+                f"{f'a button of {marking}' if marking else 'the pedal'} marks phases, and there are none",
+                "list them: 'phases: [reach, grasp, drive]'",
+            )
+        return {
+            "phases": tuple(phases),
+            "phase_pedal": self.text(pedal, "phase pedal").strip("/") if pedal is not None else "",
+        }
 
     def camera(self, node: Node) -> dict[str, Any]:
         if isinstance(node, Scalar):

@@ -25,10 +25,10 @@ class ConsoleTopics:
 
     Names are ``enable``, ``scale``, ``select`` and ``unselect`` with the name of a pair, ``pair`` with those of leader
     and follower (dVRK 2.3 and older), ``cycle`` with that of a leader, and the pedals ``clutch``, ``camera`` and
-    ``present``.
+    ``present``, and ``phase`` for that with the topic ``phase_pedal``, if it is not empty.
     """
 
-    def __init__(self, prefix: str, put: Put) -> None:
+    def __init__(self, prefix: str, put: Put, phase_pedal: str = "") -> None:
         root = f"{prefix}console/teleop"
         self._selected = rospy.Publisher(f"{root}/selected", String, latch=True, queue_size=10)
         self._unselected = rospy.Publisher(f"{root}/unselected", String, latch=True, queue_size=10)
@@ -44,6 +44,8 @@ class ConsoleTopics:
         for pedal, topics in PEDALS.items():
             for topic in topics:
                 self._listen(prefix + topic, Joy, _pedal(pedal, put))
+        if phase_pedal:
+            self._listen(prefix + phase_pedal, Joy, _pedal("phase", put))
 
     @staticmethod
     def _listen(topic: str, type_: type, take: Callable[[Any], None]) -> None:

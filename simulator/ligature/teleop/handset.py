@@ -9,9 +9,13 @@ from ligature.teleop.calibration import Calibration
 from ligature.teleop.devices.device import Reading
 from ligature.teleop.pairing import Hand
 
-ACTIONS = ("clutch", "camera", "close", "toggle", "next", "previous", "present")
+ACTIONS = ("clutch", "camera", "close", "toggle", "next", "previous", "present", "phase", "phase back")
 """What a button may do: ``close`` keeps the jaw closed while down, ``toggle`` opens or closes with each press, ``next``
-and ``previous`` select another follower, ``present`` means that the operator is there while down."""
+and ``previous`` select another follower, ``present`` means that the operator is there while down, ``phase`` and
+``phase back`` mark that the next or the previous phase of the work begins."""
+
+MARKS = {"phase": 1, "phase back": -1}
+"""Actions that mark phases, and by how many they go on in the list."""
 
 
 @dataclass(frozen=True)

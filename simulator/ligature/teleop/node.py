@@ -29,11 +29,12 @@ from ligature.teleop.devices import module
 from ligature.teleop.devices.device import Device, Reading
 from ligature.teleop.follower import Arm
 from ligature.teleop.frames import Frames
-from ligature.teleop.handset import Handset
+from ligature.teleop.handset import MARKS, Handset
 from ligature.teleop.haptics import Haptics, period_of, step_of
 from ligature.teleop.messages import pose_numbers
 from ligature.teleop.pair import MOST_SCALE, Pair
 from ligature.teleop.pairing import HOLDING, Status, Tip
+from ligature.teleop.phases import Phases
 from ligature.teleop.proxy import Proxy
 from ligature.teleop.record import Recorder, Replay
 from ligature.teleop.seat import Conflict, Leader, Seat
@@ -116,7 +117,8 @@ class Teleop:
         if config.T_world_camera is not None:
             self.frames.put("world", VIEW, config.T_world_camera, -1)
         self.pairs = {(name, arm): self._pair(name, arm) for name, arms in config.pairs.items() for arm in arms}
-        self._console = ConsoleTopics(config.prefix, self.put)
+        self._console = ConsoleTopics(config.prefix, self.put, config.phase_pedal)
+        self._phases = Phases(config.phases, config.prefix)
         self._camera_topics = CameraTopics(
             config.prefix + "_".join([*list(config.pairs)[:2], config.camera or "camera"]), config.camera_scale,
             lambda verb, value: self.put("drive camera", (verb, value)),
@@ -354,6 +356,8 @@ class Teleop:
                 self._take_camera(press.pressed, [name])
             elif press.action == "present":
                 self._on_present(press.pressed)
+            elif press.action in MARKS and press.pressed:
+                self._phases.go(MARKS[press.action])
 
     def _on_enable(self, on: bool) -> None:
         self._enabled = on
@@ -395,6 +399,10 @@ class Teleop:
 
     def _on_present(self, present: bool) -> None:
         self._present = present
+
+    def _on_phase(self, pressed: bool) -> None:
+        if pressed:
+            self._phases.go(1)
 
     def _on_drive_camera(self, value: tuple[str, Any]) -> None:
         verb, what = value

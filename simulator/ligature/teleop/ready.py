@@ -27,9 +27,10 @@ def of_devices(wanted: Sequence[str]) -> TeleopConfig:
     pairs: dict[str, tuple[str, ...]] = {}
     waiting: set[str] = set()
     first: TeleopConfig | None = None
+    phases: tuple[str, ...] = ()
     for text in wanted:
         found, topic = _one(text)
-        first = first or found
+        first, phases = first or found, phases or found.phases
         for name, spec in found.devices.items():
             own = next(each for each in (name, *(f"{name}{n}" for n in range(2, 100))) if each not in devices)
             devices[own] = replace(spec, name=own, topic=topic or spec.topic)
@@ -41,7 +42,7 @@ def of_devices(wanted: Sequence[str]) -> TeleopConfig:
             pairs[own] = (*free, *(arm for arm in followers if arm not in free))
     if first is None:
         raise ValueError(f"name a device; choose one of {', '.join(names())}")
-    return replace(first, devices=devices, pairs=pairs, waiting=frozenset(waiting))
+    return replace(first, devices=devices, pairs=pairs, waiting=frozenset(waiting), phases=phases)
 
 
 def _one(text: str) -> tuple[TeleopConfig, str]:

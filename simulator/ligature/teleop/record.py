@@ -80,7 +80,7 @@ class Replay:
 
 VALUES: dict[str, type] = {
     "enable": bool, "scale": float, "select": str, "unselect": str, "cycle": str, "clutch": bool, "camera": bool,
-    "present": bool,
+    "present": bool, "phase": bool,
 }  # fmt: skip
 """Events with one value, and its kind."""
 

@@ -1,8 +1,8 @@
 """The keys of the terminal: each press moves the hand by a step. Metres, radians.
 
 ``d a`` right and left, ``s w`` down and up, ``e q`` away and near; ``l j``, ``k i``, ``o u`` turn about these axes.
-The keys space, ``c`` and ``v`` are buttons that one press holds down and the next one lets go; tab is one that is
-down for a moment.
+The keys space, ``c`` and ``v`` are buttons that one press holds down and the next one lets go; tab, ``p`` and ``P``
+are down for a moment.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ OPTIONS: dict[str, Any] = {"step": 0.005, "turn": 0.05}
 MOVES = {"d": (0, 1), "a": (0, -1), "s": (1, 1), "w": (1, -1), "e": (2, 1), "q": (2, -1)}
 TURNS = {"l": (1, 1), "j": (1, -1), "k": (0, -1), "i": (0, 1), "o": (2, 1), "u": (2, -1)}
 SWITCHES = {" ": "space", "c": "c", "v": "v"}
-CLICKS = {"\t": "tab"}
+CLICKS = {"\t": "tab", "p": "p", "P": "P"}
 
 
 class Adapter(Device):
