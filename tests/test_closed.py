@@ -100,14 +100,16 @@ names = st.lists(st.sampled_from("abcd"), min_size=1, max_size=3, unique=True)
 
 
 @settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(first=names, second=names, ticks=st.integers(0, 20))
-def test_a_snapshot_fits_its_own_scene_alone(tmp_path: Path, first: list[str], second: list[str], ticks: int) -> None:
+@given(first=names, second=names, ticks=st.integers(0, 20), dt=st.sampled_from((1e-3, 1e-3, 2e-3)))
+def test_a_snapshot_fits_its_own_scene_and_tick_alone(
+    tmp_path: Path, first: list[str], second: list[str], ticks: int, dt: float
+) -> None:
     taken_of = Simulation(ligature.load(_box(tmp_path, first)))
-    other = Simulation(ligature.load(_box(tmp_path, second)))
+    other = Simulation(ligature.load(_box(tmp_path, second)), dt)
     taken_of.step(ticks)
     snapshot = pickle.loads(pickle.dumps(taken_of.snapshot()))
     before = other.state_hash()
-    if first == second:
+    if first == second and dt == taken_of.dt:
         other.restore(snapshot)
         assert other.state_hash() == taken_of.state_hash()
     else:

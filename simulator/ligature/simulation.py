@@ -236,7 +236,7 @@ class Simulation:
         self.phases = {name: Stopwatch() for name in PHASES}
         self.problems: list[Diagnostic] = []
         self._counts = object_counts(scene)
-        self._scene_digest = _digest_of(scene, self.state)
+        self._scene_digest = _digest_of(scene, self.state, dt)
         self._closed = False
         self._clock = Clock()
         self._watched = 0
@@ -492,13 +492,15 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot of this scene, taken here or elsewhere.
 
-        Raises ValueError, and changes nothing, for a snapshot of a scene with other objects.
+        Raises ValueError, and changes nothing, for a snapshot of a scene with other objects or of another tick.
         """
         self._check_open()
         if not isinstance(snapshot, Snapshot):
             raise TypeError(f"a {type(snapshot).__name__} is no snapshot; give what 'snapshot' returned")
         if snapshot.scene != self._scene_digest:
-            raise ValueError("the snapshot is of another scene; load the scene that it was taken of")
+            raise ValueError(
+                "the snapshot is of another scene or tick; restore it in a simulation made in the same way"
+            )
         parts = copied(dict(snapshot.parts))
         self._clock, self._resting = parts["clock"], parts["resting"]
         for n, subsystem in reversed(list(enumerate(self._subsystems))):
@@ -561,12 +563,12 @@ class Clock:
         state["update"] = self.tick // ticks_per_update
 
 
-def _digest_of(scene: Scene, state: StateRecord) -> str:
-    """SHA-256 of what a state's rows stand for: the objects of a scene in their order, and how many there are."""
+def _digest_of(scene: Scene, state: StateRecord, dt: float) -> str:
+    """SHA-256 of what a snapshot stands for: the objects of a scene in their order, how many, and seconds a tick."""
     objects = (scene.bodies, scene.joints, scene.ghosts, scene.sensors, scene.actuators, scene.cameras, scene.lights)
     names = [[item.identity.identifier for item in items] for items in objects]
     arms = [arm.name for arm in scene.arms]
-    return hashlib.sha256(repr((names, arms, state.dtype.descr)).encode("utf-8", "surrogatepass")).hexdigest()
+    return hashlib.sha256(repr((names, arms, state.dtype.descr, dt)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _digest(value: Any, update: Callable[[bytes], object]) -> None:

@@ -33,7 +33,7 @@ def started(
 ) -> subprocess.CompletedProcess[str]:
     """The command as a shell starts it with ``redirections``."""
     return subprocess.run(
-        ["bash", "-c", f'exec "$@" {redirections}', "bash", sys.executable, "-c", START.format(command), *words],
+        ["bash", "-c", f'set -o pipefail; "$@" {redirections}', "bash", sys.executable, "-c", START.format(command), *words],
         cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, pass_fds=pass_fds,
     )  # fmt: skip
 
@@ -97,6 +97,7 @@ def test_a_terminal_without_unicode_gets_every_line(
     (folder / "scene.yaml").write_text(BODY.replace("B", "手術é"), encoding="utf-8")
     monkeypatch.setenv("PYTHONIOENCODING", encoding)
     done = started(words, folder, "| LC_ALL=C cat -v")
+    assert done.returncode == 0, done.stdout + done.stderr
     assert "Traceback" not in done.stdout + done.stderr and "Error" not in done.stderr
     assert done.stdout.strip()
 
