@@ -6,9 +6,11 @@ same scene, commands and calls give the same bits.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import math
 import time as clock
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Generic, NoReturn, TypeVar
@@ -200,6 +202,27 @@ class JointHandle:
         return float(self._simulation.state["joint_effort"][0, self.joint.index])
 
 
+MOST_UNHELD = 8
+"""Simulations that nobody holds any more and that may wait to be freed."""
+
+_simulations: weakref.WeakSet[Simulation] = weakref.WeakSet()
+"""All that are in memory."""
+
+_crowd = MOST_UNHELD
+"""Number of `_simulations` at which those that nobody holds are freed."""
+
+
+def _free_unheld() -> None:
+    """Free simulations that nobody holds, once there are many.
+
+    Each is a cycle of references of 30 to 100 MB, and Python's collector goes by numbers of objects, not by their size.
+    """
+    global _crowd
+    if len(_simulations) >= _crowd:
+        gc.collect()
+        _crowd = max(MOST_UNHELD, 2 * len(_simulations))
+
+
 class Simulation:
     """A running scene.
 
@@ -229,6 +252,8 @@ class Simulation:
         for name, value in (("dt", dt), ("update", update)):
             if value is not None and not 0.0 < value < math.inf:
                 raise ValueError(f"{name} is {value}; it must be a number of seconds above 0")
+        _free_unheld()
+        _simulations.add(self)
         self.scene = scene
         self.dt = dt
         self.ticks_per_update = max(1, round((update or dt) / dt))
