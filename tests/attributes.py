@@ -36,8 +36,6 @@ CACHES: dict[str, str] = {
             "Rod._apart",
             "Rod._movable",
             "Rod._pushed",
-            "Rod._pushed_nodes",
-            "Rod._found",
             "Nodes.met",
             "Shapes.node",
         ),

@@ -35,10 +35,10 @@ KEPT = 30 * 24 * 3600.0
 """Seconds for which the machine code of a version is kept after the last start with it."""
 
 _PACKAGE = Path(__file__).parent
-_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic)\b", re.MULTILINE)
+_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic|unrolled)\b", re.MULTILINE)
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
-    "kernels.py", "model/state.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
+    "kernels.py", "unrolled.py", "model/state.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
     "tissue/contact_arrays.py",
 )  # fmt: skip
 """Sources without kernels whose contents are compiled into kernels."""

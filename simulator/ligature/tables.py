@@ -38,6 +38,20 @@ def _words(group: NamedTuple) -> list[int]:
     return words
 
 
+@intrinsic  # type: ignore[misc]
+def copy_into(typing_context: Any, target: Any, source: Any) -> Any:
+    """Copy a contiguous array over another of the same shape and type, both in compiled code."""
+    if not (isinstance(source, types.Array) and source.layout == "C" and target == source):
+        return None
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        to, origin = (make_array(target)(context, builder, value) for value in arguments)
+        cgutils.raw_memcpy(builder, to.data, origin.data, origin.nitems, origin.itemsize)
+        return context.get_dummy_value()
+
+    return types.void(target, source), build
+
+
 def opener(example: NamedTuple) -> Callable[[Any], Any]:
     """A function for compiled code that turns a table back into a group of the types of ``example``."""
     kind = typeof(example)

@@ -52,17 +52,18 @@ def _radial(x: float, y: float, z: float, radius: float, normal: Array) -> float
 
 @kernel
 def _box(size: Array, p: Array, normal: Array) -> float:
-    square = 0.0
+    square, outside = 0.0, 0
     deepest, axis = -1e30, 0
     for i in range(3):
         d = abs(p[i]) - 0.5 * size[i]
         normal[i] = 0.0
         if d > 0.0:
             square += d * d
+            outside += 1
             normal[i] = d if p[i] > 0.0 else -d
         if d > deepest:
             deepest, axis = d, i
-    if square > 0.0:
+    if outside > 1:  # over one face, the rule, neither root nor division is needed
         length = square**0.5
         for i in range(3):
             normal[i] /= length

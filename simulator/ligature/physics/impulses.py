@@ -35,11 +35,12 @@ class Impulses:
         A driven body feels it and moves as commanded.
         """
         total = self._total[body]
-        if body not in self._bodies:
+        if body in self._bodies:
+            total[:3] += impulse
+            total[3:] += moment
+        else:
             self._bodies.add(body)
-            total[:] = 0.0
-        total[:3] += impulse
-        total[3:] += moment
+            total[:3], total[3:] = impulse, moment
         if self._commands.pushable(body):
             self._load(body, impulse, moment)
 

@@ -9,277 +9,192 @@ moment),
 with X = [[1, -[r]], [0, -B]] of the lever r from the node's centre to the pivot. Eliminating nodes
 and joints in turn from the first to the last leaves 6 x 6 blocks alone: the block-tridiagonal solver
 of Deul et al. (Direct Position-Based Solver for Stiff Rods, 2018), written with the admittance Y of
-each node and the impedance Z of each joint, so that nodes of infinite mass (Y = 0) need no special
-case. Elimination goes from both ends to one node, the top, so that the motion of the nodes between the
-first that is loaded and the top follows from these nodes alone. World axes.
+each node and the impedance Z of each joint,
+
+    Y_i = (H_i + X'_i^T Z_(i-1) X'_i)^-1,    Z_i = (X_i Y_i X_i^T + a_i)^-1,
+
+so that nodes of infinite mass (Y = 0) need no special case. Elimination goes from both ends to one node, the top, so
+that the motion of the nodes between the first that is loaded and the top follows from these nodes alone. From the last
+node the equations are the same with X and X' exchanged and the sign of l reversed. So both ends are eliminated at
+once, one in each lane of a register (`ligature.unrolled`), as long as nodes are left on both sides.
+
+Of symmetric matrices only the lower half counts. World axes.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.unrolled import Flags, Matrix, Rows, cross_matrix, lower, symmetric, unrolled
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+Flagged = NDArray[np.bool_]
+
+HEAD, TAIL = 0, 1
+"""The sides of the top: what is eliminated from the first node on, and from the last."""
+
+_SIGN = np.array([1.0, -1.0])
+"""Sign of the joints' multipliers on either side."""
+
+
+def _inverse(A: Matrix) -> Matrix:
+    """Inverse of the symmetric positive definite ``A``: one row is swept after the other (Goodnight 1979)."""
+    for k in range(len(A)):
+        per, row = 1.0 / A[k, k], A[k].copy()
+        share = row * per
+        A = symmetric(A - np.outer(share, row))
+        A[k], A[:, k], A[k, k] = share, share, -per
+    return -A
+
+
+def _jacobian(r: Matrix, B: Matrix) -> Matrix:
+    """X: motion of the pivot, and turn in joint axes with the sign of the first node."""
+    return np.block([[np.eye(3), -cross_matrix(r)], [np.zeros((3, 3)), -B]])
+
+
+@unrolled(A=(6, 6), out=(6, 6))
+def _invert(row: Any, A: Rows, out: Rows) -> None:
+    out[row] = _inverse(symmetric(A[row]))
 
 
 @inlined
 def invert_spd6(A: Array, out: Array) -> None:
-    """Inverse of the symmetric positive definite ``A`` (6, 6) by L D Lᵀ; ``A`` is used up."""
-    for j in range(6):
-        for k in range(j):
-            s = A[j, k] * A[k, k]
-            for i in range(j, 6):
-                A[i, j] -= A[i, k] * s
-        s = 1.0 / A[j, j]
-        for i in range(j + 1, 6):
-            A[i, j] *= s
-    for j in range(6):
-        for i in range(j + 1, 6):
-            s = -A[i, j]
-            for k in range(j + 1, i):
-                s -= A[i, k] * out[k, j]
-            out[i, j] = s
-    for k in range(6):
-        pivot = 1.0 / A[k, k]
-        out[k, k] = pivot
-        for j in range(k):
-            A[k, j] = out[k, j]
-            out[k, j] *= pivot
-    for i in range(6):
-        for j in range(i + 1):
-            s = out[i, j]
-            for k in range(i + 1, 6):
-                s += A[k, i] * out[k, j]
-            out[i, j] = s
-            out[j, i] = s
+    """Inverse of the symmetric positive definite ``A`` (6, 6), of which the lower half counts."""
+    _invert(0, A, out)
+
+
+_BLOCKS = {
+    "fixed": (), "H": (6, 6), "lever": (3,), "B": (3, 3), "compliance": (6,), "Y": (6, 6), "Z": (6, 6), "c": (6,),
+    "g": (6,), "d": (6,), "load": (6,), "felt": (6, 6), "felt_load": (6,), "sign": (1,),
+}  # fmt: skip
+"""Shapes of the rows of a chain's arrays: nodes i, joints j, two levers of each joint, two sides."""
+
+
+@unrolled(**_BLOCKS)
+def _eliminate(
+    i: Any, j: Any, near: Any, far: Any, side: Any, fixed: Flags, H: Rows, lever: Rows, B: Rows, compliance: Rows,
+    felt: Rows, Y: Rows, Z: Rows,
+) -> None:  # fmt: skip
+    """Eliminate node ``i`` and joint ``j`` beyond it; ``felt`` is what the next node feels of them, X'^T Z X'."""
+    admittance = fixed.choose(i, _inverse(symmetric(H[i] + felt[side])), 0.0)
+    X, X_next = _jacobian(lever[near], B[j]), _jacobian(lever[far], B[j])
+    impedance = _inverse(X @ admittance @ X.T + np.diag(compliance[j]))
+    felt[side] = lower(X_next.T @ impedance @ X_next)
+    Y[i], Z[j] = lower(admittance), lower(impedance)
+
+
+@unrolled(**_BLOCKS)
+def _close(i: Any, head: Any, tail: Any, fixed: Flags, H: Rows, felt: Rows, Y: Rows) -> None:
+    """Eliminate the top ``i``, which feels both sides."""
+    Y[i] = lower(fixed.choose(i, _inverse(symmetric(H[i] + felt[head] + felt[tail])), 0.0))
+
+
+@unrolled(**_BLOCKS)
+def _advance(
+    i: Any, j: Any, near: Any, far: Any, side: Any, sign: Rows, lever: Rows, B: Rows, Y: Rows, Z: Rows, c: Rows | None,
+    g: Rows, felt_load: Rows, d: Rows, load: Rows,
+) -> None:  # fmt: skip
+    """Correct node ``i`` and joint ``j`` as if nothing lay beyond them; ``felt_load`` is what the next node feels."""
+    s = sign[side]
+    X, X_next = _jacobian(lever[near], B[j]), _jacobian(lever[far], B[j])
+    d[i] = moved = symmetric(Y[i]) @ (g[i] + felt_load[side])
+    gap = s * (X @ moved) if c is None else s * (X @ moved) + c[j]
+    load[j] = multiplier = -(symmetric(Z[j]) @ gap)
+    felt_load[side] = -s * (X_next.T @ multiplier)
+
+
+@unrolled(**_BLOCKS)
+def _turn_back(i: Any, head: Any, tail: Any, Y: Rows, g: Rows, felt_load: Rows, d: Rows) -> None:
+    """Correct the top ``i``, which feels both sides."""
+    d[i] = symmetric(Y[i]) @ (g[i] + felt_load[head] + felt_load[tail])
+
+
+@unrolled(**_BLOCKS)
+def _return(
+    i: Any, j: Any, following: Any, near: Any, far: Any, side: Any, sign: Rows, lever: Rows, B: Rows, Y: Rows, Z: Rows,
+    d: Rows, load: Rows,
+) -> None:  # fmt: skip
+    """Complete node ``i`` and joint ``j`` from the node ``following``, towards the top."""
+    s = sign[side]
+    X, X_next = _jacobian(lever[near], B[j]), _jacobian(lever[far], B[j])
+    load[j] = multiplier = load[j] + s * (symmetric(Z[j]) @ (X_next @ d[following]))
+    d[i] = d[i] + s * (symmetric(Y[i]) @ (X.T @ multiplier))
 
 
 @inlined
-def _carry_admittance(Y: Array, r: Array, B: Array, out: Array) -> None:
-    """X Y Xᵀ: the admittance of a node, felt at its pivot in the rows of the joint."""
-    rx, ry, rz = r[0], r[1], r[2]
-    for c in range(3):
-        # Columns of U = Yll - [r] Yal and V = Yla - [r] Yaa; U goes to the upper left, V to the upper right.
-        u, v = c, c + 3
-        out[0, u] = Y[0, u] - (ry * Y[5, u] - rz * Y[4, u])
-        out[1, u] = Y[1, u] - (rz * Y[3, u] - rx * Y[5, u])
-        out[2, u] = Y[2, u] - (rx * Y[4, u] - ry * Y[3, u])
-        out[0, v] = Y[0, v] - (ry * Y[5, v] - rz * Y[4, v])
-        out[1, v] = Y[1, v] - (rz * Y[3, v] - rx * Y[5, v])
-        out[2, v] = Y[2, v] - (rx * Y[4, v] - ry * Y[3, v])
-    for i in range(3):
-        vx, vy, vz = out[i, 3], out[i, 4], out[i, 5]
-        out[i, 0] += vy * rz - vz * ry
-        out[i, 1] += vz * rx - vx * rz
-        out[i, 2] += vx * ry - vy * rx
-        for j in range(3):
-            s = -(vx * B[j, 0] + vy * B[j, 1] + vz * B[j, 2])
-            out[i, 3 + j] = s
-            out[3 + j, i] = s
-    for j in range(3):
-        tx = B[j, 0] * Y[3, 3] + B[j, 1] * Y[4, 3] + B[j, 2] * Y[5, 3]
-        ty = B[j, 0] * Y[3, 4] + B[j, 1] * Y[4, 4] + B[j, 2] * Y[5, 4]
-        tz = B[j, 0] * Y[3, 5] + B[j, 1] * Y[4, 5] + B[j, 2] * Y[5, 5]
-        for i in range(j, 3):
-            out[3 + i, 3 + j] = tx * B[i, 0] + ty * B[i, 1] + tz * B[i, 2]
-
-
-@inlined
-def _add_impedance(Z: Array, r: Array, B: Array, H: Array, E: Array) -> None:
-    """H += Xᵀ Z X: the impedance of a joint, felt at the centre of the next node; ``E`` (6, 3) is scratch."""
-    rx, ry, rz = r[0], r[1], r[2]
-    for i in range(6):
-        ax, ay, az = Z[i, 0], Z[i, 1], Z[i, 2]
-        cx, cy, cz = Z[i, 3], Z[i, 4], Z[i, 5]
-        E[i, 0] = -(ay * rz - az * ry) - (cx * B[0, 0] + cy * B[1, 0] + cz * B[2, 0])
-        E[i, 1] = -(az * rx - ax * rz) - (cx * B[0, 1] + cy * B[1, 1] + cz * B[2, 1])
-        E[i, 2] = -(ax * ry - ay * rx) - (cx * B[0, 2] + cy * B[1, 2] + cz * B[2, 2])
-    for i in range(3):
-        for j in range(3):
-            H[i, j] += Z[i, j]
-            H[i, 3 + j] += E[i, j]
-            H[3 + j, i] += E[i, j]
-    for j in range(3):
-        H[3, 3 + j] += ry * E[2, j] - rz * E[1, j] - (B[0, 0] * E[3, j] + B[1, 0] * E[4, j] + B[2, 0] * E[5, j])
-        H[4, 3 + j] += rz * E[0, j] - rx * E[2, j] - (B[0, 1] * E[3, j] + B[1, 1] * E[4, j] + B[2, 1] * E[5, j])
-        H[5, 3 + j] += rx * E[1, j] - ry * E[0, j] - (B[0, 2] * E[3, j] + B[1, 2] * E[4, j] + B[2, 2] * E[5, j])
-
-
-@inlined
-def apply_lever(d: Array, r: Array, B: Array, out: Array) -> None:
-    """out = X d: motion of the pivot, and turn in joint axes with the sign of the first node."""
-    out[0] = d[0] - (r[1] * d[5] - r[2] * d[4])
-    out[1] = d[1] - (r[2] * d[3] - r[0] * d[5])
-    out[2] = d[2] - (r[0] * d[4] - r[1] * d[3])
-    for i in range(3):
-        out[3 + i] = -(B[i, 0] * d[3] + B[i, 1] * d[4] + B[i, 2] * d[5])
-
-
-@inlined
-def add_joint_force(load: Array, r: Array, B: Array, sign: float, out: Array) -> None:
-    """out += sign Xᵀ load: force and moment of a joint on a node's centre."""
-    fx, fy, fz = sign * load[0], sign * load[1], sign * load[2]
-    out[0] += fx
-    out[1] += fy
-    out[2] += fz
-    out[3] += r[1] * fz - r[2] * fy
-    out[4] += r[2] * fx - r[0] * fz
-    out[5] += r[0] * fy - r[1] * fx
-    for j in range(3):
-        out[3 + j] -= sign * (B[0, j] * load[3] + B[1, j] * load[4] + B[2, j] * load[5])
-
-
-@inlined
-def _times6(A: Array, v: Array, out: Array) -> None:
-    for i in range(6):
-        out[i] = A[i, 0] * v[0] + A[i, 1] * v[1] + A[i, 2] * v[2] + A[i, 3] * v[3] + A[i, 4] * v[4] + A[i, 5] * v[5]
-
-
-@inlined
-def _clear_admittance(compliance: Array, Z: Array) -> None:
-    for a in range(6):
-        for b in range(6):
-            Z[a, b] = 0.0
-        Z[a, a] = 1.0 / compliance[a]
-
-
-@inlined
-def _invert_node(fixed: bool, H: Array, Y: Array) -> None:
-    if fixed:
-        for a in range(6):
-            for b in range(6):
-                Y[a, b] = 0.0
-    else:
-        invert_spd6(H, Y)
-
-
-@inlined
-def _join(Y: Array, fixed: bool, r: Array, B: Array, compliance: Array, Z: Array, scratch: Array) -> None:
-    """Impedance ``Z`` of a joint with the eliminated node of admittance ``Y`` behind it, at its lever ``r``."""
-    if fixed:
-        _clear_admittance(compliance, Z)
-    else:
-        _carry_admittance(Y, r, B, scratch)
-        for a in range(6):
-            scratch[a, a] += compliance[a]
-        invert_spd6(scratch, Z)
+def _clear(out: Array) -> None:
+    for s in range(2):
+        out[s] = 0.0
 
 
 @kernel
 def factor(
-    n: int, top: int, fixed: Flags, H: Array, r_near: Array, r_far: Array, B: Array, compliance: Array, Y: Array,
-    Z: Array, scratch: Array,
+    n: int, top: int, fixed: Flagged, H: Array, lever: Array, B: Array, compliance: Array, Y: Array, Z: Array,
+    felt: Array,
 ) -> None:  # fmt: skip
     """Eliminate the chain's ``n`` nodes from both ends towards ``top``: fills ``Y`` (n, 6, 6), ``Z`` (n - 1, 6, 6).
 
-    ``H`` is used up. ``r_near[j]``, ``r_far[j]`` are the levers of joint j on its nodes j and j + 1; nodes with
-    ``fixed`` do not move.
+    ``lever`` (n - 1, 2, 3) are those of joint j on its nodes j and j + 1; nodes with ``fixed`` do not move. ``felt``
+    (2, 6, 6) is scratch.
     """
-    for i in range(top):
-        _invert_node(fixed[i], H[i], Y[i])
-        _join(Y[i], fixed[i], r_near[i], B[i], compliance[i], Z[i], scratch)
-        if not fixed[i + 1]:
-            _add_impedance(Z[i], r_far[i], B[i], H[i + 1], scratch)
-    for i in range(n - 1, top, -1):
-        j = i - 1
-        _invert_node(fixed[i], H[i], Y[i])
-        _join(Y[i], fixed[i], r_far[j], B[j], compliance[j], Z[j], scratch)
-        if not fixed[j]:
-            _add_impedance(Z[j], r_near[j], B[j], H[j], scratch)
-    _invert_node(fixed[top], H[top], Y[top])
+    _clear(felt)
+    pairs = min(top, n - 1 - top)
+    for i in range(pairs):
+        k = n - 1 - i
+        _eliminate((i, k), (i, k - 1), (2 * i, 2 * k - 1), (2 * i + 1, 2 * k - 2), (HEAD, TAIL), fixed, H, lever, B,
+                   compliance, felt, Y, Z)  # fmt: skip
+    for i in range(pairs, top):
+        _eliminate(i, i, 2 * i, 2 * i + 1, HEAD, fixed, H, lever, B, compliance, felt, Y, Z)
+    for k in range(n - 1 - pairs, top, -1):
+        _eliminate(k, k - 1, 2 * k - 1, 2 * k - 2, TAIL, fixed, H, lever, B, compliance, felt, Y, Z)
+    _close(top, HEAD, TAIL, fixed, H, felt, Y)
 
 
 @kernel
 def solve(
-    n: int, top: int, r_near: Array, r_far: Array, B: Array, Y: Array, Z: Array, c: Array, g: Array, d: Array,
-    load: Array, scratch: Array,
+    n: int, top: int, lever: Array, B: Array, Y: Array, Z: Array, c: Array, g: Array, d: Array, load: Array,
+    felt_load: Array,
 ) -> None:  # fmt: skip
     """Corrections ``d`` (n, 6) and multipliers ``load`` (n - 1, 6) for the rows ``c`` and loads ``g`` of the nodes.
 
-    ``top`` is that of `factor`; ``g`` is left as it came.
+    ``top`` is that of `factor`; ``felt_load`` (2, 6) is scratch.
     """
-    u, w, far = scratch[0], scratch[1], scratch[2]
-    for i in range(top):
-        for a in range(6):
-            w[a] = g[i, a]
-        if i > 0:
-            add_joint_force(load[i - 1], r_far[i - 1], B[i - 1], -1.0, w)
-        _times6(Y[i], w, d[i])
-        apply_lever(d[i], r_near[i], B[i], u)
-        for a in range(6):
-            u[a] = -(u[a] + c[i, a])
-        _times6(Z[i], u, load[i])
-    for i in range(n - 1, top, -1):
-        for a in range(6):
-            w[a] = g[i, a]
-        if i < n - 1:
-            add_joint_force(load[i], r_near[i], B[i], 1.0, w)
-        _times6(Y[i], w, d[i])
-        apply_lever(d[i], r_far[i - 1], B[i - 1], u)
-        for a in range(6):
-            u[a] -= c[i - 1, a]
-        _times6(Z[i - 1], u, load[i - 1])
-    for a in range(6):
-        w[a] = g[top, a]
-    if top > 0:
-        add_joint_force(load[top - 1], r_far[top - 1], B[top - 1], -1.0, w)
-    if top < n - 1:
-        add_joint_force(load[top], r_near[top], B[top], 1.0, w)
-    _times6(Y[top], w, d[top])
-    _substitute_back(0, top, r_near, r_far, B, Y, Z, d, load, u, w, far)
-    for i in range(top + 1, n):
-        j = i - 1
-        apply_lever(d[j], r_near[j], B[j], far)
-        _times6(Z[j], far, u)
-        for a in range(6):
-            load[j, a] -= u[a]
-            w[a] = 0.0
-        add_joint_force(load[j], r_far[j], B[j], -1.0, w)
-        _times6(Y[i], w, u)
-        for a in range(6):
-            d[i, a] += u[a]
-
-
-@inlined
-def _substitute_back(
-    low: int, top: int, r_near: Array, r_far: Array, B: Array, Y: Array, Z: Array, d: Array, load: Array, u: Array,
-    w: Array, far: Array,
-) -> None:  # fmt: skip
-    """Complete nodes and joints below ``top``, down to ``low``, from what is above them."""
-    for i in range(top - 1, low - 1, -1):
-        apply_lever(d[i + 1], r_far[i], B[i], far)
-        _times6(Z[i], far, u)
-        for a in range(6):
-            load[i, a] += u[a]
-            w[a] = 0.0
-        add_joint_force(load[i], r_near[i], B[i], 1.0, w)
-        _times6(Y[i], w, u)
-        for a in range(6):
-            d[i, a] += u[a]
+    _clear(felt_load)
+    pairs = min(top, n - 1 - top)
+    for i in range(pairs):
+        k = n - 1 - i
+        _advance((i, k), (i, k - 1), (2 * i, 2 * k - 1), (2 * i + 1, 2 * k - 2), (HEAD, TAIL), _SIGN, lever, B, Y, Z, c,
+                 g, felt_load, d, load)  # fmt: skip
+    for i in range(pairs, top):
+        _advance(i, i, 2 * i, 2 * i + 1, HEAD, _SIGN, lever, B, Y, Z, c, g, felt_load, d, load)
+    for k in range(n - 1 - pairs, top, -1):
+        _advance(k, k - 1, 2 * k - 1, 2 * k - 2, TAIL, _SIGN, lever, B, Y, Z, c, g, felt_load, d, load)
+    _turn_back(top, HEAD, TAIL, Y, g, felt_load, d)
+    for i in range(top - 1, pairs - 1, -1):
+        _return(i, i, i + 1, 2 * i, 2 * i + 1, HEAD, _SIGN, lever, B, Y, Z, d, load)
+    for k in range(top + 1, n - pairs):
+        _return(k, k - 1, k - 1, 2 * k - 1, 2 * k - 2, TAIL, _SIGN, lever, B, Y, Z, d, load)
+    for i in range(pairs - 1, -1, -1):
+        k = n - 1 - i
+        _return((i, k), (i, k - 1), (i + 1, k - 1), (2 * i, 2 * k - 1), (2 * i + 1, 2 * k - 2), (HEAD, TAIL), _SIGN,
+                lever, B, Y, Z, d, load)  # fmt: skip
 
 
 @kernel
 def solve_within(
-    low: int, top: int, r_near: Array, r_far: Array, B: Array, Y: Array, Z: Array, g: Array, d: Array, load: Array,
-    scratch: Array,
-) -> None:  # fmt: skip
+    low: int, top: int, lever: Array, B: Array, Y: Array, Z: Array, g: Array, d: Array, load: Array, felt_load: Array
+) -> None:
     """Corrections ``d`` of the nodes ``low`` … ``top`` for loads ``g`` on them alone; what lies outside yields along.
 
-    Outside, nothing is computed; ``load`` is scratch.
+    Outside, nothing is computed; ``load`` and ``felt_load`` are scratch.
     """
-    u, w, far = scratch[0], scratch[1], scratch[2]
-    for i in range(low, top + 1):
-        for a in range(6):
-            w[a] = g[i, a]
-        if i > low:
-            add_joint_force(load[i - 1], r_far[i - 1], B[i - 1], -1.0, w)
-        _times6(Y[i], w, d[i])
-        if i < top:
-            apply_lever(d[i], r_near[i], B[i], u)
-            for a in range(6):
-                u[a] = -u[a]
-            _times6(Z[i], u, load[i])
-    _substitute_back(low, top, r_near, r_far, B, Y, Z, d, load, u, w, far)
+    _clear(felt_load)
+    for i in range(low, top):
+        _advance(i, i, 2 * i, 2 * i + 1, HEAD, _SIGN, lever, B, Y, Z, None, g, felt_load, d, load)
+    _turn_back(top, HEAD, TAIL, Y, g, felt_load, d)
+    for i in range(top - 1, low - 1, -1):
+        _return(i, i, i + 1, 2 * i, 2 * i + 1, HEAD, _SIGN, lever, B, Y, Z, d, load)

@@ -123,6 +123,8 @@ def _touch_bodies(
                 continue
             if not turned:
                 matrix_of(pose[3], pose[4], pose[5], pose[6], R)
+                q = nodes.q[shapes.node[c]]
+                matrix_of(q[0], q[1], q[2], q[3], work.R[shapes.node[c]])
                 turned = True
             for e in range(g * GROUP, min(n, (g + 1) * GROUP)):
                 if not (_outside(work.box[e], shapes.box[c], sweep + work.thrown[e]) or shapes.skip[c, e]):
@@ -247,7 +249,7 @@ def _record(
 ) -> None:  # fmt: skip
     """Add the contact of element ``e`` at ``s`` with node ``k``, whose surface is at ``d`` along -normal.
 
-    ``inside`` is the depth of the point that node ``k`` keeps, below its skin.
+    ``inside`` is the depth of the point that node ``k`` keeps, below its skin. Both nodes have their matrix ``work.R``.
     """
     c, i = new.count[0], first + e
     new.count[0] = c + 1
@@ -260,9 +262,6 @@ def _record(
         start[0, a] = along
         start[1, a] = along - (d + inside) * new.normal[c, a]
     _to_local(nodes, work, i, start[0], local[0])
-    if k < first or k >= first + work.segment.shape[0]:
-        q = nodes.q[k]
-        matrix_of(q[0], q[1], q[2], q[3], work.R[k])
     _to_local(nodes, work, k, start[1], local[1])
     new.arm[c, 0], new.arm[c, 1] = -radius, inside
     gap = d - radius

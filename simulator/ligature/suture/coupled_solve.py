@@ -86,9 +86,7 @@ def _apply_coupling(rows: int, nodes: Nodes, touches: Touches, work: Work, p: Ar
 @inlined
 def _precondition(n: int, low: int, high: int, rows: int, work: Work, g: Array, d: Array) -> None:
     """d = S⁻¹ g: the chain by its direct solver, every body alone."""
-    solve_within(
-        low, high, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, g, d, work.coupled_load, work.six
-    )
+    solve_within(low, high, work.lever, work.B, work.Y, work.Z, g, d, work.coupled_load, work.felt_load)
     _move_bodies(n, rows, work, g, d)
 
 
@@ -132,8 +130,7 @@ def couple(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touche
     for i in range(low, high + 1):
         for a in range(6):
             work.g[i, a] -= felt[i, a]
-    solve(n, high, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, work.c, work.g, work.d, work.load,
-          work.six)  # fmt: skip
+    solve(n, high, work.lever, work.B, work.Y, work.Z, work.c, work.g, work.d, work.load, work.felt_load)
 
 
 @inlined

@@ -115,7 +115,7 @@ class Work(NamedTuple):
     B: Array  # (n - 1, 3, 3)
     c: Array  # (n - 1, 6)
     compliance: Array  # (n - 1, 6)
-    H: Array  # (N, 6, 6)
+    H: Array  # (N, 6, 6); of H, and of Y and Z of the chain, only the lower half counts
     Y: Array  # (N, 6, 6)
     Z: Array  # (n - 1, 6, 6)
     g: Array  # (N, 6)
@@ -127,7 +127,8 @@ class Work(NamedTuple):
     pushed: NDArray[np.bool_]  # (N,) bodies that contacts push
     K: Array  # (C, 3, 3) contact stiffness times dt²
     arms: Array  # (C, 2, 3) levers of each contact on its nodes
-    six: Array  # (6, 6)
+    felt: Array  # (2, 6, 6) what the next node feels of those eliminated on either side
+    felt_load: Array  # (2, 6)
     sum6: Array  # (6,)
     kept_x: Array  # (N, 3) state at the start of the tick, and so on
     kept_q: Array  # (N, 4)
@@ -168,7 +169,8 @@ class RodArrays(NamedTuple):
     shape_poses: Array  # (S, 7) as `Shapes.pose`, kept over a tick
     impulse: Array  # (N, 6) of the tick
     tension: Array  # (elements,) N
-    counts: NDArray[np.int64]  # (5,) what `ligature.suture.substeps.run_tick` returns
+    pushed: NDArray[np.int64]  # (N,) the nodes outside the rod that it pushed
+    counts: NDArray[np.int64]  # (6,) what `ligature.suture.substeps.run_tick` returns
 
 
 def rod_arrays(
@@ -180,7 +182,8 @@ def rod_arrays(
     return RodArrays(
         constants=Constants(*whole, *real), nodes=nodes, joints=joints, shapes=shapes, work=work,
         shape_poses=np.zeros_like(shapes.pose), impulse=np.zeros((len(nodes.mass), 6)),
-        tension=np.zeros(len(work.segment)), counts=np.zeros(5, np.int64),
+        tension=np.zeros(len(work.segment)), pushed=np.zeros(len(nodes.mass), np.int64),
+        counts=np.zeros(6, np.int64),
     )  # fmt: skip
 
 
@@ -222,7 +225,8 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
         Y=z((total, 6, 6)), Z=z((j, 6, 6)), g=z((total, 6)), d=z((total, 6)), load=z((j, 6)),
         cg=z((4, total, 6)), coupled_load=z((j, 6)), rows=np.zeros(total, np.int64),
-        pushed=np.zeros(total, np.bool_), K=z((contacts, 3, 3)), arms=z((contacts, 2, 3)), six=z((6, 6)),
+        pushed=np.zeros(total, np.bool_), K=z((contacts, 3, 3)), arms=z((contacts, 2, 3)), felt=z((2, 6, 6)),
+        felt_load=z((2, 6)),
         sum6=z(6), kept_x=z((total, 3)), kept_q=z((total, 4)), kept_v=z((total, 3)), kept_w=z((total, 3)),
         kept_angle=z((j, 3)), kept_load=z((j, 6)),
         three=z((3, 3)), segment=z((elements, 2, 3)), ahead=z((elements, 2, 3)), reach=z(elements),

@@ -190,16 +190,19 @@ def write_elements(
         tensions[b] = tension[e]
 
 
-@kernel
-def find_pushed(impulse: Array, nodes: Integers, out: Integers) -> int:
-    """How many of ``nodes`` (n,) have an ``impulse`` (N, 6); ``out`` (n,) receives their places among them."""
+@inlined
+def find_pushed(first: int, elements: int, met: Flags, impulse: Array, out: Integers) -> int:
+    """How many nodes outside a rod have an ``impulse`` (N, 6) and are ``met`` (N,); ``out`` (N,) lists them."""
     count = 0
-    for k in range(nodes.shape[0]):
+    for i in range(met.shape[0]):
+        if not met[i] or first <= i < first + elements:
+            continue
+        pushed = False
         for a in range(6):
-            if impulse[nodes[k], a] != 0.0:
-                out[count] = k
-                count += 1
-                break
+            pushed = pushed or impulse[i, a] != 0.0
+        if pushed:
+            out[count] = i
+            count += 1
     return count
 
 

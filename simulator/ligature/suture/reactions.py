@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined
-from ligature.suture.chain import add_joint_force
 from ligature.suture.coupling import lever_of
 from ligature.suture.layout import Joints, Touches, Work
 from ligature.suture.rotations import cross
@@ -17,14 +16,28 @@ Array = NDArray[np.float64]
 
 
 @inlined
+def _add_joint_force(load: Array, r: Array, B: Array, sign: float, out: Array) -> None:
+    """out += sign Xᵀ load: force and moment of a joint on a node's centre."""
+    fx, fy, fz = sign * load[0], sign * load[1], sign * load[2]
+    out[0] += fx
+    out[1] += fy
+    out[2] += fz
+    out[3] += r[1] * fz - r[2] * fy
+    out[4] += r[2] * fx - r[0] * fz
+    out[5] += r[0] * fy - r[1] * fx
+    for j in range(3):
+        out[3 + j] -= sign * (B[0, j] * load[3] + B[1, j] * load[4] + B[2, j] * load[5])
+
+
+@inlined
 def _joint_load(n: int, work: Work, joints: Joints, i: int, out: Array) -> None:
     """Total force and moment (6,) of the joints on the centre of chain node ``i``, times dt²."""
     for a in range(6):
         out[a] = 0.0
     if i < n - 1:
-        add_joint_force(joints.load[i], work.lever[i, 0], work.B[i], 1.0, out)
+        _add_joint_force(joints.load[i], work.lever[i, 0], work.B[i], 1.0, out)
     if i > 0:
-        add_joint_force(joints.load[i - 1], work.lever[i - 1, 1], work.B[i - 1], -1.0, out)
+        _add_joint_force(joints.load[i - 1], work.lever[i - 1, 1], work.B[i - 1], -1.0, out)
 
 
 @inlined

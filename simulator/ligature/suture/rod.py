@@ -21,7 +21,7 @@ from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import Attachment, RodDescription, frame_quaternions
 from ligature.suture.passages import Passages, passages
-from ligature.suture.placing import bounds, find_pushed, sound, write_elements
+from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.springs import read_other_loads, springs
 from ligature.suture.substeps import run_tick
@@ -151,25 +151,22 @@ class Rod:
         )  # fmt: skip
         self._table = table_of(self._arrays)
         self._permanent = [self._constraint_of(attachment) for attachment in others]
-        self._mobile = {p.body: p.mass > 0.0 for p in partners}
+        self._mobile = {self.node_of[p.body]: p.body for p in partners if p.mass > 0.0}
         self._fixed = {p.body: p.fixed for p in partners}
         self._near: list[int] | None = None
         self._met, self._motion = np.zeros((0, 2), np.int64), np.zeros((0, 13))
         self._apart: list[int] = []
         self._movable: list[tuple[int, int]] = []
-        self._pushed: list[tuple[int, int]] = []
-        self._pushed_nodes, self._found = np.zeros((2, 0), dtype=np.int64)
         self._pulled: dict[int, tuple[Array, float, Array]] = {}
         self._external: dict[int, tuple[Array, Array]] = {}
         self._attached = [attachment.body for attachment in description.attachments]
-        self._corners = np.zeros((2, 3))
+        self._positions, self._corners = self._nodes.x[self._own], np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
         self.take_passages(passages(1), 0)
         self.springs = springs()
         self._spring_table = table_of(self.springs)
         self.impulse, self.tension = self._arrays.impulse, self._arrays.tension
-        self.newton_steps, self.settled_soundly = 0, True
         self.reset()
 
     # --- building ---------------------------------------------------------------------------
@@ -218,7 +215,7 @@ class Rod:
         self._external.clear()
         self._constraint_rows = self._gather_constraints()
         self.tension[:], self.impulse[:] = 0.0, 0.0
-        self.newton_steps, self.settled_soundly = 0, True
+        self.newton_steps, self.settled_soundly, self._pushed = 0, True, 0
         self._clear_touches()
 
     def _clear_touches(self) -> None:
@@ -250,7 +247,7 @@ class Rod:
         for name in TOUCHES_KEPT:
             getattr(touches, name)[:n] = snapshot[f"touch_{name}"]
         put_back(self, {name: snapshot[name] for name in _KEPT})
-        self._near = None
+        self._near, self._pushed = None, 0
         self._constraint_rows = self._gather_constraints()
 
     def finite(self) -> bool:
@@ -270,7 +267,7 @@ class Rod:
     @property
     def positions(self) -> Array:
         """Centres of mass (n, 3) of the elements."""
-        return self._nodes.x[self._own]
+        return self._positions
 
     @property
     def orientations(self) -> Array:
@@ -402,7 +399,7 @@ class Rod:
 
     def box(self) -> Array:
         """Corners (2, 3) of a box around all centres of elements."""
-        bounds(self.positions, self._corners)
+        bounds(self._positions, self._corners)
         return self._corners
 
     def place(self, body: int, pose: Array, twist: Array) -> None:
@@ -438,9 +435,6 @@ class Rod:
         self._apart = [body for body in holding if body not in near]
         partners = [(body, self.node_of[body]) for body in (*near, *self._apart)]
         self._movable = [(body, node) for body, node in partners if not self._fixed[body]]
-        self._pushed = [(body, node) for body, node in partners if self._mobile[body]]
-        self._pushed_nodes = np.array([node for _, node in self._pushed], dtype=np.int64)
-        self._found = np.zeros(len(self._pushed), dtype=np.int64)
         self._nodes.met[self._chain :] = False
         self._nodes.met[[node for _, node in partners]] = True
 
@@ -502,8 +496,8 @@ class Rod:
 
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
-        count = find_pushed(self.impulse, self._pushed_nodes, self._found)
-        return [(body, self.impulse[node]) for body, node in (self._pushed[k] for k in self._found[:count].tolist())]
+        pushed = self._arrays.pushed[: self._pushed].tolist()
+        return [(self._mobile[node], self.impulse[node]) for node in pushed if node in self._mobile]
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds the impulse on each partner."""
@@ -517,7 +511,7 @@ class Rod:
             points, self._motion, self._met,
         )  # fmt: skip
         self._end_pushes(springs)
-        _, _, self.newton_steps, in_scratch, finite = self._arrays.counts.tolist()
+        _, _, self.newton_steps, in_scratch, self._pushed, finite = self._arrays.counts.tolist()
         self.settled_soundly = bool(finite)
         self._end_pulls()
         self._touches, self._touch_tables = _turned(self._touches, in_scratch), _turned(self._touch_tables, in_scratch)

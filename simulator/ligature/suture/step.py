@@ -245,11 +245,9 @@ def advance(
         add_passage_forces(passages, owner, nodes, work, elapsed, dt)
         add_springs(springs, nodes, work, dt)
         low, high, rows = gather(n, total, nodes, touches, work)
-        top = high if high >= 0 else n - 1
-        factor(n, top, nodes.fixed, work.H, work.lever[:, 0], work.lever[:, 1], work.B, work.compliance,
-               work.Y, work.Z, work.six)  # fmt: skip
-        solve(n, top, work.lever[:, 0], work.lever[:, 1], work.B, work.Y, work.Z, work.c, work.g, work.d,
-              work.load, work.six)  # fmt: skip
+        top = high if high >= 0 else n // 2
+        factor(n, top, nodes.fixed, work.H, work.lever, work.B, work.compliance, work.Y, work.Z, work.felt)
+        solve(n, top, work.lever, work.B, work.Y, work.Z, work.c, work.g, work.d, work.load, work.felt_load)
         if rows > 0:
             couple(n, low, high, rows, nodes, touches, work)
         changed = settle_contacts(nodes, touches, work, stiffness, dt)

@@ -16,7 +16,7 @@ from ligature.suture.contacts import detect
 from ligature.suture.crossing import free_share, shorten
 from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
 from ligature.suture.passages import Passages
-from ligature.suture.placing import sound
+from ligature.suture.placing import find_pushed, sound
 from ligature.suture.plasticity import set_bends
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
@@ -24,7 +24,7 @@ from ligature.suture.rotations import cross, turn
 from ligature.suture.springs import Springs, add_spring_impulses, begin_springs, open_springs
 from ligature.suture.step import advance, finish
 from ligature.suture.tracking import open_passages
-from ligature.tables import opener
+from ligature.tables import copy_into, opener
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -45,13 +45,6 @@ MAX_STEPS = 16
 
 
 @inlined
-def _copy2(a: Array, b: Array) -> None:
-    for i in range(a.shape[0]):
-        for k in range(a.shape[1]):
-            b[i, k] = a[i, k]
-
-
-@inlined
 def _place(nodes: layout.Nodes, motion: Array, met: Integers) -> None:
     """Set the nodes ``met[:, 1]`` to the motion of their bodies, rows ``met[:, 0]`` of ``motion`` (b, 13)."""
     for m in range(met.shape[0]):
@@ -64,22 +57,22 @@ def _place(nodes: layout.Nodes, motion: Array, met: Integers) -> None:
 
 @inlined
 def _keep(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
-    _copy2(nodes.x, work.kept_x)
-    _copy2(nodes.q, work.kept_q)
-    _copy2(nodes.v, work.kept_v)
-    _copy2(nodes.w, work.kept_w)
-    _copy2(joints.angle, work.kept_angle)
-    _copy2(joints.load, work.kept_load)
+    copy_into(work.kept_x, nodes.x)
+    copy_into(work.kept_q, nodes.q)
+    copy_into(work.kept_v, nodes.v)
+    copy_into(work.kept_w, nodes.w)
+    copy_into(work.kept_angle, joints.angle)
+    copy_into(work.kept_load, joints.load)
 
 
 @inlined
 def _take_back(nodes: layout.Nodes, joints: layout.Joints, work: layout.Work) -> None:
-    _copy2(work.kept_x, nodes.x)
-    _copy2(work.kept_q, nodes.q)
-    _copy2(work.kept_v, nodes.v)
-    _copy2(work.kept_w, nodes.w)
-    _copy2(work.kept_angle, joints.angle)
-    _copy2(work.kept_load, joints.load)
+    copy_into(nodes.x, work.kept_x)
+    copy_into(nodes.q, work.kept_q)
+    copy_into(nodes.v, work.kept_v)
+    copy_into(nodes.w, work.kept_w)
+    copy_into(joints.angle, work.kept_angle)
+    copy_into(joints.load, work.kept_load)
 
 
 @inlined
@@ -130,8 +123,8 @@ def run_tick(
     """One tick; contacts of the last one are in ``last``, those of this one go to ``next_``, or ``scratch``.
 
     Groups of arrays come as the tables of `ligature.tables`. `RodArrays.counts` returns: contacts found,
-    contacts for which there was no room, Newton steps, whether the contacts lie in ``scratch``, and whether all
-    elements are finite and slower than the maximum speed.
+    contacts for which there was no room, Newton steps, whether the contacts lie in ``scratch``, how many nodes
+    `RodArrays.pushed` lists, and whether all elements are finite and slower than the maximum speed.
     """
     rod, passages, springs = open_rod(rod_table), open_passages(passage_table), open_springs(spring_table)
     a, b, c = open_touches(last), open_touches(next_), open_touches(scratch)
@@ -140,7 +133,7 @@ def run_tick(
     first, dt = rod.constants.first[0], rod.constants.dt[0]
     _place(nodes, motion, met)
     _keep(nodes, joints, work)
-    _copy2(shapes.pose, rod.shape_poses)
+    copy_into(rod.shape_poses, shapes.pose)
     begin_passages(passages, owner)
     begin_springs(springs, nodes)
     for i in range(total):
@@ -152,8 +145,9 @@ def run_tick(
     steps = 0
     while done < MAX_PARTS:
         h = dt * size / MAX_PARTS
-        _scale_loads(joints, (size / scale) ** 2)
-        scale = size
+        if size != scale:
+            _scale_loads(joints, (size / scale) ** 2)
+            scale = size
         more, settled = _one_step(
             rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
         )
@@ -181,8 +175,10 @@ def run_tick(
         while done % (REFINEMENT * size) == 0:
             size *= REFINEMENT
     set_bends(joints)
-    _copy2(rod.shape_poses, shapes.pose)
-    _scale_loads(joints, (MAX_PARTS / scale) ** 2)
+    copy_into(shapes.pose, rod.shape_poses)
+    if scale != MAX_PARTS:
+        _scale_loads(joints, (MAX_PARTS / scale) ** 2)
     find_tension(first, n, joints, work, rod.tension, dt)
     counts[2], counts[3] = steps, 1 if in_c else 0
-    counts[4] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, rod.constants.max_speed[0]) else 0
+    counts[4] = find_pushed(first, elements, nodes.met, impulse, rod.pushed)
+    counts[5] = 1 if sound(first, elements, nodes.x, nodes.q, nodes.v, nodes.w, rod.constants.max_speed[0]) else 0
