@@ -13,7 +13,7 @@ from ligature.physics.engine import Engine
 SHARE = 0.2
 """Part of an overlap that Bullet takes back in a tick, its default."""
 
-PACE = 1.0
+PACE = 0.2
 """Speed in m/s at which bodies that overlap are pushed apart at most."""
 
 EVERY = 10

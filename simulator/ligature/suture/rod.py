@@ -20,10 +20,11 @@ from ligature.suture import layout
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import Attachment, RodDescription, frame_quaternions
+from ligature.suture.parting import depth_of, draw_out, find_inside
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
-from ligature.suture.springs import read_other_loads, springs
+from ligature.suture.springs import CAPACITY, read_other_loads, springs
 from ligature.suture.substeps import run_tick
 from ligature.tables import table_of
 
@@ -154,6 +155,8 @@ class Rod:
         self._mobile = {self.node_of[p.body]: p.body for p in partners if p.mass > 0.0}
         self._fixed = {p.body: p.fixed for p in partners}
         self._near: list[int] | None = None
+        self._lent = 0
+        """Springs that others have filled for the tick."""
         self._met, self._motion = np.zeros((0, 2), np.int64), np.zeros((0, 13))
         self._apart: list[int] = []
         self._movable: list[tuple[int, int]] = []
@@ -164,7 +167,7 @@ class Rod:
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
         self.take_passages(passages(1), 0)
-        self.springs = springs()
+        self.springs = springs(CAPACITY + n)
         self._spring_table = table_of(self.springs)
         self.impulse, self.tension = self._arrays.impulse, self._arrays.tension
         self.reset()
@@ -358,25 +361,35 @@ class Rod:
         K, load = self._external.get(element, (np.zeros((6, 6)), np.zeros(6)))
         self._external[element] = K + J.T @ stiffness @ J, load + J.T @ force
 
-    def _begin_pushes(self) -> int:
-        """Make springs of what `push` took, as many as there is room for; returns how many springs there were."""
+    def _begin_pushes(self) -> None:
+        """Make springs of what `push` took, as many as there is room for."""
         springs = self.springs
-        before = int(springs.filled[0])
         for element, (K, load) in self._external.items():
             row = int(springs.filled[0])
             if row < len(springs.node):
                 springs.node[row], springs.K[row], springs.load[row] = self._first + element, K, load
                 springs.filled[0] = row + 1
         self._external.clear()
-        return before
 
-    def _end_pushes(self, before: int) -> None:
-        """Remove the springs of pushes, which come after the first ``before``."""
-        if int(self.springs.filled[0]) == before:
+    def _end_pushes(self) -> None:
+        """Remove the springs of `push` and `draw_out`, which come after those of others."""
+        if int(self.springs.filled[0]) == self._lent:
             return
         for array in self.springs[1:]:
-            array[before : self.springs.filled[0]] = 0
-        self.springs.filled[0] = before
+            array[self._lent : self.springs.filled[0]] = 0
+        self.springs.filled[0] = self._lent
+
+    def find_inside(self, parts: NDArray[np.bool_], inside: NDArray[np.bool_]) -> None:
+        """Flag elements ``inside`` (S, n) the ``parts`` (S,) of `shapes` that they may collide with."""
+        find_inside(self._table, parts, inside)
+
+    def depth(self, part: int, element: int) -> float:
+        """How deep the axis of an element is in a part of `shapes`, in metres; below 0 outside."""
+        return float(depth_of(self._table, part, element))
+
+    def draw_out(self, never: NDArray[np.bool_], inside: NDArray[np.bool_]) -> bool:
+        """Push elements out of the parts that they are ``inside`` (S, n) in the coming tick; see `parting.draw_out`."""
+        return bool(draw_out(self._table, self._touch_tables[0], self._spring_table, never, inside, self.dt))
 
     def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
         """Set the gravity ``acceleration`` (3,) of an element from now on."""
@@ -415,6 +428,7 @@ class Rod:
 
     def meet(self, colliders: Colliders, near: list[int], bodies: Bodies) -> None:
         """Read the motion of the partners of this tick: those near, attached or grasping."""
+        self._lent = int(self.springs.filled[0])
         if near is not self._near:
             self._gather_partners(colliders, near)
         self._motion = colliders.motion
@@ -505,12 +519,12 @@ class Rod:
         if self._pads:
             self._find_grasped()
         constraints, points = self._constraint_rows
-        springs = self._begin_pushes()
+        self._begin_pushes()
         run_tick(
             self._table, last, next_, scratch, self._passage_table, self._owner, self._spring_table, constraints,
             points, self._motion, self._met,
         )  # fmt: skip
-        self._end_pushes(springs)
+        self._end_pushes()
         _, _, self.newton_steps, in_scratch, self._pushed, finite = self._arrays.counts.tolist()
         self.settled_soundly = bool(finite)
         self._end_pulls()
@@ -523,7 +537,7 @@ class Rod:
 
 NODES_KEPT = ("x", "q", "v", "w", "mass", "inertia", "gravity", "fixed")
 JOINTS_KEPT = ("angle", "load", "rest")
-TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "normal", "force", "start")
+TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "normal", "force", "start", "gap")
 """Arrays of nodes, joints and contact points that last from tick to tick."""
 
 _KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly")

@@ -114,9 +114,12 @@ class Rods:
         Threads that are attached to it alone move with it, at rest.
         """
         self.colliders.restart()
-        for rod in self.rods:
+        for rod, exclusions in zip(self.rods, self._exclusions, strict=True):
             if rod.hangs_on(body):
                 rod.carry(T)
+                exclusions.look()
+            else:
+                exclusions.look(self.colliders.parts_of(body))
 
     def pose7(self, body: int) -> Array:
         """Pose (7,) of an element's body frame now."""
@@ -187,7 +190,7 @@ class Rods:
         return found
 
     def _report_inside(self, number: int, found: list[tuple[int, int, float]]) -> None:
-        """Report the deepest of the overlaps in which an attached rod starts, once."""
+        """Report the deepest of the overlaps in which a rod starts, once."""
         if not found or self._reported[number]:
             return
         self._reported[number] = True
