@@ -1,14 +1,15 @@
 """Runs CoACD in a separate process, so that a crash, a hang or Ctrl-C in its native code affects nothing else.
 
-``python -m ligature.mesh.coacd_process INPUT OUTPUT SETTINGS PARENT``: INPUT is an npz file of ``vertices`` (n, 3) and
-``faces`` (m, 3), OUTPUT gets one array (k, 3) of vertices per convex piece, SETTINGS is a JSON
-object of keyword arguments of ``coacd.run_coacd``, PARENT the id of the process that waits: this one ends with it.
-Any length unit.
+``python -m ligature.mesh.coacd_process INPUT OUTPUT SETTINGS PARENT LIMIT``: INPUT is an npz file of ``vertices``
+(n, 3) and ``faces`` (m, 3), OUTPUT gets one array (k, 3) of vertices per convex piece, SETTINGS is a JSON object of
+keyword arguments of ``coacd.run_coacd``, PARENT the id of the process that waits: this one ends with it. LIMIT is the
+maximum processor time in seconds. Any length unit.
 """
 
 from __future__ import annotations
 
 import json
+import resource
 import sys
 
 import numpy as np
@@ -16,9 +17,10 @@ import numpy as np
 from ligature.process import end_with_parent
 
 
-def main(source: str, target: str, settings: str, parent: str) -> None:
+def main(source: str, target: str, settings: str, parent: str, limit: str) -> None:
     """Decompose the mesh of ``source`` into ``target``."""
     end_with_parent(int(parent))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 1))
     import coacd
 
     coacd.set_log_level("error")

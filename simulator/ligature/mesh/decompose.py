@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ligature.cache import cache_folder, write_atomically
 from ligature.mesh.inertia import hull_properties, mass_properties
 from ligature.mesh.mesh import Array, Mesh
-from ligature.mesh.surface import convex_surface, hull_vertices, joined
+from ligature.mesh.surface import convex_surface, extent_rank, hull_vertices, joined, open_edges, shell_count
 
 CONVEX_ENOUGH = 0.02
 """Largest part of its hull's volume by which a solid may fall short of it and still count as convex."""
@@ -43,14 +43,23 @@ QUICK: dict[str, Any] = {
 They bound the search by iterations, so that the pieces are the same on a busy machine.
 """
 
+SHELL: dict[str, Any] = {name: QUICK[name] for name in ("mcts_iterations", "mcts_max_depth", "mcts_nodes")}
+"""Settings of the search for open meshes, which CoACD makes solid as thin shells: three triangles in 1 s.
+
+A shell needs many pieces, and CoACD's own settings search minutes for each.
+"""
+
+MOST_SHELLS = 256
+"""Most separate pieces of surface that are decomposed: CoACD compares all of them in pairs."""
+
 MOST_FACES = 20000
 """Most triangles that `convex_pieces` hands to CoACD, whose time grows with them; finer meshes are simplified."""
 
 FINEST_GRID = 256
 """Cells along the longest edge of a mesh's box in the first try of `simplified`."""
 
-HANG_LIMIT = 3600.0
-"""Seconds after which CoACD counts as hanging."""
+CPU_LIMIT = 1800
+"""Seconds of processor time after which CoACD counts as hanging, so that other load of the machine does not matter."""
 
 PROGRESS_SECONDS = 4.0
 """Seconds between two progress lines of a decomposition."""
@@ -90,15 +99,19 @@ def decompose(mesh: Mesh, threshold: float = 0.05, max_hulls: int = -1, seed: in
     """Decompose all triangles of ``mesh``.
 
     Lower ``threshold`` (0.01 to 1) follows the shape closer; ``max_hulls`` below 1 sets no limit;
-    equal arguments give equal pieces. Raises `DecompositionError`.
+    equal arguments give equal pieces. An open mesh is decomposed as a thin shell. Raises `DecompositionError`.
     """
     if not 0.01 <= threshold <= 1.0:
         raise DecompositionError(f"threshold is {threshold:g}; it must be from 0.01 to 1")
     vertices, faces = joined(mesh.parts)
     if not len(faces):
         raise DecompositionError("the mesh holds no triangle")
-    settings = {"threshold": threshold, "max_convex_hull": max(max_hulls, 0) or -1, "seed": seed}
-    hulls = _cached_hulls(vertices, faces, settings, HANG_LIMIT, str(mesh.path))
+    settings: dict[str, Any] = {"threshold": threshold, "max_convex_hull": max(max_hulls, 0) or -1, "seed": seed}
+    edges = open_edges(faces)
+    if edges:
+        _log.warning("%s is not closed (%d open edges): it is decomposed as a thin shell", mesh.path, edges)
+        settings |= SHELL
+    hulls = _cached_hulls(vertices, faces, settings, str(mesh.path))
     from ligature.mesh.quality import hausdorff_distance, volume_error  # compiled; pieces alone do without
 
     return Decomposition(hulls, volume_error(vertices, faces, hulls), hausdorff_distance(vertices, faces, hulls, seed))
@@ -131,7 +144,7 @@ def convex_pieces(vertices: Array, faces: NDArray[np.int32], source: str = "") -
     if _convex_enough(vertices, faces):
         return [whole]
     try:
-        return list(_cached_hulls(*simplified(vertices, faces), QUICK, HANG_LIMIT, source))
+        return list(_cached_hulls(*simplified(vertices, faces), QUICK, source))
     except DecompositionError as error:
         name = source or f"a moving mesh of {len(faces)} triangles"
         _log.warning("%s collides as its convex hull: %s; run 'ligature decompose' on it", name, error)
@@ -177,9 +190,10 @@ def _convex_enough(vertices: Array, faces: NDArray[np.int32]) -> bool:
 
 
 def _cached_hulls(
-    vertices: Array, faces: NDArray[np.int32], settings: dict[str, Any], limit: float, source: str
+    vertices: Array, faces: NDArray[np.int32], settings: dict[str, Any], source: str
 ) -> tuple[Array, ...]:
     """The pieces of an earlier run of CoACD with the same arguments, else of a new one."""
+    _check_surface(vertices, faces)
     stored = io.BytesIO()
     np.savez(stored, vertices=vertices, faces=faces)
     words = json.dumps(settings, sort_keys=True)
@@ -195,7 +209,7 @@ def _cached_hulls(
     name = source or "a mesh"
     _log.warning("decomposing %s, %d triangles, into convex pieces; this is done once", name, len(faces))
     try:
-        data = _run_coacd(stored.getvalue(), words, limit, name)
+        data = _run_coacd(stored.getvalue(), words, name)
         hulls = _solid_hulls(data)
     except DecompositionError as error:
         if error.lasting:
@@ -203,6 +217,19 @@ def _cached_hulls(
         raise
     _keep(path, data)
     return hulls
+
+
+def _check_surface(vertices: Array, faces: NDArray[np.int32]) -> None:
+    """Raise `DecompositionError` for surfaces on which CoACD fails or does not end."""
+    if not np.isfinite(vertices).all():
+        raise DecompositionError("the mesh has vertices that are not finite")
+    if extent_rank(vertices) < 3:
+        raise DecompositionError("the mesh is flat: it has no volume to decompose; give it a thickness")
+    shells = shell_count(len(vertices), faces)
+    if shells > MOST_SHELLS:
+        raise DecompositionError(
+            f"the mesh has {shells} separate pieces of surface, more than {MOST_SHELLS}; join them, or split the file"
+        )
 
 
 def _keep(path: Path, data: bytes) -> None:
@@ -236,7 +263,7 @@ def _solid_hulls(data: bytes) -> tuple[Array, ...]:
     return tuple(hulls)
 
 
-def _run_coacd(mesh: bytes, settings: str, limit: float, name: str) -> bytes:
+def _run_coacd(mesh: bytes, settings: str, name: str) -> bytes:
     """Content of the npz file of pieces that CoACD makes of the npz file ``mesh``; raises `DecompositionError`.
 
     Logs a line with the ``name`` of the mesh every few seconds.
@@ -244,30 +271,29 @@ def _run_coacd(mesh: bytes, settings: str, limit: float, name: str) -> bytes:
     with tempfile.TemporaryDirectory(prefix="ligature-coacd-") as folder:
         source, target = Path(folder, "mesh.npz"), Path(folder, "pieces.npz")
         source.write_bytes(mesh)
-        words = (str(source), str(target), settings, str(os.getpid()))
+        words = (str(source), str(target), settings, str(os.getpid()), str(CPU_LIMIT))
         command = [sys.executable, "-m", "ligature.mesh.coacd_process", *words]
-        status, error = _wait(command, limit, name)
+        status, error = _wait(command, name)
+        if status == -signal.SIGXCPU:
+            reason = f"CoACD took longer than {CPU_LIMIT} s of processor time; simplify the mesh"
+            raise DecompositionError(reason, lasting=True)
         if status or not target.is_file():
             lasting = status not in _FROM_OUTSIDE and not error.startswith(_MACHINE_ERRORS)
             raise DecompositionError(f"CoACD ended with status {status}: {error}", lasting)
         return target.read_bytes()
 
 
-def _wait(command: Sequence[str], limit: float, name: str) -> tuple[int, str]:
-    """Exit status and last line of errors of a command that may take ``limit`` seconds."""
+def _wait(command: Sequence[str], name: str) -> tuple[int, str]:
+    """Exit status and last line of errors of a command."""
     begin = time.monotonic()
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
         try:
             while True:
-                passed = time.monotonic() - begin
                 try:
-                    _, errors = process.communicate(timeout=min(PROGRESS_SECONDS, max(0.0, limit - passed)))
+                    _, errors = process.communicate(timeout=PROGRESS_SECONDS)
                     break
                 except subprocess.TimeoutExpired:
-                    passed = time.monotonic() - begin
-                    if passed >= limit:
-                        raise DecompositionError(f"CoACD took longer than {limit:g} s", lasting=True) from None
-                    _log.warning("still decomposing %s after %.0f s", name, passed)
+                    _log.warning("still decomposing %s after %.0f s", name, time.monotonic() - begin)
         finally:
             process.kill()
     return process.returncode, " ".join(errors.decode("utf-8", "replace").strip().splitlines()[-1:])

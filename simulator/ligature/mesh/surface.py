@@ -48,6 +48,19 @@ def open_edges(faces: Faces) -> int:
     return int(np.count_nonzero(balance))
 
 
+def shell_count(vertices: int, faces: Faces) -> int:
+    """Number of pieces of a welded surface of that many ``vertices`` that share no vertex with each other."""
+    lowest = np.arange(vertices)
+    while True:
+        low = lowest[faces].min(axis=1)
+        before = lowest.copy()
+        for corner in range(3):
+            np.minimum.at(lowest, faces[:, corner], low)
+        lowest = lowest[lowest]
+        if np.array_equal(lowest, before):
+            return len(np.unique(lowest[faces]))
+
+
 def extent_rank(points: Array) -> int:
     """Number of dimensions that ``points`` span: 0 one place, 1 a line, 2 a plane, 3 a solid."""
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
