@@ -19,7 +19,8 @@ from ligature.adf.checker import (
     repeated_keys,
     suggestion,
 )
-from ligature.adf.diagnostics import Diagnostic, Mark, Severity
+from ligature.adf.contents import content_of
+from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.document import Document, Element
 from ligature.adf.lacking import lack_of
 from ligature.adf.nodes import Mapping, Node, Scalar, Sequence, parse
@@ -139,8 +140,23 @@ class _Source:
 
 def _opened(path: Path, resolver: Resolver) -> _Source:
     real = resolver.allow(Path(path))
-    text = resolver.read_text(real, MAX_TEXT)
-    return _Source(real, text, parse(text, real))
+    try:
+        text = resolver.read_text(real, MAX_TEXT)
+        return _Source(real, text, parse(text, real))
+    except AdfError:
+        content = _content(real, resolver)
+        if content is None:
+            raise
+        message = f"'{path}' is {content[0]}, not a scene file"
+        raise AdfError(Diagnostic(Severity.ERROR, message, Mark(real, 1, 1), content[1], "yaml")) from None
+
+
+def _content(path: Path, resolver: Resolver) -> tuple[str, str] | None:
+    """What a file is that cannot be read as YAML, and what to do with it; None for what is not known."""
+    try:
+        return content_of(resolver.read_bytes(path, MAX_TEXT))
+    except ResolutionError:
+        return None
 
 
 def _launch(source: _Source, resolver: Resolver, strict: bool) -> LaunchDocument:

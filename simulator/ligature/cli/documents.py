@@ -118,7 +118,13 @@ def inertia(file: Path, density: float, mass: float | None, console: Console) ->
     document = _read(file, console)
     if document is None:
         return 1
+    if document.kind != "model":
+        console.print(f"{file}: this is a {document.kind} file; give a mesh or a model", style="red", markup=False)
+        return 1
     subject = Subject(document, resolver)
+    if not subject.bodies:
+        console.print(f"{file}: the file has no body; give a mesh or a model", style="red", markup=False)
+        return 1
     for body in subject.bodies.values():
         shapes = [(shape, T) for shape, T in subject.shapes(body) if shape.kind != "PLANE"]
         mesh = subject.mesh(body, "mesh")

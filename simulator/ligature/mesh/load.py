@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ligature.adf.contents import content_of
 from ligature.adf.resolver import Resolver
-from ligature.mesh.mesh import Mesh, failure
+from ligature.mesh.mesh import Mesh, MeshError, failure
 from ligature.mesh.obj import read_obj
 from ligature.mesh.stl import read_stl
 from ligature.mesh.tds import read_3ds
 
-EXTENSIONS = (".obj", ".stl", ".3ds")
+_KINDS = {".obj": "an OBJ mesh", ".stl": "an STL mesh", ".3ds": "a 3DS mesh"}
+EXTENSIONS = tuple(_KINDS)
 
 
 def load_mesh(path: Path, resolver: Resolver) -> Mesh:
@@ -22,6 +24,17 @@ def load_mesh(path: Path, resolver: Resolver) -> Mesh:
     if extension not in EXTENSIONS:
         raise failure(path, f"the mesh format of '{path.name}' is not supported", hint=f"use {', '.join(EXTENSIONS)}")
     data = resolver.read_bytes(path)
+    try:
+        return _read(data, path, extension, resolver)
+    except MeshError:
+        content = content_of(data)
+        if content is None or content[0] == _KINDS[extension]:
+            raise
+        message = f"'{path.name}' is {content[0]}, not {_KINDS[extension]}"
+        raise failure(path, message, hint=content[1]) from None
+
+
+def _read(data: bytes, path: Path, extension: str, resolver: Resolver) -> Mesh:
     if extension == ".obj":
         return read_obj(data, path, resolver)
     if extension == ".stl":
