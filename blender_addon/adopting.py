@@ -17,7 +17,8 @@ from . import making
 from .compat import custom_properties
 from .ligature.adf.frames import axis_rotation, frame, rpy_matrix
 from .ligature.authoring.shapes import Shape
-from .placing import place, rest_pose
+from .placing import place
+from .poses import rest_pose
 from .references import topic_name
 
 ROLES = ("NONE", "RIGID_BODY", "GHOST_OBJECT", "CONSTRAINT", "COLLISION_SHAPE")

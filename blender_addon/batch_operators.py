@@ -6,14 +6,16 @@ import bpy
 import numpy as np
 
 from . import making
+from .held_keys import keys_of
 from .key_panels import CATEGORIES, OTHER, SHOWN, group_of
 from .ligature.adf.schema import Type
-from .mesh_data import points_of
+from .mesh_reading import points_of
 from .object_operators import active_body
-from .placing import SHAPED, hang, inertial_frame, relative_pose, rest_pose
+from .placing import hang
+from .poses import SHAPED, inertial_frame, relative_pose, rest_pose
 from .preview_operators import behind
 from .properties import KIND_OF_ROLE
-from .schema_properties import fetch, identifier, keys_of, store, unset
+from .schema_properties import fetch, identifier, store, unset
 from .solids import own_solid
 from .steps import InSteps
 

@@ -11,7 +11,8 @@ from .ligature.adf.diagnostics import Severity
 from .ligature.adf.reader import read_text
 from .ligature.adf.schema import BY_PATH
 from .ligature.authoring.lint import Finding, lint_by_rule
-from .placing import SHAPED, place, rest_pose
+from .placing import place
+from .poses import SHAPED, rest_pose
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier, store, unset
 from .steps import InSteps, finished, part

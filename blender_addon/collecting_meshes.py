@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from .mesh_data import Textures, mesh_print, surfaces_of
+from .materials import Textures
+from .mesh_reading import mesh_print, surfaces_of
 from .mesh_source import HIGH, LOW, MeshSource
-from .placing import SHAPED
+from .poses import SHAPED
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier
 from .solids import Solid, solids_of

@@ -8,9 +8,9 @@ from . import making
 from .ligature.adf.frames import pose_matrix
 from .ligature.authoring.rings import capsules_along, edge_loops
 from .ligature.authoring.shapes import Shape, fitted, oriented
-from .mesh_data import points_of, surfaces_of
+from .mesh_reading import points_of, surfaces_of
 from .object_operators import NeedsBody, active_body
-from .placing import scaling
+from .poses import scaling
 from .properties import SHAPE_KINDS, USES
 from .solids import own_solid
 

@@ -6,9 +6,10 @@ import bpy
 import numpy as np
 
 from . import making
-from .mesh_data import points_of, shape_data
+from .mesh_making import shape_data
+from .mesh_reading import points_of
 from .object_operators import active_body
-from .placing import children_with
+from .poses import children_with
 from .quality import measure
 from .solids import own_solid
 from .steps import InSteps

@@ -17,9 +17,9 @@ import numpy as np
 
 from . import compat, making
 from .ligature.mesh.cache import write_atomically
-from .mesh_data import points_of
+from .mesh_reading import points_of
 from .object_operators import NeedsBody, active_body
-from .placing import children_with
+from .poses import children_with
 from .quality import measure
 from .solids import own_solid
 from .waiting import Process, Waits, failure

@@ -7,10 +7,10 @@ from math import isfinite
 
 import bpy
 
+from .collected import Part
 from .ligature.adf.references import merged
-from .placed import Placed, State
-from .placing import SHAPED, children_with, owner_of, shapes_of
-from .references import file_of, members, qualified
+from .poses import SHAPED, children_with, shapes_of
+from .references import file_of, members, owner_of, qualified
 
 
 class ExportError(Exception):
@@ -21,7 +21,30 @@ class ExportError(Exception):
         self.obj = obj
 
 
-def check_values(objects: list[bpy.types.Object], values: list[dict]) -> None:
+def check_parts(collection: bpy.types.Collection, objects: list[bpy.types.Object], parts: list[Part]) -> list[str]:
+    """What the user should know about the objects of a file; raises `ExportError` for what cannot be written."""
+    _check_values(objects, parts)
+    for obj, part in zip(objects, parts, strict=True):
+        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None and obj.adf.role in SHAPED:
+            words = f"'{obj.name}' shows the collection '{obj.instance_collection.name}', whose objects are not written"
+            raise ExportError(f"{words}; use Object > Apply > Make Instances Real, and join them", obj)
+        if part.placed.ends is None:
+            gone = deleted_owner(collection, objects, obj)
+            if gone:
+                raise ExportError(
+                    f"'{obj.name}' hangs on '{gone}', which was deleted; parent it to another, or delete it", obj
+                )
+        else:
+            _check_joint(collection, objects, obj, part)
+    notes = [f"'{obj.name}' {note}" for obj in objects for note in notes_of(obj)]
+    return notes + [
+        f"'{obj.name}' was moved, and joins a body that is not open: its pose in the file stays"
+        for obj, part in zip(objects, parts, strict=True)
+        if _keeps_pose(part)
+    ]
+
+
+def _check_values(objects: list[bpy.types.Object], parts: list[Part]) -> None:
     """Raise `ExportError` unless every object has an identifier of its own, and finite numbers."""
     users: dict[str, str] = {}
     for obj in objects:
@@ -31,40 +54,18 @@ def check_values(objects: list[bpy.types.Object], values: list[dict]) -> None:
             words = f"'{obj.name}' and '{users[obj.adf.key]}' have one identifier, '{obj.adf.key}'"
             raise ExportError(f"{words}; Check Scene can give the copy its own", obj)
         users[obj.adf.key] = obj.name
-    for obj, found in zip(objects, values, strict=True):
-        for path, value in found.items():
+    for obj, part in zip(objects, parts, strict=True):
+        for path, value in part.values.items():
             numbers = value if isinstance(value, (tuple, list)) else (value,)
             if any(isinstance(v, float) and not isfinite(v) for v in numbers):
                 raise ExportError(f"'{obj.name}' has a {path} that is not a finite number; give it one", obj)
-
-
-def check_ends(
-    collection: bpy.types.Collection,
-    objects: list[bpy.types.Object],
-    places: list[Placed],
-    unchanged: list[set[str]],
-) -> None:
-    """Raise `ExportError` for instances of collections, and for objects whose bodies were deleted."""
-    for obj, place, same in zip(objects, places, unchanged, strict=True):
-        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None and obj.adf.role in SHAPED:
-            words = f"'{obj.name}' shows the collection '{obj.instance_collection.name}', whose objects are not written"
-            raise ExportError(f"{words}; use Object > Apply > Make Instances Real, and join them", obj)
-        if place.ends is None:
-            gone = deleted_owner(collection, objects, obj)
-            if gone:
-                raise ExportError(
-                    f"'{obj.name}' hangs on '{gone}', which was deleted; parent it to another, or delete it", obj
-                )
-        else:
-            _check_joint(collection, objects, obj, place, same)
 
 
 def _check_joint(
     collection: bpy.types.Collection,
     objects: list[bpy.types.Object],
     obj: bpy.types.Object,
-    place: Placed,
-    unchanged: set[str],
+    part: Part,
 ) -> None:
     """Raise `ExportError` for a joint without two bodies that the file can name."""
     for end in ("parent", "child"):
@@ -72,12 +73,12 @@ def _check_joint(
         if gone:
             words = f"'{obj.name}' joins '{gone}', which was deleted"
             raise ExportError(f"{words}; choose another {end} body in the Physics tab, or delete the joint", obj)
-    if "ends" in unchanged:
+    if "ends" in part.unchanged:
         return
-    for end, key in zip(("parent", "child"), place.ends, strict=True):
+    for end, key in zip(("parent", "child"), part.placed.ends, strict=True):
         if not key:
             raise ExportError(f"'{obj.name}' has no {end} body; choose one in the Physics tab, or delete it", obj)
-    if place.frames is None and not obj.adf.was:
+    if part.placed.frames is None and not obj.adf.was:
         raise ExportError(f"'{obj.name}' joins a body of a file that is not open, so that it has no place there", obj)
 
 
@@ -110,15 +111,16 @@ def _was_here(collection: bpy.types.Collection, objects: list[bpy.types.Object],
     return bool(text) and any(n.endswith(text) for n in had) and not any(n.endswith(text) for n in now)
 
 
-def kept_joints(
-    objects: list[bpy.types.Object], places: list[Placed], states: list[State | None], unchanged: list[set[str]]
-) -> list[str]:
-    """Joints that were moved, of which the file keeps its own pose since not both bodies are open."""
-    return [
-        f"'{obj.name}' was moved, and joins a body that is not open: its pose in the file stays"
-        for obj, place, before, same in zip(objects, places, states, unchanged, strict=True)
-        if place.ends is not None and place.frames is None and before and "pose" in before and "pose" not in same
-    ]
+def _keeps_pose(part: Part) -> bool:
+    """Whether a joint was moved and keeps its pose in the file, since not both of its bodies are open."""
+    place, before = part.placed, part.before
+    return (
+        place.ends is not None
+        and place.frames is None
+        and bool(before)
+        and "pose" in before
+        and "pose" not in part.unchanged
+    )
 
 
 def notes_of(obj: bpy.types.Object) -> list[str]:

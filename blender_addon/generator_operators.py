@@ -20,7 +20,8 @@ from .ligature.authoring.generate import (
     suture_hole,
 )
 from .object_operators import active_body, target_file
-from .placing import hang, inertial_frame, place, rest_pose
+from .placing import hang, place
+from .poses import inertial_frame, rest_pose
 from .read_file import add_parts, find_open
 
 THREADS = [

@@ -16,7 +16,7 @@ from mathutils import Matrix
 
 from .ligature.adf.frames import axis_rotation
 from .overlay import SIZE, SIZE_OF_HANDLE_GAP, redraw
-from .placing import is_prismatic, rest_pose
+from .poses import is_prismatic, rest_pose
 
 TURNS = (axis_rotation((0, 1, 0), pi / 2), axis_rotation((1, 0, 0), -pi / 2), np.eye(3))
 """Rotations that bring Z to each axis; arcs are drawn in the plane that XY becomes."""

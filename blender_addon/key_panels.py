@@ -3,9 +3,10 @@
 import bpy
 
 from . import making
+from .held_keys import keys_of
 from .ligature.adf.schema import SCHEMA, Type
 from .properties import KIND_OF_ROLE
-from .schema_properties import SHOWN_UNITS, identifier, keys_of, unset
+from .schema_properties import SHOWN_UNITS, identifier, unset
 
 CATEGORIES = {
     "Identity": ("name", "namespace", "passive", "publish frequency"),

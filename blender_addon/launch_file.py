@@ -11,15 +11,16 @@ from pathlib import Path
 import bpy
 
 from .folders import allowed_folders, own_files, remember_opened, remember_written
-from .in_file import top_values
+from .held_keys import unheld
 from .ligature.adf import AdfError, Document, Resolver, read_any, read_launch, read_world
+from .ligature.adf.document import own_element
 from .ligature.adf.nodes import parse
 from .ligature.adf.patch import PatchError
 from .ligature.adf.reader import LaunchDocument, Reference
-from .ligature.adf.update import given_values, new_text, updated
-from .ligature.authoring.save import SaveError, checked_text, foreign
+from .ligature.adf.update import new_text, updated
+from .ligature.authoring.save import SaveError, checked_text
 from .read_file import Import, importing
-from .schema_properties import fetch, store, unheld
+from .schema_properties import fetch, store
 from .steps import Steps, all_or_nothing, finished, part
 from .write_file import PREPARED, Export, ExportError, keeping, preparing, write
 
@@ -92,7 +93,7 @@ class OpenedLaunch:
         stored.filepath, stored.source = str(self.path), launch.text
         stored.byte_order_mark = self.data.startswith(BOM_UTF8)
         remember_opened(stored, {self.path: self.data})
-        store(stored.launch, "launch", given_values(launch.top))
+        store(stored.launch, "launch", launch.top.given())
         stored.models.clear()
         for index, reference in enumerate(launch.models):
             entry = stored.models.add()
@@ -205,8 +206,7 @@ def preparing_scene(scene: bpy.types.Scene, path: Path) -> Steps[WholeScene]:
     except (SaveError, PatchError) as error:
         raise ExportError(str(error)) from error
     whole.files[path] = BOM_UTF8 + data if stored.byte_order_mark else data
-    own = own_files(stored, *(collection.adf for collection, *_ in parts))
-    whole.foreign = foreign(whole.files, own)
+    whole.own = own_files(stored, *(collection.adf for collection, *_ in parts))
     return WholeScene(whole, names, parts)
 
 
@@ -302,4 +302,5 @@ def launch_text(scene: bpy.types.Scene, names: _Names) -> str:
     if not stored.source:
         return new_text("launch", top, [])
     root = parse(stored.source, Path(stored.filepath))
-    return updated(stored.source, "launch", {**unheld("launch", top_values("launch", root)), **top}, [], (), root)
+    kept = unheld("launch", own_element("launch", root).given())
+    return updated(stored.source, "launch", {**kept, **top}, [], (), root)

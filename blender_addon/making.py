@@ -13,8 +13,9 @@ import numpy as np
 
 from .ligature.authoring.placement import rigid
 from .ligature.authoring.shapes import Shape, shape_mesh
-from .mesh_data import shape_data
-from .placing import hang, place, rest_pose
+from .mesh_making import shape_data
+from .placing import hang, place
+from .poses import rest_pose
 from .properties import KIND_OF_ROLE
 from .read_file import SHAPE_COLOUR, set_shape, shape_collection
 from .references import file_of, topic_name

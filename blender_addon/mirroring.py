@@ -19,15 +19,15 @@ import numpy as np
 from mathutils import Matrix
 
 from . import making
-from .in_file import object_element
+from .ligature.adf.document import object_element
 from .ligature.adf.nodes import Mapping as MappingNode
 from .ligature.adf.nodes import parse
-from .ligature.adf.update import given_values
 from .ligature.authoring.placement import JointKeys, child_pose
-from .mesh_data import baked
-from .placing import SHAPED, hang, inertial_frame, owner_of, place, relative_pose, rest_pose
+from .mesh_reading import baked
+from .placing import hang, place
+from .poses import SHAPED, inertial_frame, relative_pose, rest_pose
 from .preview_operators import behind, is_previewing, joints_of
-from .references import file_of, topic_name
+from .references import file_of, owner_of, topic_name
 from .steps import InSteps, Steps, all_or_nothing
 
 FLIP_X, FLIP_Z = np.diag([-1.0, 1.0, 1.0, 1.0]), np.diag([1.0, 1.0, -1.0, 1.0])
@@ -229,7 +229,7 @@ def zero_of(joint: bpy.types.Object) -> float:
     element = object_element("joint", joint.adf.was, _parsed(file.adf.source))
     if element is None:
         return 0.0
-    values = given_values(element)
+    values = element.given()
     names = ("parent pivot", "child pivot", "parent axis", "child axis")
     if any(name not in values for name in names):
         return 0.0

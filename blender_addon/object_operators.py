@@ -11,8 +11,8 @@ from .ligature.adf.frames import axis_rotation, frame, pose_matrix
 from .ligature.authoring.generate import mass_keys
 from .ligature.authoring.shapes import Shape, shapes_properties
 from .ligature.mesh.inertia import combined, mass_properties
-from .mesh_data import points_of
-from .placing import SHAPED, children_with, relative_pose, rest_pose, shape_of, shapes_of
+from .mesh_reading import points_of
+from .poses import SHAPED, children_with, relative_pose, rest_pose, shape_of, shapes_of
 from .properties import ROLES
 from .solids import own_solid
 from .steps import InSteps, all_or_nothing

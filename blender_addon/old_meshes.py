@@ -55,7 +55,7 @@ class OldMeshes:
         """The content of a file that may be opened; None for any other."""
         if path not in self._known:
             try:
-                self._known[path] = self._resolver.read_bytes(path)
+                self._known[path] = self._resolver.read_bytes(path) if self._resolver.exists(path) else None
             except (AdfError, OSError):
                 self._known[path] = None
         return self._known[path]

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import compat
 from .ligature.adf.frames import Array, axis_rotation
-from .placing import is_prismatic, rest_pose
+from .poses import is_prismatic, rest_pose
 from .tissue_grid import grid_lines, tissue_keys
 
 COLOURS = {

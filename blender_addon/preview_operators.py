@@ -10,7 +10,8 @@ import numpy as np
 
 from . import making
 from .ligature.adf.frames import axis_rotation, frame
-from .placing import place, rest_pose
+from .placing import place
+from .poses import rest_pose
 
 WITHOUT_LIMITS = {"T": (-0.05, 0.05), "R": (-np.pi, np.pi)}
 """Metres along and radians about an axis that has no limits, which are shown of it."""

@@ -17,9 +17,9 @@ from mathutils.kdtree import KDTree
 from . import making
 from .ligature.authoring.shapes import shape_mesh, shape_properties
 from .ligature.mesh.inertia import mass_properties
-from .mesh_data import points_of
+from .mesh_reading import points_of
 from .object_operators import NeedsBody, active_body
-from .placing import children_with, relative_pose, rest_matrix, shape_of, shapes_of
+from .poses import children_with, relative_pose, rest_matrix, shape_of, shapes_of
 from .properties import KIND_OF_ROLE
 from .schema_properties import identifier
 from .solids import own_solid

@@ -14,7 +14,7 @@ from mathutils import Matrix, Vector
 
 from . import compat
 from .overlay import changes
-from .placing import SHAPED, rest_pose
+from .poses import SHAPED, rest_pose
 from .quality import deviations_of, is_measured_now, kept_figures
 
 BELOW, NONE, OUTSIDE = (0.1, 0.3, 1.0), (0.75, 0.8, 0.75), (1.0, 0.12, 0.1)

@@ -20,15 +20,17 @@ from .folders import allowed_folders, remember_opened
 from .ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any, read_launch
 from .ligature.adf.reader import read_text
 from .ligature.adf.references import find_by_text
-from .ligature.adf.update import Item, given_values, new_text
+from .ligature.adf.update import Item, new_text
 from .ligature.authoring.generate import Parts
 from .ligature.authoring.placement import matrix_of
 from .ligature.authoring.shapes import Shape, shape_mesh
 from .ligature.mesh import Mesh, MeshError, load_mesh
-from .mesh_data import MeshMaker, mesh_print, shape_data
-from .placing import SHAPED, hang, place, place_joint, place_light, place_view, placed, rest_pose
+from .mesh_making import MeshMaker, shape_data
+from .mesh_reading import mesh_print
+from .placing import hang, place, place_joint, place_light, place_view
+from .poses import SHAPED, placed, rest_pose
 from .properties import ROLE_OF_KIND
-from .references import qualified
+from .references import owner_names, qualified
 from .schema_properties import fetch, identifier, state_text, store
 from .solids import solids_of
 from .steps import Steps, all_or_nothing, finished, part
@@ -88,7 +90,7 @@ def _begun(path: Path, document: Document) -> Import:
     done = Import(collection, document, [str(d) for d in document.diagnostics if d.severity >= Severity.ERROR])
     if stored.kind == "OTHER":
         return done
-    store(getattr(stored, identifier(document.kind)), document.kind, given_values(document.top))
+    store(getattr(stored, identifier(document.kind)), document.kind, document.top.given())
     return done
 
 
@@ -208,7 +210,7 @@ class _Importer:
         for number, obj in enumerate(made):
             yield words, MADE + (1.0 - MADE) * number / len(made)
             obj.adf.called = obj.name
-            obj.adf.imported = state_text(placed(obj).state())
+            obj.adf.imported = state_text(placed(obj, owner_names(obj)).state())
             if obj.adf.role in SHAPED:
                 obj.adf.mesh_print = mesh_print(solids_of(obj))
         self.collection.adf.imported_keys = json.dumps([obj.adf.key for obj in made])
@@ -219,7 +221,7 @@ class _Importer:
         bodies_first = sorted(elements.values(), key=lambda e: (e.kind != "body", e.kind == "joint"))
         for number, element in enumerate(bodies_first):
             yield words, number / len(bodies_first)
-            self.values[element.key] = given_values(element)
+            self.values[element.key] = element.given()
             if element.kind != "joint":
                 self._make(element)
         for element in bodies_first:

@@ -1,4 +1,4 @@
-"""How files name each other's objects: which collection holds an object, and the text that means it."""
+"""Which file has an object, which object it is parented to, and how files name each other's objects."""
 
 from __future__ import annotations
 
@@ -17,6 +17,12 @@ def file_of(obj: bpy.types.Object | None) -> bpy.types.Collection | None:
         (c for c in bpy.data.collections if c.adf.kind != "NONE" and obj is not None and obj.name in c.all_objects),
         None,
     )
+
+
+def owner_of(obj: bpy.types.Object) -> bpy.types.Object | None:
+    """The object of a file, if any, that an object is parented to."""
+    parent = obj.parent
+    return parent if parent is not None and parent.adf.role in KIND_OF_ROLE else None
 
 
 def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -62,3 +68,18 @@ def reference(obj: bpy.types.Object, other: bpy.types.Object, given: str = "") -
         if text and whole.endswith(text) and not any(own.adf.key == text for own in here.all_objects):
             return text
     return whole
+
+
+def owner_names(obj: bpy.types.Object) -> tuple[str, ...]:
+    """How the file names the owner of an object, or both bodies of a joint.
+
+    A text that was never found among the open files stays.
+    """
+    own = obj.adf
+    if own.role == "JOINT":
+        ends = ((own.parent_object, own.parent_text), (own.child_object, own.child_text))
+        return tuple(reference(obj, body, text) if body else text for body, text in ends)
+    owner = owner_of(obj)
+    if owner is not None:
+        return (reference(obj, owner, own.parent_text),)
+    return ("" if own.hung else own.parent_text,)

@@ -14,7 +14,6 @@ from .file_operators import REPLACE, chosen_collection
 from .folders import own_files, remember_written
 from .ligature.adf import AdfError, Resolver, read_any
 from .ligature.authoring.robot import exported, read_sdf, read_urdf, sdf_text, to_adf, urdf_text
-from .ligature.authoring.save import foreign
 from .ligature.authoring.xml_files import XmlError
 from .read_file import adding
 from .saving import Export, write
@@ -146,7 +145,7 @@ def preparing_robot(collection, path):
     files = {**{path.parent / name: data for name, data in done.files.items()}, path: text.encode("utf-8")}
     own = own_files(collection.adf)
     problems = [*done.notes, *notes]
-    return Export(files, (path.parent,), problems=problems, foreign=foreign(files, own)), len(done.robot.links)
+    return Export(files, (path.parent,), problems=problems, own=own), len(done.robot.links)
 
 
 def _import_entry(self, context):

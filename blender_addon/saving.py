@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from .export_checks import ExportError
-from .ligature.authoring.save import SaveError, save_all
+from .ligature.authoring.save import SaveError, foreign, save_all
 
 
 @dataclass
@@ -21,8 +22,8 @@ class Export:
         Folders outside which nothing is written.
     notes
         What the user should know before anything is written.
-    foreign
-        Existing files that would be replaced and that are not this export's own.
+    own
+        Digests of the files that are this export's own, by path.
     """
 
     files: dict[Path, bytes] = field(default_factory=dict)
@@ -30,8 +31,13 @@ class Export:
     text: str = ""
     notes: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
-    foreign: list[Path] = field(default_factory=list)
+    own: dict[str, str] = field(default_factory=dict)
     written: list[Path] = field(default_factory=list)
+
+    @cached_property
+    def foreign(self) -> list[Path]:
+        """Existing files that would be replaced and that are not this export's own."""
+        return foreign(self.files, self.own)
 
 
 class ForeignFiles(ExportError):

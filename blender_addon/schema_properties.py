@@ -1,7 +1,7 @@
 """Property groups made from the format's schema: one group a kind, one property a key.
 
 A key counts as given in the file when its property is set; *Unset* in a property's context menu takes
-it back to the default. Keys that a transform or a child object states (`PLACED`) have no property.
+it back to the default. `held_keys` says which keys have a property.
 """
 
 from __future__ import annotations
@@ -13,30 +13,8 @@ from functools import cache
 import bpy
 
 from .decimals import decimal, decimals
-from .ligature.adf.schema import SCHEMA, Key, Status, Type
-
-_SHAPES = (
-    "shape", "geometry", "compound shape", "collision shape", "collision geometry", "collision offset",
-    "compound collision shape",
-)  # fmt: skip
-PLACED = {
-    "body": (*_SHAPES, "location", "inertial offset", "parent"),
-    "soft body": (*_SHAPES, "location", "parent"),
-    "ghost object": (*_SHAPES, "location", "inertial offset", "parent"),
-    "sensor": ("location", "parent"),
-    "actuator": ("location", "parent"),
-    "volume": ("location", "parent"),
-    "suture": ("location", "parent"),
-    "vehicle": ("parent",),
-    "joint": (
-        "parent", "child", "parent pivot", "child pivot", "parent axis", "child axis", "offset", "child offset",
-        "joint offset",
-    ),
-    "camera": ("location", "look at", "up", "parent", "field view angle", "clipping plane"),
-    "light": ("location", "direction", "parent", "cutoff angle"),
-    "launch": ("world config", "input devices config", "color config", "multibody configs"),
-}  # fmt: skip
-"""Keys, with those below them, that Blender's own data states."""
+from .held_keys import has_property, keys_below
+from .ligature.adf.schema import SCHEMA, Key, Type
 
 _NUMBERS = (Type.NUMBER, Type.NUMBER_OR_MAP)
 _WHOLE = (Type.INTEGER, Type.UNSIGNED)
@@ -51,20 +29,6 @@ _GROUPS: dict[str, type] = {}
 def identifier(path: str) -> str:
     """The property's name for the key at a dotted path."""
     return re.sub(r"[^a-z0-9]+", "_", path.lower()).strip("_")
-
-
-def keys_of(kind: str) -> list[Key]:
-    """The keys of a kind that have properties."""
-    return [key for key in SCHEMA[kind] if "[]" not in key.path and _has_property(kind, key)]
-
-
-def _has_property(kind: str, key: Key) -> bool:
-    placed = PLACED.get(kind, ())
-    if key.status is Status.IGNORED or any(key.path == p or key.path.startswith(f"{p}.") for p in placed):
-        return False
-    return key.type not in (Type.MAP, Type.MATRIX, Type.ANY) and not (
-        key.type is Type.TEXTS and kind in ("model", "world", "input devices")
-    )
 
 
 def group_class(kind: str) -> type:
@@ -85,7 +49,7 @@ def _make(kind: str, prefix: str, name: str) -> type:
     annotations: dict[str, object] = {}
     for key in SCHEMA[kind]:
         path = key.path[len(prefix) :]
-        if not key.path.startswith(prefix) or "[]" in path or not _has_property(kind, key):
+        if not key.path.startswith(prefix) or "[]" in path or not has_property(kind, key):
             continue
         if key.type is Type.MAPS:
             item = _make(kind, f"{key.path}[].", f"{name}_{identifier(path)}")
@@ -144,7 +108,7 @@ def _properties(key: Key, path: str) -> dict[str, object]:
 
 def store(group: bpy.types.PropertyGroup, kind: str, values: dict, prefix: str = "") -> None:
     """Set the properties of a group from typed values by path; other keys are left unset."""
-    for key in _keys_below(kind, prefix):
+    for key in keys_below(kind, prefix):
         path = key.path[len(prefix) :]
         if path not in values or values[path] is None:
             continue
@@ -166,7 +130,7 @@ def store(group: bpy.types.PropertyGroup, kind: str, values: dict, prefix: str =
 def fetch(group: bpy.types.PropertyGroup, kind: str, prefix: str = "") -> dict:
     """The typed value of every property that is set, by path."""
     values: dict = {}
-    for key in _keys_below(kind, prefix):
+    for key in keys_below(kind, prefix):
         path = key.path[len(prefix) :]
         name = identifier(path)
         if key.type is Type.POSE:
@@ -183,46 +147,9 @@ def fetch(group: bpy.types.PropertyGroup, kind: str, prefix: str = "") -> dict:
     return values
 
 
-@cache
-def unheld_paths(kind: str) -> list[str]:
-    """Keys that neither properties nor placing hold: they stay as the file has them."""
-    held = {key.path for key in keys_of(kind)}
-    placed = PLACED.get(kind, ())
-    return [
-        key.path
-        for key in SCHEMA[kind]
-        if key.path not in held and not any(key.path == p or key.path.startswith(f"{p}.") for p in placed)
-    ]
-
-
-def unheld(kind: str, values: dict) -> dict:
-    """The values of `unheld_paths` among all ``values`` of an object in the file."""
-    return {path: values[path] for path in unheld_paths(kind) if path in values}
-
-
-@cache
-def unheld_in_lists(kind: str) -> frozenset[str]:
-    """Keys of items of lists that neither properties nor placing hold: they stay as the file has them."""
-    placed = PLACED.get(kind, ())
-    return frozenset(
-        key.path
-        for key in SCHEMA[kind]
-        if "[]" in key.path and not any(key.path.startswith(f"{p}[]") for p in placed) and not _has_property(kind, key)
-    )
-
-
 def unset(group: bpy.types.PropertyGroup, name: str) -> None:
     """Take a key out of the file: its property shows the default again."""
     group.property_unset(name)
-
-
-@cache
-def _keys_below(kind: str, prefix: str) -> list[Key]:
-    return [
-        key
-        for key in SCHEMA[kind]
-        if key.path.startswith(prefix) and "[]" not in key.path[len(prefix) :] and _has_property(kind, key)
-    ]
 
 
 def _typed(key: Key, value: object) -> object:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .placing import children_with, relative_pose, scaling
+from .poses import children_with, relative_pose, scaling
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 
 from .ligature.mesh.voxels import lattice, usual_cell
-from .mesh_data import points_of
-from .placing import relative_pose, shape_of, shapes_of
+from .mesh_reading import points_of
+from .poses import relative_pose, shape_of, shapes_of
 from .properties import KIND_OF_ROLE
 from .quality import collision_print
 from .schema_properties import fetch, identifier

@@ -5,11 +5,12 @@ import bpy
 import numpy as np
 
 from .decimals import decimals
+from .held_keys import keys_of
 from .key_panels import ABOVE, group_of
 from .ligature.adf.schema import BY_PATH
 from .object_operators import NeedsBody, active_body
-from .placing import rest_pose, scaling
-from .schema_properties import identifier, keys_of, unset
+from .poses import rest_pose, scaling
+from .schema_properties import identifier, unset
 from .tissue_grid import FACES, held_faces, surface_of, tissue_keys
 
 MATERIALS = [

@@ -1,6 +1,6 @@
 """Writes a collection back to its file: only what changed in Blender changes in the text.
 
-An export collects from the scene (`collecting`) and from the old files (`old_meshes`), converts plain data
+An export collects from the scene (`collecting`) and from the old files (`in_file`, `old_meshes`), converts plain data
 (`mesh_files`, `file_text`), and then writes (`saving`). The scene is read, never touched. Everything is prepared and
 checked before the first file is written, and a failure leaves files and scene as they were.
 """
@@ -19,23 +19,24 @@ from .collecting_meshes import has_mesh
 from .export_checks import ExportError
 from .file_text import text_of
 from .folders import own_files, remember_written
-from .in_file import top_values
+from .in_file import in_file
 from .ligature.adf import AdfError, Element, Resolver
+from .ligature.adf.document import own_element
 from .ligature.adf.frames import pose_matrix
 from .ligature.adf.nodes import parse
 from .ligature.adf.patch import PatchError
-from .ligature.adf.update import Item, given_values, updated
+from .ligature.adf.update import Item, updated
 from .ligature.authoring.motion import moved_pose
 from .ligature.authoring.objfile import MeshWriteError
 from .ligature.authoring.placement import matrix_of
-from .ligature.authoring.save import SaveError, checked_text, foreign
-from .mesh_data import mesh_print
+from .ligature.authoring.save import SaveError, checked_text
 from .mesh_files import NO_MESH, MeshFiles
+from .mesh_reading import mesh_print
 from .old_meshes import OldMeshes
 from .placed import ZERO
-from .placing import SHAPED, owner_of, placed, shapes_of
+from .poses import SHAPED, placed, shapes_of
 from .properties import KIND_OF_ROLE
-from .references import members
+from .references import members, owner_names, owner_of
 from .saving import Export, ForeignFiles, write
 from .schema_properties import identifier, state_text, store
 from .solids import solids_of
@@ -83,17 +84,18 @@ def preparing(
         words = f"Preparing {path.name}"
         yield words, COLLECTED
         before = Path(found.path) if found.path and found.source else None
-        old = OldMeshes(found.meshes, found.top, path, before, Resolver.for_file(before or path, found.folders))
+        old = in_file(found)
+        old_meshes = OldMeshes(found.meshes, found.top, path, before, Resolver.for_file(before or path, found.folders))
         yield words, 0.5 * (COLLECTED + 1.0)
-        meshes = MeshFiles(found.meshes, old, path, root)
+        meshes = MeshFiles(found.meshes, old_meshes, path, root)
         yield words, 0.75 + 0.25 * COLLECTED
-        text = text_of(found, meshes.keys, {**meshes.top, **top})
+        text = text_of(found, old, meshes.keys, {**meshes.top, **top})
         data = text.encode("utf-8") if text == found.source else checked_text(text, path)
     except (ValueError, AdfError, SaveError, PatchError, MeshWriteError) as error:
         raise ExportError(str(error)) from error
     files = {**meshes.files, path: BOM_UTF8 + data if found.byte_order_mark else data}
     problems = list(dict.fromkeys(meshes.problems))
-    return Export(files, (root,), text, found.notes, problems, foreign(files, found.own))
+    return Export(files, (root,), text, found.notes, problems, found.own)
 
 
 def current_text(collection: bpy.types.Collection) -> Steps[str]:
@@ -102,18 +104,18 @@ def current_text(collection: bpy.types.Collection) -> Steps[str]:
     They raise ValueError for what has no place.
     """
     found = yield from collecting(collection)
-    return text_of(found)
+    return text_of(found, in_file(found))
 
 
 def variant_text(text: str, collection: bpy.types.Collection, variant: bpy.types.PropertyGroup) -> str:
     """The text of a model under another namespace, moved as a whole; ``text`` is its own."""
     motion = pose_matrix(variant.location, variant.rotation)
     root = parse(text, Path("variant.yaml"))
-    top = {**top_values("model", root), "namespace": variant.namespace}
+    top = {**own_element("model", root).given(), "namespace": variant.namespace}
     items = []
     for obj in members(collection):
         kind = KIND_OF_ROLE[obj.adf.role]
-        values = given_values(Element(kind, obj.adf.key, root.get(obj.adf.key)))
+        values = Element(kind, obj.adf.key, root.get(obj.adf.key)).given()
         if kind == "body":
             was = values.get("location", (ZERO, ZERO))
             T = matrix_of(was)
@@ -134,7 +136,7 @@ def preparing_variants(collection: bpy.types.Collection) -> Steps[Export]:
             files[path] = checked_text(variant_text(text, collection, variant), path)
     except (ValueError, AdfError, SaveError, PatchError) as error:
         raise ExportError(str(error)) from error
-    return Export(files, (folder,), foreign=foreign(files, own_files(collection.adf)))
+    return Export(files, (folder,), own=own_files(collection.adf))
 
 
 def keeping(collection: bpy.types.Collection, path: Path, text: str) -> Steps[None]:
@@ -147,11 +149,12 @@ def keeping(collection: bpy.types.Collection, path: Path, text: str) -> Steps[No
     if stored.kind == "OTHER":
         return
     root, kind = parse(text, path), FILE_KINDS[stored.kind]
-    store(getattr(stored, identifier(kind)), kind, top_values(kind, root))  # folders and file names that were chosen
+    top = own_element(kind, root).given()  # with folders and file names that were chosen
+    store(getattr(stored, identifier(kind)), kind, top)
     for number, obj in enumerate(objects):
         yield words, 0.5 * number / len(objects)
         own, node = KIND_OF_ROLE[obj.adf.role], root.get(obj.adf.key)
-        store(getattr(obj.adf, identifier(own)), own, given_values(Element(own, obj.adf.key, node)))
+        store(getattr(obj.adf, identifier(own)), own, Element(own, obj.adf.key, node).given())
     stored.imported_keys = json.dumps([obj.adf.key for obj in objects])
     for number, obj in enumerate(objects):
         yield words, 0.5 + 0.5 * number / len(objects)
@@ -160,7 +163,7 @@ def keeping(collection: bpy.types.Collection, path: Path, text: str) -> Steps[No
         for use in ("COLLISION", "VISUAL"):
             for order, shape in enumerate(shapes_of(obj, use)):
                 shape.adf.shape.order = order
-        obj.adf.imported = state_text(placed(obj).state())
+        obj.adf.imported = state_text(placed(obj, owner_names(obj)).state())
         if obj.adf.role in SHAPED:
             obj.adf.mesh_print = mesh_print(solids_of(obj))
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ligature.adf import Resolver, read_any
 from ligature.adf.align import GAP, aligned
 from ligature.adf.nodes import parse, plain
-from ligature.adf.update import Item, given_values, items_of, same, updated
+from ligature.adf.update import Item, items_of, same, updated
 
 ITEMS = st.lists(st.fixed_dictionaries({"a": st.integers(0, 3), "b": st.integers(0, 3)}), max_size=6)
 
@@ -117,7 +117,7 @@ def test_a_list_states_what_is_wanted_and_keeps_what_the_editor_does_not_hold(
     document = read_any(folder / "m.yaml", Resolver([folder]))
     item = items_of(document)[0]
     new = Item(item.kind, item.key, {**item.values, "wheels": tuple(wanted)}, unheld=frozenset({"wheels[].width"}))
-    text = updated(document.text, "model", given_values(document.top), [new])
+    text = updated(document.text, "model", document.top.given(), [new])
     wheels = plain(parse(text, Path("m.yaml")))["V"]["wheels"]
     assert [(w["body"], float(w["radius"])) for w in wheels] == [(w["body"], w["radius"]) for w in wanted]
     if wanted[0] == {"body": "A", "radius": 0.5}:
@@ -132,7 +132,7 @@ def test_an_aliased_item_is_spelled_out_only_where_it_changes(tmp_path: Path) ->
     new = [dict(w) for w in item.values["wheels"]]
     new[1]["radius"] = 0.25
     changed = Item(item.kind, item.key, {**item.values, "wheels": tuple(new)})
-    text = updated(document.text, "model", given_values(document.top), [changed])
+    text = updated(document.text, "model", document.top.given(), [changed])
     assert (
         text
         == HEAD + "  wheels:\n  - &w {body: A, radius: 0.50, mine: 1}\n  - {body: A, radius: 0.25, mine: 1}\n  - *w\n"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ligature.adf import Document, Element, Resolver, read_any
 from ligature.adf.nodes import parse
 from ligature.adf.patch import PatchError
-from ligature.adf.update import Item, given_values, items_of, new_text, same, updated
+from ligature.adf.update import Item, items_of, new_text, same, updated
 
 TEXT = """# hand-written
 bodies: [BODY a, BODY b]
@@ -60,7 +60,7 @@ def changed(document: Document, key: str, values: dict[str, object], removed: tu
             item = replace(item, values={path: v for path, v in merged.items() if v is not None})
         if item.key not in removed:
             items.append(item)
-    return updated(document.text, document.kind, given_values(document.top), items, removed)
+    return updated(document.text, document.kind, document.top.given(), items, removed)
 
 
 def differing(before: str, after: str) -> list[str]:
@@ -116,7 +116,7 @@ def test_an_object_goes_with_its_place_in_the_list_and_its_anchor_is_spelled_out
 def test_a_new_object_is_listed_and_defined_at_the_end(tmp_path: Path) -> None:
     document = read(tmp_path, TEXT)
     ghost = Item("ghost object", "GHOST g", {"name": "g", "parent": "BODY a", "visible": False})
-    after = updated(TEXT, "model", given_values(document.top), [*items_of(document), ghost])
+    after = updated(TEXT, "model", document.top.given(), [*items_of(document), ghost])
     assert differing(TEXT, after) == ["ghost objects:", "- GHOST g", "GHOST g:", "  name: g", "  visible: false"]
     assert after.index("ghost objects:") < after.index("namespace:")
     assert read(tmp_path, after).elements("ghost objects")[0].text("parent") == "BODY a"
@@ -155,7 +155,7 @@ def test_any_keys_give_place_to_any_others(before: list[list[str]], after: list[
     after_all = updated(text, "model", {}, files[1], removed)
     root = parse(after_all, Path("m.yaml"))
     wanted = {item.key: item.values for item in files[1]}
-    assert {key: given_values(Element("body", key, root.get(key))) for key in wanted} == wanted
+    assert {key: Element("body", key, root.get(key)).given() for key in wanted} == wanted
     assert sorted(entry.text for entry in root.get("bodies").items) == sorted(wanted)
     assert not set(removed) & set(root.entries)
     assert updated(after_all, "model", {}, files[1]) == after_all
@@ -164,7 +164,7 @@ def test_any_keys_give_place_to_any_others(before: list[list[str]], after: list[
 def test_an_object_is_renamed_in_the_list_and_where_it_stands(tmp_path: Path) -> None:
     document = read(tmp_path, TEXT)
     items = [replace(i, key="BODY c", was="BODY b") if i.key == "BODY b" else i for i in items_of(document)]
-    after = updated(TEXT, "model", given_values(document.top), items)
+    after = updated(TEXT, "model", document.top.given(), items)
     assert differing(TEXT, after) == ["bodies: [BODY a, BODY c]", "BODY c:"]
 
 
@@ -175,10 +175,10 @@ def test_an_unreadable_object_is_left_alone(tmp_path: Path) -> None:
 
 def test_a_new_file_is_canonical_and_states_the_same(tmp_path: Path) -> None:
     document = read(tmp_path, TEXT)
-    text = new_text(document.kind, given_values(document.top), items_of(document))
+    text = new_text(document.kind, document.top.given(), items_of(document))
     again = read(tmp_path, text)
     assert items_of(again) == items_of(document)
-    assert new_text(again.kind, given_values(again.top), items_of(again)) == text
+    assert new_text(again.kind, again.top.given(), items_of(again)) == text
     with pytest.raises(PatchError, match="'joints' is the identifier of two objects"):
         new_text("model", {}, [Item("joint", "joints", {})])
 
@@ -191,7 +191,7 @@ def test_every_corpus_file_stays_as_it_is_and_can_be_written_anew(corpus: Path, 
         document = read_any(file, resolver)
         if document.kind == "colors":
             continue
-        top, items = given_values(document.top), items_of(document)
+        top, items = document.top.given(), items_of(document)
         assert updated(document.text, document.kind, top, items) == document.text, file
         again = read(tmp_path, new_text(document.kind, top, items))
         assert {i.key: same(dict(i.values), dict(j.values)) for i, j in zip(items_of(again), items, strict=True)} == {

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
 from ligature.adf.diagnostics import Diagnostic, Mark, Severity
 from ligature.adf.nodes import Mapping, Node, Sequence, plain
-from ligature.adf.schema import BY_PATH, Fault
+from ligature.adf.schema import BY_PATH, LISTS, SCHEMA, Fault, Key, Type
 from ligature.adf.values import BadValue, Vector, convert
 
 
@@ -103,6 +104,31 @@ class Element:
             if isinstance(item, Mapping)
         )
 
+    def given(self) -> dict[str, Any]:
+        """The typed value of every key of the schema that the file gives, by path; items of lists as such dicts.
+
+        The lists that name a file's objects, and bad values, are left out.
+        """
+        values: dict[str, Any] = {}
+        for path, key in _plain_keys(self.kind, self.prefix):
+            if not self.has(path) or (key.type is Type.TEXTS and path in LISTS):
+                continue
+            if key.type is Type.MAPS:
+                values[path] = tuple(child.given() for child in self.children(path))
+            elif key.type is Type.NUMBER_OR_MAP and isinstance(self.raw_value(path), dict):
+                continue
+            else:
+                try:
+                    values[path] = self.value(path)
+                except BadValue:
+                    continue
+        return values
+
+    def unknown(self) -> dict[str, Any]:
+        """The top-level keys that the schema does not know, as nested plain values."""
+        known = BY_PATH[self.kind]
+        return {name: plain(value) for name, (_, value) in self.node.entries.items() if name not in known}
+
     def raw(self) -> Any:
         """The element as nested dicts, lists and strings, aliases expanded."""
         return plain(self.node)
@@ -117,6 +143,26 @@ class Element:
         for part in path.split("."):
             node = node.get(part) if isinstance(node, Mapping) else None
         return node
+
+
+def own_element(kind: str, root: Mapping) -> Element:
+    """The file's own keys as an element; ``kind`` is that of the file, ``root`` the whole file."""
+    own = Mapping(root.mark, root.span, entries={n: e for n, e in root.entries.items() if n in BY_PATH[kind]})
+    own.uses = root.uses
+    return Element(kind, kind, own)
+
+
+def object_element(kind: str, key: str, root: Mapping) -> Element | None:
+    """The object of a ``kind`` that the file defines under ``key``; None when it defines none."""
+    node = root.get(key)
+    return Element(kind, key, node) if isinstance(node, Mapping) else None
+
+
+@cache
+def _plain_keys(kind: str, prefix: str) -> list[tuple[str, Key]]:
+    """The keys below a prefix that are not blocks, by their paths from there."""
+    below = [(key.path[len(prefix) :], key) for key in SCHEMA[kind] if key.path.startswith(prefix)]
+    return [(path, key) for path, key in below if "[]" not in path and key.type is not Type.MAP]
 
 
 @dataclass

@@ -9,13 +9,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from ligature.adf import nodes
 from ligature.adf.align import aligned
-from ligature.adf.document import Document, Element
+from ligature.adf.document import Document, Element, own_element
 from ligature.adf.patch import (
     Edit,
     PatchError,
@@ -31,7 +30,6 @@ from ligature.adf.patch import (
     spelled_out,
 )
 from ligature.adf.schema import BY_PATH, LISTS, PLURALS, SCHEMA, Key, Type
-from ligature.adf.values import BadValue
 from ligature.adf.writer import entry_lines, text_scalar, write_document
 
 MAX_ROUNDS = 200
@@ -67,27 +65,10 @@ class Item:
     unheld: Collection[str] = ()
 
 
-def given_values(element: Element) -> dict[str, Any]:
-    """The typed value of every key of the schema that an element gives, but for the lists of a file's objects.
-
-    Bad values are left out.
-    """
-    return _given(element, "")
-
-
 def items_of(document: Document) -> list[Item]:
     """The usable objects of a document, each once, in the order of its lists."""
     found = {e.key: e for elements in document.lists.values() for e in elements}
-    return [Item(e.kind, e.key, given_values(e), extra=unknown_values(e)) for e in found.values()]
-
-
-def unknown_values(element: Element) -> dict[str, Any]:
-    """The top-level keys of an element that the schema does not know, as nested plain values."""
-    return {
-        name: nodes.plain(value)
-        for name, (_, value) in element.node.entries.items()
-        if name not in BY_PATH[element.kind]
-    }
+    return [Item(e.kind, e.key, e.given(), extra=e.unknown()) for e in found.values()]
 
 
 def new_text(kind: str, top: Mapping[str, Any], items: Sequence[Item]) -> str:
@@ -152,9 +133,7 @@ def _edits(
 ) -> list[Edit]:
     """Changes of one round: those where the values stand; when there are none, one behind an alias."""
     behind_alias: list[Edit] = []
-    own = nodes.Mapping(root.mark, root.span, entries={n: e for n, e in root.entries.items() if n in BY_PATH[kind]})
-    own.uses = root.uses
-    edits = list(_changes(text, root, Element(kind, kind, own), top, behind_alias))
+    edits = list(_changes(text, root, own_element(kind, root), top, behind_alias))
     edits += _object_edits(text, root, kind, items, removed)
     for item in items:
         node = root.get(item.key)
@@ -236,7 +215,7 @@ def _changes(
     yield from edits
     if edits:
         return
-    old = _given(element, element.prefix)
+    old = element.given()
     gone = [path for path in old if path not in wanted and element.prefix + path not in unheld]
     yield from _removals(text, owner, element, gone)
 
@@ -251,7 +230,7 @@ def _additions(
 ) -> Iterator[Edit]:
     """Edits that give ``owner`` the wanted values that it does not have."""
     prefix = element.prefix
-    old = _given(element, prefix)
+    old = element.given()
     known = BY_PATH[element.kind]
     additions: dict[str, dict[str, Any]] = {}
     for path, value in wanted.items():
@@ -305,7 +284,7 @@ def _list_changes(
         return
     children = element.children(path)
     prefix = children[0].prefix
-    held = [{p: v for p, v in _given(child, prefix).items() if prefix + p not in unheld} for child in children]
+    held = [{p: v for p, v in child.given().items() if prefix + p not in unheld} for child in children]
     pairs = aligned(held, wanted, same)
     both = [(i, j) for i, j in pairs if i is not None and j is not None and not same(held[i], wanted[j])]
     for i, j in both:
@@ -404,30 +383,6 @@ def _whole_blocks(owner: nodes.Mapping, paths: list[str]) -> list[str]:
     return [path for path in going if not any(path.startswith(f"{other}.") for other in going)]
 
 
-def _given(element: Element, prefix: str) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for path, key in _plain_keys(element.kind, prefix):
-        if not element.has(path) or (key.type is Type.TEXTS and path in LISTS):
-            continue
-        if key.type is Type.MAPS:
-            values[path] = tuple(_given(child, f"{key.path}[].") for child in element.children(path))
-        elif key.type is Type.NUMBER_OR_MAP and isinstance(element.raw_value(path), dict):
-            continue
-        else:
-            try:
-                values[path] = element.value(path)
-            except BadValue:
-                continue
-    return values
-
-
-@cache
-def _plain_keys(kind: str, prefix: str) -> list[tuple[str, Key]]:
-    """The keys below a prefix that are no blocks, by their paths from there."""
-    below = [(key.path[len(prefix) :], key) for key in SCHEMA[kind] if key.path.startswith(prefix)]
-    return [(path, key) for path, key in below if "[]" not in path and key.type is not Type.MAP]
-
-
 def same(a: Any, b: Any) -> bool:
     """Whether two typed values are equal, numbers in single precision."""
     if isinstance(a, bool) or isinstance(b, bool):
@@ -483,4 +438,4 @@ def _plain(key: Key, value: Any, kind: str = "") -> Any:
     return value
 
 
-__all__ = ["Item", "given_values", "items_of", "new_text", "same", "unknown_values", "updated"]
+__all__ = ["Item", "items_of", "new_text", "same", "updated"]

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from ligature.adf import AdfError, Document, Resolver, Severity, read_any
-from ligature.adf.update import given_values, items_of, new_text, same
+from ligature.adf.update import items_of, new_text, same
 from ligature.authoring.generate import mass_keys
 from ligature.authoring.lint.subject import Subject
 from ligature.authoring.save import SaveError, checked_text, save_all
@@ -32,7 +32,7 @@ def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> in
         if document is None:
             status = 1
             continue
-        text = new_text(document.kind, given_values(document.top), items_of(document))
+        text = new_text(document.kind, document.top.given(), items_of(document))
         lost = _lost(document)
         if text == document.text:
             continue
@@ -74,7 +74,7 @@ def diff(before: Path, after: Path, console: Console) -> int:
     if documents[0] is None or documents[1] is None:
         return 2
     old, new = ({i.key: (i.kind, dict(i.values)) for i in items_of(d)} for d in documents if d is not None)
-    old[""], new[""] = (("file", given_values(d.top)) for d in documents if d is not None)
+    old[""], new[""] = (("file", d.top.given()) for d in documents if d is not None)
     lines: list[str] = []
     for key in dict.fromkeys((*old, *new)):
         if key not in new:

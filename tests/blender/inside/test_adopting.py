@@ -12,7 +12,7 @@ from adf_studio.adopt_operators import REPORT
 from adf_studio.adopting import JOINTS, ROLES, adopt
 from adf_studio.ligature.adf import Resolver, read_any
 from adf_studio.ligature.authoring.placement import JointKeys, child_pose, joint_pose, matrix_of
-from adf_studio.placing import rest_pose
+from adf_studio.poses import rest_pose
 from adf_studio.write_file import export_file
 
 from .scene import cube

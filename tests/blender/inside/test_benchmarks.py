@@ -13,9 +13,9 @@ from adf_studio.decompose_operators import Job
 from adf_studio.ligature.adf import Resolver, read_any
 from adf_studio.ligature.authoring.shapes import Shape
 from adf_studio.ligature.mesh import load_mesh
-from adf_studio.mesh_data import points_of
+from adf_studio.mesh_reading import points_of
 from adf_studio.object_operators import solid_of
-from adf_studio.placing import rest_pose
+from adf_studio.poses import rest_pose
 from adf_studio.read_file import import_file
 from adf_studio.solids import own_solid
 from adf_studio.write_file import export_file

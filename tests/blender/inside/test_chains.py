@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from adf_studio.batch_operators import moved_inertia
 from adf_studio.ligature.adf import Resolver, read_any
-from adf_studio.mesh_data import points_of
+from adf_studio.mesh_reading import points_of
 from adf_studio.mirroring import mirrored_name
-from adf_studio.placing import rest_pose
+from adf_studio.poses import rest_pose
 from adf_studio.preview_operators import behind, motion_along, ranges_of, show, shown
 from adf_studio.solids import own_solid
 from adf_studio.write_file import export_file

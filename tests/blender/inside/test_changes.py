@@ -13,9 +13,10 @@ from adf_studio import making
 from adf_studio.check_operators import check_file, mend
 from adf_studio.ligature.adf.nodes import parse, plain
 from adf_studio.ligature.adf.reader import read_text
-from adf_studio.ligature.adf.schema import LISTS
+from adf_studio.ligature.adf.schema import BY_PATH, LISTS
 from adf_studio.ligature.authoring.placement import JointKeys, child_pose, matrix_of
-from adf_studio.placing import place, rest_pose
+from adf_studio.placing import place
+from adf_studio.poses import rest_pose
 from adf_studio.read_file import import_file
 from adf_studio.write_file import ExportError, members, prepared
 
@@ -416,3 +417,19 @@ JOINT j: {name: j, type: fixed, parent: BODY a, child: other/BODY far, parent pi
     assert [
         n.startswith("'j' was moved, and joins a body that is not open") for n in prepared(done.collection, file).notes
     ] == [True]
+
+
+@pytest.mark.parametrize(("listed", "kind"), LISTS.items())
+def test_an_object_that_is_renamed_is_written_whether_or_not_its_kind_has_a_name(tmp_path, listed, kind):
+    file = tmp_path / "m.yaml"
+    file.write_text(
+        f"{listed}: [thing]\nthing: {{mass: 1.0, hardware name: MTML, simulated multibody: x.yaml, parent: BODY a}}\n"
+    )
+    done = import_file(file, bpy.context.scene)
+    objects = members(done.collection)
+    assert objects or kind != "input device"
+    for obj in objects:
+        obj.name = "Another"
+    root = parse(prepared(done.collection, file).text, file)
+    if objects:
+        assert plain(root.get("thing")).get("name") == ("Another" if "name" in BY_PATH[kind] else None)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from adf_studio.ligature.adf import Resolver, read_any, read_launch
 from adf_studio.ligature.mesh import load_mesh
-from adf_studio.mesh_data import shape_data
-from adf_studio.placing import relative_pose, rest_pose, shape_of
+from adf_studio.mesh_making import shape_data
+from adf_studio.poses import relative_pose, rest_pose, shape_of
 from adf_studio.write_file import prepared
 
 from .scene import body, model, scene_print, select

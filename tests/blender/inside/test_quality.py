@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from adf_studio import making, quality, quality_overlay
 from adf_studio.ligature.authoring.shapes import Shape
-from adf_studio.mesh_data import shape_data
+from adf_studio.mesh_making import shape_data
 
 from .scene import body, model, select
 

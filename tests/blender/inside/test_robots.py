@@ -19,7 +19,7 @@ from adf_studio.ligature.authoring.robot import (
 from adf_studio.ligature.authoring.shapes import Shape
 from adf_studio.ligature.mesh import load_mesh
 from adf_studio.ligature.mesh.inertia import box_properties
-from adf_studio.placing import inertial_frame, relative_pose, rest_pose
+from adf_studio.poses import inertial_frame, relative_pose, rest_pose
 
 from .chains import random_chain
 from .scene import body, model, scene_print

@@ -10,7 +10,7 @@ import pytest
 from adf_studio.launch_file import preparing_scene
 from adf_studio.ligature.adf import AdfError, Resolver, read_any
 from adf_studio.ligature.authoring.placement import matrix_of
-from adf_studio.placing import rest_pose
+from adf_studio.poses import rest_pose
 from adf_studio.read_file import import_file
 from adf_studio.steps import finished
 from adf_studio.write_file import export_file, prepared

@@ -8,8 +8,8 @@ from adf_studio.key_panels import CATEGORIES, OTHER, SHOWN, group_of
 from adf_studio.ligature.adf import Resolver
 from adf_studio.ligature.mesh import load_mesh
 from adf_studio.ligature.mesh.surface import open_edges, weld
-from adf_studio.mesh_data import points_of
-from adf_studio.placing import relative_pose, shape_of
+from adf_studio.mesh_reading import points_of
+from adf_studio.poses import relative_pose, shape_of
 from adf_studio.schema_properties import fetch, identifier
 from adf_studio.solids import own_solid
 

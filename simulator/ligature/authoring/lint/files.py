@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from ligature.adf import Element, ResolutionError, Severity
-from ligature.adf.update import given_values
 from ligature.authoring.lint.subject import Finding, Subject, rule
 from ligature.paths import real_path
 
@@ -173,7 +172,7 @@ def legacy_key(subject: Subject) -> Iterator[Finding]:
 def float_noise(subject: Subject) -> Iterator[Finding]:
     """Numbers that are meant to be zero."""
     for element in subject.objects:
-        noisy = [path for path, value in given_values(element).items() if _noisy(value)]
+        noisy = [path for path, value in element.given().items() if _noisy(value)]
         if noisy:
             message = f"'{noisy[0]}' holds numbers that are nearly zero"
             yield Finding("float-noise", Severity.INFO, element.key, message, "they are the rounding of an exporter")
