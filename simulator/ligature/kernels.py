@@ -38,8 +38,8 @@ _PACKAGE = Path(__file__).parent
 _KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic|unrolled)\b", re.MULTILINE)
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
-    "kernels.py", "unrolled.py", "model/state.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
-    "tissue/contact_arrays.py",
+    "kernels.py", "unrolled.py", "model/state.py", "physics/loop_arrays.py", "suture/layout.py", "suture/passages.py",
+    "tissue/layout.py", "tissue/contact_arrays.py",
 )  # fmt: skip
 """Sources without kernels whose contents are compiled into kernels."""
 
@@ -114,7 +114,7 @@ def compile_with(function: Function, **options: Any) -> Function:
 
 
 def _keep_bitcode(dispatcher: Any) -> None:
-    """Of a kernel that is loaded, keep what others link with as bitcode: parsed, it takes eight times that.
+    """Keep the library of a loaded kernel, which others link with, as bitcode: parsed, it is eight times as large.
 
     Where all kernels are loaded nothing links, and a physics process saves 20 MB.
     """

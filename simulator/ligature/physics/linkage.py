@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ligature.model.mechanism import LEAST_SIZE
 from ligature.physics.divergence import joined
 from ligature.physics.engine import Engine
-from ligature.physics.projection import Loops, loops
+from ligature.physics.loop_arrays import Loops, loops
 
 Array = NDArray[np.float64]
 
