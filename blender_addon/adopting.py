@@ -206,7 +206,7 @@ def _adopt_shaped(obj: bpy.types.Object, name: str, namespace: str, role: str, d
 
 
 def _internal(name: str) -> bool:
-    """Properties by which the add-on steers its panels."""
+    """Whether a property belongs to the add-on's own panels."""
     return any(word in name for word in ("show", "pointer", "namespace", "object_type", "visible", "enable", "group"))
 
 
@@ -317,7 +317,7 @@ def _blender_body(obj: bpy.types.Object, group: bpy.types.PropertyGroup, done: A
 
 
 def _fitted(obj: bpy.types.Object, kind: str) -> tuple[Shape, str, np.ndarray]:
-    """The primitive of a kind around a mesh, along Z as Blender's own."""
+    """The primitive of a kind with the extents of a mesh, along Z as in Blender."""
     corners = np.array([list(corner) for corner in obj.bound_box], dtype=float)
     size, middle = np.ptp(corners, axis=0), corners.mean(axis=0)
     radius = float(size.max() if kind == "SPHERE" else max(size[:2])) / 2.0
@@ -387,7 +387,7 @@ def _six(group: bpy.types.PropertyGroup, stored: Stored, kind: str) -> None:
 
 
 def _adopt_blender_joint(obj: bpy.types.Object, name: str, done: Adopted) -> None:
-    """A joint from a rigid-body constraint of Blender; the object that carries it may be a body itself."""
+    """Make a joint of a rigid-body constraint of Blender; the object that has it may be a body itself."""
     own = obj.rigid_body_constraint
     ends = [own.object1, own.object2]
     if own.type not in BLENDER_JOINTS or any(end is None or end.adf.role != "BODY" for end in ends):
@@ -413,7 +413,7 @@ def _adopt_blender_joint(obj: bpy.types.Object, name: str, done: Adopted) -> Non
 
 
 def _blender_six(group: bpy.types.PropertyGroup, own: bpy.types.RigidBodyConstraint, kind: str) -> None:
-    """Limits of a generic constraint: an axis without limits is free, which the format states as low above high."""
+    """Limits of a generic constraint. The format states a free axis as a low limit above the high one."""
     for half, short in (("linear", "lin"), ("angular", "ang")):
         for axis in "xyz":
             fixed = own.type == "PISTON" and axis != "x"
@@ -437,7 +437,7 @@ def _blender_six(group: bpy.types.PropertyGroup, own: bpy.types.RigidBodyConstra
 def _make_joint(
     obj: bpy.types.Object, name: str, kind: str, ends: list, axis: str, done: Adopted, turned: bool = True
 ) -> None:
-    """Make an object the joint of two bodies; its frame is turned so that the axis is where this format has it."""
+    """Make an object the joint of two bodies; its frame is rotated so that the axis is that of this format."""
     T = rest_pose(obj)
     if turned:
         T = T @ frame(TURNS[axis], (0.0, 0.0, 0.0))

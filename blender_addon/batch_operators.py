@@ -87,7 +87,7 @@ def _take_out(group, key):
 
 @cache
 def _numbers_of(kind):
-    """The numbers of a kind as choices; kept, since Blender does not keep them."""
+    """The numeric keys of a kind as items of an enum; referenced here, since Blender keeps no reference to them."""
     found = [key for key in keys_of(kind) if key.type in NUMBERS]
     return [(identifier(key.path), key.path, key.doc or key.path) for key in found]
 
@@ -191,7 +191,7 @@ def _receivers(context):
 
 
 def _touched(child):
-    """Whether a part is what its body collides by."""
+    """Whether a part is collision geometry of its body."""
     return child.adf.role == "HULL" or (child.adf.role == "SHAPE" and child.adf.shape.use == "COLLISION")
 
 
@@ -206,7 +206,7 @@ def _box(body):
 
 
 def _stretch(part, body, T_source, T, stretch):
-    """Put a copied part where a stretched box has it; its own axes are stretched by what lies along them."""
+    """Place a copied part in a stretched box; each of its axes is scaled as the box is along that axis."""
     place = T_source.copy()
     place[:3, 3] = stretch * T_source[:3, 3] + T[:3, 3]
     along = np.linalg.norm(stretch[:, None] * T_source[:3, :3], axis=0)

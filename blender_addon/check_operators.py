@@ -94,7 +94,7 @@ def _unwritten(obj):
 
 
 def _bereft(collection, objects, obj):
-    """What names a body that was deleted."""
+    """References to deleted bodies."""
     if obj.adf.role == "JOINT":
         for end in ("parent", "child"):
             gone = deleted_end(collection, objects, obj, end)
@@ -113,7 +113,7 @@ def _bereft(collection, objects, obj):
 
 
 def _units(scene):
-    """Numbers of Blender are written as metres, whatever the scene shows them as."""
+    """A finding for a unit scale other than 1, since lengths are written in metres."""
     units = scene.unit_settings
     if units.system != "NONE" and abs(units.scale_length - 1.0) > 1e-6:
         message = f"its unit scale is {units.scale_length:g}, and lengths are written as metres"

@@ -104,7 +104,7 @@ def deleted_owner(collection: bpy.types.Collection, objects: list[bpy.types.Obje
 
 
 def _was_here(collection: bpy.types.Collection, objects: list[bpy.types.Object], text: str) -> bool:
-    """Whether a text names an object that the file had and that is no more."""
+    """Whether a text names an object that the file had and that was deleted since."""
     now = [qualified(collection, obj) for obj in objects]
     space = getattr(getattr(collection.adf, collection.adf.kind.lower(), None), "namespace", "")
     had = [merged(space, "") + key for key in json.loads(collection.adf.imported_keys or "[]")]

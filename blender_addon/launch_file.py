@@ -211,7 +211,7 @@ def preparing_scene(scene: bpy.types.Scene, path: Path) -> Steps[WholeScene]:
 
 
 class _Names:
-    """How a launch file at ``path`` names its files: as it does, or below its folder when it goes elsewhere."""
+    """File names in a launch file at ``path``: unchanged, or below its folder when it is written to another folder."""
 
     def __init__(self, scene: bpy.types.Scene, path: Path) -> None:
         stored = self._stored = scene.adf

@@ -190,7 +190,7 @@ def new_part(body: bpy.types.Object, name: str, data: bpy.types.ID | None, role:
 
 
 def _shapes_of_file(body: bpy.types.Object) -> bpy.types.Collection:
-    """Where primitives, hulls and frames of a body belong."""
+    """The collection for primitives, hulls and frames of a body."""
     file = file_of(body)
     return bpy.context.scene.collection if file is None else shape_collection(file)
 

@@ -82,7 +82,7 @@ class MeshFiles:
         return Path(os.path.relpath(target, joined(self._folder, top, own))).as_posix()
 
     def _copy(self, source: MeshSource) -> None:
-        """Copies of an unchanged object's mesh files, and their names where these are others now."""
+        """Copy the mesh files of an unchanged object, and set the keys whose file names change."""
         keys = {}
         for key, name in ((HIGH, "mesh"), (LOW, "collision mesh")):
             old = self._old.files.get((key, source.key))
@@ -120,7 +120,7 @@ class MeshFiles:
         return folder / base
 
     def _whole(self, source: MeshSource) -> dict:
-        """The mesh that is seen; linked duplicates share one file."""
+        """Write the visual mesh; linked duplicates share one file."""
         if source.type != "MESH":
             return {}
         given, shared = source.places[HIGH], self._shared.get(source.print)
@@ -135,7 +135,7 @@ class MeshFiles:
         return {"mesh": name}
 
     def _hulls(self, source: MeshSource) -> dict:
-        """The convex parts of the collision shape in one file."""
+        """Write the convex parts of the collision shape to one file."""
         if not source.hulls:
             return {}
         whole = (source.places[LOW], f"hulls of {source.print}")
@@ -154,7 +154,7 @@ class MeshFiles:
         return {"collision mesh": name, **given}
 
     def _keep_collision(self, source: MeshSource) -> None:
-        """Name the collision mesh that went by the name of a mesh that has another name now."""
+        """Set the key of a collision mesh that was implied by the visual mesh, when the name of that mesh changes."""
         keys = self.keys[source.key]
         old = None if source.collision_mesh or not source.mesh else self._old.files.get((LOW, source.key))
         if old is None or "collision mesh" in keys or keys.get("mesh", source.mesh) == source.mesh:
@@ -183,7 +183,7 @@ class MeshFiles:
 
 
 def _part_colour(number: int) -> tuple[float, float, float]:
-    """A colour of its own for each part, by the golden ratio around the colour circle."""
+    """Distinct colours of parts: hues a golden ratio apart."""
     return colorsys.hsv_to_rgb(number * 0.618034 % 1.0, 0.6, 0.9)
 
 

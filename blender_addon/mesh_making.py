@@ -60,7 +60,7 @@ class MeshMaker:
 
 
 def _welded(part: MeshPart) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices that differ only in normal or texture coordinate joined, so that edges are whole."""
+    """Merge vertices that differ only in normal or texture coordinate, so that faces share edges."""
     vertices, inverse = np.unique(part.vertices.astype(np.float32), axis=0, return_inverse=True)
     return vertices, inverse.reshape(-1)[part.faces].reshape(-1, 3)
 

@@ -99,7 +99,7 @@ def chain_of(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def _copy(obj: bpy.types.Object) -> bpy.types.Object:
-    """A copy under the name of the other side, new to the file."""
+    """A copy with the name of the other side, which the file does not have yet."""
     copy = obj.copy()
     copy.name = free_name(mirrored_name(obj.name), bpy.data.objects)
     for collection in obj.users_collection:
@@ -117,7 +117,7 @@ def _copy(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def _shaped(obj: bpy.types.Object, reflection: np.ndarray, owner: bpy.types.Object | None) -> bpy.types.Object:
-    """The mirror image of a body or ghost with its parts; below ``owner`` when it hangs on one."""
+    """The mirror image of a body or ghost with its parts, parented to ``owner`` if there is one."""
     copy = _copy(obj)
     if owner is None:
         place(copy, reflection @ rest_pose(obj) @ FLIP_X)
@@ -206,7 +206,7 @@ def _joint(
 
 
 def _mirror_axes(group: bpy.types.PropertyGroup) -> None:
-    """Turn the axes round that the reflection of z reverses: motion along z, rotation about x and y."""
+    """Negate the axes that the reflection of z reverses: translation along z, rotation about x and y."""
     for half, axis in (("linear", "z"), ("angular", "x"), ("angular", "y")):
         low, high = (f"joint_limits_{half}_{end}_{axis}" for end in ("low", "high"))
         values = [getattr(group, name) if group.is_property_set(name) else None for name in (low, high)]

@@ -63,7 +63,7 @@ def _parent(placed: Placed, same: set[str], file_values: Keys) -> Keys:
 
 
 def _before(placed: Placed, before: State, same: set[str]) -> np.ndarray | None:
-    """The pose that the file's numbers stand for; None when they do not: the object is new, or hangs on another."""
+    """The pose that the file's numbers state; None for a new object and for one that was parented to another since."""
     if "pose" not in before or (placed.kind != "body" and "parent" not in same):
         return None
     return pose_of(before["pose"])
@@ -89,7 +89,7 @@ def _placed(placed: Placed, before: State, same: set[str], file_values: Keys) ->
 
 
 def _pose(given: tuple | None, before: np.ndarray | None, now: np.ndarray, reach: float) -> tuple:
-    """The pose to write: what the file gives, or had without giving it, moved; else the pose itself."""
+    """The pose to write: the file's, or its default, moved as the object was; the object's own when it is new."""
     if before is None:
         return new_pose(now, reach)
     return moved_pose(given or new_pose(before, reach), before, now, reach)
@@ -259,7 +259,7 @@ def _number(name: str, old: float | None, now: float, file_values: Keys) -> Keys
 
 
 def _distance(file_values: Keys) -> float:
-    """How far the file's camera looks; one metre when the file does not say."""
+    """Distance from the file's camera to its target; one metre when the file does not state it."""
     a, b = (np.array(file_values.get(name, ZERO)) for name in ("location", "look at"))
     return float(np.linalg.norm(a - b)) or 1.0
 

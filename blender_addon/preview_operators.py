@@ -68,7 +68,7 @@ def show(scene, positions):
 
 
 def _from_the_root(joints):
-    """Joints in such an order that none moves the frame of one before it."""
+    """Joints ordered from the root outwards."""
     below = {joint: behind(joint) for joint in joints}
     return sorted(joints, key=lambda joint: sum(joint.adf.parent_object in bodies for bodies in below.values()))
 

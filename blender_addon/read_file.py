@@ -143,7 +143,7 @@ def _outside_of(path: Path, roots: tuple[Path, ...]) -> list[str]:
 
 
 def _outside(document: Document, resolver: Resolver) -> list[str]:
-    """The folders of one file; of two beside each other the one around them."""
+    """The folders outside the scene's that a file needs; for two folders with one parent, the parent."""
     found: dict[Path, None] = {}
     for element in (e for listed in document.lists.values() for e in listed if e.kind in MESHED):
         high, low = element.text("mesh"), element.text("collision mesh") or element.text("mesh")
@@ -205,7 +205,7 @@ class _Importer:
         self.shape_collection: bpy.types.Collection | None = None
 
     def run(self, words: str) -> Steps[None]:
-        """Make everything, and remember how it stood."""
+        """Make all objects, and store their state, with which exports find what changed."""
         made = yield from part(self.make(words), 0.0, MADE)
         for number, obj in enumerate(made):
             yield words, MADE + (1.0 - MADE) * number / len(made)
@@ -239,7 +239,7 @@ class _Importer:
         return obj
 
     def _shape_collection(self) -> bpy.types.Collection:
-        """Where primitives, hulls and frames lie, so that one click hides them all."""
+        """The collection of primitives, hulls and frames, which one click hides."""
         if self.shape_collection is None:
             self.shape_collection = shape_collection(self.collection)
         return self.shape_collection

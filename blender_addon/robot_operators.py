@@ -29,7 +29,7 @@ REPORT = "Converted Robot"
 
 
 def _listed(operator, notes):
-    """Tell of what was lost: the first notes here, all of them in a text."""
+    """Report what the format cannot hold: the first note as a warning, all of them in a text."""
     if notes:
         text = bpy.data.texts.get(REPORT) or bpy.data.texts.new(REPORT)
         text.from_string("\n".join(notes))

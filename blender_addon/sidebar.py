@@ -21,7 +21,7 @@ class Sidebar:
 
 
 def _above(layout, group, name):
-    """A property below its name, which a narrow sidebar would cut beside it; a truth value beside its own."""
+    """Draw a property below its label, since a narrow sidebar would cut the label off; a checkbox beside its label."""
     shown = group.bl_rna.properties[name]
     if shown.type == "BOOLEAN":
         layout.prop(group, name)

@@ -128,7 +128,7 @@ class InSteps:
         self._end(context)
 
     def _slice(self, seconds):
-        """What the operator returns, once it has come to its end; None before."""
+        """Work for ``seconds``; the result of the operator when it has finished, else None."""
         until = time.monotonic() + seconds
         try:
             while True:

@@ -356,7 +356,7 @@ class Simulation:
         self._clock.advance()
 
     def _leave_out(self, subsystem: Subsystem, error: Exception) -> None:
-        """A step raised: the subsystem is reset and skipped for a while, then it continues without commands."""
+        """Reset and skip, for a while, a subsystem whose step raised; then it continues without commands."""
         self._report(subsystem, "step", f"it is reset to its start and skipped for {REST * self.dt:g} s", error)
         self._guarded(subsystem, "recover")
         self._resting[self._subsystems.index(subsystem)] = self._clock.tick + REST
@@ -385,7 +385,7 @@ class Simulation:
             self.problems.append(failed(f"'{name}' of {what[0]} failed; {outcome}", error))
 
     def _watch(self) -> None:
-        """Report what moves as nothing commands."""
+        """Report bodies whose motion no command explains."""
         passed = self._clock.tick - self._watched
         if passed >= GUARD_TICKS:
             self._watched = self._clock.tick
@@ -397,12 +397,12 @@ class Simulation:
                 self.problems += [alarm] if alarm is not None else []
 
     def _watch_anew(self) -> None:
-        """Bodies were put elsewhere: they have the motion that the state has."""
+        """Restart the watch of motions after bodies were placed."""
         self._watched = self._clock.tick
         self._guard.reset()
 
     def _write_state(self) -> None:
-        """Fill the state record: what is, then what sensors make of it. Looking changes nothing."""
+        """Fill the state record: the state, then the sensors' readings of it. This changes no state."""
         with self.phases["state"]:
             for subsystem in self._writers:
                 self._guarded(subsystem, "write_state", self.state)

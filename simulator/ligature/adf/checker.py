@@ -137,7 +137,7 @@ def _check_converted(key: Key, value: Node, element: Element, found: list[Diagno
 
 
 def _check_vector(key: Key, value: Mapping, element: Element, found: list[Diagnostic]) -> None:
-    """Keys beside x y z, r p y or position and orientation are not read."""
+    """Report keys other than x y z, r p y, position and orientation, which are not read."""
     wanted = _VECTOR_KEYS[key.type]
     found += repeated_keys(value)
     unknown = [n for n in value.entries if n not in wanted and f"{key.path}.{n}" not in BY_PATH[element.kind]]

@@ -48,7 +48,7 @@ def instead_of_url(url: str) -> str:
 
 
 def _unfound(path: Path, error: OSError) -> Lack:
-    """What a failed look at ``path`` means."""
+    """The fault and the hint for a ``path`` whose lookup failed with ``error``."""
     if error.errno == errno.ELOOP:
         return Lack("is a link in a circle", "let it lead to a file")
     if error.errno not in (errno.ENOENT, errno.ENOTDIR):
@@ -59,7 +59,7 @@ def _unfound(path: Path, error: OSError) -> Lack:
 
 
 def _spelling(path: Path) -> str:
-    """How the part of ``path`` that is missing is written, if it is meant for another system or case; else nothing."""
+    """The right spelling of what is missing of ``path``, if it is of another system or differs in case; else empty."""
     there = path.parent
     while not there.is_dir() and there != there.parent:
         there = there.parent

@@ -121,7 +121,7 @@ _CONTROL = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\
 
 
 def _first_control(parsed: Relaxed, file: Path) -> Mark:
-    """Where the first character stands that YAML forbids."""
+    """Place of the first character that YAML forbids."""
     found = _CONTROL.search(parsed.text)
     before = parsed.text[: found.start() if found else 0]
     line, column = before.count("\n"), len(before) - before.rfind("\n") - 1

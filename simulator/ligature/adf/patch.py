@@ -44,7 +44,7 @@ def apply(text: str, edits: Iterable[Edit]) -> str:
 
 
 def _outwards(text: str) -> tuple[int, bool]:
-    """What sorts lines that are added behind a line: the deeper first, items of a list before keys beside it."""
+    """Sort key of lines inserted behind the same line: deeper indentation first, items of a list before keys."""
     line = text.lstrip("\r\n")
     inner = line.lstrip(" ")
     return (len(inner) - len(line), not inner.startswith("-")) if line != text else (0, False)
@@ -155,7 +155,7 @@ def remove_item(text: str, items: Sequence, index: int) -> Edit:
 
 
 def _dash(text: str, start: int) -> int:
-    """The dash of the item of a list whose value begins at ``start``."""
+    """Offset of the dash of the list item whose value begins at ``start``."""
     dash = text.rfind("-", 0, start)
     while dash > 0 and not (text[dash - 1].isspace() and text[dash + 1 : dash + 2].isspace()):
         dash = text.rfind("-", 0, dash)
@@ -245,7 +245,7 @@ def _changed(node: Node, path: str, value: Any) -> Any:
 
 
 def _literal(node: Node) -> Any:
-    """A node as nested dicts, lists and texts whose numbers keep their digits."""
+    """A node as nested dicts, lists and strings; numbers remain as they are written."""
     if isinstance(node, Mapping):
         return {key: _literal(value) for key, (_, value) in node.entries.items()}
     if isinstance(node, Sequence):

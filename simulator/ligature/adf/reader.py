@@ -207,7 +207,7 @@ def _listed(root: Mapping, kind: str) -> set[str]:
 
 
 def _other_keys(root: Mapping, kind: str) -> list[Diagnostic]:
-    """Top-level keys that are neither the file's own nor listed objects: slips, spare objects, anchor holders."""
+    """Findings about top-level keys that are neither the file's own nor listed objects, such as typing errors."""
     listed = _listed(root, kind)
     found: list[Diagnostic] = []
     for name, (key, node) in root.entries.items():
@@ -229,7 +229,7 @@ def _other_key(name: str, key: Scalar, node: Node, kind: str) -> Diagnostic:
 
 
 def _may_hold(key: Key, node: Node) -> bool:
-    """Whether a key can have been meant by the look of the value: an unlisted object is no slip of a list."""
+    """Whether the value is of a form that the key takes: a block of an unlisted object is not a misspelled list."""
     return isinstance(node, Mapping) == (key.type in (Type.MAP, Type.VECTOR, Type.POSE))
 
 
@@ -245,7 +245,7 @@ def _holds_anchor(node: Node) -> bool:
 
 
 def _elements(document: Document, list_name: str, strict: bool) -> tuple[Element, ...]:
-    """The usable objects of one list; one that is listed twice is checked once and stands twice."""
+    """The usable objects of one list; an object that is listed twice is checked once and returned twice."""
     node = document.top.node.get(list_name)
     checked: dict[str, Element | None] = {}
     elements = []

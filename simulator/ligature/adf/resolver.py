@@ -158,7 +158,7 @@ def scene_root(path: Path) -> Path:
 
 
 def _too_wide(folder: Path) -> bool:
-    """Whether ``folder`` holds more than scenes: all of a disk, all of a home, or more."""
+    """Whether ``folder`` is too wide for a root: a whole disk, a whole home folder, or more."""
     return folder == folder.parent or _above_home(folder) or folder == _home()
 
 

@@ -131,7 +131,7 @@ def _edits(
     items: Sequence[Item],
     removed: Collection[str],
 ) -> list[Edit]:
-    """Changes of one round: those where the values stand; when there are none, one behind an alias."""
+    """Edits of one round: those of values that are written in place; if there are none, one of an aliased value."""
     behind_alias: list[Edit] = []
     edits = list(_changes(text, root, own_element(kind, root), top, behind_alias))
     edits += _object_edits(text, root, kind, items, removed)
@@ -182,7 +182,7 @@ def _definition(text: str, item: Item) -> Edit:
 
 
 def _list_edit(text: str, root: nodes.Mapping, name: str, keys: list[str]) -> Edit:
-    """A list written whole, where it stands or after the lists that are there."""
+    """Edit that writes a whole list, in its place or after the other lists."""
     if name in root.entries:
         return set_value(text, root, name, keys)
     before = [other for other in LISTS if other in root.entries]
@@ -367,7 +367,7 @@ def _removals(text: str, owner: nodes.Mapping, element: Element, paths: list[str
 
 
 def _whole_blocks(owner: nodes.Mapping, paths: list[str]) -> list[str]:
-    """``paths`` with every block whose keys all go in place of these keys."""
+    """``paths``, in which a block replaces its keys when all of them are removed."""
     going = set(paths)
     for path in paths:
         block = path.rpartition(".")[0]
@@ -421,7 +421,7 @@ def _put(nested: dict[str, Any], path: str, value: Any) -> None:
 
 
 def _plain(key: Key, value: Any, kind: str = "") -> Any:
-    """A typed value as the file writes it."""
+    """A typed value as nested plain values, as files have it."""
     if key.type in _PARTS:
         return dict(zip(_PARTS[key.type], value, strict=True))
     if key.type is Type.POSE:

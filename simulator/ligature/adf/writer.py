@@ -64,7 +64,7 @@ def text_scalar(text: str) -> str:
 
 
 def _key_text(name: str) -> str:
-    """A key; those of vectors stay plain, as everybody writes them, also ``y`` and ``n``."""
+    """A key as text; ``y`` and ``n`` of vectors remain unquoted, as all ADF files have them."""
     return name if len(name) == 1 and name.isalpha() else text_scalar(name)
 
 

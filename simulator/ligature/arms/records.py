@@ -104,7 +104,7 @@ def describe_arms(handle: int, tree_table: Integers, arm_table: Integers) -> boo
 
 @compiled
 def _look(trees: Trees, arms: ArmArrays, m: int, group: int, begin: int, n: int) -> None:
-    """Take down the ``n`` joints from ``begin`` on of one group of arm ``m``, measured and asked for."""
+    """Record the ``n`` joints from ``begin`` on of one group of arm ``m``: measured values and set points."""
     own, aim = arms.own[m, group], arms.aim[m, group]
     for c in range(3):
         for j in range(n):
@@ -123,7 +123,7 @@ def _look(trees: Trees, arms: ArmArrays, m: int, group: int, begin: int, n: int)
 
 @compiled
 def _note_inputs(arms: ArmArrays, m: int) -> bool:
-    """Whether joints or wrench of arm ``m`` are others than when they were noted last; they are noted now."""
+    """Whether joints or wrench of arm ``m`` changed since the last call."""
     changed, i, inputs = False, 0, arms.inputs[m]
     for c in range(3):
         for j in range(ARM_JOINTS + 1):
@@ -159,7 +159,7 @@ class ArmRecords:
         self._numbers = np.zeros((0, NUMBERS))
 
     def _find(self, m: int, g: int, group: Axes) -> None:
-        """Note where the joints of a group are found."""
+        """Store the addresses and indices of the joints of a group."""
         arrays, begin = self._arrays, g * ARM_JOINTS
         state, axes = group.plant.source()
         arrays.own[m, g] = 0 if state is None else state.ctypes.data
@@ -196,7 +196,7 @@ class ArmRecords:
         self._outlines = [()] * len(self._arms)
 
     def _renew(self, m: int, arm: Arm, state: StateRecord) -> None:
-        """Take modes, kinematics and frames of an arm, and write its status."""
+        """Update modes, kinematics and frames of an arm, and write its status."""
         arrays = self._arrays
         for number, g, group in self._groups:
             if number == m:
@@ -219,7 +219,7 @@ def _groups(arm: Arm) -> tuple[Axes, ...]:
 
 
 def _write_status(record: Any, arm: Arm) -> None:
-    """Write what changes seldom."""
+    """Write the fields that change seldom."""
     state, axes = arm.operating_state, arm.joints
     record["operating"], record["homed"], record["busy"] = state.state, state.is_homed, state.is_busy
     if isinstance(arm, PsmArm):

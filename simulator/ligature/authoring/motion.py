@@ -260,7 +260,7 @@ def _scaled(keys: JointKeys, scales: tuple[float, float]) -> JointKeys:
 
 
 def _shifted(was: float, before: float, now: float, noise: float) -> float:
-    """A number of a file that stood for ``before`` and now stands for ``now``."""
+    """A number of a file, changed by the difference of ``before`` and ``now``."""
     own = 0.5 * float(np.spacing(np.float32(abs(before))))
     if abs(now - before) <= max(own, noise):
         return was

@@ -210,7 +210,7 @@ class Block:
 
 
 def _reserve(descriptor: int, path: Path, size: int) -> None:
-    """Take memory now: a page that cannot be allocated later would kill the process that writes to it."""
+    """Allocate all pages now: a page that could not be allocated later would kill the process that writes to it."""
     try:
         os.posix_fallocate(descriptor, 0, size)
     except OSError as error:

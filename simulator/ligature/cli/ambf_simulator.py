@@ -137,7 +137,7 @@ def _switch(text: str) -> bool:
 
 
 def _notes(given: argparse.Namespace) -> tuple[str, ...]:
-    """What the flags ask for and do not get."""
+    """Notes on flags that have no effect."""
     notes = [
         f"{words[0]} ({what}) has no effect here"
         for words, what in _WITHOUT_EFFECT.items()

@@ -95,5 +95,5 @@ def _has_bodies(document: Document) -> bool:
 
 
 def _distinct(found: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """Each finding once, as it was reported last: the scene adds to a file's finding what follows from it."""
+    """Each finding once, in its last form: the scene adds consequences to the finding of a file."""
     return list({(d.severity, d.message, d.mark): d for d in found}.values())

@@ -44,7 +44,7 @@ def _serve(run: Run) -> None:
 
 
 def _on_ros(prefix: str) -> tuple[TopicHealth, TeleopRemote]:
-    """What the page shows of ROS."""
+    """The state of ROS for the page."""
     from ligature.ros.health import TopicHealth, begin_node
     from ligature.teleop.remote import TeleopRemote
 

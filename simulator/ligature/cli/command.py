@@ -76,7 +76,7 @@ def _fail(text: str) -> NoReturn:
 
 
 def _open_streams() -> None:
-    """Lead input, output and errors that are closed, as a service may start a command, to nowhere.
+    """Open the null device for standard streams that are closed, as a service may start a command.
 
     The first files opened would take their places, and get what is printed.
     """

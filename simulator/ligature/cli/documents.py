@@ -50,7 +50,7 @@ def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> in
 
 
 def _lost(document: Document) -> str:
-    """What the canonical form cannot hold of a file."""
+    """Content of a file that the canonical form cannot represent."""
     if any(line.lstrip().startswith("#") or " #" in line for line in document.text.splitlines()):
         return "its comments"
     if any(d.code == "unlisted" for d in document.diagnostics):

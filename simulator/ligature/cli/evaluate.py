@@ -75,7 +75,7 @@ def _print(summary: Mapping[str, Any], console: Console) -> None:
 
 
 class _Moments:
-    """Writes pictures of the first, the middle and the last moment of an episode."""
+    """Writes pictures of the first, the middle and the last state of an episode."""
 
     def __init__(self, env: SuturingEnv, episode: Episode, out: Path) -> None:
         self._env, self._stem = env, out / str(episode.seed)

@@ -192,7 +192,7 @@ def run(
 
 
 def _served_at(text: str | None) -> str:
-    """The address of the page, after a look at whether it may be served there."""
+    """The address of the page; raises `typer.BadParameter` when the page may not be served there."""
     if importlib.util.find_spec("viser") is None:
         raise typer.BadParameter(remedy("viser"))
     from ligature.cockpit.address import DEFAULT, TOKEN_VARIABLE, AddressError, check_token, read_address

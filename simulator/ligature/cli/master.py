@@ -16,7 +16,7 @@ ANSWER_TIMEOUT = 1.0
 
 
 class _Transport(xmlrpc.client.Transport):
-    """A transport that does not wait for ever for a program that listens and answers nothing."""
+    """A transport with a timeout, for programs that accept a connection and never answer."""
 
     def make_connection(self, host: object) -> HTTPConnection:
         connection = super().make_connection(host)  # type: ignore[arg-type]

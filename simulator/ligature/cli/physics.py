@@ -74,7 +74,7 @@ def _simulate(run: Run) -> None:
 
 
 def _give_memory_back() -> None:
-    """Give what the start allocated and needs no more back to the system: 12 MB, which only the GNU library keeps."""
+    """Return the memory that only the start needed to the system: 12 MB, which the GNU C library would keep."""
     with contextlib.suppress(AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
 

@@ -88,7 +88,7 @@ def run_process(work: Callable[[Run], None], owner: bool = False, early: bool = 
 
 
 def _leave(stop: Stop, owner: bool, problems: list[str], status: int) -> NoReturn:
-    """Report why this process cannot join and end it.
+    """Report why this process cannot take part in the run, and end it.
 
     When the owner has the same problem it reports it and the run ends; others repeat it only when the run continues.
     """

@@ -58,7 +58,7 @@ def record(out: Path, exclude: str, seconds: float, keep_free: float, console: C
 
 
 def _obstacle(out: Path) -> str:
-    """Why nothing can be recorded; empty when nothing stands in the way."""
+    """Why nothing can be recorded; empty when it can."""
     if recorder() is None:
         return "ROS's bag recorder is not installed (Debian package python3-rosbag)"
     if out.suffix != ".bag":
@@ -84,7 +84,7 @@ def _commanded() -> list[str]:
 
 
 def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
-    """What the recorder printed, and its status; a signal to this program or the end of time has it end well."""
+    """Output and exit status of the recorder, which a signal to this program or the duration interrupts."""
     stop = stop_on_signal((signal.SIGINT, signal.SIGTERM), timeout=None)
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
@@ -108,7 +108,7 @@ def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
 
 
 def _reason(lines: list[str]) -> str:
-    """Why the recorder gave up; empty when it did not."""
+    """Why the recorder failed; empty when it did not."""
     plain = [_COLOUR.sub("", line).strip() for line in lines]
     loud = [line for line in plain if line.lower().startswith(_LOUD)]
     return loud[-1].removeprefix("what():").strip() if loud else ""

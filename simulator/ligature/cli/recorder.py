@@ -136,7 +136,7 @@ class Recorder:
         self._copying = [other for other in self._copying if other.is_alive()] + [thread]
 
     def _copy(self, excerpt: Excerpt, moment: Moment, seconds: float) -> None:
-        """On a thread: a large file must not hold up the loop."""
+        """Copy a file on a thread, since a large one must not delay the loop."""
         try:
             excerpt.finish(moment)
         except OSError as error:
@@ -163,7 +163,7 @@ class Recorder:
         self._block.figures["recording"] = 0
 
     def _report(self, text: str, bad: bool = False) -> None:
-        """Report to the page, and to the terminal when something is wrong."""
+        """Report to the page, and errors to the terminal too."""
         self._block.events.write(RUN, EVENT, text)
         if bad:
             report("warning", text)

@@ -67,7 +67,7 @@ class _Exposure:
         return self._picture.due if self._cloud is None else min(self._picture.due, self._cloud.due)
 
     def open(self, now: float, update: int) -> tuple[Wishes, int]:
-        """What clients want of what is due and new, and how many frames they did not get since the last time."""
+        """The due topics with subscribers and a new state, and the number of frames dropped since the last call."""
         missed = self._picture.missed(now) if self._drawn else 0
         picture = self._picture.open(now, update)
         cloud = self._cloud is not None and self._cloud.open(now, update)
@@ -94,7 +94,7 @@ class Studio:
         self._exposures = [_Exposure(topics) for topics in self._node.topics]
 
     def _look_at_parameters(self) -> None:
-        """Read what users have set, and write what follows from it; on the thread that watches the master."""
+        """Read the parameters that users set, and write derived ones; runs on the thread that watches the master."""
         self._follower.poll()
         self._clouds.poll()
         if self._block.filled and self._block.read(self._seen):

@@ -75,7 +75,7 @@ def _again(record: Record, scene: Path | None, dataset: Sampled | None, console:
 
 
 def _sampled_bag(file: Path, scene: Path | None, dataset: Sampled, console: Console) -> int:
-    """What a bag has, as a dataset: nothing is simulated."""
+    """Convert the content of a bag to a dataset, without simulation."""
     from ligature.datasets.bags import record_bag
     from ligature.ros.bags import judge
 

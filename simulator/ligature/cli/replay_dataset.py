@@ -21,7 +21,7 @@ NEEDS_REPORT = "pose_estimation"
 
 
 class _Sampler:
-    """Watches a run that is simulated again; its writer belongs to ``files``."""
+    """Samples a run while it is simulated again; ``files`` owns the writer."""
 
     def __init__(self, dataset: Sampled, task: str, source: str, marked: MarkedPhases, files: ExitStack) -> None:
         self._dataset, self._task, self._source, self._files = dataset, task, source, files
@@ -30,7 +30,7 @@ class _Sampler:
         self._attempt: Attempt | None = None
 
     def watch(self, simulation: ligature.Simulation) -> None:
-        """Take what is due of an update."""
+        """Sample an update when a sample is due."""
         if self._writer is None:
             self._begin(simulation)
         assert self._writer is not None
@@ -56,7 +56,7 @@ class _Sampler:
         self._writer = self._files.enter_context(writer)
 
     def finish(self) -> str:
-        """End the episode; returns how it went, in words."""
+        """End the episode; returns its outcome as text."""
         assert self._writer is not None
         found, why = self._dataset.success, "" if self._dataset.success is None else "as the operator found"
         figures: dict[str, float | int | str] = {}

@@ -46,7 +46,7 @@ def _serve(run: Run) -> None:
 
 
 def _haptics(options: RunOptions) -> dict[str, object]:
-    """What teleoperation is to know of forces."""
+    """Settings of force feedback for teleoperation."""
     found: dict[str, object] = {"rate": options.haptic_rate} if options.haptic_rate else {}
     if options.haptic_fixed:
         found["step"] = options.speed / (options.haptic_rate or HAPTIC_RATE)

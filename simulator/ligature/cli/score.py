@@ -55,7 +55,7 @@ def _live(task: str, timeout: float) -> Figures:
 
 
 def _recorded(task: str, file: Path, scene: Path | None) -> Figures:
-    """Judged at the end of a run that is simulated again, with everything measured."""
+    """Score a recorded run at its end, with all measures, by simulating it again."""
     from ligature.cli.resimulation import looks, resimulate
     from ligature.tasks import Attempt
 

@@ -81,7 +81,7 @@ class Child:
         threading.Thread(target=self._listen, args=(self.process,), daemon=True).start()
 
     def _prepare(self) -> None:
-        """In the new process, in its session, before it is the program."""
+        """Prepare the forked process, in its own session, before it executes the program."""
         end_with_parent()
         if self._nice:
             lower_priority(self._nice)
@@ -171,7 +171,7 @@ class Supervisor:
             self._children[name] = Child(name, command, self._events, self._env, nice)
 
     def _master_begun(self) -> bool:
-        """Whether there is a ROS master, after one was started where none answered: it may still take a second."""
+        """Whether a ROS master answers or was started now, which may take another second to answer."""
         uri = self._env["ROS_MASTER_URI"] = self._env.get("ROS_MASTER_URI") or master.DEFAULT_MASTER
         if master.master_answers(uri):
             self._print(f"using the ROS master at {uri}")
@@ -185,7 +185,7 @@ class Supervisor:
         return True
 
     def _master_answers(self) -> bool:
-        """Wait until a master that was started answers; the run is over when it does not."""
+        """Wait until the started master answers; the run ends when it does not."""
         child, uri = self._children.get("master"), self._env["ROS_MASTER_URI"]
         if child is None:
             return True

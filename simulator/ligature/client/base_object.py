@@ -194,7 +194,7 @@ class BaseObject:
             self._pose_commanded()
 
     def _takes(self, *values: float) -> bool:
-        """Whether all numbers of a command are finite; a message when not, and the command before stays.
+        """Whether all numbers of a command are finite; otherwise it is reported and the previous command remains.
 
         The simulator would refuse the whole message, and release the object when nothing better follows.
         """
@@ -206,7 +206,7 @@ class BaseObject:
         return False
 
     def _pose_commanded(self) -> None:
-        """Mark the command as one of a pose."""
+        """Mark the command as a pose command."""
 
     def _wanted_pose(self) -> Pose:
         return self._cmd.pose if self._posed else self._state.pose

@@ -61,7 +61,7 @@ class JointedObject(BaseObject):
         self.set_wrench(Wrench(vector(fx, fy, fz), vector(nx, ny, nz)))
 
     def _wrench_commanded(self) -> None:
-        """Mark the command's wrench as the one that is meant."""
+        """Mark the command as a wrench command."""
         raise NotImplementedError
 
     def get_children_names(self) -> list[str]:

@@ -8,7 +8,7 @@ from ligature.client.base_object import BaseObject
 
 
 class _Placed(BaseObject):
-    """Something that goes where it is put; a pose set once holds."""
+    """An object with a commanded pose, which holds until the next command."""
 
     def _pose_commanded(self) -> None:
         self._cmd.enable_position_controller = True

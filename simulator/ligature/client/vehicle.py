@@ -98,5 +98,5 @@ class Vehicle(BaseObject):
 
 
 def _inside(place: Point, angle: float) -> float:
-    """How far a wheel is towards the centre of the turn."""
+    """Offset of a wheel towards the centre of the turn, m."""
     return math.copysign(1.0, angle) * place.y

@@ -84,7 +84,7 @@ class World(BaseObject):
 
 
 def _heard(publisher: Any, name: str) -> bool:
-    """Whether a simulator listens, after a moment for a connection that is just being made."""
+    """Whether a simulator subscribes; waits a moment for a connection that is being made."""
     if publisher is None:
         raise RuntimeError(f"{name} is not connected: get its handle from a Client after connect()")
     deadline = time.monotonic() + LISTENER_TIMEOUT

@@ -173,7 +173,7 @@ def _slider(gui: Any, joint: JointFacts, value: float) -> Any:
 
 
 def _follow(slider: Any, joint: JointFacts, value: float, astray: bool) -> None:
-    """Take a slider to a value; one that is ``astray`` also where its copy here has that value already.
+    """Set a slider to a value; when it is ``astray``, also if the server's copy has that value already.
 
     What the browser sends of a drag and what it is sent cross on their way, and it keeps the older of the two.
     """
@@ -189,7 +189,7 @@ def _inside(joint: JointFacts, shown: float) -> float:
 
 
 async def _forward(take: Any, event: GuiEvent[Any]) -> None:
-    """Hand on what a person did; what the page itself set comes without a client."""
+    """Forward an input of a person; changes by the page itself have no client."""
     value = float(event.target.value)
     if event.client_id is not None and np.isfinite(value):
         await take(value)

@@ -227,12 +227,12 @@ class Assist:
     # --- deeds: each step ends a turn of the loop ---------------------------------------------------
 
     def _align(self) -> Steps:
-        """Turn the jaw to the needle, and stand before it, open."""
+        """Align the jaw with the needle and move to the approach pose, jaw open."""
         pick = yield from self._plan()
         yield from self._stand(pick.T_arc_tool)
 
     def _pick(self) -> Steps:
-        """Take the needle so that it can be driven, if need be by laying it down in another direction first."""
+        """Grasp the needle so that it can be driven; if needed, lay it down in another orientation first."""
         for _ in range(TURNS):
             if (yield from self._take()):
                 return
@@ -240,7 +240,7 @@ class Assist:
                 return
 
     def _stand(self, grasp: Array) -> Steps:
-        """Stand before the needle with the jaw open, without touching it on the way there."""
+        """Move to the approach pose with the jaw open, without touching the needle on the way."""
         planner = self._planner
         yield from self._jaw(OPEN)
         T = self._tip
@@ -290,7 +290,7 @@ class Assist:
         return True
 
     def _bring(self) -> Steps:
-        """Take the needle's tip to before the entry of the throw that the arm reaches best."""
+        """Move the needle's tip in front of the entry of the throw that the arm reaches best."""
         for left in reversed(range(TURNS)):
             hold = self._hold
             throw = yield from self._think(self._arm, self._planner.throw, hold)
@@ -305,7 +305,7 @@ class Assist:
         self._throw = self._arm, throw, hold
 
     def _drive(self) -> Steps:
-        """Turn the needle along its arc to where the slider is."""
+        """Drive the needle along its arc to the position of the slider."""
         assert self._throw is not None
         _, throw, hold = self._throw
         facts, pursuits, planner = self._arms[self._arm], self._pursuits[self._arm], self._planner
@@ -331,7 +331,7 @@ class Assist:
         return np.asarray(inverse(self._planner.needle(self._state)) @ self._tip)
 
     def _plan(self) -> Generator[None, None, Pick]:
-        """How the needle is taken: by the operator's arm, or by another that is ready and can."""
+        """Plan the grasp of the needle: by the operator's arm, or by another arm that is ready and reaches it."""
         others = [arm for arm in self._planners if arm != self._arm and self._arms[arm].ready(self._state)]
         found: dict[int, Pick] = {}
         for arm in (self._arm, *others):
@@ -347,7 +347,7 @@ class Assist:
         return found[self._arm]
 
     def _think(self, arm: int, plan: Callable[..., Any], *given: Any) -> Generator[None, None, Any]:
-        """What ``plan`` finds for an arm, of a copy of the state and on a thread of its own: the page goes on."""
+        """The result of ``plan`` for an arm, from a copy of the state and on a thread: the page does not wait."""
         state = self._state.copy()
         found = self._thinker.submit(plan, state, self._arms[arm].base_in_world(state), *given)
         self._thought = found
@@ -359,7 +359,7 @@ class Assist:
             raise Failed(str(error)) from error
 
     def _go(self, T: Array) -> Steps:
-        """Take the tip to ``T`` (4, 4): straight, or up and over to it where joints would meet their limits."""
+        """Move the tip to ``T`` (4, 4): straight, or up and over where joints would reach their limits."""
         planner, q = self._planner, self._arms[self._arm].setpoints(self._state)
         T_base = self._arms[self._arm].base_in_world(self._state)
         if not planner.straight(T_base, q, self._tip, T):
@@ -376,7 +376,7 @@ class Assist:
         yield from self._slide(T)
 
     def _turn(self, joints: Array) -> Steps:
-        """Take the arm to joint values (6,)."""
+        """Move the arm to joint values (6,)."""
         facts, pursuits = self._arms[self._arm], self._pursuits[self._arm]
         pursuits.joints(facts.setpoints(self._state), joints, SPEED * facts.speed)
         while pursuits.active:
@@ -384,7 +384,7 @@ class Assist:
         yield from self._wait(STUCK, lambda: bool(np.abs(facts.setpoints(self._state) - joints).max() < NEAR))
 
     def _slide(self, T: Array) -> Steps:
-        """Take the tip straight to ``T`` (4, 4)."""
+        """Move the tip straight to ``T`` (4, 4)."""
         facts, pursuits = self._arms[self._arm], self._pursuits[self._arm]
         pursuits.pose(facts.in_reference(self._state, self._tip), facts.in_reference(self._state, T), True)
         since = None
@@ -397,7 +397,7 @@ class Assist:
         yield from self._wait(SETTLING)  # the arm follows its set-point
 
     def _wait(self, seconds: float, until: Callable[[], bool] = lambda: False) -> Steps:
-        """Wait so long, or until something holds."""
+        """Wait for a time, or until a condition holds."""
         begin = float(self._state["sim_time"])
         while float(self._state["sim_time"]) - begin < seconds and not until():
             yield
@@ -420,7 +420,7 @@ class Assist:
         return True
 
     def _jaw(self, angle: float) -> Steps:
-        """Take the jaw to ``angle``."""
+        """Move the jaw to ``angle``."""
         facts, pursuits = self._arms[self._arm], self._pursuits[self._arm]
         assert facts.grip is not None
         angle = float(np.clip(angle, facts.grip.low, facts.grip.high))
@@ -431,7 +431,7 @@ class Assist:
 
     @property
     def _pressure(self) -> float:
-        """Newtons at the tip of the arm."""
+        """Force at the tip of the arm, N."""
         return float(np.linalg.norm(self._state["arm"][self._arm]["spatial_measured_cf"][:3]))
 
     @property

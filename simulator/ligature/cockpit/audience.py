@@ -115,7 +115,7 @@ class Audience:
         self._begin(self.clients[client])
 
     def _seat(self, client: int) -> None:
-        """Let a browser take the desk, or give it up."""
+        """Make a browser the operator's, or end that."""
         gui = self.clients[client].gui
         if client in self._buttons:
             self._buttons.pop(client).remove()

@@ -243,7 +243,7 @@ class Cockpit:
     # --- the page's own script -------------------------------------------------------------------
 
     def _hear_wire(self, client: int, order: Order) -> None:
-        """What the script of a browser orders: some of it anybody's, the rest the operator's."""
+        """Handle the orders of a browser's script: a few are open to all, the others to the operator alone."""
         handle = self._audience.clients.get(client)
         if handle is None:
             return
@@ -296,7 +296,7 @@ class Cockpit:
                 self._forget_note(arm)
 
     def _hold(self) -> None:
-        """Every arm stays where it is."""
+        """Hold all arms where they are."""
         self._hands.rest()
         for arm, pursuits in enumerate(self._pursuits):
             if pursuits.stop():
@@ -309,7 +309,7 @@ class Cockpit:
 
     @property
     def _camera_sight(self) -> Sightline | None:
-        """How the camera looks whose picture is shown, the first of two."""
+        """Line of sight of the camera whose picture is shown, of the first of two."""
         sight = self._sights.get(self._sight)
         if sight is None:
             return None
@@ -317,7 +317,7 @@ class Cockpit:
         return Sightline.of(self._scene.cameras[index], self._state["camera_world"][0, index])
 
     def _sightline(self, client: ClientHandle) -> Sightline:
-        """How a browser looks: through the camera where its picture is large, else at the 3D view."""
+        """Line of sight of a browser: the camera's if its picture is large, else that of the 3D view."""
         if self._views.get(client.client_id, SMALL_VIEW).large and self._camera_sight is not None:
             return self._camera_sight
         try:
@@ -326,7 +326,7 @@ class Cockpit:
             return self._camera_sight or Sightline(np.eye(3), np.zeros(3))
 
     def _inform(self) -> None:
-        """Give every script what it shows."""
+        """Send each script the values that it shows."""
         desk = self._audience.desk
         ready = [arm.facts.ready(self._state[0]) for arm in self._arms]
         hands = self._hands
@@ -396,7 +396,7 @@ class Cockpit:
             obey_teleop(self._ros.remote, word, value)
 
     def _cut(self, distance: float) -> None:
-        """Leave out of the operator's 3D view what is nearer than ``distance`` metres."""
+        """Clip the operator's 3D view at ``distance`` metres."""
         client = self._operating
         if client is not None:
             client.camera.near = float(np.clip(distance, NEAREST, 1e-3 * MOST_CUT))
@@ -425,7 +425,7 @@ class Cockpit:
             pursuits.pose(start, facts.in_reference(state, value))
 
     def _follow(self, now: float, dt: float) -> None:
-        """Send the next goals of what is pursued, slower or not at all while the operator's browser is silent."""
+        """Send the next goals of motions in progress, slowed or stopped while the operator's browser is silent."""
         client, state = self._operating, self._state[0]
         # goals move in simulated time: an arm keeps a hand's speed in a simulation that is slow, held up, or paused
         step = float(np.clip(state["sim_time"] - self._followed, 0.0, AWAKE))
@@ -470,7 +470,7 @@ class Cockpit:
         return dragged if self._hands.dragging is None else dragged | {self._hands.dragging}
 
     def _give_up(self, why: str) -> None:
-        """Hold every arm that a hand steers, and show why."""
+        """Hold all arms that are driven by hand, and show why."""
         dragged = self._dragged
         for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
             steered = pursuits.active and not pursuits.planned
@@ -551,7 +551,7 @@ class Cockpit:
         return WORDS_PERIOD
 
     def _wish(self) -> Wish | None:
-        """The picture that the browsers want: as large as the largest of them."""
+        """The picture to draw for the browsers: as large as the largest request."""
         sight = self._sights.get(self._sight)
         self._views = {client: view for client, view in self._views.items() if client in self._audience.clients}
         views = [self._views.get(client, SMALL_VIEW) for client in self._audience.clients]

@@ -23,7 +23,7 @@ REPORT_PAUSE = 10.0
 
 @dataclass
 class _Caller:
-    """One address: wrong tokens so far, since the last line, and when the next answer is due."""
+    """State of one address: wrong tokens in all, those since the last log line, and when the next answer is due."""
 
     wrong: int = 0
     unreported: int = 0

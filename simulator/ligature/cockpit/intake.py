@@ -84,7 +84,7 @@ def _answers(message: LocalStorageGetItemResponseMessage) -> bool:
 
 
 def _looks(message: ViewerCameraMessage) -> bool:
-    """Whether somebody can look so: finite numbers of the right shapes, and axes that are no zeros."""
+    """Whether a view is valid: finite numbers of the right shapes, and axes that are not zero."""
     vectors = (message.wxyz, message.position, message.look_at, message.up_direction)
     try:
         numbers = [np.array(value, dtype=float) for value in (*vectors, [message.fov, message.near, message.far])]

@@ -134,7 +134,7 @@ def _view(value: Any) -> View:
 
 
 def _key(value: Any) -> str:
-    """The key of an operator who comes back, as `desk` gave it."""
+    """The key of an operator who reconnects, as `desk` issued it."""
     if not isinstance(value, str) or len(value) > 100:
         raise ValueError
     return value

@@ -153,7 +153,7 @@ class Sharpness:
 
 
 def _draw(scene: Scene, bus: str, pipe: Connection) -> None:
-    """The process: draws what was asked for last."""
+    """Main of the process: draws the newest request."""
     end_with_parent()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.setsid()
@@ -220,7 +220,7 @@ class _Easel:
         self._drawn = -1
 
     def picture(self, wish: Wish) -> NDArray[np.uint8] | None:
-        """All eyes of ``wish`` side by side, (h, w, 3); None when nothing has happened since the last one."""
+        """All eyes of ``wish`` side by side, (h, w, 3); None when the state has not changed since the last picture."""
         from ligature.render import view_of
 
         self._block.read(self._state)

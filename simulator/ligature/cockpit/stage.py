@@ -112,7 +112,7 @@ class Stage:
 
 
 def _rests(scene: Scene, owner: int) -> bool:
-    """Whether shadows fall on a body; what moves casts them. Nothing does both: a shadow map is too coarse for it."""
+    """Whether a body receives shadows; moving bodies cast them. None does both: a shadow map is too coarse."""
     return owner < len(scene.bodies) and scene.bodies[owner].static
 
 
@@ -130,7 +130,7 @@ def work_place(scene: Scene, state: NDArray[np.void]) -> Array:
 
 
 def _worked_on(scene: Scene) -> list[int]:
-    """Bodies of threads, else needles, else all that can move."""
+    """The bodies that the view is centred on: threads, else needles, else all that can move."""
     needles = [needle.body for needle in scene.needles]
     return [*scene.rod_bodies] or needles or [body.index for body in scene.bodies if not body.static]
 

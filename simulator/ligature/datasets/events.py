@@ -20,7 +20,7 @@ it."""
 
 @dataclass(frozen=True)
 class _Moment:
-    """What events are read from.
+    """The part of a state from which events are detected.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class EventWatch:
 
 
 def _passed(before: _Moment, now: _Moment) -> tuple[bool, bool]:
-    """Whether the needle's tip went in, and out, since.
+    """Whether the needle's tip entered, and left, between two states.
 
     Rigid holes: the first one that has it is where it went in, a further one where it came out, also where it goes on
     to the next bite before it has left the last. Soft tissue lists the places of both: the first, third, ... went in.

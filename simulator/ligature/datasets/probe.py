@@ -46,7 +46,7 @@ def probe(path: Path) -> None:
 
 
 def _look(path: Path, writes: int, seconds: int) -> NoReturn:
-    """In the child: read everything that a reader reads, say what is wrong, and end."""
+    """Main of the child process: read all that a reader reads, report errors, and exit."""
     try:
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -80,7 +80,7 @@ def check(file: h5py.File, path: Path) -> None:
 
 
 class _Walk:
-    """Everything in a file, once: no circles, no bytes of other files, no array that is mostly a claim."""
+    """Visits all items of a file once; rejects cycles, data in other files and arrays far larger than their bytes."""
 
     def __init__(self, episodes: str) -> None:
         self._episodes, self._seen, self._count = episodes, set[tuple[int, int]](), 0
@@ -117,7 +117,7 @@ class _Walk:
 
 
 def _check_stored(array: Any, name: str) -> None:
-    """Its bytes are in this file, and about as many as it claims."""
+    """Raise `Unsound` unless the bytes of an array are in this file, and about as many as its shape states."""
     if array.external or array.is_virtual:
         raise Unsound(f"'{name}' refers to data in another file")
     size = math.prod(array.shape or (0,)) * array.dtype.itemsize

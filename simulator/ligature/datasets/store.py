@@ -212,7 +212,7 @@ def damaged(path: Path) -> Iterator[None]:
 
 
 def _printable(text: object) -> str:
-    """Without the surrogates that stand for bytes of names that are no UTF-8, which no terminal takes."""
+    """``text`` with escapes for the surrogates of names that are not UTF-8, which terminals cannot print."""
     return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
@@ -231,7 +231,7 @@ def _name(number: int) -> str:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Hand the names in a folder to the disk."""
+    """Flush the entries of a folder to the disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

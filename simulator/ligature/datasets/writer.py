@@ -103,7 +103,7 @@ class DatasetWriter:
             raise DatasetError(f"cannot write the dataset '{path}': {reason(error)}") from error
 
     def _describe(self, file: h5py.File) -> None:
-        """What holds for all episodes."""
+        """Write the attributes that are the same for all episodes."""
         scene, attributes = self._simulation.scene, file.attrs
         attributes["format"], attributes["version"] = FORMAT, ligature.__version__
         attributes["scene"], attributes["rate"], attributes["task"] = scene.name, self._rate, self._task
@@ -195,7 +195,7 @@ class DatasetWriter:
         self._episode, self._rows, self._exposures = None, None, {}
 
     def _values(self, phase: str, doers: Collection[str] | None) -> Iterator[Value]:
-        """All of one sample."""
+        """The values of one sample."""
         simulation, state = self._simulation, self._simulation.state[0]
         scene, label = simulation.scene, self._phases.index(phase)
         yield "time", simulation.time, {"dtype": "f8", "units": "s"}
@@ -307,7 +307,7 @@ class DatasetWriter:
 
 
 def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: Mapping[str, str]) -> None:
-    """Raise ValueError for what no dataset can have."""
+    """Raise ValueError for settings that a dataset cannot have."""
     if not 0.0 < rate <= 1000.0:
         raise ValueError(f"rate must be above 0 and at most 1000 samples per simulated second, not {rate:g}")
     if min(size) < 1:

@@ -223,7 +223,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         return False
 
     def _keep_thread(self, index: int, thread: thread_grasps.ThreadGrasp) -> None:
-        """Let the pads of a jaw act on a thread in the coming tick, or release it."""
+        """Apply the pads of a jaw to a thread in the next tick, or release it."""
         pads = thread_grasps.keep(thread, self._rods, self._world, self._fingers[index])
         if pads is None:
             self._release_thread(index, thread)
@@ -240,7 +240,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._update_rod(thread.rod)
 
     def _update_rod(self, number: int) -> None:
-        """Hand a rod all pads that hold it."""
+        """Set the pads that hold a rod."""
         held = [
             other
             for p, other in zip(self._thread_grasps, self._pads, strict=True)
@@ -265,7 +265,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         )
 
     def _keep(self, index: int, held: JawGrasp) -> None:
-        """Press as hard as the commands request; release the body when they open, or when it has slipped out."""
+        """Set the commanded normal force; release the body when the jaw opens or the body slipped out."""
         fingers = self._fingers[index]
         efforts = fingers.efforts()
         force = min(effort / max(lever, LEAST_LEVER) for effort, lever in zip(efforts, held.levers, strict=True))

@@ -74,7 +74,7 @@ class CollisionCache:
 
 
 def _kept(path: Path, data: bytes) -> Path:
-    """``path`` holding ``data``, written unless it does already; a damaged file is replaced."""
+    """Write ``data`` to ``path`` unless the file has this content already; returns ``path``."""
     try:
         if path.read_bytes() == data:
             return path
@@ -100,7 +100,7 @@ def _face_lines(faces: NDArray[np.int32], first: int) -> list[str]:
 
 
 def _surface(points: Array) -> tuple[Array, NDArray[np.int32]]:
-    """Corners, and triangles that mention each: Bullet takes the points that faces name and hulls them."""
+    """Vertices and triangles that use each of them: Bullet builds the hull of the vertices that faces use."""
     try:
         return convex_surface(points)
     except ValueError:

@@ -178,7 +178,7 @@ def simplified(vertices: Array, faces: NDArray[np.int32], most: int = MOST_FACES
 
 
 def _convex_enough(vertices: Array, faces: NDArray[np.int32]) -> bool:
-    """Whether a mesh fills its hull, or has none to fill."""
+    """Whether a mesh fills its hull, or has no hull with a volume."""
     try:
         hull = hull_properties(vertices).volume
     except ValueError:
@@ -233,7 +233,7 @@ def _check_surface(vertices: Array, faces: NDArray[np.int32]) -> None:
 
 
 def _keep(path: Path, data: bytes) -> None:
-    """Write what was found, if the cache can be written."""
+    """Write the pieces to the cache, if it can be written."""
     try:
         write_atomically(path, data)
     except OSError as error:

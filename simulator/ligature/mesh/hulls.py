@@ -73,7 +73,7 @@ def _path(points: Array) -> Path | None:
 
 
 def _store(path: Path, hull: ConvexHull) -> None:
-    """Keep a hull, where it can be: all that is lost is time."""
+    """Write a hull to the cache; if that fails, it is computed again next time."""
     file = io.BytesIO()
     for array in hull:
         np.save(file, array, allow_pickle=False)

@@ -146,7 +146,7 @@ class _Reader:
             yield MeshPart(material, vertices[used], corners, None, of_part, materials.get(material))
 
     def _group(self, start: int, end: int) -> tuple[str, NDArray[np.int64]]:
-        """Name of a material and the faces that wear it."""
+        """Name of a material and the faces that have it."""
         material, start = self._text(start, end)
         return material, self._rows(start, end, "<u2", 1).ravel().astype(np.int64)
 

@@ -228,7 +228,7 @@ class _Assembly:
         return False
 
     def _fits(self, joint: Joint) -> bool:
-        """Whether the tree that a closing joint starts from has links left for it; report one that has not."""
+        """Whether the tree from which a closing joint starts has room for another link; report a tree that is full."""
         inner = self._chain(joint).inner
         tree = self.tree_of[inner]
         needed = 0 if joint.type is JointType.P2P else links_of(joint)
@@ -320,7 +320,7 @@ class _Assembly:
         return mechanism, [*places, *others], (float(size[0]), float(size[1]))
 
     def _places(self, mechanism: Mechanism, x: Array) -> list[Array]:
-        """The configuration ``x`` (n,) and others that a walk within the limits leads to."""
+        """The configuration ``x`` (n,) and others, sampled by a random walk within the joint limits."""
         rng, places = np.random.default_rng(0), [x]
         for _ in range(SAMPLES):
             trial = mechanism.wandered(places[-1], rng, SAMPLE_STEP, REDUNDANT)
@@ -330,7 +330,7 @@ class _Assembly:
         return places
 
     def _redundant(self, mechanism: Mechanism, places: list[Array]) -> tuple[list[tuple[Axis, ...]], list[float]]:
-        """Directions of each loop that the others hold at all ``places``, and what is open there, in metres."""
+        """Directions of each loop that other joints constrain at all ``places``, and the gaps along them in metres."""
         grams = [np.zeros((6, 6)) for _ in mechanism.chains]
         for place in places:
             for k, gram in enumerate(mechanism.freedoms(place, REDUNDANT)):

@@ -203,7 +203,7 @@ class SceneBuilder:
                 self.linked.append((parent.index, body.index))
 
     def _note_unusable(self, document: Document, model: Model) -> None:
-        """Remember the listed bodies that an error took away, so that what names them is no further error."""
+        """Record the listed bodies that an error dropped, so that references to them cause no further errors."""
         usable = {element.key for element in document.elements("bodies")}
         listed = document.top.node.get("bodies")
         for item in listed.items if isinstance(listed, Sequence) else []:

@@ -100,7 +100,7 @@ def _converted(
     document: Document,
     resolver: Resolver,
 ) -> Part[Any]:
-    """One element; what makes it impossible is its last finding."""
+    """Convert one element; if that fails, the last finding states why."""
     findings: list[Diagnostic] = []
     top = document.top
     context = FileContext(

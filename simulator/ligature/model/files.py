@@ -103,7 +103,7 @@ def read_scene(
 
 
 class _Reading:
-    """Reads file after file; what cannot be read is a finding."""
+    """Reads the files of a scene; a file that cannot be read becomes a finding."""
 
     def __init__(self, start: Document, resolver: Resolver) -> None:
         self._files = SceneFiles(start.path.stem, start, resolver)

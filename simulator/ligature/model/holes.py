@@ -66,7 +66,7 @@ def _opening(shape: Shape) -> tuple[Array, Array]:
 
 
 def _ringed(colliders: Sequence[Collider], T_body_hole: Array, half: Array) -> bool:
-    """Whether shapes stand around the opening on all sides and none in it."""
+    """Whether shapes surround the opening on all sides and none is inside it."""
     if len(colliders) < LEAST_RING:
         return False
     centres = np.array([(inverse(T_body_hole) @ part.T_body_shape)[:3, 3] for part in colliders])

@@ -252,7 +252,7 @@ class Message:
     by_code: ClassVar[dict[int, type[Message]]] = {}
 
     def __init_subclass__(cls, code: int = -1) -> None:
-        """Register a message under its ``code``; bases that never travel have none."""
+        """Register a message under its ``code``; base classes that are never sent have none."""
         if code < 0:
             return
         if not 0 <= code < 256 or code in Message.by_code:

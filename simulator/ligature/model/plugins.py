@@ -97,7 +97,7 @@ def plugin_entries(
 
 
 def _owners(documents: Sequence[Document], bodies: Mapping[Mark | None, int]) -> Iterator[tuple[Element, int]]:
-    """Everything that may have plug-ins, files before bodies, with the index of the body or -1."""
+    """All elements that may have plug-ins, files before bodies, with the index of the body or -1."""
     tops = {document.top.mark: document for document in documents}
     for document in tops.values():
         yield document.top, -1

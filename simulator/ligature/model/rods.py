@@ -42,14 +42,14 @@ def find_rods(
 
 
 def _finding_of_joint(joint: Joint) -> Diagnostic:
-    """A joint between two elements of rods has no effect: a rod attaches to bodies only."""
+    """Finding for a joint between two elements of rods, which has no effect: rods attach to bodies only."""
     message = f"joint '{joint.identity.key}' connects two rod elements; ignoring it"
     hint = "connect an element and a body, or set 'ligature rod: false' for one of the two chains"
     return Diagnostic(Severity.ERROR, message, joint.identity.mark, hint, "rod")
 
 
 def _finding_of_sensor(sensor: Sensor) -> Diagnostic:
-    """A resistance sensor on a rod pushes what it touches and not the rod."""
+    """Finding for a resistance sensor on a rod, which pushes the bodies that it touches and not the rod."""
     message = f"resistance sensor '{sensor.identity.key}' applies no force to the rod that carries it"
     hint = "mount it on a body, or set 'ligature rod: false'"
     return Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod")
@@ -86,7 +86,7 @@ def _chains(bodies: Sequence[Body], joints: Sequence[Joint], opted_out: frozense
 def _without_joints_between(
     chains: Sequence[RodChain], joints: Sequence[Joint]
 ) -> tuple[tuple[RodChain, ...], tuple[Joint, ...]]:
-    """The chains with the anchors that a rod can have, to bodies outside all rods, and the joints that are none."""
+    """The chains with only their anchors to bodies outside all rods, and the joints between rods that were dropped."""
     members = {body for chain in chains for body in chain.bodies}
     between = {j for chain in chains for j in chain.anchors if {joints[j].parent, joints[j].child} <= members}
     kept = tuple(replace(chain, anchors=tuple(j for j in chain.anchors if j not in between)) for chain in chains)
@@ -96,7 +96,7 @@ def _without_joints_between(
 def _joined(
     chains: Sequence[RodChain], bodies: Sequence[Body], joints: Sequence[Joint]
 ) -> tuple[dict[int, Array], list[Diagnostic]]:
-    """Where elements start that their joints hold further off than an element is long, by body (4, 4), with a report.
+    """Initial poses (4, 4), by body, of elements whose joints are open by more than their length, and findings.
 
     The element in the middle of the chain's places stays, and the others follow from it; no element turns.
     """

@@ -112,7 +112,7 @@ def _volume(vertices: Array, faces: NDArray[np.int32]) -> float:
 
 
 def _hardness(share: float, times: int) -> float:
-    """κ / (1 - κ) of what takes away a share, so many times a step."""
+    """κ / (1 - κ), for a gain that removes a share of an error several times a step."""
     left = (1.0 - min(max(share, 0.0), 1.0)) ** max(times, 0)
     return (1.0 - left) / left if left > 0.0 else np.inf
 

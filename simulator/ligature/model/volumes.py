@@ -58,7 +58,7 @@ def volume_of(element: Element, context: FileContext) -> Callable[..., Body]:
 
 
 def _form(element: Element, context: FileContext) -> VolumeForm:
-    """The voxels, of which at least one is inside."""
+    """The voxels of a volume; raises `GeometryError` when none is inside."""
     mark = element.mark_of("images")
 
     def error(message: str, hint: str = "") -> GeometryError:
@@ -87,7 +87,7 @@ def _form(element: Element, context: FileContext) -> VolumeForm:
 
 
 def _look(element: Element, level: float) -> VolumeLook:
-    """How a volume is drawn whose surface is at ``level``, 0 to 1."""
+    """Rendering settings of a volume whose surface is at ``level``, 0 to 1."""
     rendering = Rendering(element.text("ligature rendering"))
     samples = float(np.clip(SAMPLES * element.number("quality"), *FEWEST_MOST_SAMPLES))
     points = [

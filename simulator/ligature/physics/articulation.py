@@ -244,7 +244,7 @@ def _positions(scene: Scene, chain: Chain) -> list[float]:
 
 
 def _end(scene: Scene, bodies: Sequence[Body], closure: Closure) -> tuple[Body, Chain]:
-    """What a closing joint carries, and the joint, free along what the other joints of its loop hold.
+    """The body that a closing joint carries, and the joint, free where the rest of its loop constrains it.
 
     It carries its part of the outer body, which a weld holds to the rest; to a point-to-point joint, a point.
     """
@@ -260,7 +260,7 @@ def _end(scene: Scene, bodies: Sequence[Body], closure: Closure) -> tuple[Body, 
 
 
 def _shared_out(scene: Scene) -> list[Body]:
-    """The bodies, each with the part of its mass that the ends of closing joints leave to it."""
+    """The bodies, each without the share of its mass that the ends of closing joints have."""
     parts: dict[int, int] = {}
     for closure in scene.closures:
         if not is_point(scene, closure):

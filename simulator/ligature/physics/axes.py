@@ -166,7 +166,7 @@ def _unchanged(axes: Axes, trees: Trees, k: int) -> bool:
 
 @inlined
 def _follow_law(axes: Axes, trees: Trees, k: int, dt: float) -> None:
-    """Velocity of the motor and effort that command and spring of one axis ask for; its integral and kick go on."""
+    """Motor velocity and effort of one axis by its command and spring; advances its integral and its kick."""
     position, velocity = trees.joints[0, k], trees.joints[1, k]
     axes.motor[k] = axes.asked[k] = trees.push[k] = 0.0
     if axes.mode[k] == POSITION:
@@ -208,7 +208,7 @@ def _vanishing(pull: float, damping: float, most: float) -> float:
 
 @inlined
 def _bound(axes: Axes, trees: Trees, k: int, dt: float) -> None:
-    """Largest effort of one motor: one that yields pulls in proportion to its following error; stops and bounds."""
+    """Maximum effort of one motor, by its strength, its compliance, its stops and its speed limits."""
     position, velocity, strength = trees.joints[0, k], trees.joints[1, k], axes.strength[k]
     limit = strength
     if axes.yield_stiffness[k] > 0.0:

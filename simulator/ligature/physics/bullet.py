@@ -292,7 +292,7 @@ def _head(at: int) -> tuple[int, int, int, int]:
 
 
 def _segments() -> Iterator[Integers]:
-    """The words of the library's variables; those that begin as 0 have no name of a file, and follow the others."""
+    """The words of the library's writable segments; zero-initialised ones have no file name and follow the others."""
     end = 0
     with contextlib.suppress(OSError), open("/proc/self/maps") as lines:
         for line in lines:
@@ -304,7 +304,7 @@ def _segments() -> Iterator[Integers]:
 
 
 def _is_client(address: int) -> bool:
-    """Whether an object of the class of clients is at an address, which may be none."""
+    """Whether there is an object of the client class at an address, which may be invalid."""
     return address % 8 == 0 and address > 0 and _word(address) == _class_of_clients()
 
 

@@ -147,7 +147,7 @@ class Closures:
         return list(found)
 
     def _hand_on(self) -> None:
-        """Hand Bullet where mechanisms are, by PyBullet's functions."""
+        """Set poses and velocities of mechanisms in Bullet, by PyBullet's functions."""
         arrays, engine = self._arrays, self._engine
         motions, client = engine.motions, self._client
         for m in np.flatnonzero(arrays.moved).tolist():

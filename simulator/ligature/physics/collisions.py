@@ -51,7 +51,7 @@ class Collisions:
         self._change(self._disabled_pairs | pair if disabled else self._disabled_pairs - pair, self._overlapped)
 
     def _change(self, disabled: set[tuple[int, int]], overlapped: set[tuple[int, int]]) -> None:
-        """Take other pairs, and set those that are no longer, or newly, among them."""
+        """Replace the disabled pairs, and set in Bullet those that were added or removed."""
         before = self._disabled_pairs | self._overlapped
         self._disabled_pairs, self._overlapped = disabled, overlapped
         now = disabled | overlapped

@@ -20,7 +20,7 @@ CONTACT_BYTES = 176
 
 @kernel
 def _touching(handle: int, information: Integers, groups: Integers) -> int:
-    """The groups that touch what is none of them, one bit each.
+    """The groups with a contact outside their group, one bit each.
 
     ``groups`` (u, l) holds the groups of each multibody's links, the base first. ``information`` (3,) is its own
     address and Bullet's answer, a number of contacts and their address.

@@ -211,7 +211,7 @@ class TreeControl:
             self._sort()
 
     def _clear_bounds(self, rows: int | slice) -> None:
-        """Let nothing stop or slow axes; what bounded them is forgotten, too."""
+        """Remove all stops and speed limits of axes."""
         own = self.axes
         own.stopped[rows], own.slowed[rows] = False, False
         for array in (own.stop, own.lower_speed, own.upper_speed, own.upper_effort):
@@ -246,7 +246,7 @@ class TreeControl:
             self._sort()
 
     def _way(self, row: int, error: float) -> float:
-        """``error``, the shorter way round for a joint that turns without limits."""
+        """``error``, wrapped to the shorter direction for a joint that turns without limits."""
         return float((error + np.pi) % (2 * np.pi) - np.pi) if self.axes.turns[row] else float(error)
 
     def read(self, rows: Integers) -> Array:

@@ -144,7 +144,7 @@ class Engine:
         self.motions.begin()
 
     def _sleepers(self) -> list[list[int]]:
-        """Where Bullet keeps whether the moving colliders of each tree sleep; none where they never may.
+        """Addresses of the activation states of each tree's moving colliders; none for trees that may not sleep.
 
         Gravity acts on a tree in every tick; loops and the chunks of volumes put bodies elsewhere.
         """

@@ -169,7 +169,7 @@ class Motions:
                 self._read(tree)
 
     def _read(self, tree: int) -> None:
-        """Read base and joints; a base that stands was read when it was put there."""
+        """Read base and joints of a tree; a static base was read when it was placed."""
         if self.handle:
             kernels.read_one(self.handle, self.table, tree)
             return
@@ -187,7 +187,7 @@ class Motions:
         arrays.read[tree] = True
 
     def _read_base(self, tree: int) -> None:
-        """Read the base. One that stands is read only when it is put there: Bullet turns it by a last bit a tick."""
+        """Read the base. A static one is read only when it is placed: Bullet changes its last bits in each tick."""
         at, around = pybullet.getBasePositionAndOrientation(self._uids[tree], physicsClientId=self._client)
         linear, angular = pybullet.getBaseVelocity(self._uids[tree], physicsClientId=self._client)
         self.pose[self._begin[tree]], self.twist[self._begin[tree]] = at + around, linear + angular

@@ -53,7 +53,7 @@ def moved_inertias(
 
 
 def _clamped(axis: Axis, angle: float) -> float:
-    """``angle``, or the limit of an axis that lies before it."""
+    """``angle``, clipped to the limits of an axis."""
     return angle if axis.low is None or axis.high is None else min(max(angle, axis.low), axis.high)
 
 

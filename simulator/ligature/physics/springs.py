@@ -43,7 +43,7 @@ def _finding(engine: Engine, group: tuple[int, ...]) -> Diagnostic | None:
 
 
 def _released(tree: Tree, dt: float) -> list[tuple[int, float]]:
-    """Joints with what their springs release until they are at rest, or at the limit before."""
+    """Joints with the energy (J) that their springs release from the start to rest, or to a limit before it."""
     found = []
     for (_, joint, axis, moved), start in zip(tree.axes, tree.start, strict=True):
         stiffness = min(axis.stiffness, moved / (STIFFEST * dt**2))

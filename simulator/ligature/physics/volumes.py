@@ -174,7 +174,7 @@ class Volumes(Subsystem):
             self._world.renew()
 
     def _note(self, tick: int) -> None:
-        """Note the chunks that were cut since the last look."""
+        """Record the chunks that were cut since the last call."""
         for volume in self._volumes:
             voxels = self.of_body[volume.body]
             if voxels.touched:

@@ -129,7 +129,7 @@ class World(Subsystem):
         self.engine.forget_contacts()
 
     def _set_up(self) -> None:
-        """Make what acts on bodies within a tick, for the engine's present client."""
+        """Create the parts that act on bodies within a tick, for the engine's present client."""
         engine = self.engine
         self._broken = False
         self._lifts = gravity_lifts(engine, self.joints.controls)
@@ -139,7 +139,7 @@ class World(Subsystem):
         self._parting = Parting(engine)
 
     def _begin(self) -> None:
-        """Make ready to begin anew; in another Bullet client where this one would remember, or does not work.
+        """Prepare a restart; with a new Bullet client if this one keeps state that cannot be cleared, or failed.
 
         Bodies are then put where they begin, and at last contacts are forgotten.
         """
@@ -238,7 +238,7 @@ class World(Subsystem):
             self._heal()
 
     def _heal(self) -> None:
-        """Put trees that diverged back to where the scene starts, with all that loops join to them."""
+        """Reset trees that diverged to their initial poses, with all trees that loops join to them."""
         self._broken = True
         found = diverged(self.engine)
         for k in found:
@@ -380,7 +380,7 @@ class World(Subsystem):
         self.restore(snapshot)
 
     def _parts(self) -> dict[str, Any]:
-        """The parts that keep something from tick to tick, in the order in which they are restored."""
+        """The parts with state, in the order in which they are restored."""
         return {
             "engine": self.engine,
             "joints": self.joints,

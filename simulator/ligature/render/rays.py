@@ -115,7 +115,7 @@ class VolumeRays:
             program.set("uBehind", BEHIND_UNIT)
 
     def _busy_cells(self, values: Values) -> NDArray[np.bool_]:
-        """The cells between ``values``, one fewer along each axis, in which there may be something to see."""
+        """The cells between ``values``, one fewer along each axis, that may be visible."""
         shape = tuple(n - 1 for n in values.shape)
         corners = [values[tuple(slice(c, c + n) for c, n in zip(corner, shape, strict=True))] for corner in _CORNERS]
         low, high = np.minimum.reduce(corners), np.maximum.reduce(corners)
@@ -125,7 +125,7 @@ class VolumeRays:
         return busy
 
     def _measure(self) -> None:
-        """Find the distance of each sample from the cells where there is something, and write all samples."""
+        """Compute the distance of each sample to the nearest visible cell, and write all samples."""
         empty = np.ones(self._values.shape, dtype=bool)
         empty[:-1, :-1, :-1] = ~self._busy
         if empty.all():

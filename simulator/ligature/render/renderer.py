@@ -203,7 +203,7 @@ class Renderer:
     def _drawn(
         self, state: NDArray[np.void], view: CameraView, passes: Sequence[str], shaders: ShaderFiles | None
     ) -> tuple[Target, Callable[[NDArray[np.uint8]], NDArray[np.uint8]]]:
-        """Where the picture is being drawn, and what is to be done with its colours and alpha."""
+        """Draw the picture; returns its target, and the function to apply to its colours and alpha."""
         moment = b"".join(state[name].tobytes() for name in PLACES)
         self._place(state, moment)
         self._lights.place(pose7_matrices(state["light_world"][0]), view.view)
@@ -271,7 +271,7 @@ class Renderer:
         return pieces
 
     def _batched(self, pieces: list[Piece]) -> tuple[list[Batch], list[Piece]]:
-        """Pieces grouped into batches, and in the order of the groups; what deforms is alone in its group."""
+        """Pieces grouped into batches, and in the order of the groups; a deforming piece is alone in its group."""
         groups: dict[Hashable, list[Piece]] = {}
         for piece in pieces:
             key = (piece.geometry, piece.surface, piece.closed, piece.coarse, piece.shaders)
@@ -301,7 +301,7 @@ class Renderer:
         return replace(surface, physical=look)
 
     def _place(self, state: NDArray[np.void], moment: bytes) -> None:
-        """Move everything to where ``state`` has it at ``moment``, once for all cameras that look at it then."""
+        """Set the transforms of ``state`` at ``moment``, once for all cameras that draw it."""
         for batch, drawn in zip(self._deforming, self._tissues, strict=False):
             batch.marks = self._marks[drawn.index].of(state)
         if moment == self._placed:

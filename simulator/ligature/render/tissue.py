@@ -151,7 +151,7 @@ def _at_rest(piece: Piece) -> Triangles:
 
 
 def _opened(surface: Triangles, slits: Sequence[Array], length: float) -> Triangles:
-    """``surface`` without what gaps take away, parted along slits, of edges up to ``length``."""
+    """``surface`` with gaps removed and slits opened, refined to edges up to ``length``."""
     for box in slits:
         for axis in range(3):
             for place in sorted(set(box[:, axis].tolist())):
@@ -174,7 +174,7 @@ def _opened(surface: Triangles, slits: Sequence[Array], length: float) -> Triang
 
 
 def _parted(surface: Triangles, side: NDArray[np.int64]) -> Triangles:
-    """``surface`` whose corners share a vertex only where their ``side`` (m, 3) of 0, 1, 2 is the same."""
+    """``surface`` with vertices split where the ``side`` (m, 3), 0, 1 or 2, of the corners at it differs."""
     keys, faces = np.unique(3 * surface.faces.astype(np.int64) + side, return_inverse=True)
     vertex = keys // 3
     faces = faces.reshape(-1, 3).astype(np.int32)
@@ -196,7 +196,7 @@ def _embedded(surface: Triangles, form: TissueForm) -> Embedding:
 
 
 def _matrix(embedding: Embedding, nodes: int) -> csr_matrix:
-    """The embedding in ``nodes`` nodes as a matrix (v, nodes), which is quicker."""
+    """The embedding in ``nodes`` nodes as a sparse matrix (v, nodes), which is faster."""
     vertices, corners = embedding.nodes.shape
     rows = np.repeat(np.arange(vertices), corners)
     return csr_matrix((embedding.weights.reshape(-1), (rows, embedding.nodes.reshape(-1))), (vertices, nodes))

@@ -201,7 +201,7 @@ class Viewer:
 
     @property
     def _moves_camera(self) -> bool:
-        """Whether the mouse moves the camera of the scene that is shown, and no free view."""
+        """Whether the mouse moves the shown camera of the scene, and not the free view."""
         return self._controls.moves_cameras and self.camera is not None
 
     def orbit(self, right: float, down: float) -> None:
@@ -344,7 +344,7 @@ def visible_cameras(scene: Scene) -> list[int]:
 
 
 def _middle(scene: Scene, state: NDArray[np.void] | None = None) -> tuple[float, float, float]:
-    """The middle of what moves, or of everything when nothing does."""
+    """Median position of the moving bodies, or of all bodies when none moves."""
     moving = [body.index for body in scene.bodies if not body.static] or [body.index for body in scene.bodies]
     if not moving:
         return (0.0, 0.0, 0.0)

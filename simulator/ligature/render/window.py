@@ -207,7 +207,7 @@ class Window:
             self._viewer.zoom(y)
 
     def _drives_arm(self) -> bool:
-        """Whether the mouse is the arm's: one is chosen, and Shift is down."""
+        """Whether the mouse drives an arm: one is chosen, and Shift is pressed."""
         shift = (glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT)
         return bool(self._viewer.arm) and any(glfw.get_key(self._window, key) == glfw.PRESS for key in shift)
 

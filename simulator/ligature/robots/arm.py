@@ -172,7 +172,7 @@ class Arm(Device):
         self._require_joints(what)
 
     def _stop_for(self, axes: Axes) -> None:
-        """A streamed command takes over from a move."""
+        """End a move that a streamed command replaces."""
         if axes.moving:
             self.emit("goal_reached", False)
             axes.hold()
@@ -395,14 +395,14 @@ class Arm(Device):
             self.body_servo_cf(np.zeros(6) if wrench is None else wrench)
 
     def _push_with(self, what: str, push: Any) -> None:
-        """Have the joints push as ``what`` computes, anew each tick."""
+        """Apply the joint efforts of the command ``what``, computed anew each tick."""
         self._require_cartesian(what)
         self._stop_for(self.joints)
         self._pushing = what, push
         self._exert()
 
     def _exert(self) -> None:
-        """Joint efforts of the wrench that is asked for, at the measured joints."""
+        """Apply the joint efforts of the commanded wrench, at the measured joints."""
         assert self._pushing is not None
         q = self.joints.measured()[0]
         self.joints.push(

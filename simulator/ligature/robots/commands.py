@@ -275,7 +275,7 @@ class ServoCr(_Pose, code=71, verb="servo_cr"):
 
 
 class _Direct(ArmCommand):
-    """As the verb without ``direct/``, wherever the arm stands; see `ligature.robots.arm.Arm.direct`."""
+    """The same as the verb without ``direct/``, in any state of the arm; see `ligature.robots.arm.Arm.direct`."""
 
     def _call(self, arm: Any) -> None:
         arm.direct(self._method, *[getattr(self, name) for name, _, _ in self.fields()[1:]])

@@ -52,7 +52,7 @@ class EcmArm(Arm):
         return q
 
     def _joint_velocity(self, q: Array, twist: Array) -> Array:
-        """As poses are met: the tip's velocity and the turn about the shaft, not the turns that four joints lack."""
+        """Joint velocities for the tip's velocity and its rotation about the shaft; four joints make no other."""
         shaft = self.kinematics.shaft_in_tip
         jacobian = self.kinematics.jacobian_body(q)
         rows = np.vstack([jacobian[:3], shaft @ jacobian[3:]])

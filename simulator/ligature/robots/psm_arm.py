@@ -118,7 +118,7 @@ class PsmArm(Arm):
         self.emit("tool_type", self.tool_type)
 
     def _fit_limits(self) -> None:
-        """Both the instrument and the scene's joints limit the travel."""
+        """Set the joint limits to the intersection of those of the instrument and of the scene's joints."""
         lower = np.maximum(self.kinematics.lower, self._travel[0])
         upper = np.minimum(self.kinematics.upper, self._travel[1])
         self.joints.limits = np.array([lower, upper])

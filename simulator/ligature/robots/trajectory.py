@@ -56,11 +56,11 @@ class JointTrajectory:
         self.goal = goal
 
     def __reduce__(self) -> tuple[type[JointTrajectory], tuple[Array, ...]]:
-        """Planned again in another process: the same request has the same trajectory."""
+        """Pickle the request alone: planned again, it gives the same trajectory."""
         return JointTrajectory, self._asked
 
     def __deepcopy__(self, memo: object) -> JointTrajectory:
-        """Itself: a trajectory never changes."""
+        """The trajectory itself, since it is immutable."""
         return self
 
     @property

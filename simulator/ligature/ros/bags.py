@@ -90,7 +90,7 @@ def _place(bag: rosbag.Bag | None) -> str:
 
 
 def _message_type(info: Any) -> Any:
-    """In place of rosbag's own, which runs what a definition says."""
+    """Message class of a connection, in place of rosbag's function, which executes code made of the definition."""
     if info.md5sum not in _classes:
         try:
             _classes[info.md5sum] = definitions.message_class(info.datatype, info.md5sum, info.msg_def)

@@ -125,7 +125,7 @@ class BodyTemplate(Template):
 
 
 class _Attached(Template):
-    """What rides on a parent: constant parent name, pose in the parent's frame."""
+    """Message of an object on a parent: constant parent name, pose in the parent's frame."""
 
     def __init__(self, scene: Scene, index: int, identity: Identity, message: Any, pose: Sequence[float]) -> None:
         super().__init__(scene, index, identity, message)

@@ -76,7 +76,7 @@ def read_bounded(connection: Any, b: io.BytesIO, msg_queue: list[Any], sock: Any
 
 
 def _skip(connection: Any, b: io.BytesIO) -> None:
-    """Drop from ``b`` what belongs to a message that is too long."""
+    """Remove the bytes of an oversized message from ``b``."""
     if connection.skipping:
         data = b.getvalue()[: b.tell()]
         dropped = min(connection.skipping, len(data))

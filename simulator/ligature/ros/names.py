@@ -44,7 +44,7 @@ def tf_topics(world: WorldSettings, name: str) -> list[str]:
 
 
 def _for_the_challenge(kind: str, identity: Identity, base: str, taken: set[str]) -> str | None:
-    """The name under ``src``; ``taken`` are the words that already mean one body."""
+    """The name of a body under ``src``; ``taken`` are the words that already name another body."""
     word = identity.topic.rpartition("/")[2]
     wanted = word in _AT_THE_TOP or _HOLE.match(word) is not None
     if kind == "body" and wanted and word not in taken:

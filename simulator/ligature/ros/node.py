@@ -168,7 +168,7 @@ class Node:
         self._woken.set()
 
     def _adopt(self, command: ParentCommand) -> None:
-        """A camera or light gets another parent; its messages name the new one."""
+        """Change the parent of a camera or light, in its messages too."""
         self._outbox.push(command)
         template = self._placed.get((command.kind, command.index))
         if template is not None:
@@ -193,7 +193,7 @@ class Node:
             self._frames = drawn, now
 
     def _keep_house(self, now: float) -> bool:
-        """Signs of life, watchdogs, diagnostics; False when the physics process is gone."""
+        """Update heartbeat, watchdogs and diagnostics; False when the physics process has ended."""
         self._ring.beat()
         self._reception.watch(now)
         figures = self._block.figures

@@ -72,7 +72,7 @@ class PaceServices:
         return int(self._state["update"][0])
 
     def _settled(self) -> int:
-        """The update at which the run stands still."""
+        """Wait until no update follows; returns the last one."""
         before, since = self._update(), time.monotonic()
         begin = since
         while time.monotonic() - since < 0.05 and time.monotonic() - begin < TIMEOUT:

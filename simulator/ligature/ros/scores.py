@@ -39,7 +39,7 @@ def _values(status: Any) -> dict[str, object]:
 
 
 def _value(text: str) -> object:
-    """A value as it was before it was written."""
+    """The value of a written ``text``: bool, int, float, or the text itself."""
     if text in ("True", "False"):
         return text == "True"
     for kind in (int, float):

@@ -49,7 +49,7 @@ class _Template:
         return self.message
 
     def content(self, state: Record) -> None:
-        """Fill what is particular to the kind."""
+        """Fill the fields that this kind of message has."""
 
 
 class ForceTemplate(_Template):

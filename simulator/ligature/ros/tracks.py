@@ -204,13 +204,13 @@ def _phases(path: Path, rows: Iterator[tuple[str, Any, float]]) -> tuple[tuple[f
 
 
 def _stamp(message: Any, received: float) -> float:
-    """When a message was true; when it was received where it has no stamp."""
+    """The stamp of a message; its time of reception when it has none."""
     header = getattr(message, "header", None)
     return float(header.stamp.to_sec()) or received if header is not None else received
 
 
 def _clock(found: Track | None) -> Track | None:
-    """Simulated time by stamps, where it goes on and never back."""
+    """Simulated time of the stamps, if it never decreases."""
     if found is None or (np.diff(found.values) < 0.0).any() or found.values[-1] == found.values[0]:
         return None
     return found

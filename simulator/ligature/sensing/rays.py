@@ -97,7 +97,7 @@ class _Stick:
         self._offset = np.zeros((n, 3))
 
     def reset(self) -> None:
-        """Stick nowhere."""
+        """Release all stuck points."""
         self._body[:] = -1
         for array in (self._on_sensed, self._on_parent, self._error, self._offset):
             array[:] = 0.0
@@ -150,7 +150,7 @@ class _Stick:
         return offset, sliding
 
     def _latch(self, ray: int, hits: RayHits, T_parent: Array, T_sensed: Array) -> None:
-        """Remember the point of a hit as stuck to both bodies."""
+        """Store the point of a hit as stuck to both bodies."""
         self._body[ray] = hits.body[ray]
         world = np.append(hits.point[ray], 1.0)
         self._on_sensed[ray] = (np.linalg.inv(T_sensed) @ world)[:3]

@@ -134,7 +134,7 @@ class BodyContacts:
         return parts
 
     def _pin(self) -> None:
-        """Hold the points of pins where they are at the start."""
+        """Fix the points of pins at their initial places."""
         t, T = self._touching, self._scene.bodies[self._own].T_world_body
         for row, (nodes, weights) in enumerate(zip(self._pins.nodes, self._pins.weights, strict=True)):
             t.used[row], t.part[row], t.body[row], t.soft[row] = 1, -1, len(self.listed) + 1, SOFT
@@ -155,7 +155,7 @@ class BodyContacts:
             self._push(self._around.pushed[:pushed].tolist())
 
     def _read(self, count: int) -> None:
-        """Read the motion of the bodies that are looked at, and how light they are."""
+        """Read motions and inverse masses of the bodies near the tissue."""
         around, bodies = self._around, self._bodies
         for row, piercer in self._piercers:
             self._contacts.partners.tip[row], around.inside[row] = piercer.tip, piercer.engaged
@@ -172,7 +172,7 @@ class BodyContacts:
         self._around.light[row] = 0.0 if self._bodies.driven(body) else 1.0 / mass
 
     def _push(self, rows: list[int]) -> None:
-        """Push the bodies by what the tissue does to them."""
+        """Apply the impulses of the tissue to the bodies."""
         push = self._contacts.partners.push
         for row in rows:
             impulse, body = self._dt * push[row], self.listed[row - 1] if row else self._own

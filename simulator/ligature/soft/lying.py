@@ -238,7 +238,7 @@ def _on_face(field: Field, q: int, p: Array, found: Array, corner: Array) -> flo
 
 @inlined
 def _edge(x: Array, i: int, j: int, h: int, k: int, share: float) -> tuple[float, float, float]:
-    """Between the way from node i to j and that from h to k."""
+    """The vector from node i to j, blended by ``share`` with that from h to k."""
     return (
         (1 - share) * (x[j, 0] - x[i, 0]) + share * (x[k, 0] - x[h, 0]),
         (1 - share) * (x[j, 1] - x[i, 1]) + share * (x[k, 1] - x[h, 1]),
@@ -275,7 +275,7 @@ def _outside(box: Array, p: Array, reach: float) -> bool:
 
 @inlined
 def _let_go(points: Points, lying: Lying, r: int) -> None:
-    """Let an element leave the surface."""
+    """Remove the contact of an element."""
     i, f = lying.point[r], lying.force[r]
     lying.used[r], points.status[i] = 0, LEAVING
     for a in range(3):
@@ -328,7 +328,7 @@ def _meet(field: Field, points: Points, lying: Lying, e: int, radius: float) -> 
 
 @inlined
 def _press(t: Tissue, lying: Lying, nodes: Nodes, s: Springs, f: FrameArrays, r: int, dt: float) -> None:
-    """Make a spring of one element's contact, if it presses."""
+    """Make a spring of one element's contact, if it is under pressure."""
     points, e, i, n = t.points, lying.element[r], lying.point[r], lying.normal[r]
     W, F, K, mean = lying.W, lying.force[r], lying.K, points.mean[i]
     _place(lying, nodes, f, e, dt)

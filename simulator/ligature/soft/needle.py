@@ -197,7 +197,7 @@ def is_engaged(needle: Integers) -> bool:
 
 @inlined
 def _beside(box: Array, reach: float, x: float, y: float, z: float) -> bool:
-    """Whether a place of B is further than ``reach`` from a box (2, 3), or nowhere."""
+    """Whether a place of B is further than ``reach`` from a box (2, 3), or not finite."""
     within = box[0, 0] - reach <= x <= box[1, 0] + reach and box[0, 1] - reach <= y <= box[1, 1] + reach
     return not (within and box[0, 2] - reach <= z <= box[1, 2] + reach)
 
@@ -231,7 +231,7 @@ def look(
 
 @inlined
 def _shape(n: NeedleArrays, m: Mount, f: FrameArrays) -> None:
-    """Where a needle is in B."""
+    """Compute the shape of a needle in B."""
     Q, R, shape = m.turn[0], m.turn[1], n.shape
     matrix_of(m.pose[3], m.pose[4], m.pose[5], m.pose[6], Q)
     for i in range(3):

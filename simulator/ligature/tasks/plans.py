@@ -219,13 +219,13 @@ class Planner:
         return found
 
     def _lies(self, rest: Array) -> Iterator[Array]:
-        """Poses (4, 4) of the arc frame of a needle that lay at ``rest`` (4, 4), turned in its place."""
+        """Poses (4, 4) of the arc frame of a needle that lay at ``rest`` (4, 4), rotated about the vertical."""
         for angle in np.linspace(0.0, 2.0 * np.pi, LIES, endpoint=False)[1:]:
             turn = axis_rotation(UP, float(angle))
             yield frame(turn @ rest[:3, :3], rest[:3, 3] + LAID * UP)
 
     def _pickable(self, now: Array, T_world_base: Array) -> Array:
-        """How far (n,) the joints stay from their limits where the needle is taken and lifted; -inf where it cannot."""
+        """Least distance (n,) of joints from limits while the needle is grasped and lifted; -inf where that fails."""
         here = now @ self._options.T
         behind, over = here.copy(), here.copy()
         behind[:, :3, 3] -= APPROACH * here[:, :3, 2]
@@ -233,14 +233,14 @@ class Planner:
         return self._margins(T_world_base, np.stack([behind, here, over], axis=1), float(now[2, 3]), 0.0)
 
     def _laid(self, lie: Array, tools: Array, T_world_base: Array) -> Array:
-        """The same (n,) where ``tools`` (n, 4, 4) in the arc frame lay it down."""
+        """The same (n,) while ``tools`` (n, 4, 4) in the arc frame lay the needle down at ``lie``."""
         here = lie @ tools
         over = here.copy()
         over[:, 2, 3] += 1.5 * ABOVE
         return self._margins(T_world_base, np.stack([over, here], axis=1), float(lie[2, 3]), 0.0)
 
     def _drivable(self, state: Any, T_world_base: Array, tried: NDArray[np.bool_]) -> Array:
-        """The same (n,) of the best throw of a scene for each hold that is ``tried`` (n,) and meant to drive."""
+        """The same (n,) for the best throw of a scene, for each grasp that is ``tried`` (n,) and allows driving."""
         found, tried = np.full(len(tried), -np.inf), tried & self._options.drives
         rows = np.flatnonzero(tried)
         for least in PLANNED:

@@ -145,7 +145,7 @@ class Wound:
         return found
 
     def _positions(self, state: Any, side: int, local: Array) -> Array:
-        """Where points (n, 3) of a lip are now, given at rest as place along the wound, width and depth."""
+        """Current positions of points (n, 3) of a lip, given at rest as place along the wound, width and depth."""
         points = np.empty((len(local), 3))
         edge = self.low[self.across] if side < 0 else self.high[self.across]
         points[:, self.across] = edge + side * (local[:, 1] + INSIDE)

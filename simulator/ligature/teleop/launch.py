@@ -141,7 +141,7 @@ def _specs(
 
 
 def _without_effect(device: InputDevice) -> list[str]:
-    """What a device asks for that means nothing where arms are driven."""
+    """Settings of a device that have no effect when arms are driven."""
     settings = device.settings
     notes = []
     if settings.get("simulated multibody"):

@@ -61,7 +61,7 @@ def begin_node() -> None:
 
 
 def _asked_of_haptics(prefix: str) -> dict[str, Any]:
-    """What the simulator was started with, ``-d``, ``-e``, ``-f`` of `ambf_simulator`; empty for none."""
+    """Settings of force feedback that the simulator was started with, ``-d``, ``-e``, ``-f``; empty for none."""
     try:
         found = rospy.get_param(f"{prefix}ligature/haptics", {})
     except OSError:
@@ -214,14 +214,14 @@ class Teleop:
             self._publish_readings(tips)
 
     def _arms_ready(self, tips: dict[str, Tip | None]) -> bool:
-        """Whether all arms that are to be driven are ready; a replay sends no sooner."""
+        """Whether all arms that are to be driven are ready; a replay waits for that."""
         driven = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
         return all(tips[arm.name] is not None and not arm.obstacle() for arm in driven)
 
     def _take_in(self, now: float, tips: dict[str, Tip | None]) -> None:
         """Empty the queue.
 
-        Of a leader that drives, no reading is passed over but those that came too late to matter.
+        No reading of a leader that drives is skipped, except those that arrived too late.
         """
         waiting: set[str] = set()
         for _ in range(len(self._inbox)):
@@ -243,7 +243,7 @@ class Teleop:
         return "the camera is driven" if self._camera_pressed else ""
 
     def _look_at_camera(self) -> None:
-        """Take the view from where the camera is, when it is not known yet, or not any more."""
+        """Update the view from the camera's pose, when the view is unknown or out of date."""
         if self._camera is None:
             return
         seen = self._camera.setpoint()
@@ -262,7 +262,7 @@ class Teleop:
                 leader.pairing.release()
 
     def _drive(self, now: float, tips: dict[str, Tip | None]) -> None:
-        """Send the arms their goals from the hands."""
+        """Send the goals that follow from the hands to the arms."""
         seen = self._camera.setpoint() if self._camera is not None else None
         if self._camera_pressed and not self._camera_ready():
             return
@@ -312,7 +312,7 @@ class Teleop:
         return next(leader for leader in self.seat.leaders.values() if leader.selected == follower)
 
     def _warn(self) -> None:
-        """Report once when a leader is not trusted any more."""
+        """Report once when the readings of a leader are rejected."""
         for name, leader in self.seat.leaders.items():
             status = leader.pairing.status
             if status is not self._warned.get(name) and status in HOLDING:
@@ -435,7 +435,7 @@ class Teleop:
             raise Conflict("states are enable, disable, align_MTM; a scale is above 0 and at most 1")
 
     def _on_rival(self, value: tuple[str, str]) -> None:
-        """Another node moves an arm: ours holds still rather than pull it to and fro."""
+        """Hold an arm that another node moves too, so that the two do not alternate."""
         arm, sender = value
         for leader in self.seat.leaders.values():
             if leader.selected == arm and leader.pairing.status is Status.FOLLOWING:
@@ -461,7 +461,7 @@ class Teleop:
         self._selected(leader, before, follower)
 
     def _contest(self, claimer: str, follower: str | None) -> None:
-        """Another node commands an arm: it holds until its leader's clutch is pressed, or the other stops."""
+        """Hold an arm that another node commands, until its leader's clutch is pressed or the other node stops."""
         for leader in self.seat.leaders.values():
             if leader.selected == follower and follower is not None and (claimer, follower) in self.pairs:
                 leader.pairing.contest()
@@ -476,7 +476,7 @@ class Teleop:
             self._console.selected(leader, after)
 
     def _take_camera(self, pressed: bool, hands: list[str]) -> None:
-        """The camera obeys hands instead of instruments while the pedal is pressed."""
+        """Drive the camera by the hands, instead of the instruments, while the pedal is pressed."""
         self._camera_pressed = pressed
         self.seat.camera(pressed, hands)
         if pressed and self._camera is not None:

@@ -86,7 +86,7 @@ class Pair:
         self.topics.publish("status", status)
 
     def _obstacle(self, now: float, tip: Tip | None) -> str:
-        """What is not ready; the follower is asked for power and homing."""
+        """The part that is not ready, or empty; requests power and homing of the follower."""
         obstacle = self.arm.obstacle()
         if obstacle:
             if self.arm.reports:
@@ -103,7 +103,7 @@ class Pair:
         return now - hand.time > self.leader.pairing.settings.timeout
 
     def _misaligned(self, now: float, tip: Tip | None) -> str:
-        """What keeps the leader from having the follower's orientation; empty when it need not, or has."""
+        """Why the leader is not aligned with the follower; empty when it is, or need not be."""
         settings, hand = self.leader.pairing.settings, self.leader.hand
         waits = self.leader.pairing.status is Status.IDLE and not self._seat.is_clutched(self.leader.name)
         if not (waits and settings.align and self._turns) or settings.lock_rotation or hand is None or tip is None:
@@ -122,7 +122,7 @@ class Pair:
         return f"{self.leader.name} aligns with {self.arm.name}" if self._turns else ""
 
     def _keep_orientation(self) -> None:
-        """While the clutch is pressed the leader keeps its orientation, so that it stays aligned."""
+        """Keep the leader's orientation while the clutch is pressed, so that it stays aligned."""
         clutched = self.selected and self.leader.pairing.status is Status.CLUTCHED
         if self._device is None or clutched == self._kept:
             return

@@ -170,7 +170,7 @@ class Pairing:
         return Status.LEAPT if moved > self.settings.leap else None
 
     def _present(self, hand: Hand) -> bool:
-        """Whether fingers moved the grip, or turned the handle, since the start."""
+        """Whether the operator is present: grip or handle were moved since the start."""
         first = self._first
         assert first is not None
         settings = self.settings
@@ -196,7 +196,7 @@ class Pairing:
         self._goal = Tip(pose, self._jaw(hand, dt))
 
     def _jaw(self, hand: Hand, dt: float) -> float:
-        """The jaw follows the grip: slowly until it has caught up with it, so that nothing is dropped."""
+        """Jaw angle that follows the grip: slowly until it has reached it, so that nothing is dropped."""
         if hand.grip is None:
             return self._goal.jaw
         closed, opened = self.settings.jaw

@@ -107,7 +107,7 @@ def _rows(path: Path) -> Iterator[dict[str, Any]]:
 
 
 def _is_reading(row: dict[str, Any]) -> bool:
-    """Whether a line has what a reading has; its numbers may be none, as a device's may."""
+    """Whether a line has the fields of a reading; its numbers may be invalid, as those of a device may be."""
     pose, grip, buttons = row["pose"], row["grip"], row["buttons"]
     return (
         isinstance(row["device"], str)

@@ -224,7 +224,7 @@ class Seat:
         return goal
 
     def _drive_camera(self, now: float, T_world_camera: Array) -> Array | None:
-        """Goal of the camera; None while a hand is missing, silent or no pose, and from there on it begins anew."""
+        """Goal of the camera; None, which restarts the motion, while a hand is missing, timed out or invalid."""
         poses = []
         for name in self._camera_hands:
             leader = self._leaders[name]
@@ -245,7 +245,7 @@ class Seat:
         return self._camera.update(poses)
 
     def _leapt(self, poses: Sequence[Array]) -> str:
-        """The leader whose hand is too far from where it was for the camera to follow, if any."""
+        """A leader whose hand moved too far since the last reading for the camera to follow, or an empty text."""
         for name, now, then in zip(self._camera_hands, poses, self._camera_last, strict=True):
             if np.linalg.norm(now[:3, 3] - then[:3, 3]) > self._leaders[name].pairing.settings.leap:
                 return name

@@ -72,7 +72,7 @@ TIP = 4e-3
 
 @inlined
 def _sort(work: Solve, count: int) -> None:
-    """The order of what was found, the nearest first, by insertion: it is short, and stays as it is for equals."""
+    """Sort the places found by distance, nearest first: an insertion sort, stable and fast for a few."""
     for n in range(count):
         k = n
         while k > 0 and work.values[work.order[k - 1], 0] > work.values[n, 0]:
@@ -83,7 +83,7 @@ def _sort(work: Solve, count: int) -> None:
 
 @inlined
 def _anchor(contacts: Contacts, points: Points, r: int, found: int) -> None:
-    """Let friction go on from where the point is, with the force that it has."""
+    """Set the anchor of friction so that its force at the present place of the point stays the same."""
     t, partners, value = contacts.touching, contacts.partners, contacts.solve.values[found]
     t.distance[r] = value[0]
     n, f = t.normal[r], t.force[r]
@@ -105,7 +105,7 @@ def _set_weights(work: Solve, found: int) -> None:
 
 @inlined
 def _begin(field: Field, points: Points, contacts: Contacts, found: int) -> None:
-    """Let a body touch the tissue at one more point, if there is room."""
+    """Begin a contact of a body and the tissue at another point, if there is room."""
     t, work, partners = contacts.touching, contacts.solve, contacts.partners
     part, q = work.found[found, 0], work.found[found, 1]
     body = contacts.parts.body[part]
@@ -277,7 +277,7 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
 
 @inlined
 def _relax(touching: Touching, work: Solve, n: int, a: int) -> float:
-    """One point: its normal force, then friction within the cone; returns the square of what its force changes by."""
+    """Update one point: its normal force, then friction within the cone; returns the squared change of its force."""
     r = work.rows[a]
     f, normal, D, u, soft = touching.force[r], touching.normal[r], work.D[a, a], work.u[a], touching.soft[work.rows[a]]
     if touching.part[r] < 0:
@@ -347,7 +347,7 @@ def touch(field: Field, points: Points, contacts: Contacts, dt: float) -> bool:
 
 @inlined
 def _resist_rolling(contacts: Contacts, n: int, dt: float) -> None:
-    """Let bodies that turn on the tissue feel a moment against it, at most `ROLLING` times the force that presses them.
+    """Apply rolling resistance to bodies that turn on the tissue, at most `ROLLING` times the force that presses them.
 
     What turns slowly is braked in proportion, so that a tick never turns it back.
     """

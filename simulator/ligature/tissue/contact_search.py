@@ -85,7 +85,7 @@ def _at(x: Array, faces: Integers, q: int, u: float, v: float, p: Array) -> None
 
 @inlined
 def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count: int) -> int:
-    """Add the deepest point of face ``q`` for part ``c``, if it is near, to what was found; returns how many are."""
+    """Add the deepest point of face ``q`` for part ``c``, if it is near, to the places found; returns their number."""
     x, faces, vectors = field.x, field.faces, work.vectors
     p, a, b, normal, best_normal = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     best, u, v, core = math.inf, 0.5, 0.5, field.core[q]
@@ -143,7 +143,7 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
 
 @inlined
 def _note(work: Solve, c: int, q: int, depth: float, u: float, v: float, normal: Array, count: int) -> int:
-    """Add a place to what was found."""
+    """Append a place to those found; returns their number."""
     work.found[count, 0], work.found[count, 1] = c, q
     work.values[count, 0], work.values[count, 4], work.values[count, 5] = depth, u, v
     for m in range(3):
@@ -195,7 +195,7 @@ def find_contacts(field: Field, parts: Parts, partners: Partners, work: Solve) -
 
 @inlined
 def _find(field: Field, parts: Parts, work: Solve, still: bool, count: int) -> int:
-    """Add what is near to the parts that are ``still``, or to the others, to the ``count`` that were found."""
+    """Add the places near the ``still`` parts, or near the others, to the ``count`` found; returns their number."""
     low, high = work.vectors[0], work.vectors[1]
     for c in range(parts.kind.shape[0]):
         if not parts.live[c] or parts.still[c] != still:

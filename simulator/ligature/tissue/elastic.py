@@ -72,7 +72,7 @@ class Bulk(NamedTuple):
 
 
 def _bulk_example() -> Bulk:
-    """The smallest one: what counts is the types of its arrays."""
+    """The smallest instance, for the types of its arrays."""
     z = np.zeros
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     return Bulk(

@@ -195,7 +195,7 @@ def _sites(faces: Integers) -> tuple[Integers, Integers]:
 
 
 def _core(elastic: ElasticGrid) -> Array:
-    """`Field.core`: the part `CORE` of the cell behind each face whose nodes are all held."""
+    """`Field.core`: the share `CORE` of the depth of the cell behind each face whose nodes are all fixed; else 0."""
     grid = elastic.grid
     corners = grid.nodes[grid.faces]
     across = np.abs(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])).argmax(axis=1)
@@ -256,7 +256,7 @@ def respond(field: Field, points: Points, i: int) -> None:
 
 @inlined
 def _couple(field: Field, points: Points, i: int) -> None:
-    """Compliance between a point and all others."""
+    """Compute the compliance between a point and all others."""
     R = field.response[i]
     for u in range(points.filled[0]):
         j = points.used[u]

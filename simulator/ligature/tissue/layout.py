@@ -128,7 +128,7 @@ def paths(number: int = MOST_PATHS, nodes: int = MOST_NODES) -> Paths:
 
 
 def _example() -> Tissue:
-    """The smallest block: what counts is the types of its arrays."""
+    """The smallest block, for the types of its arrays."""
     z = np.zeros
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     factor = Elimination(i(1, 5), i(1), z(1), z(1), z(1))

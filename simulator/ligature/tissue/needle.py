@@ -262,7 +262,7 @@ def follow_tip(points: Points, paths: Paths, held: Held, dt: float) -> int:
 
 @inlined
 def _find_bases(points: Points, held: Held, rows: Bristles, s: float) -> None:
-    """Where the needle's points would be at the end of this tick without its own forces."""
+    """Positions of the needle's points at the end of this tick without its own forces."""
     contact = held.tip[2]
     for u in range(points.filled[0]):
         j = points.used[u]

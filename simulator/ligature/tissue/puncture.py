@@ -156,7 +156,7 @@ class NeedleInTissue:
         self.arrays.H[:], self.arrays.g[:] = H, g
 
     def _conclude(self, left: int, through: bool) -> None:
-        """Follow the tip: out of the tissue, further in, or off the surface."""
+        """Update the path after a tick: the tip left the tissue, punctured or cut, or left the surface."""
         h = self._held
         if left >= 0:
             self._lay_exit(left)
@@ -220,7 +220,7 @@ class NeedleInTissue:
         return found
 
     def _get_through(self) -> None:
-        """The tip's force reached its limit: it enters, cuts on, or leaves."""
+        """Puncture, cut on or leave, after the tip's force reached its limit."""
         h, paths = self._held, self._paths
         if h.tip[0] == states.TOUCHES:
             point = int(h.tip[2])
@@ -236,17 +236,17 @@ class NeedleInTissue:
             h.tip[0] = states.LEAVES
 
     def _drop_of(self, point: int) -> float:
-        """Time in which the force on a dented point falls, s."""
+        """Time in seconds in which the force on an indented point falls."""
         dent = self._interface.points.at[point] - self._at_rest(point)
         return max(states.DROP, float(np.linalg.norm(dent)) / states.RECOIL)
 
     def _at_rest(self, point: int) -> Array:
-        """Where a point is in the tissue at rest, (3,)."""
+        """Position (3,) of a point in the tissue at rest."""
         p = self._interface.points
         return np.asarray(p.weights[point] @ self._interface.elastic.grid.nodes[p.nodes[point]])
 
     def _let_go(self) -> None:
-        """The tip has left the surface."""
+        """End the contact of the tip with the surface."""
         self._interface.release(int(self._held.tip[2]))
         self._held.tip[0], self._held.tip[2] = states.OUTSIDE, -1
 
@@ -299,7 +299,7 @@ class NeedleInTissue:
         return float(np.linalg.norm(there - self._at_rest(point)))
 
     def _hold(self, point: int) -> None:
-        """Let a node where the tip is hold the needle from now on."""
+        """Engage a node at the tip, which holds the needle from now on."""
         h = self._held
         h.engaged[point], h.anchor[point], h.sigma[point] = 1, 0.0, 0.0
         h.offset[point] = self._shape[:3] - self._interface.points.at[point]

@@ -168,7 +168,7 @@ def _keep_order(rows: Rows, n: int) -> None:
 
 @inlined
 def _find(points: Points, held: Held, rows: Rows, line: Array) -> None:
-    """Where along the thread its nodes are now; those off its ends are let go."""
+    """Update the places of the nodes along the thread; nodes beyond its ends are released."""
     n = _list_nodes(points, held, rows)
     length = _find_nearest(points, rows, line, n)
     _keep_order(rows, n)
@@ -300,7 +300,7 @@ def _ring_axis(line: Array, s: int, part: float, x: float, y: float, z: float) -
 
 @inlined
 def _way(line: Array, s: int, part: float, sense: int) -> tuple[float, float, float, float]:
-    """From a place on the thread to one `RIM` further along it, or back for -1; and how far that is along it."""
+    """Vector from a place on the thread to one `RIM` further along it (back for -1), and the arc length to it."""
     x, y, z, left, share = 0.0, 0.0, 0.0, RIM, 1.0 - part if sense > 0 else part
     while left > 0.0 and 0 <= s < line.shape[0] - 1:
         ex, ey, ez = line[s + 1, 0] - line[s, 0], line[s + 1, 1] - line[s, 1], line[s + 1, 2] - line[s, 2]
@@ -315,7 +315,7 @@ def _way(line: Array, s: int, part: float, sense: int) -> tuple[float, float, fl
 
 @inlined
 def _beside(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A direction across (x, y, z)."""
+    """A vector perpendicular to (x, y, z)."""
     ax, ay, az = abs(x), abs(y), abs(z)
     if ax <= ay and ax <= az:
         return 0.0, z, -y
@@ -385,7 +385,7 @@ def find_springs(tissue: Integers, thread: Integers, line: Array) -> None:
 
 @inlined
 def _motion(rows: Rows, r: int, line: Array) -> tuple[float, float, float]:
-    """How far the thread has moved at a node, in its directions."""
+    """Displacement of the thread at a node, in the node's directions."""
     s, part, E = rows.segment[r], rows.part[r], rows.E[r]
     x = line[s, 0] + part * (line[s + 1, 0] - line[s, 0]) - rows.start[r, 0]
     y = line[s, 1] + part * (line[s + 1, 1] - line[s, 1]) - rows.start[r, 1]
@@ -399,7 +399,7 @@ def _motion(rows: Rows, r: int, line: Array) -> tuple[float, float, float]:
 
 @inlined
 def _find_excess(rows: Rows, r: int, x: float, y: float, z: float) -> None:
-    """What the bristle alone is stretched by after the motion (x, y, z) with the force ``local``."""
+    """Elongation of the bristle alone after the motion (x, y, z) with the force ``local``."""
     S, f = rows.soft[r], rows.local[r]
     rows.excess[r, 0] = rows.stretch[r, 0] + x - (S[0, 0] * f[0] + S[0, 1] * f[1] + S[0, 2] * f[2])
     rows.excess[r, 1] = rows.stretch[r, 1] + y - (S[1, 0] * f[0] + S[1, 1] * f[1] + S[1, 2] * f[2])
@@ -408,7 +408,7 @@ def _find_excess(rows: Rows, r: int, x: float, y: float, z: float) -> None:
 
 @inlined
 def _change_sides(held: Held, rows: Rows, back: bool) -> bool:
-    """Which rows are at their limits after a solve, and with ``back`` which are not any more; True on a change."""
+    """Update which rows are at their limits after a solve, with ``back`` also which no longer are; True on a change."""
     changed = False
     for r in range(rows.filled[0]):
         for a in range(2):
@@ -425,7 +425,7 @@ def _change_sides(held: Held, rows: Rows, back: bool) -> bool:
 
 @inlined
 def _follow_limits(held: Held, rows: Rows) -> None:
-    """Move anchors that slip, and note what tears."""
+    """Move anchors that slip, and add up tearing."""
     for r in range(rows.filled[0]):
         i = rows.node[r]
         if held.side[i, 0] != 0:

@@ -61,7 +61,7 @@ _TISSUES = {name: name for name in ("silicone pad", "skin", "fat", "stomach", "l
 
 
 def _material(block: str) -> tuple[Key, ...]:
-    """What tissue is made of; numbers come before those of the named material."""
+    """Keys of a tissue material; numbers that the file gives override those of the named material."""
 
     def number(name: str, unit: str, doc: str, least: float = 0.0, most: float | None = None) -> Key:
         path = f"{block}.{name}"

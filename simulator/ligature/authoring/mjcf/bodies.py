@@ -112,7 +112,7 @@ def _body(
 
 
 def _plane(model: Any, geom: int, poses: list[Array]) -> Item:
-    """A plane is endless and stands still, and cannot be one of several shapes: a body of its own."""
+    """Make a plane a static body of its own: it is infinite, and cannot be one of several shapes."""
     name = name_of(model, "geom", geom)
     T = poses[int(model.geom_bodyid[geom])] @ _geom_pose(model, geom)
     values: dict[str, Any] = {"name": name, "location": pose_of(T), "mass": 0.0}
@@ -167,7 +167,7 @@ def _geom_pose(model: Any, geom: int) -> Array:
 def _shapes(
     model: Any, geoms: list[int], T_body: Array, poses: list[Array], notes: list[str]
 ) -> tuple[list[tuple[Shape, Array]], list[MeshPart]]:
-    """Primitives with their poses in the body, and triangles of what the format has no primitive for."""
+    """Primitives with their poses in the body, and triangles of shapes for which the format has no primitive."""
     primitives: list[tuple[Shape, Array]] = []
     parts: list[MeshPart] = []
     for geom in geoms:
@@ -206,7 +206,7 @@ def _triangles(model: Any, mesh: int) -> tuple[Array, Any]:
 
 
 def _note_unsupported(model: Any, notes: list[str]) -> None:
-    """What of the model has no counterpart."""
+    """Note elements of the model that have no counterpart."""
     for size, kind, plural in _LEFT_OUT:
         count = int(getattr(model, size, 0))
         if count:

@@ -93,7 +93,7 @@ def first(value: Any) -> float:
 
 
 def _range(model: Any, joint: int) -> tuple[float, float] | None:
-    """Limits from the reference configuration on; None without."""
+    """Limits relative to the reference configuration; None without limits."""
     if not model.jnt_limited[joint]:
         return None
     zero = float(model.qpos0[model.jnt_qposadr[joint]])
@@ -157,7 +157,7 @@ def _several(model: Any, joints: list[int]) -> tuple[dict[str, Any], Array] | No
 
 
 def _completed(columns: dict[int, Array]) -> Array | None:
-    """A right-handed rotation with the given columns; the last of three may be turned round; None if they lean."""
+    """A right-handed rotation with these columns, of three the last maybe negated; None unless orthogonal."""
     R = np.zeros((3, 3))
     for place, axis in columns.items():
         if any(abs(R[:, other] @ axis) > 1e-6 for other in range(3)):
@@ -195,7 +195,7 @@ def _six_keys(model: Any, used: dict[int, tuple[int, float]]) -> dict[str, Any]:
 
 
 def _note_unsupported(model: Any, joint: int, notes: list[str]) -> None:
-    """What of a joint has no counterpart."""
+    """Note properties of a joint that have no counterpart."""
     name, kind, dof = name_of(model, "jnt", joint), int(model.jnt_type[joint]), int(model.jnt_dofadr[joint])
     lost = []
     if kind == _BALL:

@@ -165,7 +165,7 @@ class _Exporter:
         return Link(name, T, solid, tuple(visuals), tuple(replace(look, colour=None) for look in touched))
 
     def _placed_shapes(self, body: Element, prefix: str, mesh: str) -> list[PlacedShape]:
-        """What is seen of a body, or what it collides by (``prefix`` is "collision ")."""
+        """Visual shapes of a body, or its collision shapes (``prefix`` is "collision ")."""
         colour = _colour(body) if not prefix else None
         if body.has(f"{prefix}shape"):
             offset = body.pose("collision offset") if prefix and body.has("collision offset") else None

@@ -80,7 +80,7 @@ def card(
 
 
 class _Origin(NamedTuple):
-    """What a card says of where the data come from."""
+    """The part of a dataset card that states the origin of the data."""
 
     title: str
     place: str

@@ -41,7 +41,7 @@ Log = Callable[[str], object]
 
 @dataclass
 class _Written:
-    """What is known of the episodes written so far."""
+    """Totals, tasks and statistics of the episodes written so far."""
 
     episodes: list[dict[str, Any]] = field(default_factory=list)
     stats: list[dict[str, statistics.Statistics]] = field(default_factory=list)
@@ -100,7 +100,7 @@ def export(source: Path, target: Path, format: str, codec: str = "h264", license
 
 
 def _check(file: h5py.File, source: Path) -> None:
-    """Raise for what LeRobot's formats cannot hold."""
+    """Raise `ExportError` for data that LeRobot's formats cannot store."""
     if file.attrs["format"] != "ligature dataset 2":
         raise DatasetError(
             f"'{source}' has the format '{file.attrs['format']}'; only 'ligature dataset 2' can be exported"
@@ -168,7 +168,7 @@ class _Export:
         return columns(self._file, episode, texts=not self._new)
 
     def _find_constant(self, names: Sequence[str]) -> list[str]:
-        """Features that are the same number in all samples: nothing is in them, and no normalisation takes them."""
+        """Features that are constant over all samples: they carry no information and have no scale to normalise by."""
         seen: dict[str, list[NDArray[Any]]] = {}
         for name in names:
             for column in self._columns(self._file[name]):
@@ -178,7 +178,7 @@ class _Export:
         return [name for name, ends in seen.items() if all((end == ends[0]).all() for end in ends)]
 
     def _add(self, number: int, name: str) -> None:
-        """One episode: its rows, its videos, its statistics."""
+        """Write one episode: rows, videos and statistics."""
         written, episode = self._written, self._file[name]
         found = [c for c in self._columns(episode) if c.name not in self._constant]
         length = int(episode.attrs["samples"])
@@ -292,7 +292,7 @@ class _Export:
         (meta / "stats.json").write_text(json.dumps(self._all_stats(), indent=1), encoding="utf-8")
 
     def _all_stats(self) -> dict[str, statistics.Statistics]:
-        """Of numbers over all samples; of pictures from those of the episodes."""
+        """Statistics of all features: of numbers over all samples, of pictures combined from those of the episodes."""
         written, found = self._written, dict[str, statistics.Statistics]()
         for key, feature in written.features.items():
             if feature["dtype"] == "video":

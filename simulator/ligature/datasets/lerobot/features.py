@@ -101,7 +101,7 @@ def _core(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
 
 
 def _more(robot: Robot, arms: Sequence[h5py.Group]) -> Iterator[Column]:
-    """What else an arm reports; a bag may lack forces."""
+    """Further columns of the arms; those of forces only if all arms have them, since a bag may lack forces."""
     motors = robot.motors()
     yield Column("observation.setpoint", motors, _motors(arms, "setpoint_js", 0))
     yield Column("observation.velocity", motors, _motors(arms, "measured_js", 1))
@@ -133,7 +133,7 @@ def _ground_truth(episode: h5py.Group) -> Iterator[Column]:
 
 
 def _extra(episode: h5py.Group) -> Iterator[Column]:
-    """What the caller added; LeRobot knows ``observation.environment_state``."""
+    """Columns that the caller added, of which LeRobot knows ``observation.environment_state``."""
     for name, data in sorted(episode.get("extra", {}).items()):
         values = data[:].reshape(len(data), -1)
         feature = "observation.environment_state" if name == "environment_state" else f"extra.{name}"

@@ -95,7 +95,7 @@ class ChallengeFace:
             publisher.publish(_posed(self._world, state["body_pose"][body], stamp))
 
     def _set_up_task_3(self, message: Any) -> None:
-        """The needle is brought into the jaw of the second arm; runs beside everything else."""
+        """Move the needle into the jaw of the second arm, on a thread of its own."""
         arm = next((arm for arm in self._arms if arm.name == TASK_3_ARM), None)
         needle = next((b.index for b in self._scene.bodies if b.identity.name == "Needle"), None)
         if arm is None or needle is None:
@@ -179,7 +179,7 @@ class _Psm:
                 self._push(ActuatorCommand(self._actuator, True, felt))
 
     def _felt(self) -> str:
-        """Identifier of the first thing worth grasping that either finger feels, or an empty text."""
+        """Identifier of the first body to grasp that either finger touches, or an empty text."""
         sensed = self._newest()["ghost_sensed"][self._ghosts].any(axis=0)
         felt = [self._scene.bodies[b].identity.identifier for b in np.flatnonzero(sensed)]
         for name in GRASPED:
@@ -189,7 +189,7 @@ class _Psm:
         return ""
 
     def publish(self, state: Any, stamp: Any) -> None:
-        """Six positions and velocities under eight names, as the challenge's node has it."""
+        """Publish six positions and velocities under eight names, as the challenge's node does."""
         record = state["arm"][self._index]
         position, velocity, _ = record["measured_js"][:, :6].tolist()
         message = JointState(name=self._names, position=position, velocity=velocity)
@@ -221,7 +221,7 @@ class _Camera:
         self._push(BodyCommand(self._body, CommandType.POSITION, tuple(pose.tolist())))
 
     def publish(self, state: Any, stamp: Any) -> None:
-        """Zeros for joints, and the camera's pose in the world, as the challenge's node has it."""
+        """Publish zeros for joints, and the camera's pose in the world, as the challenge's node does."""
         message = JointState(name=[f"j{i}" for i in range(4)], position=[0.0] * 4)
         message.header.stamp = stamp
         self._measured_js.publish(message)

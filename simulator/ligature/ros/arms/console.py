@@ -78,7 +78,7 @@ class Console:
         topic.publish(value)
 
     def _hear_scale(self, message: Any) -> None:
-        """Whoever teleoperates reports the scale that it has, which may come from its own file."""
+        """Take the scale that the teleoperation node reports, which may come from its own file."""
         if message._connection_header["callerid"] != rospy.get_name():
             self._values[self._scale] = message.data
 
@@ -207,7 +207,7 @@ class _SetupArm:
         self._local.publish(_posed(cart, local, stamp))
 
     def close(self) -> None:
-        """Leave all topics to others."""
+        """Unregister all topics, so that another node can publish them."""
         self._state.close()
         for end in (self._measured_js, self._measured_cp, self._local, *self._refusing):
             end.unregister()

@@ -130,7 +130,7 @@ class ArmsNode:
     # --- rivals -----------------------------------------------------------------------------
 
     def _yielded(self) -> list[str]:
-        """Names of parts that are another node's since the last call, each reported once."""
+        """Names of parts that another node took over since the last call; each is logged once."""
         found = self._rivals.take()
         for part, rival in found:
             rospy.logwarn(
@@ -140,7 +140,7 @@ class ArmsNode:
         return [part for part, _ in found]
 
     def _fall_silent(self, part: str) -> None:
-        """Leave a part to the node that publishes it; the master is asked on another thread."""
+        """Stop publishing a part that another node publishes; the master is called on another thread."""
         if part == CONSOLE and self._console is not None:
             threading.Thread(target=self._console.close, daemon=True).start()
         elif self._setup_joints is not None:
@@ -246,7 +246,7 @@ class ArmsNode:
 
 
 def _parts(scene: Scene, prefix: str) -> dict[str, list[str]]:
-    """What is left to others as a whole, by name: each arm, its set-up joints, the console; and its topics."""
+    """Topics of each part that another node takes over as a whole: each arm, its set-up joints, the console."""
     parts = {arm.name: published_topics(arm, f"{prefix}{arm.name}") for arm in scene.arms}
     for arm in scene.arms:
         if arm.kind is not ArmKind.MTM:

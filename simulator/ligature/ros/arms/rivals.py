@@ -112,14 +112,14 @@ class Rivals(threading.Thread):
             self._called.wait(PERIOD)
 
     def _register(self, known: set[str]) -> None:
-        """Have the master call about the topics that it does not know to be listened to."""
+        """Subscribe at the master to the publishers of topics that are not watched yet."""
         missing = [topic for topic in self._part_of if topic.endswith(WATCHED) and topic not in known]
         if missing:
             self._ask_all("registerSubscriber", [(topic, "*", self._uri) for topic in missing])
             self._called.set()  # whoever came between the look and this is seen by another look
 
     def _leave(self) -> None:
-        """Have the master forget this listener."""
+        """Unregister this listener at the master."""
         with suppress(*NO_ANSWER):
             topics = [topic for topic in self._part_of if topic.endswith(WATCHED)]
             self._ask_all("unregisterSubscriber", [(topic, self._uri) for topic in topics])
@@ -133,7 +133,7 @@ class Rivals(threading.Thread):
 
 
 class _Listener(XmlRpcHandler):  # type: ignore[misc]
-    """Answers the master, which calls about publishers, and whoever asks whether the node lives."""
+    """XML-RPC server of a listener: the master reports publishers to it, and nodes ask whether it is alive."""
 
     def __init__(self, called: threading.Event) -> None:
         self._called = called
@@ -144,5 +144,5 @@ class _Listener(XmlRpcHandler):  # type: ignore[misc]
         return 1, "", 0
 
     def getPid(self, caller_id: str) -> tuple[int, str, int]:  # noqa: N802
-        """A sign of life."""
+        """The process id, by which others see that the node is alive."""
         return 1, "", os.getpid()

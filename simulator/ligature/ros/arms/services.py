@@ -92,5 +92,5 @@ class Services:
         return QueryInverseKinematicsResponse(result.q.tolist(), True, "")
 
     def _convert(self, request: Any) -> ConvertFloat64ArrayResponse:
-        """Actuators of the simulated arm are its joints."""
+        """Return the input: actuators of the simulated arm are its joints."""
         return ConvertFloat64ArrayResponse(request.input)
