@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-import importlib.util
-import os
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 from rich.console import Console
 
-from ligature.bundle import launch_file, scene_names
-from ligature.cli.missing import remedy
+from ligature.cli.arguments import (
+    AllowPlugins,
+    Cameras,
+    CockpitAddress,
+    DatasetFile,
+    Devices,
+    Launch,
+    Models,
+    Rate,
+    Roots,
+    Size,
+    five_numbers,
+    indices,
+    launch_files,
+    page_address,
+    sampling_of,
+    task_name,
+)
 from ligature.cli.numbers import Commands
-from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, name_prefix, rate_notes
-from ligature.cli.sampling import Sampling, picture_size
+from ligature.cli.options import RunOptions, arm_entry, arm_names, name_prefix, rate_notes
 from ligature.cli.supervisor import supervise
 from ligature.model.softening import requested
 
@@ -29,88 +42,8 @@ app = Commands(
 dataset_app = Commands(no_args_is_help=True, help="Inspect datasets and export them to LeRobot's formats.")
 app.add_typer(dataset_app, name="dataset")
 
-
-def _launch_files(paths: list[Path] | None) -> list[Path]:
-    return [launch_file(path) for path in paths or []]
-
-
-Launch = Annotated[
-    Path,
-    typer.Argument(
-        help=f"Launch file, one model file, or the name of a bundled scene: {', '.join(scene_names())}.",
-        callback=launch_file,
-    ),
-]
-Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', for example 10,11,6.")]  # noqa: UP045
-Roots = Annotated[
-    list[Path] | None, typer.Option("--root", help="Additional folder that scene files may be read from.")
-]  # noqa: UP045
-
-Rate = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--rate", help="For a dataset: samples per simulated second, 10 by default.", min=0.1, max=1000),
-]
-Size = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--size", help="For a dataset: width x height of its pictures, 320x240 by default."),
-]
-Cameras = Annotated[
-    Optional[list[str]],  # noqa: UP045
-    typer.Option("--camera", help="For a dataset: a camera, or 'none'; repeatable. By default cameraL and cameraR."),
-]
-
-AllowPlugins = Annotated[
-    bool,
-    typer.Option(
-        "--allow-plugins", help="Run the plug-ins that the scene's files name; their code can do all you can."
-    ),
-]
-Devices = Annotated[Optional[str], typer.Option("-i", help="Indices of input devices whose proxies the scene gets.")]  # noqa: UP045
-
 FIRST_THROW = Path("needle_insertion")
-"""Scene of the cockpit for who names none."""
-
-CockpitAddress = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(
-        "--cockpit-at", "--at", metavar="ADDRESS:PORT",
-        help="Address of the web page; other machines need a token in LIGATURE_COCKPIT_TOKEN.",
-    ),
-]  # fmt: skip
-
-
-def indices(text: str | None) -> tuple[int, ...] | None:
-    """Indices of a list such as ``10, 11,6``; None for none given."""
-    if text is None:
-        return None
-    try:
-        return model_indices(text)
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from None
-
-
-def _sampling(dataset: Path | None, rate: float | None, size: str | None, cameras: list[str] | None) -> Sampling:
-    """How a dataset is sampled; its options without one are an error."""
-    if dataset is None:
-        if (rate, size, cameras or None) != (None, None, None):
-            raise typer.BadParameter("--rate, --size and --camera are for '--dataset'")
-        return Sampling()
-    default = Sampling()
-    try:
-        pixels = default.size if size is None else picture_size(size)
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from None
-    names = default.cameras if not cameras else tuple(name for name in cameras if name != "none")
-    return Sampling(rate or default.rate, pixels, names)
-
-
-def task_name(text: str) -> str:
-    """``text``, unless it is given and no task has that name."""
-    from ligature.tasks import TASKS
-
-    if text and text not in TASKS:
-        raise typer.BadParameter(f"unknown task '{text}'; choose one of {', '.join(TASKS)}")
-    return text
+"""Default scene of the cockpit."""
 
 
 @app.command()
@@ -184,24 +117,11 @@ def run(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), namespace, rate, speed,
         min_hz=min_hz, max_hz=max_hz, names=names, arms=arms, src_crtk=src_crtk, cameras=cameras,
         window=window or camera_windows, camera_windows=camera_windows, task=task, record=str(record) if record else "",
-        cockpit=_served_at(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
+        cockpit=page_address(cockpit_at) if cockpit or cockpit_at else "", notes=rate_notes(rate),
         devices=indices(devices) or (), soft=tuple(soft or ()), only=names_of_arms, masters=masters,
         base_frames=base_frames, allow_plugins=allow_plugins,
     )  # fmt: skip
     supervise(options)
-
-
-def _served_at(text: str | None) -> str:
-    """The address of the page; raises `typer.BadParameter` when the page may not be served there."""
-    if importlib.util.find_spec("viser") is None:
-        raise typer.BadParameter(remedy("viser"))
-    from ligature.cockpit.address import DEFAULT, TOKEN_VARIABLE, AddressError, check_token, read_address
-
-    try:
-        check_token(read_address(text or DEFAULT), os.environ.get(TOKEN_VARIABLE, ""))
-    except AddressError as error:
-        raise typer.BadParameter(str(error)) from None
-    return text or DEFAULT
 
 
 @app.command()
@@ -221,7 +141,7 @@ def cockpit(
     """
     options = RunOptions(
         str(launch), indices(models), (), tuple(str(r) for r in root or ()), rate=rate, speed=speed,
-        cockpit=_served_at(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
+        cockpit=page_address(at), ros=False, notes=rate_notes(rate), devices=indices(devices) or (),
         allow_plugins=allow_plugins,
     )  # fmt: skip
     supervise(options)
@@ -232,7 +152,7 @@ def check(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Launch, world, model or input-device files, or names of bundled scenes.", callback=_launch_files
+            help="Launch, world, model or input-device files, or names of bundled scenes.", callback=launch_files
         ),
     ],
     strict: Annotated[bool, typer.Option(help="Reject files that AMBF rejects.")] = False,
@@ -266,7 +186,7 @@ def bench(
 def compile_kernels(
     scenes: Annotated[
         Optional[list[Path]],  # noqa: UP045
-        typer.Argument(help="Launch files; by default two bundled scenes.", callback=_launch_files),
+        typer.Argument(help="Launch files; by default two bundled scenes.", callback=launch_files),
     ] = None,
 ) -> None:
     """Compile the kernels of scenes ahead of their first start, several at a time."""
@@ -305,7 +225,7 @@ def render(
     if not set(kinds) <= set(ANNOTATIONS):
         raise typer.BadParameter(f"--annotations is any of {', '.join(ANNOTATIONS)}, not '{annotations}'")
     try:
-        sensor = ImageSensor(exposure, noise, _five_numbers(distortion), depth_noise, seed)
+        sensor = ImageSensor(exposure, noise, five_numbers(distortion), depth_noise, seed)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     console = Console(highlight=False, soft_wrap=True)
@@ -314,14 +234,6 @@ def render(
             launch, indices(models), root or [], camera, out, seconds, (width, height), format, kinds, sensor, console
         )
     )
-
-
-def _five_numbers(text: str) -> tuple[float, float, float, float, float]:
-    try:
-        k1, k2, p1, p2, k3 = (float(part) for part in text.split(","))
-    except ValueError:
-        raise typer.BadParameter(f"--distortion is five numbers k1,k2,p1,p2,k3, not '{text}'") from None
-    return k1, k2, p1, p2, k3
 
 
 @app.command()
@@ -415,7 +327,7 @@ def demo(
     """Let two arms suture autonomously; prints the score, writes pictures."""
     from ligature.cli.demo import demo as run_demo
 
-    sampling, console = _sampling(dataset, rate, size, camera), Console(highlight=False, soft_wrap=True)
+    sampling, console = sampling_of(dataset, rate, size, camera), Console(highlight=False, soft_wrap=True)
     raise typer.Exit(run_demo(throws, seed, out, dataset, console, episodes, sampling, tissue))
 
 
@@ -506,7 +418,7 @@ def replay(
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
     if page or compare is not None:
-        address = _served_at(at)
+        address = page_address(at)
         from ligature.cli.replay_page import show
 
         files = [file] if compare is None else [file, compare]
@@ -516,7 +428,7 @@ def replay(
 
     if joints not in ("", "measured", "setpoint"):
         raise typer.BadParameter(f"--joints is 'measured' or 'setpoint', not '{joints}'")
-    sampling = _sampling(dataset, rate, size, camera)
+    sampling = sampling_of(dataset, rate, size, camera)
     if dataset is None and (task or text or success is not None):
         raise typer.BadParameter("--task, --success and --text are for '--dataset'")
     sampled = None if dataset is None else Sampled(dataset, sampling, task, success, text)
@@ -579,9 +491,6 @@ def teleop(
     raise typer.Exit(
         run_teleop(config, device or (), record, replay, calibrate, check, timeout, indices(devices), console)
     )
-
-
-DatasetFile = Annotated[Path, typer.Argument(help="HDF5 dataset of demo, replay or DatasetWriter.")]
 
 
 @dataset_app.command("info")
