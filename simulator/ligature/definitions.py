@@ -26,7 +26,10 @@ class DefinitionError(ValueError):
 
 
 def plain(definition: str) -> str:
-    """The fields of a definition and of its parts: all that the bytes of a message depend on."""
+    """The fields of a definition and of its parts: all that the bytes of a message depend on.
+
+    Raises `DefinitionError` for a definition that is too long.
+    """
     if len(definition) > MOST_CHARACTERS:
         raise DefinitionError(
             f"the message definition has {len(definition)} characters; the maximum is {MOST_CHARACTERS}"

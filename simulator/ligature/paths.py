@@ -25,7 +25,7 @@ def real_path(path: Path) -> Path:
 
 
 def regular_file(path: Path) -> Path:
-    """``path``, where it is a file to read; raises OSError.
+    """``path``, where it is a file to read; raises OSError, for a folder `IsADirectoryError`.
 
     Reading a pipe waits for who writes to it, and a device such as ``/dev/zero`` has no end.
     """

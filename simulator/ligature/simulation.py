@@ -517,7 +517,8 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot of this scene, taken here or elsewhere.
 
-        Raises ValueError, and changes nothing, for a snapshot of a scene with other objects or of another tick.
+        Raises ValueError, and changes nothing, for a snapshot of a scene with other objects or of another tick, and
+        TypeError for anything but a snapshot.
         """
         self._check_open()
         if not isinstance(snapshot, Snapshot):

@@ -162,7 +162,7 @@ def test_the_reader_of_the_examples_says_what_it_wants(words: list[str]) -> None
     [
         ({"rate": 0.0}, "rate must be above 0 and at most 1000 samples per simulated second"),
         ({"size": (0, 48)}, "size is a width and a height"),
-        ({"gestures": {"work": "G3"}}, "'work' is not a phase"),
+        ({"gestures": {"work": "G3"}}, "gestures: 'work' is not a phase; the phases are .+"),
         ({"phases": ("work",), "gestures": {"work": "G99"}}, "'G99' is not one of the gestures G1, G2"),
     ],
 )

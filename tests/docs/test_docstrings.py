@@ -5,12 +5,14 @@ The form (summary, sections) is checked by ruff's pydocstyle rules in numpy's co
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import importlib
 import inspect
 import re
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -90,6 +92,53 @@ def test_what_lists_parameters_describes_what_it_returns(name: str) -> None:
     text = inspect.getdoc(SURFACE[name]) or ""
     if "Parameters\n---" in text and inspect.signature(SURFACE[name]).return_annotation not in ("None", None):
         assert "Returns\n---" in text
+
+
+ENDINGS = {"Exit", "BadParameter", "SystemExit", "StopIteration", "NotImplementedError", "KeyboardInterrupt"}
+"""Exceptions that end a program or an iteration: callers do not handle them."""
+
+UNNAMED = {
+    "hand.py: Hand.grasp", "inverse.py: pose_rows", "inverse.py: seed_rows", "rod.py: Rod.attach",
+    "scripts.py: side_grasp", "suturing.py: SuturingEnv.save",
+}  # fmt: skip
+"""Functions whose docstrings do not name their exceptions yet."""
+
+
+def raised(function: ast.FunctionDef) -> set[str]:
+    """The exceptions of the ``raise`` statements of a function, but for those that it may catch itself."""
+    found, nodes = set(), list[ast.AST](function.body)
+    while nodes:
+        node = nodes.pop()
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Lambda):
+            continue
+        if isinstance(node, ast.Try) and node.handlers:
+            nodes += [*node.handlers, *node.orelse, *node.finalbody]
+            continue
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            error = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+            found.add(getattr(error, "id", getattr(error, "attr", "")))
+        nodes += ast.iter_child_nodes(node)
+    return {name for name in found if name[:1].isupper()} - ENDINGS
+
+
+def silent_raises(path: Path) -> Iterator[str]:
+    """Public functions of a module that raise what neither their docstring nor the module's names."""
+    module = ast.parse(path.read_text("utf-8"))
+    classes = [node for node in module.body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")]
+    for owner in (module, *classes):
+        prefix = f"{owner.name}." if isinstance(owner, ast.ClassDef) else ""
+        for function in owner.body:
+            if not isinstance(function, ast.FunctionDef) or function.name.startswith("_"):
+                continue
+            text = ast.get_docstring(function)  # an override without one has that of its base
+            known = f"{text}{ast.get_docstring(module)}"
+            if text and any(name not in known for name in raised(function)):
+                yield f"{path.name}: {prefix}{function.name}"
+
+
+def test_public_functions_name_the_exceptions_that_they_raise() -> None:
+    files = (ROOT / "simulator" / "ligature").rglob("*.py")
+    assert {name for file in files for name in silent_raises(file)} == UNNAMED
 
 
 @pytest.mark.parametrize("what", ["attribute", "data", "property"])

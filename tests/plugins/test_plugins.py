@@ -263,7 +263,7 @@ def test_a_hook_that_fails_switches_its_plugin_off_and_the_run_goes_on(simulate:
         ("def after_step(self): self.host.push(0, [0, 0, 1])", "bodies are pushed in before_step"),
         ("def before_step(self): self.host.push(0, [0, 0, float('nan')])", "three finite numbers"),
         ("def before_step(self): self.host.push(0, [0, 0, 1e9])", "at most 1e\\+06 N"),
-        ("def before_step(self): self.host.body('Nobody')", "'Nobody' does not name exactly one body"),
+        ("def before_step(self): self.host.body('Nobody')", "'Nobody' does not name exactly one body; the scene has "),
         ("def before_step(self): self.publish('nothing', [1])", "nothing"),
         ("def before_step(self): self.received['goal'][0] = 1", "read-only"),
         ("def draw(self): yield 1, 2, 3", "two ends|inhomogeneous|dimension"),

@@ -91,7 +91,10 @@ def add_key(text: str, owner: Mapping, name: str, value: Any) -> Edit:
 
 
 def remove_key(text: str, owner: Mapping, name: str) -> Edit:
-    """Remove a key and its value from the block ``owner``, with the lines they take."""
+    """Remove a key and its value from the block ``owner``, with the lines they take.
+
+    Raises `PatchError` when the block has no such key.
+    """
     if name not in owner.entries:
         raise PatchError(f"there is no '{name}' in the block at {owner.mark}")
     names = list(owner.entries)
@@ -120,7 +123,10 @@ def add_item(text: str, items: Sequence, value: Any) -> Edit:
 
 
 def insert_item(text: str, items: Sequence, index: int, value: Any) -> Edit:
-    """Add ``value`` before the item at ``index``, written as that one."""
+    """Add ``value`` before the item at ``index``, written as that one.
+
+    Raises `PatchError` when that item shares its line with others.
+    """
     start = items.uses[index][0]
     if items.flow:
         return Edit((start, start), flow_text(value) + ", ")

@@ -182,7 +182,7 @@ def sensor_rays(element: Element) -> Iterator[Diagnostic]:
 
 
 def camera_view(element: Element) -> Iterator[Diagnostic]:
-    """A camera that looks nowhere stays where its parent is (§18.1)."""
+    """A camera needs a viewing direction, clipping planes in order, and publish intervals from 1 (§18.1)."""
     ahead = [a - b for a, b in zip(element.vector("look at"), element.vector("location"), strict=True)]
     up = element.vector("up")
     across = (

@@ -72,7 +72,7 @@ def items_of(document: Document) -> list[Item]:
 
 
 def new_text(kind: str, top: Mapping[str, Any], items: Sequence[Item]) -> str:
-    """The text of a new file of ``kind``, in canonical order."""
+    """The text of a new file of ``kind``, in canonical order. Raises `PatchError` when two items have one key."""
     values: dict[str, Any] = _nested(kind, top)
     for item in items:
         values.setdefault(PLURALS[item.kind], []).append(item.key)

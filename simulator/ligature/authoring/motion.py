@@ -91,7 +91,7 @@ def new_pose(T: Array, reach: float = 0.0) -> Pose:
 
 
 def near_rpy(R: Array, was: Vector) -> Vector:
-    """The orientation block of ``R`` (3, 3), of all that mean it the one nearest to ``was``."""
+    """Angles r, p, y in radians of the rotation ``R`` (3, 3): of all equivalent ones those nearest to ``was``."""
     p = float(np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])))
     if np.hypot(R[0, 0], R[1, 0]) < MOVED:  # only the sum, or the difference, of r and y is defined
         side = 1.0 if p > 0.0 else -1.0

@@ -88,7 +88,10 @@ class Journal:
         return Moment(update, state_hash, self._file.tell())
 
     def copy(self, put: Callable[[bytes], object], begin: int, end: int) -> None:
-        """Give ``put`` bytes from ``begin`` to ``end``; may run beside `write` on another thread."""
+        """Give ``put`` bytes from ``begin`` to ``end``; may run beside `write` on another thread.
+
+        Raises OSError when the file has been truncated.
+        """
         while begin < end:
             data = os.pread(self._file.fileno(), min(_CHUNK, end - begin), begin)
             if not data:

@@ -16,7 +16,7 @@ from ligature.datasets.store import DatasetError, damaged, episode_names, join, 
 
 
 def info(file: Path, console: Console) -> int:
-    """Print what a dataset holds; the exit status is 1 for a file that is none."""
+    """Print the episodes of a dataset; the exit status is 1 for a file that is not a dataset."""
 
     def report() -> None:
         with opened(file) as found:

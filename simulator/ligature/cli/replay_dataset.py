@@ -79,7 +79,10 @@ def _updates(simulation: ligature.Simulation) -> int:
 
 
 def sampled(record: Record, scene: Path | None, dataset: Sampled) -> tuple[ligature.Simulation, str]:
-    """Simulate ``record`` again into ``dataset``; returns the simulation at its end, and how the episode went."""
+    """Simulate ``record`` again into ``dataset``; returns the simulation at its end, and how the episode went.
+
+    Raises ValueError for a task that a record cannot be judged by.
+    """
     if dataset.task == NEEDS_REPORT:
         raise ValueError(f"a record of a run contains no reported pose, which '{NEEDS_REPORT}' needs")
     recorded = RunOptions.from_text(record.header.options).task

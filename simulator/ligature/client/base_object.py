@@ -174,7 +174,7 @@ class BaseObject:
         return [end for end in (self._sub, self._pub) if end is not None]
 
     def publish(self) -> None:
-        """Send the stored command now."""
+        """Send the stored command now. Raises RuntimeError before the object is connected."""
         if self._pub is None:
             raise RuntimeError(f"{self._name} is not connected: get its handle from a Client after connect()")
         with self._lock:

@@ -77,6 +77,8 @@ class Client:
 
         Without a simulator it continues without objects after ``max_discovery_attempts`` attempts, and logs it.
         ConnectionError when there is no ROS master.
+
+        Raises ValueError unless the rate is above 0.
         """
         if not default_publish_rate > 0:
             raise ValueError(f"a publish rate of {default_publish_rate} Hz: must be above 0")

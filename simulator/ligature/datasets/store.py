@@ -197,7 +197,10 @@ def opened(path: Path) -> h5py.File:
 
 @contextmanager
 def damaged(path: Path) -> Iterator[None]:
-    """Reports in one way what HDF5 finds wrong with bytes of the dataset ``path``, wherever they are read."""
+    """Reports in one way what HDF5 finds wrong with bytes of the dataset ``path``, wherever they are read.
+
+    Raises `DatasetError` then.
+    """
     try:
         yield
     except (DatasetError, MemoryError):

@@ -315,10 +315,10 @@ def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: 
     if len(phases) > MOST_PHASES:
         raise ValueError(f"a dataset has at most {MOST_PHASES} phases, not {len(phases)}")
     for phase, gesture in gestures.items():
-        if phase not in phases or gesture not in GESTURES:
-            raise ValueError(
-                f"'{phase}' is not a phase, or '{gesture}' is not one of the gestures {', '.join(GESTURES)}"
-            )
+        if phase not in phases:
+            raise ValueError(f"gestures: '{phase}' is not a phase; the phases are {', '.join(phases) or 'none'}")
+        if gesture not in GESTURES:
+            raise ValueError(f"gestures: '{gesture}' is not one of the gestures {', '.join(GESTURES)}")
 
 
 def _unit(kind: JointType) -> str:

@@ -116,17 +116,20 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             warm_up()
 
     def __getitem__(self, name: str) -> Held | None:
-        for index, jaw in enumerate(self._scene.jaws):
-            if jaw.name == name:
-                return self._held(index)
-        known = ", ".join(jaw.name for jaw in self._scene.jaws) or "none"
-        raise UnknownNameError(f"jaw '{name}' is missing; the scene has {known}")
+        return self._held(self._index(name))
 
     def __iter__(self) -> Iterator[str]:
         return (jaw.name for jaw in self._scene.jaws)
 
     def __len__(self) -> int:
         return len(self._scene.jaws)
+
+    def _index(self, name: str) -> int:
+        """Index of a jaw; raises `UnknownNameError` for a name that no jaw has."""
+        names = [jaw.name for jaw in self._scene.jaws]
+        if name not in names:
+            raise UnknownNameError(f"jaw '{name}' is missing; the scene has {', '.join(names) or 'none'}")
+        return names.index(name)
 
     def _held(self, index: int) -> Held | None:
         held, thread = self._jaw_grasps[index], self._thread_grasps[index]
@@ -143,12 +146,12 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def patch(self, name: str) -> Array:
         """Pose (4, 4) in world axes of the contact patch of a jaw, z normal to the pads, x along the fingers.
 
-        Raises ValueError when the jaw holds nothing.
+        Raises `UnknownNameError` for a name that no jaw has, ValueError when the jaw holds no body.
         """
-        index = [jaw.name for jaw in self._scene.jaws].index(name)
+        index = self._index(name)
         held = self._jaw_grasps[index]
         if held is None:
-            raise ValueError(f"the jaw of {name} holds nothing")
+            raise ValueError(f"the jaw of {name} holds no body")
         return held.grasp.world_patch(self._world.motion(self._scene.jaws[index].palm)[0])
 
     # --- the tick ---------------------------------------------------------------------------

@@ -64,6 +64,8 @@ def collision_parts(
 
     Raises
     ------
+    ValueError
+        For another ``kind``.
     MeshError
         When a point cloud has more than `MAX_POINTS` points, or ``scale`` makes vertices insane.
     """

@@ -95,7 +95,10 @@ def hull_properties(points: Array, density: float = 1.0) -> MassProperties:
 
 
 def combined(parts: Sequence[MassProperties]) -> MassProperties:
-    """Mass properties of several solids together, by the parallel-axis theorem; overlaps count twice."""
+    """Mass properties of several solids together, by the parallel-axis theorem; overlaps count twice.
+
+    Raises ValueError when their total mass is not above 0.
+    """
     mass = sum(p.mass for p in parts)
     if not mass > 0.0:
         raise ValueError("solids without mass have no centre of mass")

@@ -89,7 +89,7 @@ def hull_vertices(points: Array) -> Array:
 
 
 def convex_surface(points: Array) -> tuple[Array, Faces]:
-    """Corners (n, 3) and outward triangles (m, 3) of the hull of ``points``; raises ValueError when it is flat."""
+    """Corners (n, 3) and outward triangles (m, 3) of the hull of ``points`` (k, 3); ValueError for a flat one."""
     corners = hull_vertices(points)
     try:
         if len(corners) < 4:

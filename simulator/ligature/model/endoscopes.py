@@ -57,8 +57,8 @@ def seen_through(camera: Camera, name: str) -> Camera:
 
     Raises
     ------
-    KeyError
-        When no endoscope is called ``name``; the message lists the known ones.
+    UnknownNameError
+        A `KeyError`, when no endoscope is called ``name``; the message lists the known ones.
     """
     scope = ENDOSCOPES.get(name)
     if scope is None:

@@ -299,7 +299,10 @@ class Message:
 
 
 def handle(handlers: Mapping[type[Message], Callable[[Any], Result]], message: Message) -> Result:
-    """Call the handler of the message's class, or of the nearest base that has one."""
+    """Call the handler of the message's class, or of the nearest base that has one.
+
+    Raises TypeError when there is none.
+    """
     for cls in type(message).__mro__:
         if cls in handlers:
             return handlers[cls](message)

@@ -124,7 +124,10 @@ def camera_of(element: Element, folder: Path) -> Callable[..., Camera]:
 
 
 def sensor_rays(element: Element, folder: Path, resolver: Resolver) -> Array:
-    """Start and end points (n, 2, 3) of a sensor's rays in its own frame (§17.2); a contact sensor has none."""
+    """Start and end points (n, 2, 3) of a sensor's rays in its own frame (§17.2); a contact sensor has none.
+
+    Raises `GeometryError` for a negative range, and for a direction that is not of length 1.
+    """
     if SensorType[element.text("type")] is SensorType.CONTACT:
         return np.zeros((0, 2, 3))
     reach = element.number("range")

@@ -52,7 +52,10 @@ class Calibration:
 
 
 def pinhole(projection: Array, width: int, height: int) -> Array:
-    """Pinhole matrix K (3, 3) of an OpenGL perspective ``projection`` (4, 4)."""
+    """Pinhole matrix K (3, 3), in pixels, of an OpenGL perspective ``projection`` (4, 4).
+
+    The middle of the first pixel, at the top left, is at (0, 0).
+    """
     p = projection
     return np.array(
         [

@@ -23,6 +23,8 @@ def slice_files(folder: Path, prefix: str, suffix: str, last: int, resolver: Res
     """The files ``prefix<number>.suffix`` from 0 to ``last`` that exist, in order.
 
     A number may have leading zeros, up to as many digits as the last one has.
+
+    Raises `PictureError` for more than `MOST_SLICES`.
     """
     if last > MOST_SLICES:
         raise PictureError(f"'count' is {last}; the maximum is {MOST_SLICES} slices")

@@ -288,7 +288,7 @@ class World(Subsystem):
         read_bodies(motions.handle, motions.table, engine.place_table, bodies, out)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Put the root body of a tree at ``pose`` (7,) at rest; raises ValueError for a link of an arm."""
+        """Put the root body of a tree at ``pose`` (7,), at rest; raises ValueError for a body that joints hold."""
         place = self.engine.place_of[body]
         if place.link >= 0:
             name = self.scene.bodies[body].identity.identifier

@@ -284,5 +284,5 @@ class Host:
 def _found(kind: str, names: Sequence[str], text: str) -> int:
     index = find_by_text(names, text)
     if index is None:
-        raise LookupError(f"'{text}' does not name exactly one {kind}")
+        raise LookupError(f"'{text}' does not name exactly one {kind}; the scene has {', '.join(names) or 'none'}")
     return index

@@ -98,7 +98,10 @@ class Plugins(Subsystem):
             self._call_all("after_step")
 
     def receive(self, command: PluginCommand) -> None:
-        """Take a message for a topic of a plug-in."""
+        """Take a message for a topic of a plug-in.
+
+        Raises ValueError for an unknown topic or the wrong number of values.
+        """
         topics = list(self._topics[command.plugin].items())
         name = self._entries[command.plugin].name
         if not 0 <= command.topic < len(topics):

@@ -29,7 +29,7 @@ class Viewpoint:
 
     @classmethod
     def at(cls, pose: Array, distance: float) -> Viewpoint:
-        """The viewpoint of a camera at ``pose`` (7,) that looks at something ``distance`` away."""
+        """The viewpoint of a camera at ``pose`` (7,) that looks at a point ``distance`` metres ahead."""
         T = pose7_matrix(pose)
         back = T[:3, 0]
         x, y, z = T[:3, 3] - distance * back

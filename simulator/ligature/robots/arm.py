@@ -150,6 +150,8 @@ class Arm(Device):
 
         The arm is enabled where it stands and need not be homed; the tip may begin anywhere and keeps no depth, poses
         are in the base. Joints are clipped to their limits all the same.
+
+        Raises `Rejected` when the arm rejects the motion.
         """
         self.take_over()
         self._direct = True
@@ -442,7 +444,10 @@ class Arm(Device):
         self.cf_orientation_absolute = bool(flag)
 
     def forward_kinematics(self, jp: ArrayLike, local: bool = False) -> Array:
-        """Pose (7,) of the tip for joint values; missing ones at the end are zero."""
+        """Pose (7,) of the tip for joint values; missing ones at the end are zero.
+
+        Raises `Rejected` for too many values.
+        """
         values = np.array(jp, dtype=float).reshape(-1)
         n = self.joints.n
         if len(values) > n:
@@ -451,7 +456,10 @@ class Arm(Device):
         return matrix_pose7(T if local else self._T_reference_base @ T)
 
     def inverse_kinematics(self, seed: ArrayLike, cp: ArrayLike) -> Array:
-        """Joint values of a local pose, closest to ``seed`` (n,)."""
+        """Joint values of a local pose, closest to ``seed`` (n,).
+
+        Raises `Rejected` for a seed of the wrong length, and where there is no solution.
+        """
         values = np.array(seed, dtype=float).reshape(-1)
         if len(values) != self.joints.n:
             raise Rejected(f"incorrect number of joints: {self.name} has {self.joints.n}, not {len(values)}")

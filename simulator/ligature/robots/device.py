@@ -143,7 +143,10 @@ class Device:
         return self._taken_over and self._state is State.ENABLED
 
     def take_over(self) -> None:
-        """Be enabled at once for a client that knows no states; whether the arm is homed stays as it was."""
+        """Be enabled at once for a client that knows no states; whether the arm is homed stays as it was.
+
+        Raises `Rejected` in FAULT.
+        """
         if self._state is State.FAULT:
             raise Rejected(f"{self.name} is in FAULT; send 'disable', then 'enable'")
         if self._state is State.ENABLED and not self._homing and (self._homed or self._taken_over):
@@ -154,7 +157,10 @@ class Device:
         self._emit_state()
 
     def adopt(self) -> None:
-        """Be enabled and homed at once, where the arm stands: for clients that know no states."""
+        """Be enabled and homed at once, where the arm stands: for clients that know no states.
+
+        Raises `Rejected` in FAULT.
+        """
         if self._state is State.FAULT:
             raise Rejected(f"{self.name} is in FAULT; send 'disable', then 'enable'")
         self._state, self._homed, self._pending = State.ENABLED, True, None

@@ -40,7 +40,10 @@ class EcmArm(Arm):
     _KEPT = (*Arm._KEPT, "kinematics")
 
     def set_endoscope_type(self, endoscope: str) -> None:
-        """Change the endoscope, which turns the picture of UP and DOWN scopes; NONE keeps the straight one."""
+        """Change the endoscope, which turns the picture of UP and DOWN scopes; NONE keeps the straight one.
+
+        Raises `Rejected` for an unknown one.
+        """
         if endoscope not in ENDOSCOPES:
             raise Rejected(f"unknown endoscope '{endoscope}'; choose one of {', '.join(ENDOSCOPES)}")
         self.kinematics = Ecm(endoscope, self.kinematics.model)

@@ -75,7 +75,10 @@ class MtmArm(Arm):
                 self.emit("gripper/pinch", None)
 
     def lock_orientation(self, quaternion: ArrayLike) -> None:
-        """Keep an orientation (4,) of `measured_cp` while the arm yields to efforts."""
+        """Keep an orientation (4,) of `measured_cp` while the arm yields to efforts.
+
+        Raises `Rejected` unless it is a finite quaternion of length 1, to 10 percent.
+        """
         values = np.array(quaternion, dtype=float).reshape(-1)
         if len(values) != 4 or not np.isfinite(values).all() or not 0.9 <= np.linalg.norm(values) <= 1.1:
             raise Rejected(f"lock_orientation takes a quaternion of length 1, not {values.tolist()}")

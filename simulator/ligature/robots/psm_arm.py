@@ -108,6 +108,8 @@ class PsmArm(Arm):
         """Change the instrument: its limits and the jaw's range.
 
         The lengths stay those of the scene's bodies, which are what moves.
+
+        Raises `Rejected` for an unknown one.
         """
         try:
             found = instrument(tool)

@@ -87,7 +87,10 @@ def _skip(connection: Any, b: io.BytesIO) -> None:
 
 
 def read_bounded_request(connection: Any, b: io.BytesIO, msg_queue: list[Any], sock: Any) -> None:
-    """The same for the client of a service; a request that is too long ends the connection, since it gets no answer."""
+    """The same for the client of a service; a request that is too long ends the connection, since it gets no answer.
+
+    Raises TransportTerminated then.
+    """
     size = announced(b)
     if size is not None and size > MOST_BYTES:
         oversized.note(connection.resolved_name, size)

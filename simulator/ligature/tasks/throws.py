@@ -117,7 +117,10 @@ class Throw:
 
     @classmethod
     def through(cls, entry: Array, exit: Array, radius: float, up: Array) -> Throw:
-        """The circle of ``radius`` through both holes, its centre above them."""
+        """The circle of ``radius`` through both holes, its centre above them.
+
+        Raises ValueError when they are further apart than the needle is wide.
+        """
         chord = exit - entry
         length = float(np.linalg.norm(chord))
         if length >= 2.0 * radius:

@@ -78,7 +78,10 @@ def pose_of(values: Array) -> Array:
 
 
 def axes_of_words(x: str, y: str, z: str) -> Array:
-    """Axes (3, 3) of a device whose x, y and z point to where the words of `AXES` state."""
+    """Axes (3, 3) of a device whose x, y and z point to where the words of `AXES` state.
+
+    Raises `Unclear` for other words, and for axes that form no right-handed frame.
+    """
     unknown = [word for word in (x, y, z) if word not in AXES]
     if unknown:
         raise Unclear(f"an axis points {', '.join(AXES)}, not '{unknown[0]}'")

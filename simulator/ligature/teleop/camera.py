@@ -43,7 +43,10 @@ class CameraDrive:
         self._hands = []
 
     def update(self, hands: Sequence[Array]) -> Array:
-        """Goal (4, 4) of the camera in the world for new poses of the hands."""
+        """Goal (4, 4) of the camera in the world for new poses of the hands.
+
+        Raises ValueError when their number changed since the start.
+        """
         if len(hands) != len(self._hands):
             raise ValueError(f"the camera motion began with {len(self._hands)} hands, not {len(hands)}")
         moved = np.mean([now[:3, 3] - then[:3, 3] for now, then in zip(hands, self._hands, strict=True)], axis=0)

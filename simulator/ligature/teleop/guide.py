@@ -44,7 +44,10 @@ class Ear:
 
 
 def calibration_of(config: TeleopConfig, name: str, ask: Callable[[str], str], show: Callable[[str], None]) -> str:
-    """Ask the operator to move a device; returns the YAML lines for its block in the configuration."""
+    """Ask the operator to move a device; returns the YAML lines for its block in the configuration.
+
+    Raises `Unclear` for an unknown device.
+    """
     if name not in config.devices:
         raise Unclear(f"unknown device '{name}'; choose one of {', '.join(config.devices)}")
     spec, ear = config.devices[name], Ear()

@@ -114,7 +114,10 @@ class Seat:
     # --- pairing ----------------------------------------------------------------------------
 
     def select(self, leader: str, follower: str | None) -> None:
-        """Have a leader drive another follower, or none; it begins where both are at the next `update`."""
+        """Have a leader drive another follower, or none; it begins where both are at the next `update`.
+
+        Raises `Conflict` for a follower that the leader may not drive, or that another leader drives.
+        """
         chosen = self._leader(leader)
         if follower is not None:
             if follower not in chosen.followers:

@@ -102,7 +102,10 @@ class NeedleInTissue:
         return self.arrays.delta.copy(), self.arrays.wrench.copy()
 
     def solve(self, dt: float) -> None:
-        """`couple` with what `arrays` hold: shape and equations; they have motion and wrench then."""
+        """`couple` with what `arrays` hold: shape and equations; they have motion and wrench then.
+
+        Raises FloatingPointError when they have no finite solution.
+        """
         if self._held.tip[0] == states.OUTSIDE:
             self._look_for_surface()
         left, fate = couple(self._interface.table, self.table, dt)
@@ -129,7 +132,10 @@ class NeedleInTissue:
         return self._rows.K.copy(), self._rows.load.copy()
 
     def prepare(self, dt: float) -> None:
-        """`begin` with what `arrays` hold: shape and equations; their rows have stiffness and load then."""
+        """`begin` with what `arrays` hold: shape and equations; their rows have stiffness and load then.
+
+        Raises FloatingPointError when they have no finite solution.
+        """
         if self._held.tip[0] == states.OUTSIDE:
             self._look_for_surface()
         self._left, self._count = begin_coupling(self._interface.table, self.table, dt)

@@ -21,7 +21,7 @@ def names_of(model: Any, kind: str, indices: Iterable[int]) -> str:
 
 
 def rest_poses(model: Any) -> list[Array]:
-    """World pose of every body in the reference configuration."""
+    """World pose (4, 4) of every body, by its MuJoCo index, in the reference configuration."""
     poses = [np.eye(4)]
     for body in range(1, model.nbody):
         T = frame(rotation(model.body_quat[body]), model.body_pos[body])

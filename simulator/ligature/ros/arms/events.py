@@ -76,7 +76,7 @@ class StateStamps:
         self._last = rospy.Time()
 
     def of(self, stamp: Any, now: Any) -> Any:
-        """The stamp to send for a state of ``stamp``; one that is older than ``stale`` seconds is that of a rest.
+        """The stamp to send for a state of ``stamp``: ``now`` if it is older than ``stale`` seconds, as after a rest.
 
         Physics may have been held up between the stamp of its first state after a rest and handing it on. After the
         clock was set back stamps follow it.
