@@ -21,7 +21,7 @@ from .steps import InSteps
 
 NUMBERS = (Type.NUMBER, Type.NUMBER_OR_MAP, Type.INTEGER, Type.UNSIGNED)
 OWN = ("name", "namespace")
-"""Keys that no two objects share."""
+"""Keys that identify one object, which batch operators leave out."""
 
 
 def alike(context):

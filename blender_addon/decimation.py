@@ -15,7 +15,7 @@ from .solids import own_solid
 from .steps import InSteps
 
 TRIES = 24
-"""Ratios that are tried: each is smaller than the last, in the measure by which that missed its target."""
+"""Most ratios that are tried; each is reduced by the factor by which the one before missed its target."""
 
 
 def decimated(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.ndarray, list[tuple[int, ...]]]:

@@ -11,7 +11,7 @@ import bpy
 from .ligature.authoring.save import digests
 
 _session: dict[str, dict[str, str]] = {}
-"""What each collection wrote since the blend file was opened: undo takes back what it remembers, and not the files."""
+"""Digests of the files that each collection wrote since the blend file was opened: undo reverts no files."""
 
 
 def allowed_folders() -> tuple[Path, ...]:

@@ -19,7 +19,7 @@ from .overlay import SIZE, SIZE_OF_HANDLE_GAP, redraw
 from .poses import is_prismatic, rest_pose
 
 TURNS = (axis_rotation((0, 1, 0), pi / 2), axis_rotation((1, 0, 0), -pi / 2), np.eye(3))
-"""Rotations that bring Z to each axis; arcs are drawn in the plane that XY becomes."""
+"""Rotations of Z to each axis; arcs are drawn in the rotated XY plane."""
 
 COLOURS = ((0.95, 0.25, 0.3), (0.5, 0.85, 0.1), (0.25, 0.5, 1.0))
 

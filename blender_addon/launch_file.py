@@ -27,7 +27,7 @@ from .write_file import PREPARED, Export, ExportError, keeping, preparing, write
 WORLD_TEXT = "namespace: /ambf/env/\ngravity: {x: 0.0, y: 0.0, z: -9.8}\nmax iterations: 10\n"
 DEVICES_TEXT = "input devices: []\n"
 COLOURS_TEXT = "white: {r: 255, g: 255, b: 255, a: 255}\n"
-"""What a launch file must name and the scene does not have."""
+"""Files that are written when the scene has none: a launch file must name them."""
 
 
 def import_launch(
@@ -66,7 +66,7 @@ def importing_launch(
 
 
 OTHERS = ("world", "devices", "colours")
-"""What a launch file names beside its models."""
+"""Files that a launch file names, other than its models."""
 
 
 @dataclass

@@ -25,11 +25,11 @@ PREFIXES = {
     "SOFT_BODY": "SOFT ", "VOLUME": "VOLUME ", "SUTURE": "SUTURE ",
 }  # fmt: skip
 HANGING = ("GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SUTURE", "VOLUME")
-"""Roles whose objects may hang on a body."""
+"""Roles whose objects may be parented to a body."""
 
 
 PARTS = ("SHAPE", "HULL", "INERTIAL")
-"""Roles of what belongs to one body."""
+"""Roles of the parts of one body."""
 
 
 def new_file(scene: bpy.types.Scene, name: str, kind: str, namespace: str = "/ambf/env/") -> bpy.types.Collection:

@@ -33,7 +33,7 @@ from .steps import InSteps, Steps, all_or_nothing
 FLIP_X, FLIP_Z = np.diag([-1.0, 1.0, 1.0, 1.0]), np.diag([1.0, 1.0, -1.0, 1.0])
 SIDES = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
 MIRRORED = ("GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SUTURE", "VOLUME")
-"""Roles that go along with the body that they hang on."""
+"""Roles of objects that are mirrored with the body that they are parented to."""
 
 
 def mirrored_name(name: str) -> str:

@@ -28,7 +28,7 @@ COLOURS = {
     "slit": (0.9, 0.05, 0.1, 1.0),
 }
 SIZE = 0.03
-"""Length in metres of what has no size of its own."""
+"""Length in metres at which objects without a size are drawn."""
 
 SIZE_OF_HANDLE_GAP = 0.08 * SIZE
 """How far the handle of a limit stands off its place, so that those of a locked axis are two."""

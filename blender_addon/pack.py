@@ -21,7 +21,7 @@ SIMULATOR = HERE.parent / "simulator" / "ligature"
 ROOMS = ("adf", "mesh", "authoring")
 MODULES = ("cache.py", "paths.py")
 LEFT_OUT = {"mesh/distance.py", "mesh/quality.py", "mesh/coacd_process.py"}
-"""Compiled by numba or in need of SciPy, neither of which Blender has."""
+"""Modules that need numba or SciPy, which Blender does not have."""
 
 NAME = "adf_studio"
 WHEELS = {"PyYAML": "6.0.2", "coacd": "1.0.14"}
@@ -36,7 +36,7 @@ _FIXED_TIME = (2026, 1, 1, 0, 0, 0)
 
 
 GUIDE = HERE.parent / "docs" / "blender.md"
-"""What the button of the preferences opens."""
+"""The page that a button of the preferences opens."""
 
 
 def stage(target: Path, vendored: bool) -> Path:

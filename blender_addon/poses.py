@@ -20,7 +20,7 @@ from .references import owner_of
 
 SHAPED = ("BODY", "GHOST_OBJECT", "SOFT_BODY")
 FAR = 1e9
-"""Metres beyond which a place is an accident: Blender makes an infinite location the greatest float."""
+"""Metres beyond which a position is invalid: Blender replaces an infinite location by the greatest float."""
 
 
 def rest_matrix(obj: bpy.types.Object) -> np.ndarray:

@@ -14,7 +14,7 @@ from .placing import place
 from .poses import rest_pose
 
 WITHOUT_LIMITS = {"T": (-0.05, 0.05), "R": (-np.pi, np.pi)}
-"""Metres along and radians about an axis that has no limits, which are shown of it."""
+"""Metres along and radians about an axis without limits that a preview shows."""
 
 _TRANSFORM = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 

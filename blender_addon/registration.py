@@ -64,7 +64,7 @@ MODULES = (
 
 
 _undo: list = []
-"""What takes the registered things away again, latest last."""
+"""Functions that undo each registration, in the order of the registrations."""
 
 
 def register() -> None:

@@ -17,7 +17,7 @@ from .write_file import ExportError, exporting, members
 
 MOTION = "ADF Motion"
 THICKNESS = 4e-4
-"""Metres that a thread is drawn in whose file names its size instead of its diameter."""
+"""Drawn diameter in metres of a thread whose file states a USP size instead of a diameter."""
 
 
 def command():

@@ -19,7 +19,7 @@ MATERIALS = [
 ]
 BLOCK = "ligature_tissue_"
 LEAST = 1e-6
-"""Metres under which a slit is flat."""
+"""Least edge in metres of a slit; a smaller one has no volume."""
 
 
 def is_tissue(obj):

@@ -33,7 +33,7 @@ TURN = 5e-7
 """Radians, and lengths of directions, below which a difference is the noise of single precision."""
 
 TINY = 1e-9
-"""Metres and radians below which a number is none."""
+"""Metres and radians below which a number is written as zero."""
 
 MOVED = 2e-6
 """Radians below which an orientation counts as the same (see `placement.SAME_PLACE`)."""

@@ -18,7 +18,7 @@ SLOT_BYTES = 512
 MOST_BYTES = SLOT_BYTES - 16
 SLOTS = 1024
 RUN = -1
-"""Number of an event that is about the run and no arm."""
+"""Number of an event of the run, which belongs to no arm."""
 
 PHASE = "phase"
 """Name of the event that an operator marked a phase of the work."""

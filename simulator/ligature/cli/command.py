@@ -17,7 +17,7 @@ from types import FrameType
 from typing import NoReturn
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of writing to a disk that takes no more."""
+"""Errors of writing to a full disk."""
 
 LONG = 120
 """Characters of a path that a message quotes."""

@@ -18,7 +18,7 @@ from ligature.process import end_with_parent
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m|\[[0-9.]+\]: |\[ ?(INFO|WARN|ERROR)\] ")
 _LOUD = ("error", "less than", "what()")
-"""What lines of the recorder begin with, in small letters, that show why it gave up."""
+"""Beginnings, in lower case, of lines by which the recorder reports why it failed."""
 
 END_TIMEOUT = 60.0
 """Seconds that the recorder is given to write its index."""

@@ -23,7 +23,7 @@ from ligature.process import report
 from ligature.simulation import Simulation
 
 FOLDER = Path("recordings")
-"""Where recordings lie that are asked for by name."""
+"""Folder of recordings that are requested by name."""
 
 EVENT = "recording"
 

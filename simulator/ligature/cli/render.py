@@ -15,7 +15,7 @@ from ligature.render.target import saturated_share
 
 ANNOTATIONS = ("coco", "mask")
 MAX_SATURATED = 0.5
-"""Share of saturated pixels above which a picture shows next to nothing."""
+"""Share of saturated pixels above which a picture is overexposed."""
 
 PASSES = ("rgb", "depth", "ids", "normals")
 

@@ -39,7 +39,7 @@ FIRST_STATE_TIMEOUT = 0.5
 POLL = 0.02
 WARNING_PERIOD = 5.0
 NAMED, LINES, LINE = 4, 2, 120
-"""A failed look-up names so many of the closest objects, in so many lines of so many characters."""
+"""Closest objects that the error of a failed look-up names, its lines, and characters of a line."""
 
 
 class Client:

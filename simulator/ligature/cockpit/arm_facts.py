@@ -20,7 +20,7 @@ from ligature.robots.psm import Psm
 Array = NDArray[np.float64]
 
 ENDLESS = 2.0 * np.pi
-"""Travel shown of a joint without ends, to either side."""
+"""Range shown of a joint without limits, to either side."""
 
 
 @dataclass(frozen=True, eq=False)

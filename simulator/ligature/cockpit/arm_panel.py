@@ -30,10 +30,10 @@ GIZMO_SIZE = 0.035
 
 COMMANDS = ("Enable", "Home", "Hold", "Disable")
 COLOURS = {State.DISABLED: "#5c636a", State.ENABLED: "#237032", State.PAUSED: "#9c5100", State.FAULT: "#c92a2a"}
-"""On which white letters can be read (4.5 : 1)."""
+"""Background colours with enough contrast for white text (4.5 : 1)."""
 
 Act = Callable[[str, int, Any], None]
-"""Takes what the operator did: a word, the number of the arm, and a value."""
+"""Handles an input of the operator: its kind, the number of the arm, and a value."""
 
 
 class ArmStatus:

@@ -63,10 +63,10 @@ SETTLING = 0.2
 """Seconds in which an arm comes to rest at its set-point."""
 
 TURNS = 3
-"""Times that a needle is laid down in another direction before the operator is asked."""
+"""Attempts to lay a needle down in another direction before the operator is asked."""
 
 THROUGH, BESIDE = 0.15, 0.004
-"""Angle of the tip beyond the exit from which the needle counts as through, and metres from it to its puncture."""
+"""Angle of the tip beyond the exit from which the needle has passed, and largest distance in metres to its puncture."""
 
 Steps = Generator[None, None, None]
 

@@ -55,13 +55,13 @@ STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD, PICTURE_PERIOD = 0.05, 0.2, 0.4, 0.02
 """Seconds between turns of the loop, poses, words and controls, curves, and looks for a new picture."""
 
 SMALL_VIEW = View(False, HEIGHT)
-"""What a browser shows that has not said anything else."""
+"""View of a browser that has not reported one yet."""
 
 AFTER_FAILURE = 1.0
 """Seconds after which a part of the page that failed is tried again."""
 
 CLAIM_TIMEOUT = 30.0
-"""Seconds in which who pressed *Start* gets control, or has to press it again."""
+"""Seconds after *Start* was pressed in which a browser gets control; later it has to be pressed again."""
 
 AGAIN = "Press again to continue from here."
 BY_HAND = f"Your hand took over. {AGAIN}"

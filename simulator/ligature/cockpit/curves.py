@@ -34,10 +34,10 @@ SCORE = "task score, % of holes"
 TENSION, FORCE, DEPTH, FACTOR = "thread tension, N", "tip force, N", "depth in tissue, mm", "real-time factor"
 
 RANGES = {SCORE: (-5.0, 105.0)}
-"""Of charts whose values have bounds."""
+"""Axis ranges of charts whose values have bounds."""
 
 LEAST = {TENSION: 0.1, FORCE: 0.1, DEPTH: 1.0, FACTOR: 1.0}
-"""Height of charts whose values are small: noise is not to fill them."""
+"""Least axis range of a chart, so that noise does not fill it."""
 
 PADDING = (14, 10, 0, 0)
 """Pixels above, right of, below and left of a chart, so that its labels are seen as a whole."""

@@ -26,7 +26,7 @@ IDLE_PERIOD = 0.2
 """Seconds between those by which the rhythm of an operator's browser is known before an arm follows."""
 
 GONE = 0.5
-"""Seconds without an answer after which what a hand steers is given up, instead of waited for."""
+"""Seconds without an answer after which motions driven by hand end, instead of being resumed."""
 
 ALONE, LEFT = 2.0, 15.0
 """The same of what the page steers by a plan: it stands after the first, goes on when the browser answers, and is given

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 FREE = 3
-"""Wrong tokens of an address that cost nothing: people mistype."""
+"""Wrong tokens of an address without a pause: people mistype."""
 
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 5.0
 """Seconds between two answers after those: doubled with each wrong token."""

@@ -24,7 +24,7 @@ from ligature.render.camera import view_of
 Array = NDArray[np.float64]
 
 NEAREST = 0.01
-"""Metres from a camera at which its picture begins for hands."""
+"""Least depth in metres from a camera of positions dragged in its picture."""
 
 ASIDE, BEFORE = 0.25, 0.6
 """Where tips are brought into view: heights of the picture beside its middle, and share of the depth of the work."""

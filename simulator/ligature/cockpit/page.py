@@ -39,10 +39,10 @@ def serve(address: Address, gate: Gate, wire: Wire | None = None) -> ViserServer
 
 
 PICTURE = '<div id="ligature-picture"></div>'
-"""Where our script shows the camera's picture while it is small."""
+"""Element in which the script shows the camera's picture while it is small."""
 
 SLOW = 60.0
-"""Seconds behind real time beyond which the figure says no more."""
+"""Seconds behind real time above which the figure is shown as a bound."""
 
 
 def paint(gui: GuiApi, dark: bool) -> None:

@@ -32,7 +32,7 @@ PERIOD, LARGE_PERIOD = 0.2, 0.05
 """Seconds between pictures at least: small ones, and one that somebody works by."""
 
 REST, LARGE_REST = 3.0, 0.1
-"""Seconds of rest for each second of drawing."""
+"""Seconds of sleep for each second of drawing."""
 
 RATE = 15.0
 """Large pictures a second below which they get fewer pixels."""

@@ -33,7 +33,7 @@ VIEW_ANGLE = 0.8
 
 
 ROOM = 1.25
-"""How much farther the first viewpoint stands than what is looked at needs."""
+"""Factor by which the first viewpoint is farther away than the extent of the objects requires."""
 
 
 class Stage:

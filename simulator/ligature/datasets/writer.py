@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # datasets of motion need no OpenGL
 
 FORMAT = "ligature dataset 2"
 DEPTH_UNIT = 1e-4
-"""Metres of one step of depth: 0.1 mm, so that two bytes reach 6.5 m. 0 is where nothing is."""
+"""Metres of one step of depth: 0.1 mm, so that two bytes reach 6.5 m. 0 means background."""
 
 EARLY = 1e-6
 """Seconds before its time at which a sample is taken, for the rounding of simulated time."""

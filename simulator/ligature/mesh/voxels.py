@@ -25,7 +25,7 @@ HELD_CELLS, FREE_CELLS = 600, 150
 """Cells of tissue whose cell size the file does not state, about; of one that nothing holds."""
 
 CHUNK = 256
-"""Points that are bound at a time."""
+"""Points that are processed at a time."""
 
 SAMPLES = 4
 """Points along each edge of a cell at which its filling is counted."""
@@ -52,7 +52,7 @@ class Embedding:
 
 
 NOWHERE = Embedding(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 8)))
-"""No points."""
+"""An empty array of points."""
 
 
 def voxelise(

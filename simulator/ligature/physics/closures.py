@@ -28,7 +28,7 @@ from ligature.tables import table_of
 Array = NDArray[np.float64]
 
 MAX_FORCE = 1e5
-"""Force in newtons that a closure may use; enough for any arm, finite so that a jam does not explode."""
+"""Maximum force of a closure in newtons: enough for any arm, and finite so that jammed bodies do not diverge."""
 
 PACE = 1.0
 """Speed in m/s at which wide gaps are closed: bodies do not get it, but what is in their way is pushed by it."""
@@ -37,7 +37,7 @@ PUSH = 0.01
 """Speed in m/s at which Bullet closes gaps at most; bodies keep what it gives them, the lighter ones a multiple."""
 
 TORN = 0.005
-"""Gap in metres from which on a loop comes apart: what it holds is damped then."""
+"""Gap in metres above which a loop is torn: its trees are damped then."""
 
 TORN_DAMPING = (8.0, 1.0)
 """Linear and angular damping in 1/s of the trees of such a loop; at 50 m/s Bullet makes it 0.4 in a tick of 1 ms."""

@@ -22,7 +22,7 @@ from ligature.physics.engine import Engine
 Array = NDArray[np.float64]
 
 DEEP = 0.005
-"""Overlap in metres from which it is taken for a mistake of the scene rather than for a rounding or a press fit."""
+"""Overlap in metres that is a mistake of the scene rather than a rounding error or a press fit."""
 
 DETOUR = 10.0
 """Speed of a body over that at which a contact parts it from another, from which joints count as holding it there."""

@@ -20,7 +20,7 @@ from ligature.physics.wrenches import contact_forces
 Array = NDArray[np.float64]
 
 _FAR = [0.0, 0.0, -1000.0]
-"""Where the probes of ghosts wait between questions."""
+"""Position of the probes of ghosts between queries."""
 
 
 @dataclass(frozen=True, eq=False)

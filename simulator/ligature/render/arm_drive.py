@@ -24,7 +24,7 @@ NOTCH = 0.002
 """Metres per notch of the wheel."""
 
 MOST_STEP = 0.005
-"""Metres that a tip goes in one step at most: a mouse that jumps must not throw it."""
+"""Maximum displacement of a tip in a step, in metres, so that a jump of the mouse causes no jump of the tip."""
 
 JAW = (np.deg2rad(60.0), np.deg2rad(-20.0))
 """An open jaw and a closed one that presses, as the dVRK's client has them."""

@@ -71,7 +71,7 @@ class LightSettings:
 
 
 HEADLIGHT = LightSettings(cutoff=np.pi / 2)
-"""Shines from the eye when a scene has no light, so that something is seen."""
+"""Light at the eye for scenes without lights."""
 
 
 class Lights:

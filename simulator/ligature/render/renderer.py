@@ -55,7 +55,7 @@ MAX_TARGETS = 16
 """Frame buffers, one for each size and choice of passes, that are kept for the next picture."""
 
 PLACES = ("body_pose", "ghost_world", "light_world", "tissue_node", "volume_value")
-"""What of a state moves things or changes their shape, and so their shadows, wherever it is looked at from."""
+"""Fields of the state that move or deform objects, and with them their shadows, for all cameras alike."""
 
 LARGE = 2.0
 """Radius in metres above which a piece is ground or wall and does not set the extent of shadow maps."""

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 UNDISTORT_ROUNDS = 20
 WIDEST = 2.0
-"""Most that a picture is drawn wider and higher than it is shown, to have something for bent corners."""
+"""Largest factor by which a picture is drawn larger than shown, so that distorted corners are filled."""
 
 
 LIMITS = {"exposure": 32.0, "noise": 10.0, "depth_noise": 1000.0}

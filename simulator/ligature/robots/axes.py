@@ -15,7 +15,7 @@ from ligature.robots.trajectory import JointTrajectory
 Array = NDArray[np.float64]
 
 STREAM_SECONDS = 0.1
-"""Silence after which a streamed velocity counts as ended, and a set-point as at rest."""
+"""Seconds without a command after which a streamed velocity ends and a set-point is at rest."""
 
 
 class Mode(enum.Enum):

@@ -22,7 +22,7 @@ SHORTEST_BUSY = 0.05
 """Seconds that a move is busy at least, so that clients see it begin (interface reference §5.2 rule 3)."""
 
 FOLLOWING_TIMEOUT = 1.0
-"""Seconds that a following error beyond its bound is suffered before the arm stops with a fault."""
+"""Seconds for which a following error may exceed its bound before the arm stops with a fault."""
 
 
 MOST_CHARACTERS = 300

@@ -55,7 +55,7 @@ TRANSITIONS: dict[str, dict[State, Action]] = {
     "home": {_D: Action.HOME, _E: Action.HOME},
     "unhome": dict.fromkeys(State, Action.UNHOME),
 }
-"""Action of each command in each state; what is missing is rejected."""
+"""Action of each command in each state; a command that is missing is rejected."""
 
 
 def action(command: str, state: State) -> Action:

@@ -16,7 +16,7 @@ import rospy
 from ligature.ros.master import NO_ANSWER
 
 LISTENING = 1.0
-"""Seconds for which a topic is listened to."""
+"""Seconds for which the rate of a topic is measured."""
 
 HEAVY = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2")
 """Types without subscription: pictures and clouds are only rendered for other subscribers."""

@@ -47,7 +47,7 @@ HAPTICS = "ligature/haptics"
 COUNTING = 1.0
 """Seconds over which pictures are counted."""
 REST = 0.0002
-"""Seconds of sleep after each publication: of a thread in real time that never sleeps nobody gets the processor."""
+"""Seconds of sleep after each publication: a real-time thread that never sleeps would starve all others."""
 HOUSEKEEPING = 0.02
 """Seconds between checks of watchdogs and the physics process."""
 

@@ -14,7 +14,7 @@ from ligature.tissue.floating import Momentum
 Array = NDArray[np.float64]
 
 MAX_SPIN = 100.0
-"""Angular velocity in rad/s above which the tissue does not feel that it turns faster."""
+"""Angular velocity in rad/s above which inertial forces of rotation no longer grow."""
 
 
 class Floating:

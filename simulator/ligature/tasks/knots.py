@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 HALF_KNOT = 3
-"""Determinant of a thread with one throw in it: of the trefoil."""
+"""Knot determinant of a thread with one throw, a trefoil."""
 
 AROUND = 0.75
 """Turns that a thread must make around a vessel to go around it: it makes half of one where it only passes below."""

@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 Number = float | int | bool
 
 STILL = 1e-5
-"""Metres that a tip must move to count: less is the trembling of a standing arm."""
+"""Least displacement in metres that counts as motion of a tip: an arm at rest oscillates by less."""
 
 FALLING = 0.2
-"""Speed in m/s with which a needle sinks that was let go in the air: after 20 ms of free fall."""
+"""Speed in m/s at which a released needle counts as falling: that after 20 ms of free fall."""
 
 
 @dataclass(frozen=True)

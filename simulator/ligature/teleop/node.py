@@ -44,10 +44,10 @@ Array = NDArray[np.float64]
 PERIOD = 0.005
 READINGS_PERIOD = 0.02
 HELD_UP = 0.05
-"""Seconds after which this process was kept waiting: what was sent meanwhile is heard before it counts as silence."""
+"""Seconds between two turns above which this process was delayed: waiting messages are read before timeouts."""
 
 VIEW = "teleoperation view"
-"""Name of the camera's frame as it was when hands began to drive: a camera that trembles must not shake instruments."""
+"""Name of the camera's frame at the start of a drive: oscillation of the camera must not move the instruments."""
 
 CAMERA_MOVED = (5e-4, np.deg2rad(0.2))
 """Metres and radians by which the camera may differ from the view before all begin anew."""

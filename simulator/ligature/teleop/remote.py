@@ -12,7 +12,7 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool, Float64, String
 
 _PAIR = re.compile(r"/(?P<leader>[A-Za-z]\w*?)_(?P<follower>[A-Za-z][A-Za-z0-9]*)/align_mtm\Z")
-"""What a pair has, and the driving of a camera lacks."""
+"""Topics of a pair that the camera drive does not have."""
 
 PEDALS = ("clutch", "camera")
 

@@ -13,7 +13,7 @@ from ligature.tissue.paths import remove_node
 Array = NDArray[np.float64]
 
 SLACK = 0.02
-"""How far outside a cell, in edges, a point still belongs to it: those of the surface lie on its very face."""
+"""Distance outside a cell, in edges, within which a point belongs to it: surface points lie on its face."""
 
 
 def tear(interface: Interface, paths: Paths, torn: Array) -> None:

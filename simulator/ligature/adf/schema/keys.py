@@ -125,13 +125,13 @@ def spellings(*names: str) -> dict[str, str]:
 
 
 FARTHEST = 1e4
-"""Largest length in metres: beyond it collisions of things of millimetres lose their precision."""
+"""Largest length in metres: beyond it collisions of parts of millimetres lose precision."""
 
 LONGEST_ARM = 100.0
 """Largest distance in metres of a centre of mass from its body's frame: the lever multiplies errors of rotation."""
 
 LARGEST_SCALE = 1e3
-"""Largest factor on a mesh: one in millimetres where metres are meant, the other way round."""
+"""Largest scale of a mesh: that between millimetres and metres."""
 
 HEAVIEST, STRONGEST = 1e6, 1e3
 """Largest mass in kg and gravity in m/s² that can be simulated."""

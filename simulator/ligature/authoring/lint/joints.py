@@ -14,7 +14,7 @@ from ligature.authoring.placement import matrix_of
 
 MASS_RATIO = 100.0
 RESIDUAL_M, RESIDUAL_RAD = 1e-3, 5e-3
-"""What a joint may be off at rest: real files carry the noise of single precision and of old exporters."""
+"""Allowed error of a joint at rest: real files have the rounding errors of single precision and of old exporters."""
 
 _SPRINGS = ("linear spring", "torsion spring")
 

@@ -26,7 +26,7 @@ WORLD = "world"
 """The link that stands for the world, in both formats."""
 
 MOST_LENGTH = 1e6
-"""Largest number of a pose or size in metres: what is farther is a mistake."""
+"""Largest number of a pose or size in metres; larger ones are errors."""
 
 
 class RobotError(ValueError):

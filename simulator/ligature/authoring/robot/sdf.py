@@ -42,7 +42,7 @@ NO_LIMIT = 1e15
 """Limits beyond this mean none."""
 
 PLANE_SIZE = 100.0
-"""Metres along each edge of what shows a plane; it collides without an end."""
+"""Edge in metres of the square that shows a plane; the plane that collides is infinite."""
 
 
 def read_sdf(path: Path) -> Robot:

@@ -22,7 +22,7 @@ KINDS = MappingProxyType(
         "mouse": "mouse and keys of the terminal",
     }
 )
-"""What there is, by the word of the configuration file."""
+"""Device adapters by their kind in the configuration file."""
 
 
 def module(kind: str) -> Any:
