@@ -158,7 +158,7 @@ class ADF_OT_copy_shapes(InSteps, bpy.types.Operator):
 
     def steps(self, context):
         source, receivers = active_body(context), _receivers(context)
-        parts = [child for child in source.children if _touched(child)]
+        parts = [child for child in source.children if _is_collision_part(child)]
         if not parts:
             self.report({"ERROR"}, f"'{source.name}' has no collision shape to copy")
             return {"CANCELLED"}
@@ -167,7 +167,7 @@ class ADF_OT_copy_shapes(InSteps, bpy.types.Operator):
             yield f"Measuring '{body.name}'", len(boxes) / len(receivers)
             boxes.append(_box(body))
         for body, own in zip(receivers, boxes or [None] * len(receivers), strict=True):
-            for old in [child for child in body.children if _touched(child)]:
+            for old in [child for child in body.children if _is_collision_part(child)]:
                 bpy.data.objects.remove(old)
             T, stretch = np.eye(4), np.ones(3)
             if own is not None:
@@ -190,7 +190,7 @@ def _receivers(context):
     return [o for o in context.selected_objects if source is not None and o is not source and o.adf.role in SHAPED]
 
 
-def _touched(child):
+def _is_collision_part(child):
     """Whether a part is collision geometry of its body."""
     return child.adf.role == "HULL" or (child.adf.role == "SHAPE" and child.adf.shape.use == "COLLISION")
 

@@ -42,7 +42,8 @@ def checking(collection):
         return copies
     objects = {obj.adf.key: obj for obj in members(collection)}
     broken = [finding for obj in objects.values() for finding in _unplaced(obj)]
-    broken += [finding for obj in objects.values() for finding in _bereft(collection, list(objects.values()), obj)]
+    for obj in objects.values():
+        broken += _references_to_deleted(collection, list(objects.values()), obj)
     if broken:
         return [(finding, objects.get(finding.key)) for finding in broken]
     try:
@@ -93,7 +94,7 @@ def _unwritten(obj):
             yield Finding("concave-moving", Severity.WARNING, obj.adf.key, message, hint, fix)
 
 
-def _bereft(collection, objects, obj):
+def _references_to_deleted(collection, objects, obj):
     """References to deleted bodies."""
     if obj.adf.role == "JOINT":
         for end in ("parent", "child"):

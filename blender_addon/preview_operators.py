@@ -43,7 +43,7 @@ def show(scene, positions):
     bring_back(scene)
     joints = [bpy.data.objects.get(name) for name in positions]
     moved = {}
-    for joint in _from_the_root([joint for joint in joints if joint is not None and joint in joints_of([joint])]):
+    for joint in _root_first([joint for joint in joints if joint is not None and joint in joints_of([joint])]):
         motion = np.eye(4)
         for axis in sorted(positions[joint.name], reverse=True):  # along its axes, then about them
             motion = motion @ motion_along(axis, positions[joint.name][axis])
@@ -67,7 +67,7 @@ def show(scene, positions):
         scene["adf_rest"], scene["adf_shown"] = json.dumps(rest), json.dumps(positions)
 
 
-def _from_the_root(joints):
+def _root_first(joints):
     """Joints ordered from the root outwards."""
     below = {joint: behind(joint) for joint in joints}
     return sorted(joints, key=lambda joint: sum(joint.adf.parent_object in bodies for bodies in below.values()))

@@ -64,7 +64,7 @@ def _simulate(run: Run) -> None:
         gc.collect()
         gc.freeze()
         gc.disable()
-        _give_memory_back()
+        _trim_memory()
         report("ready", f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.rods)} rods")
         while not run.stop.is_set():
             loop.turn()
@@ -73,7 +73,7 @@ def _simulate(run: Run) -> None:
         block.close()
 
 
-def _give_memory_back() -> None:
+def _trim_memory() -> None:
     """Return the memory that only the start needed to the system: 12 MB, which the GNU C library would keep."""
     with contextlib.suppress(AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

@@ -109,7 +109,7 @@ class Assist:
         if arm in self._planners and self._arms[arm].ready(state):
             self._pursuits[arm].stop()  # it rests while a plan is made
             self._arm, self._state, self.note = arm, state, ""
-            self._steps = {"align": self._align, "pick": self._pick, "bring": self._bring}[word]()
+            self._steps = {"align": self._align, "pick": self._pick, "bring": self._move_to_entry}[word]()
 
     def drive(self, share: float, arm: int, state: Any) -> None:
         """Take the needle's tip to a share of the way along its arc."""
@@ -160,7 +160,7 @@ class Assist:
         if not self._arms[self._arm].ready(state):
             self.stop(f"{self._arms[self._arm].name} stopped: it is no longer enabled and homed.")
             return
-        if self._pressure > PRESSED:
+        if self._tip_force > PRESSED:
             self.stop(f"{self._arms[self._arm].name} stopped: it presses on something. Lead it away by hand.")
             return
         try:
@@ -229,17 +229,17 @@ class Assist:
     def _align(self) -> Steps:
         """Align the jaw with the needle and move to the approach pose, jaw open."""
         pick = yield from self._plan()
-        yield from self._stand(pick.T_arc_tool)
+        yield from self._approach(pick.T_arc_tool)
 
     def _pick(self) -> Steps:
         """Grasp the needle so that it can be driven; if needed, lay it down in another orientation first."""
         for _ in range(TURNS):
-            if (yield from self._take()):
+            if (yield from self._grasp()):
                 return
-            if not (yield from self._lay()):
+            if not (yield from self._lay_down()):
                 return
 
-    def _stand(self, grasp: Array) -> Steps:
+    def _approach(self, grasp: Array) -> Steps:
         """Move to the approach pose with the jaw open, without touching the needle on the way."""
         planner = self._planner
         yield from self._jaw(OPEN)
@@ -252,7 +252,7 @@ class Assist:
             yield from self._go(over)
         yield from self._go(before)
 
-    def _take(self) -> Generator[None, None, bool]:
+    def _grasp(self) -> Generator[None, None, bool]:
         """Take the needle and lift it; jaws that close on nothing try it at another depth.
 
         Whether it can be driven held so.
@@ -261,7 +261,7 @@ class Assist:
         for press in PRESSES:
             pick = yield from self._plan()
             grasp = pick.T_arc_tool
-            yield from self._stand(grasp)
+            yield from self._approach(grasp)
             self._rest = self._planner.needle(self._state)
             depth = min(press, deepest)
             yield from self._go(self._rest @ grasp @ frame(np.eye(3), np.array([0, 0, depth])))
@@ -274,12 +274,12 @@ class Assist:
                 return pick.drives or self._inside(self._state)
         raise Failed("The jaws closed on nothing. Try again.")
 
-    def _lay(self) -> Generator[None, None, bool]:
+    def _lay_down(self) -> Generator[None, None, bool]:
         """Lay the needle down in a direction from which it can be picked up and driven; whether there is one."""
         rest, hold = self._rest, self._hold
         if rest is None:
             return False
-        lie = yield from self._think(self._arm, self._planner.lie, hold, rest)
+        lie = yield from self._planned(self._arm, self._planner.lie, hold, rest)
         if lie is None:
             return False
         down = lie @ hold
@@ -289,16 +289,16 @@ class Assist:
         yield from self._go(drawn_back(down, APPROACH))
         return True
 
-    def _bring(self) -> Steps:
+    def _move_to_entry(self) -> Steps:
         """Move the needle's tip in front of the entry of the throw that the arm reaches best."""
         for left in reversed(range(TURNS)):
             hold = self._hold
-            throw = yield from self._think(self._arm, self._planner.throw, hold)
+            throw = yield from self._planned(self._arm, self._planner.throw, hold)
             if throw is not None:
                 break
-            if not left or not (yield from self._lay()):
+            if not left or not (yield from self._lay_down()):
                 raise Failed("Held like this the needle does not reach through. Put it down (X) and pick it up again.")
-            yield from self._take()
+            yield from self._grasp()
         start = throw.arc_at(-BEFORE, self._planner.arc) @ hold
         yield from self._go(_raised(start, ABOVE))
         yield from self._go(start)
@@ -335,7 +335,7 @@ class Assist:
         others = [arm for arm in self._planners if arm != self._arm and self._arms[arm].ready(self._state)]
         found: dict[int, Pick] = {}
         for arm in (self._arm, *others):
-            pick = yield from self._think(arm, self._planners[arm].pick)
+            pick = yield from self._planned(arm, self._planners[arm].pick)
             if pick is not None:
                 found[arm] = pick
                 if pick.drives:
@@ -346,7 +346,7 @@ class Assist:
         self._arm = next((arm for arm, pick in found.items() if pick.drives), next(iter(found)))
         return found[self._arm]
 
-    def _think(self, arm: int, plan: Callable[..., Any], *given: Any) -> Generator[None, None, Any]:
+    def _planned(self, arm: int, plan: Callable[..., Any], *given: Any) -> Generator[None, None, Any]:
         """The result of ``plan`` for an arm, from a copy of the state and on a thread: the page does not wait."""
         state = self._state.copy()
         found = self._thinker.submit(plan, state, self._arms[arm].base_in_world(state), *given)
@@ -414,7 +414,7 @@ class Assist:
             return self._holds(self._arm, self._state)
 
         for _ in chain(self._jaw(SHUT), self._wait(CLOSING, held)):
-            if self._pressure > BLUNT and not held():
+            if self._tip_force > BLUNT and not held():
                 return False
             yield
         return True
@@ -430,7 +430,7 @@ class Assist:
         yield from self._wait(STUCK, lambda: abs(self._setpoint - angle) < TURNED)
 
     @property
-    def _pressure(self) -> float:
+    def _tip_force(self) -> float:
         """Force at the tip of the arm, N."""
         return float(np.linalg.norm(self._state["arm"][self._arm]["spatial_measured_cf"][:3]))
 

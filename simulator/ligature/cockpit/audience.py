@@ -58,7 +58,7 @@ class Audience:
         if word == "connect":
             self.clients[client] = value
             value.gui.add_html(f'<span id="ligature-pass" data-pass="{self._wire.admit(client)}"></span>', order=-1)
-            self._seat(client)
+            self._set_operator(client)
             self._ask_key(value, "comes back", KEY_TIMEOUT)
         elif word == "disconnect":
             self.clients.pop(client, None)
@@ -76,7 +76,7 @@ class Audience:
         elif word == "release":
             if self.desk.releases(client):
                 self._end("the operator gave up control", True)
-                self._seat(client)
+                self._set_operator(client)
         else:
             return client != self.desk.operator
         return True
@@ -106,15 +106,15 @@ class Audience:
             return
         if before is not None and before != client:
             self._end("the operator went to another page", True)
-            self._seat(before)
+            self._set_operator(before)
         self.clients[client].local_storage.set_item(KEY, new)
         self._sit_down(client)
 
     def _sit_down(self, client: int) -> None:
-        self._seat(client)
+        self._set_operator(client)
         self._begin(self.clients[client])
 
-    def _seat(self, client: int) -> None:
+    def _set_operator(self, client: int) -> None:
         """Make a browser the operator's, or end that."""
         gui = self.clients[client].gui
         if client in self._buttons:

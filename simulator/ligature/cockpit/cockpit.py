@@ -168,7 +168,7 @@ class Cockpit:
             word, client, value = self._inbox.popleft()
             try:
                 if word == "wire":
-                    self._hear_wire(client, value)
+                    self._handle_order(client, value)
                 elif not self._audience.hear(word, client, value, now):
                     self._obey(word, value)
             except Exception as error:  # nothing that one browser does ends the page for the others
@@ -242,7 +242,7 @@ class Cockpit:
 
     # --- the page's own script -------------------------------------------------------------------
 
-    def _hear_wire(self, client: int, order: Order) -> None:
+    def _handle_order(self, client: int, order: Order) -> None:
         """Handle the orders of a browser's script: a few are open to all, the others to the operator alone."""
         handle = self._audience.clients.get(client)
         if handle is None:
@@ -258,7 +258,7 @@ class Cockpit:
         elif word == "start":
             self._start(handle)
         elif client == self._audience.desk.operator:
-            self._obey_hands(word, value, handle)
+            self._handle_hand_order(word, value, handle)
 
     def _start(self, client: ClientHandle) -> None:
         look_now(client, *first_view(self._scene, self._state))
@@ -268,7 +268,7 @@ class Cockpit:
             self._begins = client.client_id, time.monotonic()
             self._audience.claim(client.client_id)
 
-    def _obey_hands(self, word: str, value: Any, client: ClientHandle) -> None:
+    def _handle_hand_order(self, word: str, value: Any, client: ClientHandle) -> None:
         state, hands = self._state[0], self._hands
         if word in ("next", "drag") or (word == "move" and any(value)):
             self._assist.stop(BY_HAND)

@@ -150,7 +150,7 @@ class DatasetWriter:
             if self._episode is None:
                 self._begin(time)
             assert self._rows is not None
-            self._develop()
+            self._append_pictures()
             for name, value, options in self._values(phase, arms):
                 self._rows.append(name, value, **options)
             for name, value in (extra or {}).items():
@@ -176,7 +176,7 @@ class DatasetWriter:
             return
         with self._writing():
             assert self._rows is not None
-            self._develop()
+            self._append_pictures()
             self._rows.finish()
             attributes = self._episode.attrs
             attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
@@ -245,7 +245,7 @@ class DatasetWriter:
         wrench = {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
         yield f"arms/{arm.name}/spatial_measured_cf", record["spatial_measured_cf"], wrench
 
-    def _develop(self) -> None:
+    def _append_pictures(self) -> None:
         """Add the pictures of the last sample, which were drawn while the simulation went on."""
         assert self._rows is not None
         exposures, self._exposures = self._exposures, {}

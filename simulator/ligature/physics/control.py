@@ -81,13 +81,13 @@ class TreeControl:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
         axes, own = [axis for _, _, axis, _ in self.tree.axes], self.axes
         moved = np.array([m for *_, m in self.tree.axes])
-        crowd = self._crowding(owners)
+        crowd = self._dampers_on_a_body(owners)
         own.stiffness[:] = np.minimum([a.stiffness for a in axes], moved / (STIFFEST * self._dt**2))
         own.damping[:] = np.minimum([a.damping for a in axes], MOST_DAMPED * moved / (crowd * self._dt))
         own.rest[:] = [a.rest for a in axes]
         own.sprung[:] = [a.sprung for a in axes]
 
-    def _crowding(self, owners: list[Joint]) -> Array:
+    def _dampers_on_a_body(self, owners: list[Joint]) -> Array:
         """Number (n,) of sprung joints that share a body with that of each axis: their dampers act together."""
         sprung = {j.index: j for j, (_, _, axis, _) in zip(owners, self.tree.axes, strict=True) if axis.sprung}
         at = Counter(body for j in sprung.values() for body in {j.parent, j.child} - {self._anchor})

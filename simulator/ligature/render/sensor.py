@@ -83,7 +83,7 @@ class ImageSensor:
         if self == IDEAL:
             return frame
         if self._bends(view):
-            frame = self._bent(frame, view)
+            frame = self._distorted(frame, view)
         rgb, depth = frame.rgb, frame.depth  # either is empty when it was not asked for
         random = np.random.default_rng((self.seed, *moment))
         if self.exposure:
@@ -98,7 +98,7 @@ class ImageSensor:
     def _bends(self, view: CameraView) -> bool:
         return any(self.distortion) and not view.orthographic
 
-    def _bent(self, frame: Frame, view: CameraView) -> Frame:
+    def _distorted(self, frame: Frame, view: CameraView) -> Frame:
         """Colour between pixels is mixed; everything else is that of the nearest pixel."""
         left, top, right, bottom = _margins(self.distortion, _key(view), view.width, view.height)
         u, v = _sources(self.distortion, _key(view), view.width, view.height)

@@ -101,7 +101,7 @@ class Node:
             now = time.monotonic()
             if now >= housekeeping:
                 housekeeping = now + HOUSEKEEPING
-                if not self._keep_house(now):
+                if not self._housekeeping(now):
                     return
             self._woken.clear()
             nap = min(self._schedule.next_due(now), self._arms.next_due(), housekeeping) - now
@@ -192,7 +192,7 @@ class Node:
             self._world.pictures_hz = (drawn - before) / (now - since)
             self._frames = drawn, now
 
-    def _keep_house(self, now: float) -> bool:
+    def _housekeeping(self, now: float) -> bool:
         """Update heartbeat, watchdogs and diagnostics; False when the physics process has ended."""
         self._ring.beat()
         self._reception.watch(now)

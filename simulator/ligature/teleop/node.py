@@ -201,7 +201,7 @@ class Teleop:
         tips = {name: arm.tip(VIEW) for name, arm in self.arms.items()}
         if self._replay is not None and (self._replay.started or self._arms_ready(tips)):
             self._inbox.extend(self._replay.due(now))
-        self._take_in(now, tips)
+        self._read_inbox(now, tips)
         idle = self._why_idle()
         for pair in self.pairs.values():
             pair.advance(now, tips[pair.arm.name], idle)
@@ -218,7 +218,7 @@ class Teleop:
         driven = [pair.arm for pair in self.pairs.values() if pair.wanted and pair.selected]
         return all(tips[arm.name] is not None and not arm.obstacle() for arm in driven)
 
-    def _take_in(self, now: float, tips: dict[str, Tip | None]) -> None:
+    def _read_inbox(self, now: float, tips: dict[str, Tip | None]) -> None:
         """Empty the queue.
 
         No reading of a leader that drives is skipped, except those that arrived too late.

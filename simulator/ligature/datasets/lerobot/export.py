@@ -207,7 +207,7 @@ class _Export:
         ]
         for camera in sorted(episode.get("cameras", {})):
             key = f"observation.images.{camera}"
-            stats[key] = self._film(key, number, episode[f"cameras/{camera}/rgb"])
+            stats[key] = self._add_video(key, number, episode[f"cameras/{camera}/rgb"])
             place |= {
                 f"videos/{key}/chunk_index": number // CHUNK, f"videos/{key}/file_index": number % CHUNK,
                 f"videos/{key}/from_timestamp": 0.0, f"videos/{key}/to_timestamp": length / self._fps,
@@ -231,7 +231,7 @@ class _Export:
             )
         self._written.features |= features
 
-    def _film(self, key: str, number: int, pictures: h5py.Dataset) -> statistics.Statistics:
+    def _add_video(self, key: str, number: int, pictures: h5py.Dataset) -> statistics.Statistics:
         """Encode the pictures (n, h, w, 3) of an episode; returns their statistics."""
         size = (pictures.shape[2], pictures.shape[1])
         looked_at, pixels = set(statistics.chosen(len(pictures)).tolist()), list[NDArray[np.uint8]]()

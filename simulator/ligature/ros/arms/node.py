@@ -139,7 +139,7 @@ class ArmsNode:
             )
         return [part for part, _ in found]
 
-    def _fall_silent(self, part: str) -> None:
+    def _stop_publishing(self, part: str) -> None:
         """Stop publishing a part that another node publishes; the master is called on another thread."""
         if part == CONSOLE and self._console is not None:
             threading.Thread(target=self._console.close, daemon=True).start()
@@ -167,7 +167,7 @@ class ArmsNode:
             self._due = now + PERIOD
         self._count += 1
         for part in self._yielded():
-            self._fall_silent(part)
+            self._stop_publishing(part)
         outlets = self.outlets
         events = [event for event in self._block.events.read() if event.arm != RUN]
         if events:
