@@ -85,7 +85,10 @@ class InverseResult:
 
 
 def pose_rows(T: ArrayLike) -> tuple[Array, tuple[int, ...]]:
-    """Poses (..., 4, 4) as rows (m, 4, 4) of their own, and the shape of their leading axes."""
+    """Poses (..., 4, 4) as rows (m, 4, 4) of their own, and the shape of their leading axes.
+
+    Raises ValueError for arrays of other shapes.
+    """
     # a copy: compiled code would be compiled again for arrays that are read-only or not contiguous
     poses = np.array(T, dtype=np.float64, order="C")
     if poses.shape[-2:] != (4, 4):
@@ -94,7 +97,10 @@ def pose_rows(T: ArrayLike) -> tuple[Array, tuple[int, ...]]:
 
 
 def seed_rows(seed: ArrayLike | None, n: int, m: int) -> Array:
-    """Joint values (..., n) to stay close to, as rows: one for all poses or one a pose; None is all zeros."""
+    """Joint values (..., n) to stay close to, as rows: one for all poses or one a pose; None is all zeros.
+
+    Raises ValueError for another number of rows.
+    """
     if seed is None:
         return np.zeros((1, n))
     rows = np.array(seed, dtype=np.float64, order="C").reshape(-1, n)
