@@ -18,7 +18,7 @@ CACHES: dict[str, str] = {
     "Rod._table": "addresses of arrays",
     "Engine._restored": "what Bullet makes of a pose that it is given: the same for the same pose",
     "Rod._arrays": "what of it lasts are attributes of the rod, too",
-    "Joints._table": "addresses of arrays",
+    "Joints.table": "addresses of arrays",
     "Motions.table": "addresses of arrays",
     "Engine._boxes": "an address in Bullet's memory",
     "Readout._table": "addresses of arrays",

@@ -301,6 +301,11 @@ class Simulation:
             (self.phases[phase], [s for s in subsystems if type(s).step is not Subsystem.step])
             for phase, subsystems in self._tick.items()
         ]
+        self._beside_bodies = [
+            s for _, subsystems in self._phases for s in subsystems if not isinstance(s, World | Controllers)
+        ]
+        self._beside_bodies.sort(key=lambda s: (type(s).idle_ticks is not Subsystem.idle_ticks, s is not self._suture))
+        """Whoever else steps; first those that may never be idle."""
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._handlers: dict[type[Message], Callable[[Any], None]] = {
@@ -335,8 +340,12 @@ class Simulation:
         self._check_open()
         if ticks < 0:
             raise ValueError(f"ticks is {ticks}; it must be 0 or more, for time does not run backwards")
-        for _ in range(ticks):
-            self._advance()
+        while ticks > 0:
+            passed = self._coast(ticks) if ticks > 1 else 0
+            if not passed:
+                self._advance()
+                passed = 1
+            ticks -= passed
         self._write_state()
         self._watch()
 
@@ -354,6 +363,25 @@ class Simulation:
             begin, now = now, clock.perf_counter()
             stopwatch.seconds += now - begin
         self._clock.advance()
+
+    def _coast(self, ticks: int) -> int:
+        """Advance by up to ``ticks`` in which only bodies and their joints have work, in one call; returns how many."""
+        tick = self._clock.since_reset
+        for subsystem in self._beside_bodies:
+            ticks = min(ticks, 0 if self._resting else subsystem.idle_ticks(tick))
+            if ticks < 2:
+                return 0
+        with self.phases["bodies"]:
+            try:
+                passed = self._world.coast(ticks)
+            except Exception as error:  # nothing ends a run but its user
+                self._leave_out(self._world, error)
+                passed = 1
+        if passed:
+            for subsystem in self._beside_bodies:
+                subsystem.pass_idle(passed)
+            self._clock.advance(passed)
+        return passed
 
     def _leave_out(self, subsystem: Subsystem, error: Exception) -> None:
         """Reset and skip, for a while, a subsystem whose step raised; then it continues without commands."""
@@ -573,10 +601,10 @@ class Clock:
     since_reset: int = 0
     resets: int = 0
 
-    def advance(self) -> None:
-        """A tick went by."""
-        self.tick += 1
-        self.since_reset += 1
+    def advance(self, ticks: int = 1) -> None:
+        """``ticks`` went by."""
+        self.tick += ticks
+        self.since_reset += ticks
 
     def restart(self) -> None:
         """The scene was reset."""

@@ -92,6 +92,15 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
             for arm in self._arms:
                 self._guarded("following-error check", arm, arm.watch, WATCH_PERIOD * self._dt)
 
+    def idle_ticks(self, tick: int) -> int:
+        """The ticks until following errors are checked, while all arms stay at their set-points."""
+        return WATCH_PERIOD - 1 - tick % WATCH_PERIOD if all(arm.is_idle for arm in self._arms) else 0
+
+    def pass_idle(self, ticks: int) -> None:
+        """Count the time of all arms."""
+        for arm in self._arms:
+            arm.pass_idle(ticks, self._dt)
+
     def write_state(self, state: StateRecord) -> None:
         """Write the state of all arms."""
         if self._arms:

@@ -23,7 +23,7 @@ from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import UnknownNameError
 from ligature.model.scene import Jaw, Scene
 from ligature.model.state import FieldViews, StateRecord
-from ligature.model.subsystem import Subsystem, kept, put_back
+from ligature.model.subsystem import ALWAYS, Subsystem, kept, put_back
 from ligature.physics import World
 from ligature.suture import Rods
 from ligature.suture.rod import JawPads
@@ -101,7 +101,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._fingers = [Fingers(jaw, world) for jaw in scene.jaws]
         tree_of = {link.body: tree for tree in scene.articulations for link in tree.links}
         self._own = [{link.body for link in tree_of[jaw.palm].links} for jaw in scene.jaws]
-        free = {body.index for body in scene.bodies if not body.static}
+        free = {body for body in tree_of if not scene.bodies[body].static}
         self._idle = [not rods.rods and not free - own for own in self._own]
         """Jaws for which there is nothing to grasp."""
         self._actuators = [[a.index for a in scene.actuators if a.parent in own] for own in self._own]
@@ -170,6 +170,15 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
                 self._search(index)
         if self._actuator_grasps or any(held is not None for held in self._jaw_grasps):
             self._exchange_impulses()
+
+    def idle_ticks(self, tick: int) -> int:
+        """The ticks until a jaw that may grasp something searches; none while jaws or actuators hold."""
+        if self._actuator_grasps or any(self._jaw_grasps) or any(self._thread_grasps):
+            return 0
+        searching = [index for index, idle in enumerate(self._idle) if not idle]
+        if any(self._near[index] for index in searching):
+            return 0
+        return min((-(tick + index) % SEARCH_PERIOD for index in searching), default=ALWAYS)
 
     def _search(self, index: int) -> None:
         """Close gently on the nearest body between the fingers; grasp it when both pads touch it."""

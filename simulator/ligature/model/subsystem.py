@@ -16,6 +16,9 @@ import numpy as np
 from ligature.adf import Diagnostic
 from ligature.model.state import StateRecord
 
+ALWAYS = 2**31
+"""More ticks than are ever done in one call."""
+
 
 class Subsystem(ABC):
     """One part of a running simulation.
@@ -26,6 +29,13 @@ class Subsystem(ABC):
 
     def step(self, tick: int) -> None:  # noqa: B027 - some do nothing in a tick
         """Do this part of a tick; ``tick`` counts from the last reset, for what is done every few ticks only."""
+
+    def idle_ticks(self, tick: int) -> int:
+        """For how many ticks from ``tick`` on `step` does nothing that `pass_idle` does not, if no command comes."""
+        return 0
+
+    def pass_idle(self, ticks: int) -> None:  # noqa: B027
+        """Do in one call what `step` would have done in ``ticks`` idle ticks, such as counting time."""
 
     def write_state(self, state: StateRecord) -> None:  # noqa: B027
         """Write what this part of the simulation is like now."""

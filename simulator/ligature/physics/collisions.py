@@ -28,6 +28,11 @@ class Collisions:
         self.overlaps = held_overlaps(engine)
         self.restart()
 
+    @property
+    def waits(self) -> bool:
+        """Whether bodies that started overlapped have not parted yet."""
+        return bool(self._overlapped)
+
     def step(self, tick: int) -> None:
         """Let those that started overlapped collide once they have parted."""
         if not self._overlapped or tick % CHECK_INTERVAL:

@@ -10,7 +10,13 @@ from ligature.physics.trees import slow_down
 
 
 class Damping:
-    """The damping of lone bodies of an engine in a tick (ADF specification §12.1)."""
+    """The damping of lone bodies of an engine in a tick (ADF specification §12.1).
+
+    Attributes
+    ----------
+    trees, factors
+        (n,) trees that are damped, and (n, 2) what their linear and angular velocities are multiplied by.
+    """
 
     def __init__(self, engine: Engine) -> None:
         bodies, dt = engine.scene.bodies, engine.dt
@@ -19,8 +25,8 @@ class Damping:
         factors = np.array([((1 - b.linear_damping) ** dt, (1 - b.angular_damping) ** dt) for b in roots])
         factors = factors.reshape(-1, 2)
         damped = (factors < 1.0).any(axis=1)
-        self._trees, self._factors = np.array(alone, dtype=np.int64)[damped], factors[damped]
-        self._places = [engine.place_of[engine.trees[k].root] for k in self._trees]
+        self.trees, self.factors = np.array(alone, dtype=np.int64)[damped], factors[damped]
+        self._places = [engine.place_of[engine.trees[k].root] for k in self.trees]
         self._motions = engine.motions
 
     def step(self) -> None:
@@ -28,7 +34,7 @@ class Damping:
         if not self._places:
             return
         if self._motions.handle:
-            slow_down(self._motions.handle, self._motions.table, self._trees, self._factors)
+            slow_down(self._motions.handle, self._motions.table, self.trees, self.factors)
         else:
-            for place, (linear, angular) in zip(self._places, self._factors.tolist(), strict=True):
+            for place, (linear, angular) in zip(self._places, self.factors.tolist(), strict=True):
                 place.slow_down(linear, angular)

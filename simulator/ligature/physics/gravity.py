@@ -18,22 +18,28 @@ Array = NDArray[np.float64]
 
 
 class Lifts:
-    """Forces on bodies whose gravity is not the common one, at their centres of mass."""
+    """Forces on bodies whose gravity is not the common one, at their centres of mass.
+
+    Attributes
+    ----------
+    bodies, forces
+        (n,) and (n, 3) in newtons.
+    """
 
     def __init__(self, engine: Engine, bodies: Sequence[int], forces: Sequence[Array]) -> None:
         self._engine = engine
-        self._bodies, self._forces = np.array(bodies, dtype=np.int64), np.array(forces).reshape(-1, 3)
+        self.bodies, self.forces = np.array(bodies, dtype=np.int64), np.array(forces).reshape(-1, 3)
 
     def step(self) -> None:
         """Apply the forces for one tick."""
-        if not self._bodies.size:
+        if not self.bodies.size:
             return
         engine = self._engine
         motions = engine.motions
         if motions.handle:
-            push_bodies(motions.handle, motions.table, engine.place_table, self._bodies, self._forces)
+            push_bodies(motions.handle, motions.table, engine.place_table, self.bodies, self.forces)
             return
-        for body, force in zip(self._bodies.tolist(), self._forces, strict=True):
+        for body, force in zip(self.bodies.tolist(), self.forces, strict=True):
             engine.place_of[body].push(force)
 
 

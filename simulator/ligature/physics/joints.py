@@ -23,6 +23,8 @@ class Joints:
     ----------
     controls
         The controllers of each tree, in the order of ``engine.trees``; others after a `rebuild`.
+    table
+        The addresses of their arrays, for compiled code; others after a `rebuild`.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -33,7 +35,7 @@ class Joints:
         """Begin anew in an engine that was rebuilt: all joints are limp."""
         engine = self._engine
         self._axes = axes(len(engine.trees), len(engine.motions.position))
-        self._table = table_of(self._axes)
+        self.table = table_of(self._axes)
         self.controls = [
             TreeControl(engine.client, tree, engine.scene.joints, engine.dt, engine.motions, self._axes, k)
             for k, tree in enumerate(engine.trees)
@@ -46,7 +48,7 @@ class Joints:
         motions = self._engine.motions
         if not motions.handle:
             motions.everything()
-        act(motions.handle, motions.table, self._table, self._engine.dt)
+        act(motions.handle, motions.table, self.table, self._engine.dt)
         if not motions.handle:
             for control in self.moving:
                 control.send()

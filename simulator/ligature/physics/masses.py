@@ -90,6 +90,11 @@ class Masses:
         if body in self._attached_loads:
             self._attached_loads[body][0].load(wrench.tolist())
 
+    @property
+    def added(self) -> bool:
+        """Whether any body has added mass."""
+        return bool(self._attached_loads)
+
     def lift(self) -> None:
         """Cancel the weight of added mass in the coming tick."""
         for place, force in self._attached_loads.values():

@@ -34,6 +34,11 @@ class Parting:
         self._ticks = 1
         self._use(0.0)
 
+    @property
+    def watches(self) -> bool:
+        """Whether overlaps are looked at in a coming tick."""
+        return self._ticks > 0
+
     def step(self) -> None:
         """A tick is over."""
         if self._ticks == 0:

@@ -20,6 +20,7 @@ from ligature.model.subsystem import Subsystem, copied
 from ligature.physics.body_commands import BodyCommands
 from ligature.physics.chunks import MOST_REPLACED, Chunks
 from ligature.physics.closures import Closures
+from ligature.physics.coasting import coast
 from ligature.physics.collisions import Collisions
 from ligature.physics.contact_wrenches import ContactWrenches
 from ligature.physics.damping import Damping
@@ -237,6 +238,26 @@ class World(Subsystem):
         if not sound:
             self._heal()
 
+    def coast(self, ticks: int) -> int:
+        """Advance by up to ``ticks`` as one compiled call, where nothing but joints, damping and gravity acts in them.
+
+        Returns how many ticks passed, with the same bits as those of `pre_step` and `step`; 0 where anything else acts.
+        """
+        engine, motions = self.engine, self.engine.motions
+        if (
+            not motions.handle or self.commands.all or self.masses.added or self.collisions.waits
+            or self._parting.watches or self.chunks.bodies or self.scene.closures
+        ):  # fmt: skip
+            return 0
+        self.impulses.clear()
+        passed, sound = coast(
+            motions.handle, motions.table, self.joints.table, engine.place_table, self._damping.trees,
+            self._damping.factors, self._lifts.bodies, self._lifts.forces, MAX_SPEED, self.dt, ticks,
+        )  # fmt: skip
+        if not sound:
+            self._heal()
+        return int(passed)
+
     def _heal(self) -> None:
         """Reset trees that diverged to their initial poses, with all trees that loops join to them."""
         self._broken = True
@@ -272,6 +293,10 @@ class World(Subsystem):
         pose, twist = np.empty(7), np.empty(6)
         self.engine.place_of[body].read_inertial(pose, twist)
         return pose, twist
+
+    def centre(self, body: int) -> Array:
+        """Centre of mass (3,) of a body; a view, which the next tick changes."""
+        return self.engine.place_of[body].centre()
 
     def twist(self, body: int) -> Array:
         """Linear velocity of the centre of mass and angular velocity of a body, (6,)."""

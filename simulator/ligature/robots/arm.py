@@ -138,6 +138,11 @@ class Arm(Device):
         self._pushing = None
         super()._off_all()
 
+    @property
+    def is_idle(self) -> bool:
+        """See `Device.is_idle`; an arm that pushes is not."""
+        return self._pushing is None and super().is_idle
+
     def _advance(self, dt: float) -> None:
         super()._advance(dt)
         if self._pushing is not None:

@@ -64,6 +64,11 @@ class Axes:
         """Whether a move is under way."""
         return self.mode is Mode.MOVE
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether `tick` does nothing until the next command."""
+        return self.mode is not Mode.MOVE and self.mode is not Mode.VELOCITY and not self._streaming
+
     def measured(self) -> Array:
         """Positions, velocities and efforts now, (3, n)."""
         return self.plant.read()

@@ -5,6 +5,7 @@ Seconds of simulated time. A command that is not carried out raises `Rejected` a
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -62,7 +63,7 @@ class Device:
         self.time = 0.0
         self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
         self._home = home
-        self._following_bound = np.asarray(following_bound, dtype=float)
+        self._following_bounds: list[float] = np.asarray(following_bound, dtype=float).tolist()
         self._state, self._homed, self._busy = State.DISABLED, False, False
         self._emitted: OperatingState | None = None
         self._pending: Action | None = None
@@ -267,6 +268,20 @@ class Device:
         if self._state is State.ENABLED:
             self._advance(dt)
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether `tick` only counts time until the next command."""
+        return (
+            self._pending is None
+            and not self._busy
+            and (self._state is not State.ENABLED or all(axes.is_idle for axes in self._groups()))
+        )
+
+    def pass_idle(self, ticks: int, dt: float) -> None:
+        """Count the time of ``ticks`` in which the device is idle, with the bits of as many calls of `tick`."""
+        for _ in range(ticks):
+            self.time += dt
+
     def _advance(self, dt: float) -> None:
         for axes in self._groups():
             axes.tick(dt)
@@ -289,15 +304,16 @@ class Device:
         if self._state is not State.ENABLED or self.joints.mode in (Mode.OFF, Mode.EFFORT):
             self._astray = 0.0
             return
-        q = self.joints.measured()[0]
-        if not np.isfinite(q).all():
+        q, bounds = self.joints.measured()[0].tolist(), self._following_bounds  # numbers: arrays of six take longer
+        if not all(map(math.isfinite, q)):
             self.fault("a joint value is not finite")
             return
-        error = np.abs(q - self.joints.setpoint[0])
-        worst = int(np.argmax(error / self._following_bound))
-        self._astray = self._astray + seconds if error[worst] > self._following_bound[worst] else 0.0
+        errors = [abs(now - wanted) for now, wanted in zip(q, self.joints.setpoint[0].tolist(), strict=True)]
+        shares = [error / bound for error, bound in zip(errors, bounds, strict=True)]
+        worst = shares.index(max(shares))
+        self._astray = self._astray + seconds if errors[worst] > bounds[worst] else 0.0
         if self._astray > FOLLOWING_TIMEOUT:
-            self.fault(f"joint {self.joints.names[worst]} is {error[worst]:.3g} away from its set-point")
+            self.fault(f"joint {self.joints.names[worst]} is {errors[worst]:.3g} away from its set-point")
 
     # --- snapshots --------------------------------------------------------------------------
 

@@ -109,6 +109,11 @@ class MtmArm(Arm):
         """Efforts (7,) that carry the arm's weight where it is."""
         return weight(self.joints.measured()[0])
 
+    @property
+    def is_idle(self) -> bool:
+        """See `Device.is_idle`; an arm that yields to efforts is not."""
+        return self.joints.mode is not Mode.EFFORT and super().is_idle
+
     def _advance(self, dt: float) -> None:
         super()._advance(dt)
         plant = self.joints.plant

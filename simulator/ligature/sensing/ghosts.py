@@ -33,7 +33,7 @@ SAMPLES = 5
 CONVEX = (Box, Sphere, Cylinder, Capsule, Cone, Hull)
 """Shapes that rod elements are tested against."""
 
-BAND = 5e-3
+BAND = 20e-3
 """Distance in metres within which the surfaces of a ghost and a body are measured.
 
 A pair is measured again only after the two may have moved by the distance between their surfaces, so that the result

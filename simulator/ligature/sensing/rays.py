@@ -15,7 +15,7 @@ from ligature.model.frames import pose7_matrix
 from ligature.model.hits import RayHits
 from ligature.model.scene import Scene, Sensor, SensorType
 from ligature.model.state import StateRecord
-from ligature.model.subsystem import Subsystem, kept, put_back
+from ligature.model.subsystem import ALWAYS, Subsystem, kept, put_back
 from ligature.sensing.targets import Targets
 
 Array = NDArray[np.float64]
@@ -42,6 +42,10 @@ class Rays(Subsystem):
         """Apply the forces of every resistance sensor in the coming step of the bodies."""
         for stick in self._stick:
             stick.step(self._targets)
+
+    def idle_ticks(self, tick: int) -> int:
+        """Always without resistance sensors, else none."""
+        return 0 if self._stick else ALWAYS
 
     def sense(self, state: StateRecord) -> None:
         """Cast every ray among the bodies of the state, and write the hits."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.state import MAX_TOUCHES, StateRecord
-from ligature.model.subsystem import Subsystem, kept, put_back
+from ligature.model.subsystem import ALWAYS, Subsystem, kept, put_back
 from ligature.sensing.queries import Touchable
 
 LOOK_TICKS = 16
@@ -36,6 +36,10 @@ class Touches(Subsystem):
         """Read the contacts of the last step, every `LOOK_TICKS`."""
         if self._watching and (tick + 1) % LOOK_TICKS == 0:
             self._points, self._forces = self._bodies.touches(MAX_TOUCHES)
+
+    def idle_ticks(self, tick: int) -> int:
+        """None while a display watches, else always."""
+        return 0 if self._watching else ALWAYS
 
     def write_state(self, state: StateRecord) -> None:
         """Write the contacts of the last reading."""

@@ -7,7 +7,7 @@ from typing import Any
 from ligature.adf import Diagnostic
 from ligature.model.scene import Scene
 from ligature.model.state import StateRecord
-from ligature.model.subsystem import Subsystem
+from ligature.model.subsystem import ALWAYS, Subsystem
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.holes import Holes
 from ligature.suture.rods import Rods
@@ -29,6 +29,10 @@ class Suture(Subsystem):
         self.holes.begin()
         self.rods.step(self._bodies)
         self.holes.end()
+
+    def idle_ticks(self, tick: int) -> int:
+        """Always where nothing can ever be done, else none."""
+        return ALWAYS if self._idle else 0
 
     def write_state(self, state: StateRecord) -> None:
         """Write elements and insertions."""

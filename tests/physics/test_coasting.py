@@ -1,0 +1,118 @@
+"""Ticks in which only bodies and joints have work are one compiled call, with the bits of as many single ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import ligature
+import numpy as np
+import pybullet
+import pytest
+from ligature import Simulation
+from ligature.model.commands import BodyCommand, Command, CommandType, Release, WatchContacts
+from ligature.model.scene import Scene
+from ligature.robots.commands import Adopt, MoveJr, ServoJr, ServoJv
+
+from tests.conftest import ROOT
+
+
+@cache
+def scene() -> Scene:
+    """An arm, a board and six rubber blocks."""
+    return ligature.load(ROOT / "scenes" / "peg_transfer" / "launch.yaml", [0, 1, 2])
+
+
+@pytest.fixture
+def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[[], tuple[Simulation, Simulation, list[int]]]:
+    """Two simulations, of which the second one never coasts, and the ticks that the first one coasts."""
+
+    def make() -> tuple[Simulation, Simulation, list[int]]:
+        first, second, passed = Simulation(scene()), Simulation(scene()), [0]
+        coast = first._world.coast
+
+        def counted(ticks: int) -> int:
+            found = coast(ticks)
+            passed[0] += found
+            return found
+
+        monkeypatch.setattr(first._world, "coast", counted)
+        monkeypatch.setattr(second._world, "coast", lambda ticks: 0)
+        return first, second, passed
+
+    return make
+
+
+def _commands(rng: np.random.Generator) -> list[Command]:
+    kind = int(rng.integers(9))
+    block = int(rng.choice([body.index for body in scene().bodies if body.identity.name.startswith("Block")]))
+    if kind == 0:
+        return [Adopt(0), ServoJr(0, tuple(rng.uniform(-0.02, 0.02, 6).tolist()))]
+    if kind == 1:
+        return [Adopt(0), MoveJr(0, tuple(rng.uniform(-0.02, 0.02, 6).tolist()))]
+    if kind == 2:
+        return [Adopt(0), ServoJv(0, tuple(rng.uniform(-0.1, 0.1, 6).tolist()))]
+    if kind == 3:
+        return [BodyCommand(block, CommandType.FORCE, tuple((0.05 * rng.standard_normal(6)).tolist()))]
+    if kind in (4, 7):
+        return [Release("body", body.index) for body in scene().bodies]
+    if kind == 5:
+        return [Release("arm", 0), WatchContacts(bool(rng.integers(4) == 0))]
+    return []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_run_that_coasts_has_the_bits_of_one_that_does_not(
+    seed: int, pair: Callable[[], tuple[Simulation, Simulation, list[int]]]
+) -> None:
+    *runs, passed = pair()
+    rng = np.random.default_rng(seed)
+    for k in range(40):
+        commands, ticks = _commands(rng), int(rng.integers(1, 40))
+        for simulation in runs:
+            for command in commands:
+                simulation.apply(command)
+            simulation.step(ticks)
+            if k == 15:
+                simulation.reset()
+        assert len({simulation.state_hash() for simulation in runs}) == 1, (k, commands, ticks)
+        assert len({tuple(arm.time for arm in simulation.arms.values()) for simulation in runs}) == 1
+    assert passed[0] > 60
+
+
+def test_a_body_that_diverges_while_coasting_is_put_back_in_the_same_tick(
+    pair: Callable[[], tuple[Simulation, Simulation, list[int]]],
+) -> None:
+    *runs, passed = pair()
+    for simulation in runs:
+        simulation.step(20)
+    begin = passed[0]
+    for simulation in runs:
+        engine = simulation._world.engine
+        place = engine.place_of[next(b.index for b in scene().bodies if b.identity.name == "Block2")]
+        pybullet.resetBaseVelocity(place.uid, [0.0, 0.0, 1e5], [0.0] * 3, physicsClientId=engine.client)
+        engine.motions.forget(place.tree)
+        simulation.step(20)
+    assert passed[0] > begin
+    assert [[str(p) for p in simulation.problems if p.code == "diverged"] for simulation in runs] == 2 * [
+        [str(p) for p in runs[1].problems if p.code == "diverged"]
+    ]
+    assert any("Block2" in str(problem) for problem in runs[0].problems)
+    assert len({simulation.state_hash() for simulation in runs}) == 1
+
+
+def test_a_coast_that_fails_is_reported_and_the_run_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulation = Simulation(scene())
+    simulation.step(20)
+
+    def broken(ticks: int) -> int:
+        raise ZeroDivisionError("broken on purpose")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(simulation._world, "coast", broken)
+        before = simulation._clock.tick
+        simulation.step(20)
+        assert simulation._clock.tick == before + 20
+    (problem,) = [problem for problem in simulation.problems if problem.code == "failed"]
+    assert "'step' of World failed" in problem.message and "broken on purpose" in problem.message
+    assert np.isfinite(simulation.state["body_pose"]).all()
