@@ -5,6 +5,7 @@ World axes, SI units.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Jaw
 from ligature.physics import World
+from ligature.physics.queries import Gaps
 
 Array = NDArray[np.float64]
 
@@ -64,11 +66,24 @@ class Fingers:
     def closing(self, finger: int, axis: Array, lever: Array) -> Array:
         """Direction (3,) in which a finger closes at ``lever`` (3,) from the axis."""
         turn = self.jaw.opening[0] if finger == 0 else -self.jaw.opening[0]
-        (ax, ay, az), (lx, ly, lz) = (-turn * axis).tolist(), lever.tolist()
-        direction = np.array(
-            [ay * lz - az * ly, az * lx - ax * lz, ax * ly - ay * lx]
-        )  # np.cross takes ten times as long
+        direction = np.array(_turned((-turn * axis).tolist(), lever.tolist()))
         return np.asarray(direction / max(float(np.linalg.norm(direction)), 1e-12))
+
+    def _facing(self, finger: int, axis: Array, pivot: Array, gaps: Gaps) -> Facing | None:
+        """The nearest of the points to which a pad is near that the pad faces, None without any."""
+        turn = self.jaw.opening[0] if finger == 0 else -self.jaw.opening[0]
+        (ax, ay, az), closing = axis.tolist(), (-turn * axis).tolist()
+        # numbers, for arrays of three take ten times as long
+        levers, normals = (gaps.point - pivot).tolist(), gaps.normal.tolist()
+        for k, ((x, y, z), (nx, ny, nz)) in enumerate(zip(levers, normals, strict=True)):
+            along = x * ax + y * ay + z * az
+            dx, dy, dz = _turned(closing, [x - along * ax, y - along * ay, z - along * az])
+            size = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-12)
+            if nx * dx + ny * dy + nz * dz < -FACING * size:
+                lever = gaps.point[k] - pivot
+                lever = lever - (lever @ axis) * axis
+                return Facing(float(gaps.distance[k]), gaps.point[k], float(np.linalg.norm(lever)))
+        return None
 
     def facing(self, body: int, within: float) -> tuple[Facing, Facing] | None:
         """Nearest points of both pads to a body between them; None when the body is not between them."""
@@ -76,16 +91,10 @@ class Fingers:
         found = []
         for finger, own in enumerate(self.jaw.fingers):
             gaps = self._world.queries.gaps(own, body, within)
-            if gaps is None:
+            face = None if gaps is None else self._facing(finger, axis, pivot, gaps)
+            if face is None:
                 return None
-            for gap, point, normal in zip(gaps.distance, gaps.point, gaps.normal, strict=True):
-                lever = point - pivot
-                lever = lever - (lever @ axis) * axis
-                if normal @ self.closing(finger, axis, lever) < -FACING:
-                    found.append(Facing(float(gap), point, float(np.linalg.norm(lever))))
-                    break
-            if len(found) == finger:
-                return None
+            found.append(face)
         return found[0], found[1]
 
     def near(self, body: int) -> bool:
@@ -158,3 +167,9 @@ class Fingers:
         """Positions of both joints in radians."""
         one, two = (self._world.joints.position(joint) for joint in self.jaw.joints)
         return one, two
+
+
+def _turned(axis: list[float], lever: list[float]) -> list[float]:
+    """The cross product (3,) of ``axis`` (3,) and ``lever`` (3,); np.cross takes ten times as long."""
+    (ax, ay, az), (lx, ly, lz) = axis, lever
+    return [ay * lz - az * ly, az * lx - ax * lz, ax * ly - ay * lx]

@@ -71,14 +71,13 @@ class JawGrasp(BodyGrasp):
 
     levers: tuple[float, float]
     positions: tuple[float, float]
-    palm_at: Array
+    palm_at: list[float]
     checked: float = 0.0
 
-    def jumped(self, palm_at: Array) -> bool:
+    def jumped(self, palm_at: list[float]) -> bool:
         """Whether the holder, now at ``palm_at`` (3,), was put elsewhere since the last call."""
         before, self.palm_at = self.palm_at, palm_at
-        # numbers, for arrays of three take five times as long
-        return any(abs(now - then) > JUMP for now, then in zip(palm_at.tolist(), before.tolist(), strict=True))
+        return any(abs(now - then) > JUMP for now, then in zip(palm_at, before, strict=True))
 
 
 class Grasps(Subsystem, Mapping[str, Held | None]):
@@ -214,7 +213,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         friction = self._friction(jaw, self._scene.bodies[body].friction)
         grasp, ride = begin(self._world, jaw.palm, body, Patch(T_palm_patch, jaw.half_width, friction))
         levers = faces[0].lever, faces[1].lever
-        held = JawGrasp(body, jaw.palm, grasp, ride, levers, fingers.positions(), palm[:3])
+        held = JawGrasp(body, jaw.palm, grasp, ride, levers, fingers.positions(), palm[:3].tolist())
         self._jaw_grasps[index] = held
         self._replace_contacts(index, held)
         self._world.masses.set_held(body, True, grasped=True)
@@ -281,7 +280,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         fingers = self._fingers[index]
         efforts = fingers.efforts()
         force = min(effort / max(lever, LEAST_LEVER) for effort, lever in zip(efforts, held.levers, strict=True))
-        if force <= 0.0 or held.jumped(self._world.motion(fingers.jaw.palm)[0][:3]):
+        if force <= 0.0 or held.jumped(self._world.centre(fingers.jaw.palm).tolist()):
             self._release(index)
             return
         held.grasp.normal_force = force

@@ -186,7 +186,7 @@ class TreeControl:
     def stop(self, joint: int, position: float, effort: float) -> None:
         """Keep one joint at ``position``, whatever it is commanded to do, until `let`; it reports ``effort``."""
         row, own = self.row[joint], self.axes
-        fresh = not own.stopped[row]
+        fresh = not own.stopped.item(row)
         own.stopped[row], own.stop[row] = True, position
         own.slowed[row] = False
         self._motions.send(self.first_axis + row, effort)
@@ -224,13 +224,14 @@ class TreeControl:
         unless it has a yield stiffness; one with a velocity pulls with all its strength.
         """
         row = self.row[joint]
-        mode, behind = self.mode[row], self._way(row, self.target[row] - self._position[row])
+        mode, target = self.mode.item(row), self.target.item(row)
+        behind = self._way(row, target - self._position.item(row))
         if mode == FORCE:
-            return float(self.target[row])
+            return target
         if mode == VELOCITY:
-            return float(np.sign(self.target[row]) * self.axes.strength[row])
+            return float(np.sign(target) * self.axes.strength[row])
         if mode == SERVO:
-            return float((self.axes.yield_stiffness[row] or stiffness) * behind)
+            return (self.axes.yield_stiffness.item(row) or stiffness) * behind
         if mode == POSITION:
             return float(self.axes.asked[row] if self.axes.force_output[row] else stiffness * behind)
         return 0.0
@@ -247,7 +248,7 @@ class TreeControl:
 
     def _way(self, row: int, error: float) -> float:
         """``error``, wrapped to the shorter direction for a joint that turns without limits."""
-        return float((error + np.pi) % (2 * np.pi) - np.pi) if self.axes.turns[row] else float(error)
+        return float((error + np.pi) % (2 * np.pi) - np.pi) if self.axes.turns.item(row) else float(error)
 
     def read(self, rows: Integers) -> Array:
         """Positions, velocities and motor efforts (3, k) of the axes ``rows`` (k,) now."""

@@ -60,6 +60,7 @@ class Motions:
         self.position, self.velocity, self.effort = arrays.joints
         self._links = [[link for link, *_ in tree.axes] for tree in trees]
         self._uids = [tree.uid for tree in trees]
+        self._tree_of = [k for k, tree in enumerate(trees) for _ in tree.axes]
 
     def _lay_out(self, tree_index: int, tree: Tree) -> None:
         """Fill the rows of one tree."""
@@ -89,7 +90,7 @@ class Motions:
     def send(self, axis: int, effort: float | None) -> None:
         """From now on an axis of the world reports another effort than its motor's; None ends that."""
         self.trees.sent[axis], self.trees.sent_effort[axis] = effort is not None, effort or 0.0
-        self.rouse(int(np.searchsorted(self.trees.first, axis, side="right")) - 1)
+        self.rouse(self._tree_of[axis])
 
     def measure(self, tree: int) -> None:
         """Fill `Trees.reaction` for the axes of a tree from now on."""
