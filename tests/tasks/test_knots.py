@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ligature.tasks.knots import ThrowScore, turns
+from ligature.tasks.knots import SquareKnotScore, ThrowScore, knotted_around, turns
 
 from tests.suture.knots import square_knot, wound
 
@@ -72,3 +72,60 @@ def test_hands_that_hold_the_throw_have_not_made_it():
     free = ThrowScore(3, 1.3, 1.0, True, 10.0)
     assert free.success
     assert not ThrowScore(3, 1.3, 1.0, False, 10.0).success
+
+
+def square_score(points, hands_empty=True):
+    points = np.asarray(points)
+    return SquareKnotScore.of(points, CENTRE, RADIUS, np.ones(len(points)), hands_empty, 20.0)
+
+
+def over_the_vessel(knot):
+    """A thread with a knot above the vessel, whose loop, where it has one, goes around it."""
+    return CENTRE + 1e-3 * (knot[::4] + [0.0, 0.0, 1.0])
+
+
+def test_a_square_knot_whose_loop_goes_around_the_vessel_is_one():
+    found = square_score(over_the_vessel(square_knot()))
+    assert found.success, found.lines()
+    assert not square_score(over_the_vessel(square_knot()), hands_empty=False).success
+
+
+def test_it_is_one_from_either_side_of_the_vessel():
+    turned = CENTRE + (over_the_vessel(square_knot()) - CENTRE) * [-1.0, -1.0, 1.0]
+    assert square_score(turned).success
+
+
+def in_one_end(knot):
+    """A thread that lies below the vessel, with a knot in its long end."""
+    knot = 1e-3 * knot
+    lying = below()[:60]
+    return np.vstack([lying, knot - knot[0] + lying[-1] + [0.0, 1e-3, 0.0]])
+
+
+@pytest.mark.parametrize("knot", [square_knot()[::4], wound(2, 3, 3)[::6]], ids=["square", "trefoil"])
+def test_a_knot_in_one_end_of_a_thread_below_the_vessel_is_not_around_it(knot):
+    assert not knotted_around(in_one_end(knot), CENTRE, RADIUS)
+
+
+def test_a_square_knot_in_one_end_does_not_count():
+    found = square_score(in_one_end(square_knot()[::4]))
+    assert (found.determinant, found.signature, found.colourings) == (9, 0, 27)
+    assert not found.success
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_coil_is_no_square_knot(count):
+    assert not square_score(coil(count)).success
+
+
+def test_one_throw_and_a_straight_thread_are_no_square_knot():
+    assert not square_score(below()).success
+    assert not square_score(CENTRE + 1e-3 * wound(2, 3, 3)[::6]).success
+
+
+@pytest.mark.parametrize(
+    ("signature", "colourings", "counts"), [(0, 27, True), (4, 27, False), (-4, 27, False), (0, 9, False)]
+)
+def test_only_a_square_knot_counts(signature, colourings, counts):
+    """Neither a granny knot nor the stevedore knot, which has the same determinant and signature."""
+    assert SquareKnotScore(9, signature, colourings, True, 1.0, True, 20.0).success == counts

@@ -10,10 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.tasks.diagrams import Diagram, crossings
+
 Array = NDArray[np.float64]
 
 HALF_KNOT = 3
 """Knot determinant of a thread with one throw, a trefoil."""
+
+SQUARE_KNOT = (9, 0, 27)
+"""Determinant, signature and three-colourings of a square knot: a trefoil and its mirror image, one after the other.
+
+A granny knot, of two trefoils of the same hand, has the signature 4 or -4; the stevedore knot has 9 colourings.
+"""
 
 AROUND = 0.75
 """Turns that a thread must make around a vessel to go around it: it makes half of one where it only passes below."""
@@ -25,27 +33,13 @@ def determinant(points: Array, seed: int = 0) -> int:
     From the crossings of its shadow on a random plane (Livingston, Knot Theory, 1993, chapter 3): in each, twice the
     arc that passes over less both that end below.
     """
-    turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    a = points @ turn
-    d, n = np.roll(a, -1, axis=0) - a, len(points)
-    crossings: list[tuple[float, float]] = []
-    for i in range(n):
-        j = np.arange(i + 2, n if i else n - 1)
-        r, s, q = d[i], d[j], a[j] - a[i]
-        with np.errstate(all="ignore"):
-            per = r[0] * s[:, 1] - r[1] * s[:, 0]
-            t, u = (q[:, 0] * s[:, 1] - q[:, 1] * s[:, 0]) / per, (q[:, 0] * r[1] - q[:, 1] * r[0]) / per
-            cross = np.abs(per) > 1e-9 * np.linalg.norm(r) * np.linalg.norm(s, axis=1)
-        for k in np.flatnonzero(cross & (t >= 0.0) & (t < 1.0) & (u >= 0.0) & (u < 1.0)):
-            below = a[i, 2] + t[k] * r[2] < a[j[k], 2] + u[k] * s[k, 2]
-            first, second = i + float(t[k]), float(j[k] + u[k])
-            crossings.append((first, second) if below else (second, first))
-    m = len(crossings)
+    found = crossings(points, seed)
+    m = len(found)
     if m < 3:
         return 1
-    unders = np.sort([under for under, _ in crossings])
+    unders = np.sort([crossing.under for crossing in found])
     rows = np.zeros((m, m))
-    for row, (under, over) in enumerate(crossings):
+    for row, (under, over, _) in enumerate(found):
         i = int(np.searchsorted(unders, under))
         rows[row, int(np.searchsorted(unders, over)) % m] += 2.0
         rows[row, i] -= 1.0
@@ -58,6 +52,27 @@ def closed(points: Array, far: float = 1.0) -> Array:
     middle = points.mean(axis=0)
     way = middle + far * np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 2.0], [0.0, -1.0, 2.0], [0.0, -1.0, 0.0]])
     return np.vstack([points, way])
+
+
+def knotted_around(points: Array, centre: Array, radius: float) -> bool:
+    """Whether the knot in a thread (n, 3) joins its parts on both sides of the point below a vessel along x.
+
+    A knot in one end of a thread that lies below the vessel is in that part alone, which then is knotted by itself.
+    """
+    near = (np.linalg.norm((points - centre)[:, 1:], axis=1) < 1.5 * radius) & (points[:, 2] < centre[2])
+    if not near.any():
+        return False
+    lowest = int(np.where(near, points[:, 2], np.inf).argmin())
+    return all(
+        determinant(_closed_below(half)) == 1 for half in (points[: lowest + 1], np.flip(points[lowest:], axis=0))
+    )
+
+
+def _closed_below(half: Array, far: float = 1.0) -> Array:
+    """A part of a thread (n, 3), closed far around it: down from its last point, along y to its first one."""
+    side = np.array([0.0, far if half[0, 1] > half[-1, 1] else -far, 0.0])
+    down = np.array([0.0, 0.0, -far])
+    return np.vstack([half, half[-1] + down, half[-1] + down + side, half[0] + side])
 
 
 def turns(points: Array, centre: Array) -> float:
@@ -108,4 +123,62 @@ class ThrowScore:
             f"{'a throw' if self.success else 'no throw'} around the vessel in {self.time:.1f} s",
             f"determinant of the knot {self.determinant}, {abs(self.turns):.2f} turns around the vessel",
             f"drawn with {self.drawn:.1f} N, hands {'empty' if self.hands_empty else 'not empty'}",
+        ]
+
+
+@dataclass(frozen=True)
+class SquareKnotScore:
+    """How well a square knot was made around a vessel: two throws of opposite hands, one on the other.
+
+    Parameters
+    ----------
+    determinant, signature, colourings
+        Of the knot in the thread, its ends led on along y.
+    around
+        Whether the knot closes a loop around the vessel (`knotted_around`); in a square knot each end leaves on its own
+        side, so that turns do not tell.
+    tension
+        Of the loop around the vessel in newtons.
+    hands_empty
+        Whether no jaw holds anything.
+    time
+        Simulated seconds until the end.
+    """
+
+    determinant: int
+    signature: int
+    colourings: int
+    around: bool
+    tension: float
+    hands_empty: bool
+    time: float
+
+    @classmethod
+    def of(
+        cls, points: Array, centre: Array, radius: float, tension: Array, hands_empty: bool, time: float
+    ) -> SquareKnotScore:
+        """The score of a thread whose elements are at ``points`` (n, 3) now and bear ``tension`` (n,).
+
+        ``centre`` (3,) and ``radius`` are those of the vessel along x.
+        """
+        half_turn = np.array([1.0, 1.0, 1.0] if points[0, 1] > points[-1, 1] else [-1.0, -1.0, 1.0])
+        diagram = Diagram.of(closed(half_turn * points))
+        below = (np.linalg.norm((points - centre)[:, 1:], axis=1) < 1.5 * radius) & (points[:, 2] < centre[2])
+        loop = float(np.median(tension[below])) if below.any() else 0.0
+        kind = diagram.determinant, diagram.signature, diagram.colourings
+        return cls(*kind, knotted_around(points, centre, radius), loop, hands_empty, time)
+
+    @property
+    def success(self) -> bool:
+        """Whether there is a square knot in the thread, around the vessel, and nothing holds it."""
+        kind = self.determinant, self.signature, self.colourings
+        return kind == SQUARE_KNOT and self.around and self.hands_empty
+
+    def lines(self) -> list[str]:
+        """One figure a line."""
+        kind = f"determinant {self.determinant}, signature {self.signature}, {self.colourings} three-colourings"
+        return [
+            f"{'a square knot' if self.success else 'no square knot'} around the vessel in {self.time:.1f} s",
+            f"{kind}, {'around' if self.around else 'not around'} the vessel",
+            f"the loop bears {self.tension:.2f} N, hands {'empty' if self.hands_empty else 'not empty'}",
         ]
