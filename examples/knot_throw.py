@@ -36,7 +36,7 @@ STREAM = 0.02
 """Seconds between two set-points of a stream."""
 
 START = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-OPEN, SHUT = 0.8, -0.35
+OPEN, FINGER_OPEN, SHUT = 0.8, 0.4, -0.35
 DEEP, FINGERTIP = 0.0075, 0.0094
 """Metres from the control point of a tool to where it holds the thread, and to the end of its fingers."""
 
@@ -46,8 +46,8 @@ TAKES = np.array([0.926, -0.185, -0.324])
 REACHES = np.array([-0.989, -0.148, 0.0])
 """Direction of the right tool: level and along the vessel, a finger that the thread is laid around."""
 
-HELD, TAIL = 6, 6
-"""How many elements from its end the thread is held: the long one, and the short one."""
+HELD, TAIL, BESIDE_PADS = 6, 6, 4
+"""How many elements from its end the thread is held: the long one, and the short one; how many pads may bend."""
 
 TIP, LOOP = -0.022, -0.003
 """Metres along the vessel from the thread to the fingertips and to the left tool, while the thread is laid around."""
@@ -64,12 +64,15 @@ BEGIN, END = 60, 420
 OVER, BESIDE = 0.0075, 0.005
 """Metres that the left tool keeps over the vessel, and from the thread that leads up from it."""
 
+RETRIES = (0, 3, -2, 6)
+"""Elements nearer to the vessel than the first choice at which jaws that closed on nothing try again."""
+
 SLOW, BRISK, FAST = 0.03, 0.06, 0.08
 PULL, DRAWN, MOST = 0.35, 1.0, 8.0
 """Newtons that keep the loop on the jaws, with which a throw is drawn, and the most."""
 
-SHIFT, FRICTION = 0.002, (0.3, 0.4)
-"""Of random seeds: metres by which the thread lies elsewhere along the vessel, and its coefficient of friction."""
+SHIFT, FRICTION = 0.003, (0.3, 0.4)
+"""Of random seeds: metres by which vessel and thread lie elsewhere on the table, and the thread's friction."""
 
 
 def length_around(anchor: Array, angle: float, radius: float) -> float:
@@ -128,6 +131,19 @@ class Knotter:
     def tension(self) -> Array:
         """Tension (n,) of the elements."""
         return np.array(self.simulation.state["rod_tension"][0][self.thread])
+
+    def taut(self) -> float:
+        """Tension of the thread, the most of all of it but what is beside the pads, which bend it."""
+        tension = self.tension()
+        for held in (self.held(name) for name in self.arms):
+            if held is None:
+                continue
+            tension[max(held - BESIDE_PADS, 0) : held + BESIDE_PADS + 1] = 0.0
+        return float(tension.max())
+
+    def pull(self) -> float:
+        """Tension of the long end beside the left jaws."""
+        return float(self.tension()[self._must_hold(LEFT) - 6 :][:3].max())
 
     def held(self, name: str) -> int | None:
         """The element between the jaws of an arm."""
@@ -222,14 +238,18 @@ class Knotter:
     # --- the throw ----------------------------------------------------------------------------
 
     def take_long_end(self) -> None:
-        """The left arm takes the long end."""
-        element = len(self.thread) - HELD
-        self.go({LEFT: drawn_back(self.grasp(LEFT, TAKES, element), 0.03)}, speed=FAST)
-        self.go({LEFT: drawn_back(self.grasp(LEFT, TAKES, element), 0.015)})
-        self.go({LEFT: self.grasp(LEFT, TAKES, element)})
-        self.go({}, {LEFT: SHUT})
-        self.wait(0.2)
-        self._must_hold(LEFT)
+        """The left arm takes the long end; where its jaws close on nothing, it tries nearer to the vessel."""
+        for more in RETRIES:
+            element = len(self.thread) - HELD - more
+            self.go({LEFT: drawn_back(self.grasp(LEFT, TAKES, element), 0.03)}, {LEFT: OPEN}, speed=FAST)
+            self.go({LEFT: drawn_back(self.grasp(LEFT, TAKES, element), 0.015)})
+            self.go({LEFT: self.grasp(LEFT, TAKES, element)})
+            self.go({}, {LEFT: SHUT})
+            self.wait(0.2)
+            if self.held(LEFT) is not None:
+                return
+            self.go({LEFT: drawn_back(self.tools[LEFT], 0.01)}, {LEFT: OPEN})
+        raise Failure(f"{LEFT} did not find the long end")
 
     def wrap(self, side: float = 1.0) -> None:
         """The left arm lays the long end once around the open jaws of the right arm, from ``side`` of the vessel on.
@@ -240,7 +260,7 @@ class Knotter:
         height = float(np.clip(SHARE * free - MORE, LOW, HIGH))
         self.go({LEFT: self._left_at(self.vessel + [LOOP, side * 0.03, height + 0.02])}, speed=BRISK)
         finger = self._tool(REACHES, np.array([0.0, -1.0, 0.0]), self.vessel + [TIP, 0.0, height], FINGERTIP)
-        self.go({RIGHT: drawn_back(finger, 0.04)}, {RIGHT: OPEN}, speed=FAST)
+        self.go({RIGHT: drawn_back(finger, 0.04)}, {RIGHT: FINGER_OPEN}, speed=FAST)
         self.go({RIGHT: finger})
         z, at = finger[:3, 2], finger[:3, 3]
         centre = at + (self.vessel[0] + LOOP - at[0]) / z[0] * z
@@ -265,8 +285,11 @@ class Knotter:
         way = way[(way[:, 2] > self.vessel[2] + 0.004) & (way[:, 2] < centre[2] - 0.006)]
         return float(way[:, 0].min() - centre[0]) if len(way) else 0.0
 
-    def take_short_end(self) -> None:
-        """The right arm takes the short end, the loop about its jaws; the left arm keeps it from slipping off."""
+    def take_short_end(self) -> bool:
+        """The right arm takes the short end, the loop about its jaws; the left arm keeps it from slipping off.
+
+        False, and nothing taken, where the loop has slipped off before.
+        """
         root = self.tools[RIGHT][:3, 3] - 0.002 * self.tools[RIGHT][:3, 2]
         off = self.tools[LEFT][:3, 3] + DEEP * self.tools[LEFT][:3, 2] - root
         away = float(np.linalg.norm(off))
@@ -274,31 +297,64 @@ class Knotter:
 
         def keep() -> None:
             nonlocal away
-            pull = float(self.tension()[self._must_hold(LEFT) - 6 :][:3].max())
-            away = float(np.clip(away + STREAM * np.clip((PULL - pull) / PULL, -1.0, 1.0) * 0.03, THINNEST, 0.045))
+            away = float(
+                np.clip(away + STREAM * np.clip((PULL - self.pull()) / PULL, -1.0, 1.0) * 0.03, THINNEST, 0.045)
+            )
             T = self.tools[RIGHT]
             self.tools[LEFT] = self._left_at(T[:3, 3] - 0.002 * T[:3, 2] + away * off)
 
-        for behind in (0.007, 0.007, 0.0):
-            goal = drawn_back(self.grasp(RIGHT, REACHES, TAIL), behind)
-            self.go({RIGHT: goal}, speed=SLOW, meanwhile=keep)
-        self.go({}, {RIGHT: SHUT})
-        self.wait(0.2)
-        if self._must_hold(RIGHT) > self.anchor() // 2:
-            raise Failure(f"{RIGHT} took the loop, not the short end")
-        # Slack, so that the loop slips off the jaws as they go back.
+        for more in RETRIES:
+            for behind in (0.007, 0.007, 0.0):
+                goal = drawn_back(self.grasp(RIGHT, REACHES, TAIL + more), behind)
+                self.go({RIGHT: goal}, speed=SLOW, meanwhile=keep)
+                if not self.looped(self.anchor()):
+                    self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.03)})
+                    return False
+            self.go({}, {RIGHT: SHUT})
+            self.wait(0.2)
+            held = self.held(RIGHT)
+            if held is not None and held < TAIL + more + 6:
+                break
+            self.go({}, {RIGHT: FINGER_OPEN})
+            self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.007)}, speed=SLOW, meanwhile=keep)
+        else:
+            raise Failure(f"{RIGHT} did not find the short end")
+        self.slip_off(off)
+        return True
+
+    def slip_off(self, off: Array) -> None:
+        """The right arm goes back through the loop, which the left one draws off its jaws along ``off`` (3,)."""
         root = self.tools[RIGHT][:3, 3] - 0.002 * self.tools[RIGHT][:3, 2]
-        self.go({LEFT: self._left_at(root + 0.015 * off)})
+        self.go({LEFT: self._left_at(root + 0.015 * off - [0.012, 0.0, 0.0])})
         self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.03)}, speed=SLOW)
+
+        def pulls() -> bool:
+            return self.taut() > 2.0
+
         through = frame(np.eye(3), np.array([0.015, 0.0, 0.006])) @ self.tools[RIGHT]
-        goals = {RIGHT: through, LEFT: self._left_at(root + 0.03 * off - [0.015, 0.0, 0.0])}
-        self.go(goals, until=lambda: float(self.tension().max()) > 2.0)
+        self.go({RIGHT: through, LEFT: self._left_at(root + 0.03 * off - [0.03, 0.0, 0.0])}, until=pulls)
+        for _ in range(6):
+            if not self.looped(self._must_hold(RIGHT) + 12):
+                return
+            hand, tool = self.tools[LEFT], self.tools[RIGHT]
+            self.go({LEFT: frame(np.eye(3), [0.01, 0.0, 0.0]) @ hand, RIGHT: drawn_back(tool, 0.006)}, speed=SLOW)
+            self.go({LEFT: frame(np.eye(3), [-0.02, 0.0, 0.0]) @ hand}, until=pulls)
+        if self.looped(self._must_hold(RIGHT) + 12):
+            raise Failure(f"the loop did not slip off {RIGHT}")
+
+    def looped(self, first: int) -> bool:
+        """Whether the thread, from element ``first`` to the left hand, goes about the right arm's jaws or shaft."""
+        T, points = self.tools[RIGHT], self.points()[first : self._must_hold(LEFT)]
+        local = (points - T[:3, 3]) @ T[:3, :3]
+        near = (np.abs(local[:, 2] + 0.008) < 0.018) & (np.hypot(local[:, 0], local[:, 1]) < 0.007)
+        angles = np.unwrap(np.arctan2(local[near, 1], local[near, 0]))
+        return bool(near.any() and np.ptp(angles) > np.pi)
 
     def draw(self, side: float = 1.0) -> None:
         """Both ends go to where the other one was, until both are taut."""
 
         def tight() -> bool:
-            return min(self.ends()) > DRAWN or float(self.tension().max()) > MOST
+            return min(self.ends()) > DRAWN or self.taut() > MOST
 
         R = self.tools[RIGHT][:3, :3]
 
@@ -320,12 +376,20 @@ class Knotter:
         self.go({name: drawn_back(T, 0.03) for name, T in self.tools.items()})
         self.wait(0.5)
 
+    def throw(self, side: float = 1.0) -> None:
+        """One throw, until both ends are taut; where the loop slips off the jaws, it is laid again."""
+        for _ in RETRIES:
+            self.wrap(side)
+            if self.take_short_end():
+                break
+        else:
+            raise Failure(f"the loop slipped off {RIGHT} each time")
+        self.draw(side)
+
     def make(self) -> None:
         """The whole throw."""
         self.take_long_end()
-        self.wrap()
-        self.take_short_end()
-        self.draw()
+        self.throw()
         self.leave()
 
     def score(self) -> ThrowScore:
@@ -335,17 +399,19 @@ class Knotter:
 
 
 def scattered(scene: Scene, seed: int) -> Scene:
-    """The thread elsewhere along the vessel, more or less smooth; seed 0 leaves it."""
+    """Vessel and thread elsewhere on the table, the thread more or less smooth; seed 0 leaves them."""
     if seed == 0:
         return scene
     rng = np.random.default_rng(seed)
-    shift, friction = frame(np.eye(3), np.array([rng.uniform(-SHIFT, SHIFT), 0.0, 0.0])), float(rng.uniform(*FRICTION))
-    thread = set(scene.rods[0].bodies)
+    shift, friction = frame(np.eye(3), np.append(rng.uniform(-SHIFT, SHIFT, 2), 0.0)), float(rng.uniform(*FRICTION))
+    thread, block = set(scene.rods[0].bodies), next(b for b in scene.bodies if b.identity.name == "Block")
     bodies = [
         replace(body, T_world_body=shift @ body.T_world_body, friction=friction) if body.index in thread else body
         for body in scene.bodies
     ]
-    return replace(scene, bodies=type(scene.bodies)(bodies))
+    bodies[block.index] = replace(block, T_world_body=shift @ block.T_world_body)
+    roots = {**scene.start.roots, block.index: shift @ scene.start.roots[block.index]}
+    return replace(scene, bodies=type(scene.bodies)(bodies), start=replace(scene.start, roots=roots))
 
 
 def operate(simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None) -> tuple[ThrowScore, str]:
