@@ -37,7 +37,9 @@ ASIDE = 0.015
 THREAD_ELEMENTS = 60
 """Of 2.5 mm: 150 mm of thread, enough for three stitches and both ends."""
 
-BOARD_LOW, BOARD_HIGH = (-0.055, -0.13, 0.0), (0.055, 0.055, 0.004)
+BOARD_LOW, BOARD_HIGH = (-0.13, -0.15, 0.0), (0.055, 0.07, 0.004)
+"""Corners of the board: needle and thread lie on it wherever they are put. A thread that hangs over its edge pulls the
+needle off."""
 NEEDLE = (-0.04, 0.03)
 """Where the needle lies on the board; its thread lies along -Y, beside the pad."""
 
