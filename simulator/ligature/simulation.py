@@ -220,7 +220,7 @@ def _free_unheld() -> None:
     global _crowd
     if len(_simulations) >= _crowd:
         gc.collect()
-        _crowd = max(MOST_UNHELD, 2 * len(_simulations))
+        _crowd = len(_simulations) + MOST_UNHELD
 
 
 class Simulation:

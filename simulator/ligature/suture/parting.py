@@ -20,7 +20,7 @@ from ligature.suture.contacts import RECOVERY
 from ligature.suture.layout import RodArrays
 from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.suture.springs import open_springs
-from ligature.suture.substeps import open_rod, open_touches
+from ligature.suture.substeps import open_rod
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -33,7 +33,10 @@ SHALLOW = 0.5
 """Distance of an element's axis from the surface of a body, in radii, above which it is not in it."""
 
 TOO_DEEP = 1e-3
-"""Depth of an element's axis in a body in metres that contact does not take back: the element was put there."""
+"""Depth of an element's axis in metres from which one that was put into a body does not collide with it.
+
+Only what was put somewhere is asked: contacts over sharp edges sink by 2 mm, and hold.
+"""
 
 BESIDE = 3
 """Elements beside one that is inside a body that do not collide with it either: they would hold back what leaves."""
@@ -83,14 +86,12 @@ def _is_inside(rod: RodArrays, c: int, e: int, normal: Array) -> bool:
 
 
 @inlined
-def _near(inside: Flags, c: int, e: int) -> bool:
-    """Whether element ``e`` is inside another part than ``c``, or beside one that is inside ``c``."""
-    near = False
-    for b in range(inside.shape[0]):
-        near = near or inside[b, e]
+def _beside(inside: Flags, c: int, e: int) -> bool:
+    """Whether element ``e`` is beside one that is inside part ``c``."""
+    beside = False
     for k in range(max(e - BESIDE, 0), min(e + BESIDE + 1, inside.shape[1])):
-        near = near or inside[c, k]
-    return near
+        beside = beside or inside[c, k]
+    return beside
 
 
 @kernel
@@ -116,21 +117,14 @@ def depth_of(rod_table: Integers, part: int, element: int) -> float:
 
 
 @kernel
-def draw_out(
-    rod_table: Integers, touch_table: Integers, spring_table: Integers, never: Flags, inside: Flags, dt: float
-) -> bool:  # fmt: skip
+def draw_out(rod_table: Integers, spring_table: Integers, never: Flags, inside: Flags, dt: float) -> bool:
     """Push elements out of the parts that they are ``inside`` (S, n), and flag those that come into one beside them.
 
-    Contacts of the last tick that are too deep are flagged, what has left is not any more. Pairs in ``never`` (S, n) do
-    not collide. Returns whether any flag changed.
+    What has left is not flagged any more. Pairs in ``never`` (S, n) do not collide. Returns whether any flag changed.
     """
-    rod, touches, s = open_rod(rod_table), open_touches(touch_table), open_springs(spring_table)
+    rod, s = open_rod(rod_table), open_springs(spring_table)
     shapes, changed = rod.shapes, False
     nodes, first, normal = rod.nodes, rod.constants.first[0], rod.work.three[2]
-    for m in range(touches.count[0]):
-        c, i = touches.key[m], touches.node[m, 0]
-        if 0 <= c < inside.shape[0] and touches.gap[m] < -TOO_DEEP - nodes.radius[i]:
-            inside[c, i - first], changed = True, True
     any_ = False
     for c in range(inside.shape[0]):
         for e in range(inside.shape[1]):
@@ -138,12 +132,16 @@ def draw_out(
     if not any_:
         return changed
     for e in range(inside.shape[1]):
-        i, row, begun = first + e, s.filled[0], False
+        i, row, begun, elsewhere = first + e, s.filled[0], False, False
+        for b in range(inside.shape[0]):
+            elsewhere = elsewhere or inside[b, e]
         for c in range(inside.shape[0]):
             if not inside[c, e]:
-                if shapes.node[c] < 0 or never[c, e] or not _near(inside, c, e) or not _is_inside(rod, c, e, normal):
+                if shapes.node[c] < 0 or never[c, e] or not (elsewhere or _beside(inside, c, e)):
                     continue
-                inside[c, e], changed = True, True
+                if not _is_inside(rod, c, e, normal):
+                    continue
+                inside[c, e], elsewhere, changed = True, True, True
             elif shapes.node[c] < 0 or _depth(rod, c, e, normal) < -nodes.radius[i]:
                 inside[c, e], changed = False, True
                 continue

@@ -389,7 +389,7 @@ class Rod:
 
     def draw_out(self, never: NDArray[np.bool_], inside: NDArray[np.bool_]) -> bool:
         """Push elements out of the parts that they are ``inside`` (S, n) in the coming tick; see `parting.draw_out`."""
-        return bool(draw_out(self._table, self._touch_tables[0], self._spring_table, never, inside, self.dt))
+        return bool(draw_out(self._table, self._spring_table, never, inside, self.dt))
 
     def set_gravity(self, element: int, acceleration: Sequence[float]) -> None:
         """Set the gravity ``acceleration`` (3,) of an element from now on."""
@@ -537,7 +537,7 @@ class Rod:
 
 NODES_KEPT = ("x", "q", "v", "w", "mass", "inertia", "gravity", "fixed")
 JOINTS_KEPT = ("angle", "load", "rest")
-TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "normal", "force", "start", "gap")
+TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "normal", "force", "start")
 """Arrays of nodes, joints and contact points that last from tick to tick."""
 
 _KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly")

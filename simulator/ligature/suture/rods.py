@@ -208,6 +208,7 @@ class Rods:
     def _heal(self, rod: Rod) -> None:
         """Put a rod that diverged back to its initial shape, and report it."""
         rod.reset()
+        self._exclusions[self.rods.index(rod)].look()
         message = f"rod '{rod.description.name}' diverged and was reset to its initial shape"
         self.problems.append(Diagnostic(Severity.ERROR, message, code="diverged"))
 
