@@ -28,6 +28,7 @@ QUALIFIED = frozenset({
 STRANGERS: dict[str, tuple[str, ...]] = {
     "adf/nodes.py:_Composer.__init__": (".yaml",),
     "adf/reader.py:_opened": (".yaml",),
+    "adf/reader.py:_content": (".yaml",),
     "adf/resolver.py:Resolver.read_bytes": (".yaml", ".obj", ".stl", ".3ds", ".mtl"),
     "adf/resolver.py:Resolver.read_text": (".yaml",),
     "adf/resolver.py:_named_files": (".yaml",),

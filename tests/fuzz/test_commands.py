@@ -31,7 +31,7 @@ def test_no_command_whatever_raises_in_a_step_or_leaves_a_number_that_is_not_fin
     run.simulation.close()
     assert run.taken > 0.2 * COMMANDS
     states = Counter(state for _, _, state in run.seen.elements())
-    assert all(states[state.name] > 50 for state in State), states
+    assert all(states[state.name] > 20 for state in State), states
     assert set(VERBS) == {verb for _, verb, _ in run.seen if verb in VERBS}
 
 

@@ -101,10 +101,10 @@ def test_bodies_that_overlap_where_they_start_part_at_walking_pace(depth: float,
     file = write(tmp_path, bodies={"A": box % ("a", 1.0, ""), "B": box % ("b", 0.1, place)})
     simulation = ligature.Simulation(ligature.load(file))
     top_speed = 0.0
-    for _ in range(1000):
+    for _ in range(5000):
         simulation.step()
         top_speed = max(top_speed, float(np.abs(simulation.state["body_twist"][0, :, :3]).max()))
-    assert top_speed < 2.5
+    assert top_speed < 0.5
     apart = np.abs(simulation.bodies["B"].pose[:3] - simulation.bodies["A"].pose[:3]).max()
     assert apart > 0.999
 
