@@ -106,7 +106,9 @@ class SimulationControls:
             self._phase: Any = gui.add_text(
                 "Phase", phase, hint="Phase of the work that begins next, such as 'G3 push the needle'; empty for none"
             )
-            mark = gui.add_button("Mark the phase", hint="From now on recordings and their datasets have this label")
+            mark = gui.add_button(
+                "Mark the phase", color="gray", hint="From now on recordings and their datasets have this label"
+            )
         self._paused.on_update(self._of("pause"))
         steps.on_click(self._of("step"))
         self._speed.on_update(self._of("speed"))
