@@ -41,6 +41,7 @@ class Exclusions:
         self.of_scene = shapes.skip.copy()
         self._pads, self._inside = np.zeros((2, *shapes.skip.shape), dtype=np.bool_)
         self._never = self.of_scene.copy()
+        self._any = False
         self._due = np.ones(len(shapes.skip), dtype=np.bool_)
 
     def look(self, parts: slice = slice(None)) -> None:
@@ -50,7 +51,7 @@ class Exclusions:
     def step(self) -> list[tuple[int, int, float]]:
         """Find what is inside bodies after a move, and push it out; returns part, element, depth of deep overlaps."""
         found = self._find() if self._due.any() else []
-        if self._rod.draw_out(self._never, self._inside):
+        if self._any and self._rod.draw_out(self._never, self._inside):
             self._write()
         return found
 
@@ -71,6 +72,7 @@ class Exclusions:
         self._write()
 
     def _write(self) -> None:
+        self._any = bool(self._inside.any())
         self._never[:] = self.of_scene | self._pads
         self._shapes.skip[:] = self._never | self._inside
         for k in range(1, BESIDE + 1):
