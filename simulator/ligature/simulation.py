@@ -366,9 +366,11 @@ class Simulation:
 
     def _coast(self, ticks: int) -> int:
         """Advance by up to ``ticks`` in which only bodies and their joints have work, in one call; returns how many."""
+        if self._resting:
+            return 0
         tick = self._clock.since_reset
         for subsystem in self._beside_bodies:
-            ticks = min(ticks, 0 if self._resting else subsystem.idle_ticks(tick))
+            ticks = min(ticks, subsystem.idle_ticks(tick))
             if ticks < 2:
                 return 0
         with self.phases["bodies"]:

@@ -55,9 +55,7 @@ class Clockwork:
 
     def mark(self, phase: str) -> None:
         """Mark that a phase of the work begins; raises ValueError for what is no name of one."""
-        mark = MarkPhase(phase.strip())
-        mark.check()
-        self._send(mark)
+        self._send(MarkPhase.of(phase))
 
     def end_record(self) -> None:
         """Record no longer."""

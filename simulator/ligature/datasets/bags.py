@@ -67,15 +67,16 @@ def record_bag(
     for name in named:
         if name not in found.cameras:
             raise BagError(f"{bag}: has no pictures of '{name}', only of {', '.join(found.cameras) or 'none'}")
+    marked = MarkedPhases(found.phases)
     stamps, times = _grid(bag, found, rate, [found.cameras[name] for name in named])
     try:
-        store = EpisodeStore(out, lambda file: _describe(file, found, rate, text))
+        store = EpisodeStore(out, lambda file: _describe(file, found, marked, rate, text))
     except OSError as error:
         raise DatasetError(f"cannot write the dataset '{out}': {reason(error)}") from error
     try:
         with interrupted_once():
             episode = store.begin()
-            _write_motion(episode, found, stamps, times)
+            _write_motion(episode, found, marked, stamps, times)
             rows = EpisodeRows(episode)
             for name in named:
                 K = intrinsics(bag, found.cameras[name], size)
@@ -116,11 +117,10 @@ def _grid(bag: Path, found: Session, rate: float, topics: Sequence[str]) -> tupl
     return times + first if clock is None else np.interp(times + first, clock.values, clock.times), times
 
 
-def _describe(file: h5py.File, found: Session, rate: float, text: str) -> None:
+def _describe(file: h5py.File, found: Session, marked: MarkedPhases, rate: float, text: str) -> None:
     attributes = file.attrs
     attributes["format"], attributes["version"] = FORMAT, ligature.__version__
     attributes["scene"], attributes["rate"], attributes["task"] = "", rate, text
-    marked = MarkedPhases(found.phases)
     attributes["phases"], attributes["activities"] = ["", *marked.names], list(ACTIVITIES[:2])
     attributes["gestures"] = ["", *(marked.gestures.get(phase, "") for phase in marked.names)]
     attributes["source"], attributes["recorded"] = "bag", True
@@ -130,14 +130,13 @@ def _describe(file: h5py.File, found: Session, rate: float, text: str) -> None:
         about["joint_units"] = ["m" if "insertion" in joint else "rad" for joint in arm.joints]
 
 
-def _write_motion(episode: h5py.File, found: Session, stamps: Array, times: Array) -> None:
+def _write_motion(episode: h5py.File, found: Session, marked: MarkedPhases, stamps: Array, times: Array) -> None:
     """What is sampled of arms and needle."""
 
     def add(name: str, values: Any, dtype: str, **notes: str) -> None:
         episode.create_dataset(name, data=values, dtype=dtype).attrs.update(notes)
 
     add("time", times, "f8", units="s")
-    marked = MarkedPhases(found.phases)
     numbers = {phase: number for number, phase in enumerate(("", *marked.names))}
     phases = [numbers[marked.at(stamp)] for stamp in stamps]
     add("phase", phases, "u1")

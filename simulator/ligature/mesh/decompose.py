@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ligature.cache import cache_folder, write_atomically
 from ligature.mesh.inertia import hull_properties, mass_properties
 from ligature.mesh.mesh import Array, Mesh
-from ligature.mesh.surface import convex_surface, extent_rank, hull_vertices, joined, open_edges, shell_count
+from ligature.mesh.surface import convex_surface, extent_rank, hull_vertices, joined, open_edges, shells
 
 CONVEX_ENOUGH = 0.02
 """Largest part of its hull's volume by which a solid may fall short of it and still count as convex."""
@@ -225,10 +225,10 @@ def _check_surface(vertices: Array, faces: NDArray[np.int32]) -> None:
         raise DecompositionError("the mesh has vertices that are not finite")
     if extent_rank(vertices) < 3:
         raise DecompositionError("the mesh is flat: it has no volume to decompose; give it a thickness")
-    shells = shell_count(len(vertices), faces)
-    if shells > MOST_SHELLS:
+    count = int(shells(len(vertices), faces).max()) + 1
+    if count > MOST_SHELLS:
         raise DecompositionError(
-            f"the mesh has {shells} separate pieces of surface, more than {MOST_SHELLS}; join them, or split the file"
+            f"the mesh has {count} separate pieces of surface, more than {MOST_SHELLS}; join them, or split the file"
         )
 
 

@@ -1,6 +1,6 @@
 """Triangle surfaces: welding, closedness, convex hulls. Vertices (n, 3), faces (m, 3); any one length unit.
 
-SciPy is imported by the hulls alone: Blender, which lacks it, can use all the rest.
+SciPy is imported by hulls and `shells` alone: Blender, which lacks it, can use all the rest.
 """
 
 from __future__ import annotations
@@ -48,17 +48,15 @@ def open_edges(faces: Faces) -> int:
     return int(np.count_nonzero(balance))
 
 
-def shell_count(vertices: int, faces: Faces) -> int:
-    """Number of pieces of a welded surface of that many ``vertices`` that share no vertex with each other."""
-    lowest = np.arange(vertices)
-    while True:
-        low = lowest[faces].min(axis=1)
-        before = lowest.copy()
-        for corner in range(3):
-            np.minimum.at(lowest, faces[:, corner], low)
-        lowest = lowest[lowest]
-        if np.array_equal(lowest, before):
-            return len(np.unique(lowest[faces]))
+def shells(vertices: int, faces: Faces) -> NDArray[np.int64]:
+    """Number (m,) of the piece of surface of each face, from 0; pieces of a welded surface share no vertex."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b, c = faces.T
+    joints = coo_matrix((np.ones(2 * len(faces)), (np.r_[a, b], np.r_[b, c])), shape=(vertices, vertices))
+    of_vertex = connected_components(joints, directed=False)[1]
+    return np.unique(of_vertex[a], return_inverse=True)[1].astype(np.int64)
 
 
 def extent_rank(points: Array) -> int:

@@ -169,6 +169,10 @@ class WatchContacts(Command, code=9):
     enabled: bool = wire(FLAG)
 
 
+PHASE_TOPIC = "ligature/phase"
+"""Topic below the root of a run by which operators mark phases."""
+
+
 @dataclass(frozen=True)
 class MarkPhase(Command, code=13):
     """The operator tells which ``phase`` of the work begins; an empty text ends the present one.
@@ -177,6 +181,13 @@ class MarkPhase(Command, code=13):
     """
 
     phase: str = wire(Text())
+
+    @classmethod
+    def of(cls, text: str) -> MarkPhase:
+        """The mark that a person means by ``text``; raises ValueError for what is no name of a phase."""
+        mark = cls(text.strip())
+        mark.check()
+        return mark
 
     def check_together(self, counts: Mapping[str, int] | None) -> None:  # noqa: D102
         if not self.phase.isprintable() or self.phase != self.phase.strip():

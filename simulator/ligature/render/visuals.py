@@ -11,12 +11,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ligature.adf import AdfError, Resolver
 from ligature.mesh import Material, Mesh, MeshError, MeshPart, load_mesh
-from ligature.mesh.surface import joined, open_edges
+from ligature.mesh.surface import joined, open_edges, shells
 from ligature.model.scene import Scene
 from ligature.model.shapes import Capsule, Cone, Cylinder, Hull, Plane, ShaderFiles, Shape, Sphere, TriMesh, Visual
 from ligature.render.geometry import Triangles, flat_shaded, of_shape
@@ -143,11 +141,8 @@ def faces_outward(mesh: Mesh) -> bool:
     if not len(faces) or open_edges(faces):
         return False
     a, b, c = faces.T
-    n = len(vertices)
-    joints = coo_matrix((np.ones(2 * len(faces)), (np.r_[a, b], np.r_[b, c])), shape=(n, n))
-    _, component = connected_components(joints, directed=False)
     volumes = np.einsum("ij,ij->i", vertices[a], np.cross(vertices[b], vertices[c]))
-    return bool((np.bincount(component[a], weights=volumes)[np.unique(component[a])] > 0).all())
+    return bool((np.bincount(shells(len(vertices), faces), weights=volumes) > 0).all())
 
 
 def primitive_of(shape: Shape) -> tuple[int, float, float] | None:

@@ -21,7 +21,7 @@ from std_msgs.msg import Empty, String
 
 from ligature.bus import Outbox, Throttle, Watchdog
 from ligature.bus.codec import CodecError, Message
-from ligature.model.commands import Command, MarkPhase, Release, Reset
+from ligature.model.commands import PHASE_TOPIC, Command, MarkPhase, Release, Reset
 from ligature.model.scene import Scene
 from ligature.ros import conversion
 from ligature.ros.schedule import Key
@@ -33,9 +33,6 @@ WARNING_PAUSE = 2.0
 WORLD: Key = ("world", 0)
 RESETS = {"Reset": False, "Reset/Bodies": True, "ResetBodies": True}
 """Topics below the world's Command, and whether they put back bodies only (interface reference §2.2)."""
-
-PHASE = "ligature/phase"
-"""Topic by which an operator tells which phase of the work begins."""
 
 _RELEASED = ("body", "actuator", "camera", "light")
 COMMANDS = {
@@ -77,7 +74,7 @@ class Reception:
         self._listen(topic, WorldCmd, self._throttle)
         for name, bodies_only in RESETS.items():
             self._listen(f"{topic}/{name}", Empty, self._reset(f"{topic}/{name}", Reset(bodies_only)))
-        phase = f"{self._scene.world.root}{PHASE}"
+        phase = f"{self._scene.world.root}{PHASE_TOPIC}"
         self._listen(phase, String, lambda message: self._mark(phase, message.data))
 
     def watch(self, now: float) -> None:
@@ -124,9 +121,7 @@ class Reception:
         return lambda _: self._push(topic, reset)
 
     def _mark(self, topic: str, phase: str) -> None:
-        mark = MarkPhase(phase.strip())
-        mark.check()
-        self._push(topic, mark)
+        self._push(topic, MarkPhase.of(phase))
 
     def _throttle(self, message: WorldCmd) -> None:
         self._push(WORLD[0], Throttle(message.enable_step_throttling, message.step_clock, message.n_skip_steps))

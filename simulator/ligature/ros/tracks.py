@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pixels
 
-from ligature.model.commands import MarkPhase
+from ligature.model.commands import PHASE_TOPIC, MarkPhase
 from ligature.ros import conversion
 from ligature.ros.bags import BagError, messages, opened, topics
 
@@ -25,9 +25,6 @@ CLOCK = "/World/State"
 """End of the topic that has simulated time."""
 
 NEEDLE = "/Needle/State"
-
-PHASE = "/ligature/phase"
-"""End of the topic by which operators mark phases."""
 
 EARLY = 1e-5
 """Seconds by which a message may be later than a sample that has it: stamps and simulated times are rounded."""
@@ -137,7 +134,7 @@ def session(path: Path) -> Session:
         needle, clock = (min((t for t in found if t.endswith(end)), default="") for end in (NEEDLE, CLOCK))
         reads |= {topic: read for topic, read in ((needle, _pose), (clock, _sim_time)) if topic}
         tracks, joints = _tracks(path, messages(bag, list(reads)), reads)
-        marked = sorted(topic for topic in found if topic.endswith(PHASE))
+        marked = sorted(topic for topic in found if topic.endswith(f"/{PHASE_TOPIC}"))
         phases = _phases(path, messages(bag, marked)) if marked else ()
     empty = [topic for each in arms.values() for topic in each.values() if topic not in tracks]
     if empty:
@@ -193,13 +190,11 @@ def _phases(path: Path, rows: Iterator[tuple[str, Any, float]]) -> tuple[tuple[f
     marks = []
     for topic, message, stamp in rows:
         try:
-            mark = MarkPhase(message.data.strip())
-            mark.check()
+            marks.append((stamp, MarkPhase.of(message.data).phase))
         except AttributeError:
             raise BagError(f"{path}: {topic} has messages of the type {message._type}, not std_msgs/String") from None
         except ValueError as error:
             raise BagError(f"{path}: {topic}, {stamp:.3f} s: {error}") from None
-        marks.append((stamp, mark.phase))
     return tuple(marks)
 
 

@@ -249,9 +249,8 @@ class _Reader:
         listed, pedal = root.get("phases"), root.get("phase pedal")
         phases = []
         for node in self.items(listed, "phases") if listed is not None else []:
-            phases.append(self.text(node, "a phase").strip())
             try:
-                MarkPhase(phases[-1]).check()
+                phases.append(MarkPhase.of(self.text(node, "a phase")).phase)
             except ValueError as error:
                 raise self.fail(node.mark, str(error)) from None
             if not phases[-1] or phases[-1] in phases[:-1]:

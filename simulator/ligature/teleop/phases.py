@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import rospy
 from std_msgs.msg import String
 
-TOPIC = "ligature/phase"
-"""Below the prefix of a teleoperation; the simulator and bags keep what is published there."""
+from ligature.model.commands import PHASE_TOPIC
 
 
 class Phases:
@@ -17,7 +16,7 @@ class Phases:
     def __init__(self, names: Sequence[str], prefix: str) -> None:
         self._names = tuple(names)
         self._number = -1
-        self._topic = rospy.Publisher(f"{prefix}{TOPIC}", String, latch=True, queue_size=10) if names else None
+        self._topic = rospy.Publisher(f"{prefix}{PHASE_TOPIC}", String, latch=True, queue_size=10) if names else None
 
     def go(self, step: int) -> None:
         """Mark that the phase ``step`` places further in the list begins now; the first mark is the first phase."""
