@@ -294,8 +294,8 @@ def test_the_command_exports_and_says_what_is_wrong(source: Path, tmp_path: Path
 @pytest.mark.parametrize(
     ("size", "rate", "message"),
     [
-        ((64, 48), 12.5, "12.5 samples a second; LeRobot takes whole numbers"),
-        ((63, 48), 20.0, "63x48; videos need even"),
+        ((64, 48), 12.5, "12.5 samples a second; record it again with a whole number"),
+        ((63, 48), 20.0, "63x48; videos need even sizes, such as 62x48"),
     ],
 )
 def test_what_the_formats_cannot_hold_is_refused(

@@ -172,7 +172,7 @@ def test_what_the_arm_refuses_is_reported_and_the_episode_goes_on() -> None:
     [
         ({"task": "knit"}, "task must be one of reach, pick, insert, puncture"),
         ({"action": "torque"}, "action must be one of cartesian, joint"),
-        ({"arm": "MTML"}, "'MTML' is not a PSM"),
+        ({"arm": "MTML"}, "'MTML' is not a PSM; choose one of PSM1, PSM2"),
         ({"arm": "PSM9"}, "unknown arm 'PSM9'"),
         ({"arm": ("PSM1", "PSM2")}, "reach is done by 1 arm, such as PSM1, not by PSM1, PSM2"),
         ({"task": "hand_over", "arm": "PSM1"}, "hand_over is done by 2 arms, such as PSM1, PSM2, not by PSM1"),

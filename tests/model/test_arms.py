@@ -91,7 +91,10 @@ def test_a_launch_file_may_declare_that_there_are_none(tmp_path: Path) -> None:
     [
         ("{name: A, kind: robot}", "A: kind 'robot' must be one of psm, ecm, mtm"),
         ("{name: '1 2', kind: mtm}", "'1 2' is not a valid name; write letters, digits and '_'"),
-        ("{name: A, kind: psm, base: nowhere}", "A: base 'nowhere' names no body, or several"),
+        (
+            "{name: A, kind: psm, base: nowhere}",
+            "A: base 'nowhere' names no body, or several; give the identifier of one",
+        ),
         ("{name: A, kind: psm, base: BODY CameraFrame}", "A: no revolute joint 'yaw' is attached to"),
         ("{name: A, kind: mtm, colour: red}", "unknown key 'colour'"),
         ("just words", "'just words' is not a mapping"),

@@ -56,7 +56,7 @@ def test_a_display_that_cannot_be_opened_is_named() -> None:
         [sys.executable, "-c", code], env=dict(os.environ, DISPLAY=":987"), capture_output=True, text=True,
         check=False,
     )  # fmt: skip
-    assert "the display ':987' cannot be opened" in done.stderr
+    assert "the display ':987' cannot be opened; set DISPLAY, or run without '--window'" in done.stderr
 
 
 def test_the_window_shows_the_picture_and_passes_mouse_and_keys_on(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -233,6 +234,20 @@ def test_motion_is_for_homed_arms_only(state, motion):
     run(arm, 0.1)
     assert arm.operating_state == before
     np.testing.assert_array_equal(arm.measured_js().position, start)
+
+
+@pytest.mark.parametrize("state", MADE)
+def test_whoever_sends_what_a_rejection_names_can_move(state):
+    arm = MADE[state]()
+    for _ in range(3):
+        try:
+            MOTIONS["servo_jp"](arm)
+            break
+        except Rejected as rejection:
+            for command in re.findall(r"'(\w+)'", str(rejection)):
+                arm.state_command(command)
+                settle(arm)
+    assert arm.operating_state.state is ENABLED and arm.is_homed
 
 
 @pytest.mark.parametrize("motion", MOTIONS)

@@ -75,7 +75,7 @@ def test_a_run_whose_scene_lacks_holes_ends_and_reports_it(ros_env: dict[str, st
         [BIN / "ligature", "run", SMALL, "--task", "insertion"], env=env, capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 1
-    assert "has 0 pairs of holes Entry1, Exit1, …, not 1" in done.stdout
+    assert "has 0 pairs of holes Entry1, Exit1, …; the task needs 1" in done.stdout
 
 
 def test_a_task_that_there_is_not_is_refused_with_those_that_there_are(ros_env: dict[str, str]) -> None:

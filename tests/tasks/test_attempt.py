@@ -114,7 +114,7 @@ def test_nothing_is_judged_before_the_first_state(scene: Scene) -> None:
 
 def test_what_a_scene_lacks_is_named(scene: Scene) -> None:
     small = ligature.load(SCENES / "suturing_small" / "launch.yaml")
-    with pytest.raises(MissingBodies, match="has 0 pairs of holes Entry1, Exit1, …, not 4"):
+    with pytest.raises(MissingBodies, match="has 0 pairs of holes Entry1, Exit1, …; the task needs 4"):
         Attempt(small, "suture")
     bodies = [
         replace(b, identity=replace(b.identity, name=b.identity.name.replace("Camera", ""))) for b in scene.bodies

@@ -95,7 +95,7 @@ def test_an_exact_estimate_has_no_error_and_a_turned_one_the_way_of_its_points(s
 
 def test_a_scene_without_holes_is_reported() -> None:
     scene = ligature.load(SMALL)
-    with pytest.raises(MissingBodies, match=r"has 0 pairs of holes Entry1, Exit1, …, not 1"):
+    with pytest.raises(MissingBodies, match=r"has 0 pairs of holes Entry1, Exit1, …; the task needs 1"):
         Scenery.of(scene)
     scenery = Scenery.of(scene, pairs=0)
     assert len(scenery.thread) == 40

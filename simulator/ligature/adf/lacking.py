@@ -31,7 +31,7 @@ def lack_of(path: Path) -> Lack | None:
     if stat.S_ISDIR(mode):
         return Lack("is a folder", "give the path of a file in it")
     if not stat.S_ISREG(mode):
-        return Lack("is not a regular file", "")
+        return Lack("is not a regular file", "give the path of a file")
     if not os.access(path, os.R_OK, effective_ids=True):
         return Lack("cannot be read: permission denied", "let your user read it")
     return None
@@ -54,7 +54,7 @@ def _unfound(path: Path, error: OSError) -> Lack:
     if error.errno not in (errno.ENOENT, errno.ENOTDIR):
         return Lack(f"cannot be read: {(error.strerror or str(error)).lower()}", "let your user read its folder")
     if os.path.islink(path):
-        return Lack("is a link that leads to no file", "")
+        return Lack("is a link that leads to no file", "mend the link, or give the file itself")
     return Lack("does not exist", _spelling(path))
 
 

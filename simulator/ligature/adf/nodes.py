@@ -170,7 +170,9 @@ class _Composer:
         """The node that begins with ``event``, and the span it takes here."""
         mark = self._mark(event.start_mark)
         if depth > MAX_DEPTH:
-            raise self._error(mark, f"the file nests deeper than {MAX_DEPTH} levels")
+            raise self._error(
+                mark, f"the file nests deeper than {MAX_DEPTH} levels", "close the inner brackets earlier"
+            )
         span = (self._offset(event.start_mark), self._offset(event.end_mark))
         if isinstance(event, yaml.AliasEvent):
             return self._alias(event.anchor, mark), span
@@ -184,7 +186,7 @@ class _Composer:
                 node = self._mapping(event, mark, span[0], depth)
             self._open.pop()
             if node.weight > MAX_NODES:
-                raise self._error(mark, f"aliases expand to more than {MAX_NODES} values")
+                raise self._error(mark, f"aliases expand to more than {MAX_NODES} values", "use fewer aliases")
         if event.anchor:
             node.anchor = event.anchor
             self._anchors[event.anchor] = node
@@ -212,7 +214,7 @@ class _Composer:
 
     def _alias(self, anchor: str, mark: Mark) -> Node:
         if anchor in self._open:
-            raise self._error(mark, f"alias '*{anchor}' is inside the block that it names")
+            raise self._error(mark, f"alias '*{anchor}' is inside the block that it names", "write the values out")
         if anchor not in self._anchors:
             raise self._error(mark, f"alias '*{anchor}' names no anchor", f"define '&{anchor}' before it")
         return self._anchors[anchor]
@@ -240,7 +242,7 @@ class _Composer:
             value, span = self._node(next(self._events), depth + 1)
             node.weight += key.weight + value.weight
             if not isinstance(key, Scalar):
-                raise self._error(key.mark, "a mapping key must be plain text")
+                raise self._error(key.mark, "a mapping key must be plain text", "write 'key: value'")
             if key.text in node.entries:
                 node.duplicates.append(key)
             else:

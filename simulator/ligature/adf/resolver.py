@@ -68,7 +68,7 @@ class Resolver:
         Raises `ResolutionError`, which names ``mark``, the place in the file that refers to it.
         """
         if "\0" in reference:
-            raise self._refusal("the path contains a zero byte", mark)
+            raise self._refusal("the path contains a zero byte", mark, "write the path without it")
         if _URL.match(reference):
             raise self._refusal(f"'{reference}' is a URL", mark, instead_of_url(reference))
         return self.allow(Path(os.path.join(base, reference)), mark)
@@ -76,9 +76,9 @@ class Resolver:
     def allow(self, path: Path, mark: Mark | None = None) -> Path:
         """``path`` with links resolved, if it lies below a root; raises `ResolutionError` at ``mark``."""
         if "\0" in str(path):
-            raise self._refusal("the path contains a zero byte", mark)
+            raise self._refusal("the path contains a zero byte", mark, "write the path without it")
         if len(str(path)) > MAX_PATH or any(len(part.encode("utf-8", "replace")) > MAX_NAME for part in path.parts):
-            raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark)
+            raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark, "give a shorter one")
         real = real_path(path)
         if not any(real == root or root in real.parents for root in self.roots):
             roots = ", ".join(map(str, self.roots))
@@ -108,10 +108,10 @@ class Resolver:
             if lack is not None:
                 raise self._refusal(f"'{real}' {lack.fault}", mark, lack.hint)
             if real.stat().st_size > limit:
-                raise self._refusal(f"'{real}' is larger than {limit} bytes", mark)
+                raise self._refusal(f"'{real}' is larger than {limit} bytes", mark, "split it, or reduce it")
             return real.read_bytes()
         except OSError as error:
-            raise self._refusal(f"'{real}' cannot be read: {error.strerror}", mark) from error
+            raise self._refusal(f"'{real}' cannot be read: {error.strerror}", mark, "give another file") from error
 
     def read_text(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> str:
         """The content of ``path`` as UTF-8 text, at most ``limit`` bytes.

@@ -43,7 +43,7 @@ def capsules_along(points: Array, closed: bool, sides: int, radius: float) -> li
     path = np.vstack([points, points[:1]]) if closed else np.asarray(points, dtype=float)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     if length[-1] <= 0.0:
-        raise ValueError("the edges have no length")
+        raise ValueError("the edges have no length; select edges whose ends lie apart")
     if len(path) - 1 > sides:
         places = np.linspace(0.0, length[-1], sides + 1)
         path = np.column_stack([np.interp(places, length, path[:, i]) for i in range(3)])

@@ -98,7 +98,7 @@ class Block:
             if found == 0:
                 raise FileNotFoundError(path)
             if found != size:
-                raise BusError(f"shared memory '{path}' belongs to another scene or version")
+                raise BusError(f"shared memory '{path}' belongs to another scene or version; end that run first")
             self._map = mmap.mmap(descriptor, size)
         finally:
             os.close(descriptor)
@@ -146,7 +146,7 @@ class Block:
                     return block
                 block.close()
             if cancelled() or time.monotonic() > deadline:
-                raise BusError(f"no simulator writes to shared memory '{name}'")
+                raise BusError(f"no simulator writes to shared memory '{name}'; start it with 'ligature run'")
             time.sleep(0.01)
 
     @property

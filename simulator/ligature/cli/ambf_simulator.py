@@ -95,7 +95,7 @@ def options_of(arguments: list[str]) -> RunOptions:
     if given.n is not None and not given.i:
         devices = tuple(range(given.n))
     if not 0.0 <= given.d <= LARGEST:
-        flags.error("-d must be a rate in Hz, at least 0")
+        flags.error(f"-d must be a rate in Hz, at least 0, not {given.d:g}")
     try:
         only = arm_names(given.only)
     except ValueError as error:
@@ -105,7 +105,7 @@ def options_of(arguments: list[str]) -> RunOptions:
     except ValueError as error:
         flags.error(f"--ns {error}")
     if not given.p >= 1 or not 0 < given.s <= LARGEST:
-        flags.error("-p must be at least 1 update per second, and -s larger than 0")
+        flags.error(f"-p must be at least 1 update per second, and -s larger than 0, not {given.p:g} and {given.s:g}")
     for name in ("override_min_comm_freq", "override_max_comm_freq"):
         frequency = getattr(given, name)
         if frequency is not None and frequency < 1:

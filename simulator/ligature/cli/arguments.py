@@ -77,7 +77,7 @@ def sampling_of(dataset: Path | None, rate: float | None, size: str | None, came
     """How a dataset is sampled; its options without one are an error."""
     if dataset is None:
         if (rate, size, cameras or None) != (None, None, None):
-            raise typer.BadParameter("--rate, --size and --camera are for '--dataset'")
+            raise typer.BadParameter("--rate, --size and --camera describe a dataset; add '--dataset FILE.h5'")
         return Sampling()
     default = Sampling()
     try:

@@ -134,7 +134,7 @@ def inertia(file: Path, density: float, mass: float | None, console: Console) ->
             elif mesh is not None:
                 solid = mass_properties(*joined(mesh.parts))
             else:
-                raise ValueError("no shape and no mesh")
+                raise ValueError("there is neither a mesh nor a shape to measure; add a 'collision shape' or a 'mesh'")
         except ValueError as error:
             console.print(f"{body.key}: {error}", markup=False)
             continue

@@ -103,7 +103,7 @@ def run(
 ) -> None:
     """Run a scene on ROS 1; starts a master when none answers."""
     if names not in ("ambf", "src"):
-        raise typer.BadParameter("--names is 'ambf' or 'src'")
+        raise typer.BadParameter(f"--names must be 'ambf' or 'src', not '{names}'")
     arms = tuple(arm or ())
     try:
         for text in arms:
@@ -223,7 +223,7 @@ def render(
         raise typer.BadParameter(f"--format must be one of {', '.join(FORMATS)}, not '{format}'")
     kinds = [kind for kind in annotations.split(",") if kind]
     if not set(kinds) <= set(ANNOTATIONS):
-        raise typer.BadParameter(f"--annotations is any of {', '.join(ANNOTATIONS)}, not '{annotations}'")
+        raise typer.BadParameter(f"--annotations must be any of {', '.join(ANNOTATIONS)}, not '{annotations}'")
     try:
         sensor = ImageSensor(exposure, noise, five_numbers(distortion), depth_noise, seed)
     except ValueError as error:
@@ -427,10 +427,10 @@ def replay(
     from ligature.cli.sampling import Sampled
 
     if joints not in ("", "measured", "setpoint"):
-        raise typer.BadParameter(f"--joints is 'measured' or 'setpoint', not '{joints}'")
+        raise typer.BadParameter(f"--joints must be 'measured' or 'setpoint', not '{joints}'")
     sampling = sampling_of(dataset, rate, size, camera)
     if dataset is None and (task or text or success is not None):
-        raise typer.BadParameter("--task, --success and --text are for '--dataset'")
+        raise typer.BadParameter("--task, --success and --text describe a dataset; add '--dataset FILE.h5'")
     sampled = None if dataset is None else Sampled(dataset, sampling, task, success, text)
     console = Console(highlight=False, soft_wrap=True)
     raise typer.Exit(run_replay(file, scene, joints, speed, console, sampled, allow_plugins))

@@ -59,6 +59,6 @@ def _reels(files: list[Path], scene: Path | None, console: Console) -> list[Reel
         console.print(f"simulating '{file}' again", markup=False)
         resimulate(Record.read(file), scene, take).close()
         if reel is None:
-            raise ValueError(f"{file}: the recording is empty")
+            raise ValueError(f"{file}: the recording is empty; record at least one update")
         found.append(reel)
     return found

@@ -42,7 +42,8 @@ def resimulate(
     if simulation.state_hash() != record.header.begin:
         simulation.close()
         raise Differs(
-            f"'{options.scene}' starts in another state than the recorded run: the scene or the version changed"
+            f"'{options.scene}' starts in another state than the recorded run: the scene or the version changed; "
+            "replay it with both as they were"
         )
 
     watched = False
@@ -57,7 +58,7 @@ def resimulate(
         watched = True
         if record.begun not in ("", simulation.state_hash()):
             simulation.close()
-            raise Differs("the run diverges before the recording begins: the version changed")
+            raise Differs("the run diverges before the recording begins: replay it with the version that recorded it")
         watch(simulation)
 
     record.replay(update, simulation.apply, started)

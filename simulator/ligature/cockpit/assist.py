@@ -62,6 +62,9 @@ SPEED = 0.5
 SETTLING = 0.2
 """Seconds in which an arm comes to rest at its set-point."""
 
+CANNOT = "cannot get there: a joint is at its limit, or something is in the way. Move it by hand, then try again."
+"""Why a plan of motion ends, behind the name of the arm, and what the operator can do."""
+
 TURNS = 3
 """Attempts to lay a needle down in another direction before the operator is asked."""
 
@@ -371,7 +374,7 @@ class Assist:
             if not planner.straight(T_base, q, self._tip, T):
                 joints = planner.joints(T_base, T)
                 if joints is None:
-                    raise Failed(f"{self._arms[self._arm].name} cannot get there.")
+                    raise Failed(f"{self._arms[self._arm].name} {CANNOT}")
                 yield from self._turn(joints)
         yield from self._slide(T)
 
@@ -393,7 +396,7 @@ class Assist:
             now = float(self._state["sim_time"])
             since = now if since is None or pursuits.active else since
             if now - since > STUCK:
-                raise Failed(f"{facts.name} cannot get there.")
+                raise Failed(f"{facts.name} {CANNOT}")
         yield from self._wait(SETTLING)  # the arm follows its set-point
 
     def _wait(self, seconds: float, until: Callable[[], bool] = lambda: False) -> Steps:

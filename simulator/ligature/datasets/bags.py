@@ -112,7 +112,10 @@ def _grid(bag: Path, found: Session, rate: float, topics: Sequence[str]) -> tupl
         first, last = begin, end
     count = int((last - first) * rate + 1e-6) + 1 if end > begin else 0
     if count < SHORTEST:
-        raise BagError(f"{bag}: arms and cameras report together for less than two samples at {rate:g} a second")
+        raise BagError(
+            f"{bag}: arms and cameras report together for less than two samples at {rate:g} a second; "
+            "give a higher rate, or a bag in which both report for longer"
+        )
     times = np.arange(count) / rate
     return times + first if clock is None else np.interp(times + first, clock.values, clock.times), times
 

@@ -514,7 +514,8 @@ def _arms(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:
 def _psm(simulation: Simulation, name: str) -> PsmArm:
     arm = simulation.arms[name]
     if not isinstance(arm, PsmArm):
-        raise ValueError(f"'{name}' is not a PSM")
+        known = [arm.name for arm in simulation.arms if isinstance(arm, PsmArm)]
+        raise ValueError(f"'{name}' is not a PSM; choose one of {', '.join(known) or 'none'}")
     return arm
 
 

@@ -19,6 +19,10 @@ MAX_COORDINATE = 1e6
 MAX_TRIANGLES = 4_000_000
 """Most triangles of one file."""
 
+REDUCE = "reduce it, in Blender by the modifier Decimate"
+DAMAGED = "the file is damaged; export the mesh again"
+"""Hints for files that are too large, and for those that no exporter writes."""
+
 MAX_PARTS = 4096
 """Most materials of one file, each of which may become a collision hull."""
 

@@ -84,7 +84,7 @@ def read_mtl(text: str, path: Path, folder: Path, resolver: Resolver, findings: 
         if word == "newmtl":
             drafts.append(_Draft(rest))
             if len(drafts) > MAX_PARTS:
-                raise failure(path, f"the library has more than {MAX_PARTS} materials", number)
+                raise failure(path, f"the library has more than {MAX_PARTS} materials", number, "join alike ones")
         elif not drafts:
             findings.add(path, f"'{word[:40]}' comes before the first newmtl and has no effect", number)
         elif word in _TEXTURES:

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from ligature.adf.lacking import lack_of
 from ligature.adf.resolver import ResolutionError, Resolver
 from ligature.mesh.mesh import (
+    DAMAGED,
     MAX_PARTS,
     MAX_TRIANGLES,
+    REDUCE,
     Array,
     Findings,
     Material,
@@ -94,11 +96,11 @@ class _Reader:
 
     def _numbers(self, words: list[str], least: int) -> list[float]:
         if len(words) < least:
-            raise failure(self.path, f"{least} numbers were expected, {len(words)} found", self.line)
+            raise failure(self.path, f"{least} numbers were expected, {len(words)} found", self.line, DAMAGED)
         try:
             return list(map(float, words))
         except ValueError:
-            raise failure(self.path, f"'{' '.join(words)[:80]}' are not numbers", self.line) from None
+            raise failure(self.path, f"'{' '.join(words)[:80]}' are not numbers", self.line, DAMAGED) from None
 
     def _use(self, name: str) -> None:
         index = self.material_index.get(name)
@@ -139,7 +141,7 @@ class _Reader:
     def _read_library(self, library: Path) -> None:
         self.libraries.add(library)
         if len(self.libraries) > MAX_LIBRARIES:
-            raise failure(self.path, f"more than {MAX_LIBRARIES} material libraries are named", self.line)
+            raise failure(self.path, f"more than {MAX_LIBRARIES} material libraries are named", self.line, "join them")
         try:
             text = self.resolver.read_bytes(library).decode("utf-8-sig", "replace")
         except ResolutionError as error:
@@ -148,13 +150,13 @@ class _Reader:
             self.material_index.setdefault(material.name, len(self.materials))
             self.materials.append(material)
         if len(self.materials) > MAX_PARTS:
-            raise failure(self.path, f"the mesh has more than {MAX_PARTS} materials", self.line)
+            raise failure(self.path, f"the mesh has more than {MAX_PARTS} materials", self.line, "join alike ones")
 
     def _face(self, words: list[str]) -> None:
         count = len(words)
         if not 3 <= count <= MAX_FACE_VERTICES:
             allowed = f"3 to {MAX_FACE_VERTICES} are allowed"
-            raise failure(self.path, f"a face has {count} vertices; {allowed}", self.line)
+            raise failure(self.path, f"a face has {count} vertices; {allowed}", self.line, "triangulate the mesh")
         known = self.spellings
         corners = [known[word] if word in known else self._corner(word) for word in words]
         triangles = self.faces.setdefault(self.current, [])
@@ -162,7 +164,7 @@ class _Reader:
             triangles += (corners[0], corners[i], corners[i + 1])
         self.triangles += count - 2
         if self.triangles > MAX_TRIANGLES:
-            raise failure(self.path, f"the mesh has more than {MAX_TRIANGLES} triangles", self.line)
+            raise failure(self.path, f"the mesh has more than {MAX_TRIANGLES} triangles", self.line, REDUCE)
 
     def _corner(self, word: str) -> int:
         """Number of the corner that ``word`` spells, seen for the first time."""
@@ -200,7 +202,7 @@ class _Reader:
 
     def _mesh(self) -> Mesh:
         if not self.points:
-            raise failure(self.path, "the file holds no vertex")
+            raise failure(self.path, "the file holds no vertex", hint="export an object with faces")
         points = checked(np.array(self.points, dtype=float), self.path, self.point_lines)
         uvs = self._finite(self.uvs, 2, "texture coordinates")
         normals = self._finite(self.normals, 3, "normals")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ligature.adf.diagnostics import Severity
-from ligature.mesh.mesh import MAX_TRIANGLES, Array, Findings, Mesh, MeshPart, checked, failure
+from ligature.mesh.mesh import DAMAGED, MAX_TRIANGLES, REDUCE, Array, Findings, Mesh, MeshPart, checked, failure
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER = 84
@@ -29,7 +29,7 @@ def read_stl(data: bytes, path: Path) -> Mesh:
 
 def _binary(data: bytes, count: int, path: Path) -> Mesh:
     if count > MAX_TRIANGLES:
-        raise failure(path, f"the mesh has more than {MAX_TRIANGLES} triangles")
+        raise failure(path, f"the mesh has more than {MAX_TRIANGLES} triangles", hint=REDUCE)
     records = np.frombuffer(data, dtype=_RECORD, count=count, offset=_HEADER)
     with np.errstate(invalid="ignore"):  # what is not a number is refused below
         corners = records["corners"].astype(float).reshape(-1, 3)
@@ -49,12 +49,12 @@ def _ascii(text: str, path: Path) -> Mesh:
             x, y, z = words[1:4]
             corners.append([float(x), float(y), float(z)])
         except ValueError:
-            raise failure(path, "a vertex needs three numbers", number) from None
+            raise failure(path, "a vertex needs three numbers", number, DAMAGED) from None
         lines.append(number)
     if len(corners) % 3:
-        raise failure(path, f"{len(corners)} vertices do not make whole triangles", lines[-1])
+        raise failure(path, f"{len(corners)} vertices do not make whole triangles", lines[-1], DAMAGED)
     if len(corners) > 3 * MAX_TRIANGLES:
-        raise failure(path, f"the mesh has more than {MAX_TRIANGLES} triangles", lines[3 * MAX_TRIANGLES])
+        raise failure(path, f"the mesh has more than {MAX_TRIANGLES} triangles", lines[3 * MAX_TRIANGLES], REDUCE)
     return _mesh(checked(np.array(corners, dtype=float).reshape(-1, 3), path, lines), path, findings)
 
 

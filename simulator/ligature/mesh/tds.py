@@ -74,7 +74,7 @@ class _Reader:
             if len(parts) > MAX_PARTS:
                 raise self._wrong(f"the file holds more than {MAX_PARTS} pairs of object and material", start)
         if not parts:
-            raise failure(self.path, "the file holds no triangle mesh")
+            raise failure(self.path, "the file holds no triangle mesh", hint="export an object with faces")
         return Mesh(self.path, tuple(parts), self.findings.all(), np.vstack(self.points))
 
     def _wrong(self, message: str, at: int) -> Exception:

@@ -168,5 +168,5 @@ def _body(bodies: Sequence[Body], name: str, key: str, entry: Mapping[Any, Any])
     text = str(entry.get(key, ""))
     index = find_by_text([body.identity.identifier for body in bodies], text) if text else None
     if index is None:
-        raise ValueError(f"{name}: {key} '{text}' names no body, or several")
+        raise ValueError(f"{name}: {key} '{text}' names no body, or several; give the identifier of one")
     return index

@@ -163,7 +163,10 @@ def _sources(distortion: tuple[float, ...], key: tuple[float, ...], width: int, 
     with np.errstate(over="ignore", invalid="ignore"):
         ideal = undistort(rays[..., :2], distortion)
     if not np.isfinite(ideal).all():
-        raise ValueError(f"a lens with the distortion {distortion} cannot be inverted over the whole picture")
+        raise ValueError(
+            f"a lens with the distortion {distortion} cannot be inverted over the whole picture; "
+            "give smaller coefficients"
+        )
     pixels = np.concatenate([ideal, np.ones_like(u)[..., None]], axis=-1) @ K.T
     return pixels[..., 0], pixels[..., 1]
 

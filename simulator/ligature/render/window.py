@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from ligature.render.context import RenderUnavailable, tidy
 from ligature.render.viewer import Viewer
 
+WITHOUT = "run without '--window'"
+"""What one can do where no window opens."""
+
 SIZE = (960, 600)
 """Width and height at start, where the scene asks for none."""
 
@@ -63,10 +66,12 @@ class Window:
 
     def __init__(self, title: str, size: tuple[int, int] = SIZE, monitor: int = 0, number: int = 0) -> None:
         if not os.environ.get("DISPLAY"):
-            raise RenderUnavailable("no window: there is no display; set DISPLAY, or run without '--window'")
+            raise RenderUnavailable(f"no window: there is no display; set DISPLAY, or {WITHOUT}")
         glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_X11)  # as DISPLAY says; Wayland offers it too
         if not glfw.init():
-            raise RenderUnavailable(f"no window: the display '{os.environ['DISPLAY']}' cannot be opened")
+            raise RenderUnavailable(
+                f"no window: the display '{os.environ['DISPLAY']}' cannot be opened; set DISPLAY, or {WITHOUT}"
+            )
         for hint, value in (
             (glfw.CONTEXT_VERSION_MAJOR, 3),
             (glfw.CONTEXT_VERSION_MINOR, 3),
@@ -78,7 +83,7 @@ class Window:
         glfw.window_hint(glfw.VISIBLE, glfw.FALSE)  # it appears where it belongs
         self._window = glfw.create_window(width, height, title, None, None)
         if not self._window:
-            raise RenderUnavailable("no window: the display has no OpenGL 3.3")
+            raise RenderUnavailable(f"no window: the display has no OpenGL 3.3; install libgl1-mesa-dri, or {WITHOUT}")
         glfw.set_window_pos(self._window, left, top)
         glfw.show_window(self._window)
         glfw.make_context_current(self._window)

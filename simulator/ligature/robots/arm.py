@@ -19,7 +19,7 @@ from ligature.robots.axes import Axes, Mode
 from ligature.robots.device import Device
 from ligature.robots.impedance import CartesianImpedance
 from ligature.robots.inverse import InverseResult, Reason
-from ligature.robots.operating_state import Rejected, State
+from ligature.robots.operating_state import Rejected, State, towards_enabled
 from ligature.robots.poses import pose_matrix_of, turned
 
 Array = NDArray[np.float64]
@@ -171,9 +171,9 @@ class Arm(Device):
         if self._direct:
             return
         if self._state is not State.ENABLED:
-            raise Rejected(f"{what}: {self.name} is {self._state.name}, not ENABLED; arm not ready")
+            raise Rejected(f"{what}: {self.name} is {self._state.name}; arm not ready: {towards_enabled(self._state)}")
         if not self._homed:
-            raise Rejected(f"{what}: {self.name} is not homed; arm not ready")
+            raise Rejected(f"{what}: {self.name} is not homed; arm not ready: send 'home'")
 
     def _require_cartesian(self, what: str) -> None:
         self._require_joints(what)

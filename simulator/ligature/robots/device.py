@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ligature.robots.axes import Axes, Mode
-from ligature.robots.operating_state import Action, OperatingState, Rejected, State, action
+from ligature.robots.operating_state import Action, OperatingState, Rejected, State, action, towards_enabled
 
 Array = NDArray[np.float64]
 
@@ -149,7 +149,7 @@ class Device:
         Raises `Rejected` in FAULT.
         """
         if self._state is State.FAULT:
-            raise Rejected(f"{self.name} is in FAULT; send 'disable', then 'enable'")
+            raise Rejected(f"{self.name} is in FAULT; {towards_enabled(self._state)}")
         if self._state is State.ENABLED and not self._homing and (self._homed or self._taken_over):
             return
         self._state, self._taken_over, self._pending = State.ENABLED, True, None
@@ -163,7 +163,7 @@ class Device:
         Raises `Rejected` in FAULT.
         """
         if self._state is State.FAULT:
-            raise Rejected(f"{self.name} is in FAULT; send 'disable', then 'enable'")
+            raise Rejected(f"{self.name} is in FAULT; {towards_enabled(self._state)}")
         self._state, self._homed, self._pending = State.ENABLED, True, None
         self._busy = self._homing = False
         self._hold_all()

@@ -69,6 +69,11 @@ def action(command: str, state: State) -> Action:
     return found
 
 
+def towards_enabled(state: State) -> str:
+    """What to send to an arm that is not ENABLED, as the end of a sentence."""
+    return {State.PAUSED: "send 'resume'", State.FAULT: "send 'disable', then 'enable'"}.get(state, "send 'enable'")
+
+
 def __getattr__(name: str) -> Any:
     """Former names of this module."""
     if name == "Refused":

@@ -91,7 +91,10 @@ class Clouds:
         if message.header.frame_id:
             body = self._scene.body_index.get(message.header.frame_id, -1)
             if body < 0:
-                raise ValueError(f"'{message.header.frame_id[:80]}' is not the identifier of a body")
+                raise ValueError(
+                    f"'{message.header.frame_id[:80]}' is not the identifier of a body; "
+                    "write one, or leave 'frame_id' empty for world axes"
+                )
         with self._lock:
             self._points[topic] = body, points, _colours(message, len(points))
 

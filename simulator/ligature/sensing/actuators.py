@@ -123,11 +123,15 @@ class Actuators(Subsystem):
         names: Sequence[str] = [sensor.identity.identifier for sensor in self._rays.sensors]
         found = find_by_text(names, text)
         if found is None or self._rays.sensors[found].type is not SensorType.PROXIMITY:
-            raise LookupError(f"actuator {actuator}: no proximity sensor is called '{text}'")
+            known = [n for n, s in zip(names, self._rays.sensors, strict=True) if s.type is SensorType.PROXIMITY]
+            raise LookupError(
+                f"actuator {actuator}: no proximity sensor is called '{text}'; "
+                f"the scene has {', '.join(known) or 'none'}"
+            )
         bodies = self._rays.hits.body[self._rays.slices[found]]
         triggered = bodies[bodies >= 0]
         if not len(triggered):
-            raise LookupError(f"actuator {actuator}: sensor '{text}' detects nothing")
+            raise LookupError(f"actuator {actuator}: sensor '{text}' detects nothing; bring it nearer to a body")
         return int(triggered[-1])
 
     def _hold(self, command: ActuatorCommand, body: int, body_pose: Array) -> None:

@@ -50,7 +50,9 @@ class Attempt:
         self._scenery = Scenery.of(scene, needed)
         cameras = [body.index for body in scene.bodies if body.identity.name == CAMERA]
         if task == "pose_estimation" and not cameras:
-            raise MissingBodies(f"the scene '{scene.name}' has no body '{CAMERA}', in whose frame poses are reported")
+            raise MissingBodies(
+                f"the scene '{scene.name}' has no body '{CAMERA}'; add one: poses are reported in its frame"
+            )
         self._camera = cameras[0] if cameras else -1
         self.restart()
 

@@ -41,7 +41,9 @@ class Scenery:
     def of(cls, scene: Scene, pairs: int = 1) -> Scenery:
         """What ``scene`` has; raises `MissingBodies` when it has no needle, or fewer than ``pairs`` pairs of holes."""
         if not scene.needles:
-            raise MissingBodies(f"the scene '{scene.name}' has no needle: no free body lies along an arc")
+            raise MissingBodies(
+                f"the scene '{scene.name}' has no needle: add a free body whose shapes lie along an arc"
+            )
         needle = scene.needles[0]
         T = scene.bodies[needle.body].T_body_inertial
         arc = needle.arc
@@ -49,7 +51,7 @@ class Scenery:
         holes = _pairs(scene)
         if len(holes) < pairs:
             raise MissingBodies(
-                f"the scene '{scene.name}' has {len(holes)} pairs of holes Entry1, Exit1, …, not {pairs}"
+                f"the scene '{scene.name}' has {len(holes)} pairs of holes Entry1, Exit1, …; the task needs {pairs}"
             )
         thread = next((rod.bodies for rod in scene.rods if _attached(scene, rod, needle.body)), ())
         tips = tuple(arm.tip for arm in scene.arms if arm.kind is ArmKind.PSM)

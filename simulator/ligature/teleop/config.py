@@ -165,14 +165,16 @@ class _Reader:
 
     def text(self, node: Node, what: str) -> str:
         if not isinstance(node, Scalar):
-            raise self.fail(node.mark, f"{what} must be one word")
+            raise self.fail(node.mark, f"{what} must be one word", "write it without brackets and lists")
         return node.text
 
     def number(self, node: Node, what: str, low: float = -np.inf, high: float = np.inf) -> float:
         try:
             value = number(self.text(node, what))
         except ValueError:
-            raise self.fail(node.mark, f"{what} must be a number, not '{self.text(node, what)}'") from None
+            raise self.fail(
+                node.mark, f"{what} must be a number, not '{self.text(node, what)}'", "such as 0.5"
+            ) from None
         if not (np.isfinite(value) and low <= value <= high):
             raise self.fail(node.mark, f"{what} must be within {low:g} … {high:g}, not {value:g}")
         return value
@@ -181,11 +183,13 @@ class _Reader:
         try:
             return flag(self.text(node, what))
         except ValueError:
-            raise self.fail(node.mark, f"{what} must be true or false") from None
+            raise self.fail(node.mark, f"{what} must be true or false, not '{self.text(node, what)}'") from None
 
     def items(self, node: Node, what: str, count: int | None = None) -> list[Node]:
         if not isinstance(node, Sequence) or (count is not None and len(node.items) != count):
-            raise self.fail(node.mark, f"{what} must be a list" + (f" of {count}" if count else ""))
+            raise self.fail(
+                node.mark, f"{what} must be a list" + (f" of {count}" if count else ""), "write '[a, b, c]'"
+            )
         return node.items
 
     def numbers(self, node: Node, what: str, count: int) -> tuple[float, ...]:

@@ -21,7 +21,7 @@ class Phases:
     def go(self, step: int) -> None:
         """Mark that the phase ``step`` places further in the list begins now; the first mark is the first phase."""
         if self._topic is None:
-            rospy.logwarn("the operator marks a phase, but the teleoperation has no list of phases")
+            rospy.logwarn("the operator marks a phase, but there are none; list them: 'phases: [reach, grasp, drive]'")
             return
         self._number = 0 if self._number < 0 else (self._number + step) % len(self._names)
         phase = self._names[self._number]

@@ -50,7 +50,7 @@ def read_sdf(path: Path) -> Robot:
     root = root_of(path, "sdf")
     models = [*root.findall("model"), *(m for world in root.findall("world") for m in world.findall("model"))]
     if not models:
-        raise RobotError("the file has no <model>")
+        raise RobotError("the file has no <model>; give a file that describes a robot")
     notes = [f"<{e.tag}> is left out: models of other files are not read" for e in root.iter("include")]
     read = [_model(m, f"{m.get('name', 'model')}_" if len(models) > 1 else "", notes) for m in models]
     links = tuple(link for one, _ in read for link in one)

@@ -107,18 +107,21 @@ def _check(file: h5py.File, source: Path) -> None:
         )
     rate, names = float(file.attrs["rate"]), episode_names(file)
     if rate != round(rate):
-        raise DatasetError(f"'{source}' has {rate:g} samples a second; LeRobot takes whole numbers")
+        raise DatasetError(f"'{source}' has {rate:g} samples a second; record it again with a whole number")
     if not names:
-        raise DatasetError(f"'{source}' has no episode")
+        raise DatasetError(f"'{source}' has no episode; record one to its end")
     if not Robot.of(file).arms:
-        raise DatasetError(f"'{source}' has no arm with a jaw, whose motion would be state and action")
+        raise DatasetError(f"'{source}' has no arm with a jaw, whose motion would be state and action; add a PSM")
     for name in names:
         if int(file[name].attrs["samples"]) < 2:
-            raise DatasetError(f"'{source}': {name} has fewer than 2 samples")
+            raise DatasetError(f"'{source}': {name} has fewer than 2 samples; record longer, or more samples a second")
         for camera, pictures in file[name].get("cameras", {}).items():
             height, width = pictures["rgb"].shape[1:3]
             if height % 2 or width % 2:
-                raise DatasetError(f"'{source}': pictures of {camera} are {width}x{height}; videos need even sizes")
+                even = f"{width - width % 2}x{height - height % 2}"
+                raise DatasetError(
+                    f"'{source}': pictures of {camera} are {width}x{height}; videos need even sizes, such as {even}"
+                )
 
 
 class _Export:
@@ -226,8 +229,10 @@ class _Export:
         }
         known = {key: value for key, value in self._written.features.items() if value["dtype"] != "video"}
         if known and known != features:
+            other = sorted(known.keys() ^ features.keys() or {key for key in known if known[key] != features[key]})
             raise DatasetError(
-                "the episodes contain different features; all episodes of a LeRobot dataset must have the same"
+                f"the episodes differ in {', '.join(other)}; all episodes of a LeRobot dataset must have the same "
+                "features: record them in one scene, with the same arms and cameras"
             )
         self._written.features |= features
 
