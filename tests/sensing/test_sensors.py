@@ -61,7 +61,7 @@ def test_an_actuator_takes_what_its_sensor_hits(simulate: Make) -> None:
     assert sim.state["actuator_body"][0, 0] == sim.bodies["Wall"].body.index
     sim.apply(ActuatorCommand(0, False))
     sim.apply(ActuatorCommand(0, True, sensor="None"))
-    assert "no proximity sensor is called 'None'; the scene has S" in str(sim.problems[-1])
+    assert "no proximity sensor is called 'None'; the scene has /ambf/env/S" in str(sim.problems[-1])
 
 
 def test_a_resistance_sensor_pushes_back(simulate: Make) -> None:

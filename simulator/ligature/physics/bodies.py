@@ -1,6 +1,6 @@
-"""Single bodies in Bullet: reading and setting poses, pushing, and Cartesian control (ADF specification §13).
+"""Single bodies in Bullet: poses, forces, and Cartesian control (ADF specification §13).
 
-Poses are of the body frame B in world axes; Bullet speaks of the inertial frame I.
+Poses are those of the body frame B in world axes. Bullet has poses of the inertial frame I.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ REST = [0.0] * 6
 
 
 class Placement:
-    """Where a body lives in Bullet: multibody ``uid`` and ``link`` (-1 is the base)."""
+    """The multibody ``uid`` and ``link`` (-1 for the base) that stand for a body in Bullet."""
 
     def __init__(self, client: int, tree: Tree, body: Body, motions: Motions, index: int) -> None:
         self.client, self.body = client, body
@@ -54,13 +54,13 @@ class Placement:
         else:
             self.motions.links(self.tree)
 
-    def put(self, pose: Array) -> None:
-        """Put the base at ``pose`` (7,) of B, at rest."""
+    def set_pose(self, pose: Array) -> None:
+        """Set the pose (7,) of B of the base, at rest."""
         T = pose7_matrix(pose) @ self.body.T_body_inertial
-        self.put_inertial(T[:3, 3].tolist(), matrix_quaternion(T[:3, :3]).tolist())
+        self.set_inertial_pose(T[:3, 3].tolist(), matrix_quaternion(T[:3, :3]).tolist())
 
-    def put_inertial(self, position: Sequence[float], quaternion: Sequence[float]) -> None:
-        """Put the base's inertial frame I at a position (3,) and quaternion (4,), at rest."""
+    def set_inertial_pose(self, position: Sequence[float], quaternion: Sequence[float]) -> None:
+        """Set position (3,) and quaternion (4,) of the base's inertial frame I, at rest."""
         for uid in self._bases:
             pybullet.resetBasePositionAndOrientation(uid, position, quaternion, physicsClientId=self.client)
             pybullet.resetBaseVelocity(uid, [0.0] * 3, [0.0] * 3, physicsClientId=self.client)
@@ -88,7 +88,7 @@ class Placement:
         centre: Array = self.motions.pose[self.row, :3]
         return centre
 
-    def push(self, force: Array, point: Array | None = None) -> None:
+    def apply_force(self, force: Array, point: Array | None = None) -> None:
         """Apply ``force`` (3,) at ``point`` (3,), default the centre of mass, for one tick."""
         self.motions.rouse(self.tree)
         at = self.centre() if point is None else point
@@ -101,14 +101,14 @@ class Placement:
             physicsClientId=self.client,
         )
 
-    def load(self, wrench: list[float]) -> None:
+    def apply_wrench(self, wrench: list[float]) -> None:
         """Apply force and torque (6,) at the centre of mass for one tick."""
         self.motions.rouse(self.tree)
         at, uid, link, client = self.centre().tolist(), self.uid, self.link, self.client
         pybullet.applyExternalForce(uid, link, wrench[:3], at, pybullet.WORLD_FRAME, physicsClientId=client)
         pybullet.applyExternalTorque(uid, link, wrench[3:], pybullet.WORLD_FRAME, physicsClientId=client)
 
-    def twist(self, torque: Array) -> None:
+    def apply_torque(self, torque: Array) -> None:
         """Apply ``torque`` (3,) for one tick."""
         self.motions.rouse(self.tree)
         pybullet.applyExternalTorque(
@@ -128,22 +128,22 @@ class BodyControl:
         self._kick_ticks = 0
 
     def set(self, type_: CommandType, target: Array) -> None:
-        """Take a command; a jump of a pose target is answered by the derivative over `KICK_SECONDS`."""
+        """Set the command. The derivative term spreads a jump of a pose target over `KICK_SECONDS`."""
         if type_ is CommandType.POSITION:
             known = self.target if self.type is CommandType.POSITION else self._pose()
             ticks = max(1, round(KICK_SECONDS / self._dt))
             self._kick = (self._kick * self._kick_ticks + _difference(target, known) / self._dt) / ticks
             self._kick_ticks = ticks
             if self.type is not CommandType.POSITION:
-                self._last = None  # of an earlier pursuit: its slope would be a blow
+                self._last = None  # the error of an earlier pose command: its slope would be a jolt
         self.type, self.target = type_, target
 
     def apply(self) -> None:
-        """Act on the body for the coming tick."""
+        """Apply the command to the body for the next tick."""
         if self.type is CommandType.FORCE:
             if np.any(self.target) and not self._place.body.static:
-                self._place.push(self.target[:3])
-                self._place.twist(self.target[3:])
+                self._place.apply_force(self.target[:3])
+                self._place.apply_torque(self.target[3:])
         elif self._place.body.static:
             self._move_static()
         elif self.type is CommandType.VELOCITY:
@@ -162,11 +162,11 @@ class BodyControl:
 
     @property
     def acts(self) -> bool:
-        """Whether the command does anything: a force of zero does not."""
+        """Whether the command has an effect; a force of zero has none."""
         return self.type is not CommandType.FORCE or bool(np.any(self.target))
 
     def snapshot(self) -> tuple[int, Array, Array, int, Array | None]:
-        """Everything that lasts from tick to tick."""
+        """The state that is kept from tick to tick."""
         return int(self.type), self.target.copy(), self._kick.copy(), self._kick_ticks, self._last
 
     def restore(self, snapshot: tuple[int, Array, Array, int, Array | None]) -> None:
@@ -183,11 +183,11 @@ class BodyControl:
         pose = self._pose()
         if self.type is CommandType.VELOCITY:
             if np.any(self.target):
-                self._place.put(_moved(pose, self.target * self._dt))
+                self._place.set_pose(_moved(pose, self.target * self._dt))
             return
         error = _difference(self.target, pose)
         if np.linalg.norm(error[:3]) >= SMALLEST_MOVE or np.linalg.norm(error[3:]) >= SMALLEST_TURN:
-            self._place.put(self.target)
+            self._place.set_pose(self.target)
 
     def _follow(self) -> None:
         """PID towards a pose; velocity output is evaluated implicitly, as for joints."""
@@ -207,22 +207,22 @@ class BodyControl:
             else:
                 halves.append((gains.p * error[part] + gains.d * kick[part]) / (1.0 + gains.d))
         if law.linear_output is OutputType.FORCE:
-            self._place.push(halves[0])
-            self._place.twist(halves[1])
+            self._place.apply_force(halves[0])
+            self._place.apply_torque(halves[1])
         else:
             self._drive(halves[0], halves[1])
 
     def _drive(self, linear: Array, angular: Array) -> None:
-        """Make the body move with a twist, less what gravity adds within the tick."""
+        """Give the body a twist, minus the velocity that gravity adds within the tick."""
         if self._place.link < 0:
             self._place.set_twist(linear - self._place.body.gravity * self._dt, angular)
             return
         pose, twist = np.empty(7), np.empty(6)
         self._place.read(pose, twist)
         body = self._place.body
-        self._place.push(body.mass * (linear - twist[:3]) / self._dt)
+        self._place.apply_force(body.mass * (linear - twist[:3]) / self._dt)
         R = pose7_matrix(pose)[:3, :3] @ body.T_body_inertial[:3, :3]
-        self._place.twist(R @ (body.inertia * (R.T @ (angular - twist[3:]))) / self._dt)
+        self._place.apply_torque(R @ (body.inertia * (R.T @ (angular - twist[3:]))) / self._dt)
 
 
 def _difference(target: Array, pose: Array) -> Array:

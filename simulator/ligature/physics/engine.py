@@ -172,7 +172,7 @@ class Engine:
     def restart(self, tree: int) -> None:
         """Put one tree back to where the scene starts, at rest."""
         root = self.trees[tree].root
-        self.place_of[root].put(matrix_pose7(self.scene.start.roots[root]))
+        self.place_of[root].set_pose(matrix_pose7(self.scene.start.roots[root]))
         self.trees[tree].put_joints(self.client)
         self.motions.forget(tree)
 
@@ -193,7 +193,7 @@ class Engine:
         """Set the motion of all trees; `forget_contacts` is to follow. Bullet's own saved states are not exact."""
         self._restored.clear()
         for tree, (pose, velocity, joints) in zip(self.trees, snapshot["trees"], strict=True):
-            self.place_of[tree.root].put_inertial(*pose)
+            self.place_of[tree.root].set_inertial_pose(*pose)
             # Bullet turns what it is given by a last bit: a base that has not moved since keeps the snapshot's pose
             turned = pybullet.getBasePositionAndOrientation(tree.uid, physicsClientId=self.client)
             self._restored[tree.uid, turned] = pose

@@ -40,7 +40,7 @@ class Lifts:
             push_bodies(motions.handle, motions.table, engine.place_table, self.bodies, self.forces)
             return
         for body, force in zip(self.bodies.tolist(), self.forces, strict=True):
-            engine.place_of[body].push(force)
+            engine.place_of[body].apply_force(force)
 
 
 def gravity_lifts(engine: Engine, controls: Sequence[TreeControl]) -> Lifts:

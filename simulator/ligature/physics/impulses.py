@@ -49,7 +49,7 @@ class Impulses:
         if motions.handle:
             load_body(motions.handle, motions.table, engine.place_table, body, impulse, moment, engine.dt)
         else:
-            engine.place_of[body].load((np.concatenate([impulse, moment]) / engine.dt).tolist())
+            engine.place_of[body].apply_wrench((np.concatenate([impulse, moment]) / engine.dt).tolist())
 
     def pending(self, body: int) -> Array:
         """Impulse and moment (6,) that act in the coming tick so far."""

@@ -88,7 +88,7 @@ class Masses:
     def carry(self, body: int, wrench: Array) -> None:
         """Apply ``wrench`` (6,) in the coming tick, which moves the added mass of a body with its holders."""
         if body in self._attached_loads:
-            self._attached_loads[body][0].load(wrench.tolist())
+            self._attached_loads[body][0].apply_wrench(wrench.tolist())
 
     @property
     def added(self) -> bool:
@@ -98,7 +98,7 @@ class Masses:
     def lift(self) -> None:
         """Cancel the weight of added mass in the coming tick."""
         for place, force in self._attached_loads.values():
-            place.push(force)
+            place.apply_force(force)
 
     def update_commanded(self, body: int, before: bool) -> None:
         """Update the mass of a light free body that was driven ``before`` a command began or ended."""

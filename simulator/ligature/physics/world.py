@@ -318,7 +318,7 @@ class World(Subsystem):
         if place.link >= 0:
             name = self.scene.bodies[body].identity.identifier
             raise ValueError(f"body '{name}' is held by joints; set its joints, or the pose of its root")
-        place.put(pose)
+        place.set_pose(pose)
         self._parting.begin()
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
@@ -328,7 +328,7 @@ class World(Subsystem):
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
         """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
-        self.engine.place_of[body].push(force, point)
+        self.engine.place_of[body].apply_force(force, point)
 
     def driven(self, body: int) -> bool:
         """Whether a command sets the velocity of a body; see `BodyCommands.driven`."""
