@@ -20,9 +20,12 @@ if [ "${1:-}" != --inside ]; then
     command -v git >/dev/null || skip "it needs git"
     unshare --mount --pid --fork true 2>/dev/null || skip "this machine allows no namespaces of its own"
     work=$(mktemp -d)
+    end_room() { # before its folder goes; unshare itself ends at SIGKILL alone, and takes all of the room with it
+        kill -KILL "$!" 2>/dev/null && wait "$!" 2>/dev/null || true
+    }
     trap 'rm -rf --one-file-system "$work"' EXIT
-    trap 'exit 130' INT
-    trap 'exit 143' TERM
+    trap 'end_room; exit 130' INT
+    trap 'end_room; exit 143' TERM
     bare=${BARE_SYSTEM:-$work/bare}
     if [ ! -e "$bare/etc/debian_version" ]; then
         echo "$try: building a bare Debian in $bare, about 2 minutes"
