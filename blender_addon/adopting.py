@@ -292,7 +292,7 @@ def _hull(obj: bpy.types.Object, other: bpy.types.Object) -> None:
 def _owner(obj: bpy.types.Object, stored: Stored, ours: str) -> None:
     parent = stored.get("object_parent", default=None)
     if ours == "GHOST_OBJECT" and isinstance(parent, bpy.types.Object):
-        making.hang_on(obj, parent)
+        making.parent_in_place(obj, parent)
 
 
 def _blender_body(obj: bpy.types.Object, group: bpy.types.PropertyGroup, done: Adopted) -> None:
@@ -447,7 +447,7 @@ def _make_joint(
     obj.adf.key, obj.adf.joint.name = making.free_key(done.collection, "JOINT", name), name
     obj.adf.joint.type = kind
     obj.adf.parent_object, obj.adf.child_object = ends
-    making.hang_on(obj, ends[0], T)
+    making.parent_in_place(obj, ends[0], T)
     done.joints += 1
 
 

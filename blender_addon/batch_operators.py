@@ -11,7 +11,7 @@ from .key_panels import CATEGORIES, OTHER, SHOWN, group_of
 from .ligature.adf.schema import Type
 from .mesh_reading import points_of
 from .object_operators import active_body
-from .placing import hang
+from .placing import parent_to
 from .poses import SHAPED, inertial_frame, relative_pose, rest_pose
 from .preview_operators import behind
 from .properties import KIND_OF_ROLE
@@ -211,7 +211,7 @@ def _stretch(part, body, T_source, T, stretch):
     place[:3, 3] = stretch * T_source[:3, 3] + T[:3, 3]
     along = np.linalg.norm(stretch[:, None] * T_source[:3, :3], axis=0)
     scale = np.array(part.scale)
-    hang(part, body, place)
+    parent_to(part, body, place)
     part.scale = scale * along
 
 

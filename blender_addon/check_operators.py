@@ -107,7 +107,7 @@ def _references_to_deleted(collection, objects, obj):
         return
     gone = deleted_owner(collection, objects, obj)
     if gone:
-        message = f"it hangs on '{gone}', which was deleted"
+        message = f"its parent '{gone}' was deleted"
         yield Finding(
             "deleted-body", Severity.ERROR, obj.adf.key, message, "parent it to another, or delete it", UNHANG
         )

@@ -32,7 +32,7 @@ def check_parts(collection: bpy.types.Collection, objects: list[bpy.types.Object
             gone = deleted_owner(collection, objects, obj)
             if gone:
                 raise ExportError(
-                    f"'{obj.name}' hangs on '{gone}', which was deleted; parent it to another, or delete it", obj
+                    f"'{obj.name}' has the parent '{gone}', which was deleted; parent it to another, or delete it", obj
                 )
         else:
             _check_joint(collection, objects, obj, part)

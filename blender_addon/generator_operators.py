@@ -20,7 +20,7 @@ from .ligature.authoring.generate import (
     suture_hole,
 )
 from .object_operators import active_body, target_file
-from .placing import hang, place
+from .placing import parent_to, place
 from .poses import inertial_frame, rest_pose
 from .read_file import add_parts, find_open
 
@@ -185,10 +185,10 @@ def anchor_of(body):
 def hang_by_text(collection):
     """Parent new objects to the bodies that their references mean."""
     for obj in collection.all_objects:
-        if obj.adf.role in making.HANGING and obj.adf.parent_text and obj.parent is None:
+        if obj.adf.role in making.PARENTED and obj.adf.parent_text and obj.parent is None:
             parent = find_open(obj.adf.parent_text, ("body",))
             if parent is not None:
-                hang(obj, parent, rest_pose(obj))
+                parent_to(obj, parent, rest_pose(obj))
 
 
 CLASSES = (ADF_OT_add_needle, ADF_OT_add_suture, ADF_OT_add_hole, ADF_OT_add_grasp, ADF_OT_add_endoscope)

@@ -232,7 +232,7 @@ class ADF_PT_object(Physics, bpy.types.Panel):
                 layout.prop(obj.adf, "parent_text")
             if obj.adf.child_object is None:
                 layout.prop(obj.adf, "child_text")
-        elif obj.adf.role in making.HANGING:
+        elif obj.adf.role in making.PARENTED:
             if obj.parent is None:
                 layout.prop(obj.adf, "parent_text")
             else:

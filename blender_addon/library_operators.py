@@ -42,7 +42,7 @@ class ADF_OT_add_sensor(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if active_body(context, ("BODY",)) is None:
-            cls.poll_message_set("Make the body active that the sensor hangs on")
+            cls.poll_message_set("Make the parent body of the sensor active")
             return False
         return True
 

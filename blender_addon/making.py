@@ -1,6 +1,6 @@
-"""Makes the objects of a file in Blender: new files, bodies, joints, shapes, what hangs on bodies.
+"""Makes the objects of a file in Blender: new files, bodies, joints, shapes, and objects parented to bodies.
 
-Nothing here selects, hides, renames or moves what the user has; new objects are added, roles are given.
+Nothing here selects, hides, renames or moves the user's objects.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from .ligature.authoring.placement import rigid
 from .ligature.authoring.shapes import Shape, shape_mesh
 from .mesh_making import shape_data
-from .placing import hang, place
+from .placing import parent_to, place
 from .poses import rest_pose
 from .properties import KIND_OF_ROLE
 from .read_file import SHAPE_COLOUR, set_shape, shape_collection
@@ -24,7 +24,7 @@ PREFIXES = {
     "BODY": "BODY ", "JOINT": "JOINT ", "GHOST_OBJECT": "GHOST ", "SENSOR": "SENSOR ", "ACTUATOR": "ACTUATOR ",
     "SOFT_BODY": "SOFT ", "VOLUME": "VOLUME ", "SUTURE": "SUTURE ",
 }  # fmt: skip
-HANGING = ("GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SUTURE", "VOLUME")
+PARENTED = ("GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SUTURE", "VOLUME")
 """Roles whose objects may be parented to a body."""
 
 
@@ -80,9 +80,9 @@ def give_role(obj: bpy.types.Object, role: str, collection: bpy.types.Collection
 
 
 def make_own(obj: bpy.types.Object) -> None:
-    """Make a copy of an object of a file an object of its own: identifier, name, and the shapes of its original.
+    """Give a copy of an object of a file its own identifier and name, and copies of the original's shapes.
 
-    Its mesh files stay those of the original until the mesh is another one.
+    It refers to the mesh files of the original until its mesh changes.
     """
     original = original_of(obj)
     obj.adf.key = free_key(file_of(obj), obj.adf.role, obj.name)
@@ -95,7 +95,7 @@ def make_own(obj: bpy.types.Object) -> None:
 
 
 def copied(obj: bpy.types.Object) -> bpy.types.Object:
-    """A copy of an object of a file in the same collections, an object of its own, with the same mesh."""
+    """A copy of an object of a file in the same collections, with its own identifier and the same mesh."""
     copy = obj.copy()
     for collection in obj.users_collection:
         collection.objects.link(copy)
@@ -111,7 +111,7 @@ def original_of(copy: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def take_shapes(original: bpy.types.Object, copy: bpy.types.Object) -> None:
-    """Give a copy of a body copies of its primitives, hulls and inertial frame, where it has none."""
+    """Give a copy of a body copies of the original's primitives, hulls and inertial frame, if it has none."""
     if any(child.adf.role in PARTS for child in copy.children):
         return
     for part in [child for child in original.children if child.adf.role in PARTS]:
@@ -119,7 +119,7 @@ def take_shapes(original: bpy.types.Object, copy: bpy.types.Object) -> None:
 
 
 def copied_part(part: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Object:
-    """A copy of a primitive, hull or frame below another body, placed there as the original below its own."""
+    """A copy of a primitive, hull or frame, parented to another body at the same relative pose."""
     own = part.copy()
     for collection in part.users_collection:
         collection.objects.link(own)
@@ -131,7 +131,7 @@ def copied_part(part: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Obj
 def new_object(
     collection: bpy.types.Collection, role: str, name: str, T_world: np.ndarray, parent: bpy.types.Object | None = None
 ) -> bpy.types.Object:
-    """A new object of a role at a rigid pose in the world, hanging on ``parent`` if there is one."""
+    """A new object of a role at a rigid pose in the world, parented to ``parent`` if there is one."""
     obj = bpy.data.objects.new(name, _data(role, name))
     collection.objects.link(obj)
     give_role(obj, role, collection)
@@ -143,7 +143,7 @@ def new_object(
     if parent is None:
         place(obj, T_world)
     else:
-        hang(obj, parent, np.linalg.inv(rest_pose(parent)) @ T_world)
+        parent_to(obj, parent, np.linalg.inv(rest_pose(parent)) @ T_world)
     return obj
 
 
@@ -170,14 +170,14 @@ def add_shape(
     collection.objects.link(obj)
     obj.adf.role = "SHAPE"
     set_shape(obj, shape, use, 1 + max((c.adf.shape.order for c in body.children if c.adf.role == "SHAPE"), default=-1))
-    hang(obj, body, np.eye(4) if T_body is None else T_body)
+    parent_to(obj, body, np.eye(4) if T_body is None else T_body)
     return obj
 
 
-def hang_on(obj: bpy.types.Object, body: bpy.types.Object, T_world: np.ndarray | None = None) -> None:
+def parent_in_place(obj: bpy.types.Object, body: bpy.types.Object, T_world: np.ndarray | None = None) -> None:
     """Parent an object to a body; it stays where it is, or goes to a pose in the world."""
     T = rest_pose(obj) if T_world is None else T_world
-    hang(obj, body, np.linalg.inv(rest_pose(body)) @ T)
+    parent_to(obj, body, np.linalg.inv(rest_pose(body)) @ T)
 
 
 def new_part(body: bpy.types.Object, name: str, data: bpy.types.ID | None, role: str) -> bpy.types.Object:
@@ -185,7 +185,7 @@ def new_part(body: bpy.types.Object, name: str, data: bpy.types.ID | None, role:
     obj = bpy.data.objects.new(name, data)
     _shapes_of_file(body).objects.link(obj)
     obj.adf.role = role
-    hang(obj, body, np.eye(4))
+    parent_to(obj, body, np.eye(4))
     return obj
 
 
@@ -196,7 +196,7 @@ def _shapes_of_file(body: bpy.types.Object) -> bpy.types.Collection:
 
 
 def redraw_shape(obj: bpy.types.Object) -> None:
-    """Give a primitive's object the mesh of its numbers; another user of the old mesh keeps that."""
+    """Make the mesh of a primitive's object from its numbers; other users keep the old mesh."""
     data = obj.adf.shape
     shape = Shape(data.kind, tuple(data.size), data.radius, data.height, data.axis, tuple(data.normal), data.offset)
     obj.data = shape_data(*shape_mesh(shape), shape.kind.title())
@@ -212,12 +212,12 @@ def add_hull(body: bpy.types.Object, points: np.ndarray, order: int | None = Non
     others = [c.adf.shape.order for c in body.children if c.adf.role == "HULL"]
     obj.adf.shape.order = max(others, default=-1) + 1 if order is None else order
     look_like_collision(obj)
-    hang(obj, body, np.eye(4))
+    parent_to(obj, body, np.eye(4))
     return obj
 
 
 def look_like_collision(obj: bpy.types.Object) -> None:
-    """Show an object as what bodies touch: wires in the colour of collision shapes, and not in pictures."""
+    """Show an object as a collision shape: as wires of their colour, not rendered."""
     obj.display_type, obj.hide_render, obj.color = "WIRE", True, SHAPE_COLOUR["COLLISION"]
 
 
@@ -251,7 +251,7 @@ def inertial_of(body: bpy.types.Object, T_body: np.ndarray) -> bpy.types.Object:
         _shapes_of_file(body).objects.link(frame)
         frame.adf.role = "INERTIAL"
         frame.empty_display_type, frame.empty_display_size = "ARROWS", 0.01
-    hang(frame, body, T_body)
+    parent_to(frame, body, T_body)
     return frame
 
 
@@ -292,5 +292,5 @@ def cursor_pose(scene: bpy.types.Scene) -> np.ndarray:
 
 
 def is_file_object(obj: bpy.types.Object | None) -> bool:
-    """Whether an object stands for one of the file."""
+    """Whether an object represents one of the file."""
     return obj is not None and obj.adf.role in KIND_OF_ROLE

@@ -1,10 +1,10 @@
-"""Mirrors bodies with all that belongs to them: shapes, joints, sensors; what is on the left comes to the right.
+"""Mirrors bodies with their shapes, joints and sensors.
 
-A reflection F of the world takes a body at T with geometry v to F T v. A rigid pose again is F T M, with geometry M v,
-for any reflection M of the body's own axes: here that of x. A joint turns or slides as its mirror image does when its
-frame is F T M with an M under which its own motion stays the same, so that limits and commands stay as they are.
+A reflection F of the world moves a point v of a body at pose T to F T v = (F T M) (M v), for any reflection M of the
+body's own axes, with M M = 1. F T M is a rigid pose, and M v the mirrored geometry. Here M reflects x. The frame of a
+joint is F T M with an M that does not change the joint's own motion, so that limits and commands stay the same.
 
-M is taken into the mesh, not into the scale: a negative scale has no body frame of its own.
+M is applied to the mesh, not to the scale: an object with a negative scale has no rigid body frame.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .ligature.adf.nodes import Mapping as MappingNode
 from .ligature.adf.nodes import parse
 from .ligature.authoring.placement import JointKeys, child_pose
 from .mesh_reading import baked
-from .placing import hang, place
+from .placing import parent_to, place
 from .poses import SHAPED, inertial_frame, relative_pose, rest_pose
 from .preview_operators import behind, is_previewing, joints_of
 from .references import file_of, owner_of, topic_name
@@ -37,7 +37,7 @@ MIRRORED = ("GHOST_OBJECT", "SENSOR", "ACTUATOR", "CAMERA", "LIGHT", "SUTURE", "
 
 
 def mirrored_name(name: str) -> str:
-    """The name of the other side: left and right change, as do L and R behind a dot, a dash or an underline."""
+    """The name of the other side: left becomes right, and L behind a dot, dash or underscore becomes R, and back."""
     for one, other in SIDES:
         if one in name or other in name:
             return re.sub(f"{one}|{other}", lambda found, a=one, b=other: b if found[0] == a else a, name)
@@ -49,7 +49,7 @@ _LETTERS = str.maketrans("LRlr", "RLrl")
 
 
 def free_name(name: str, taken: Container[str]) -> str:
-    """A name that no other has: given one that is taken, Blender may rename the other instead."""
+    """A name that is free. If a name is taken, Blender may rename the other object instead."""
     found, number = name.encode()[:LONGEST].decode(errors="ignore"), 1
     while found in taken:
         found, number = f"{name.encode()[: LONGEST - 5].decode(errors='ignore')}.{number:03d}", number + 1
@@ -63,25 +63,25 @@ LONGEST = 63
 def mirroring(objects: list[bpy.types.Object], plane: np.ndarray) -> Steps[tuple[list[bpy.types.Object], list[str]]]:
     """The steps that mirror bodies and joints at the plane across the X of a frame (4, 4), to what is made, and notes.
 
-    Joints whose child is mirrored and all that hangs on these bodies are mirrored with them. A joint whose parent is
-    not mirrored hangs on that parent too.
+    Joints whose child is mirrored, and objects parented to the bodies, are mirrored with them. If the parent of a joint
+    is not mirrored, it is also the parent of the mirror image.
     """
     reflection = plane @ FLIP_X @ np.linalg.inv(plane)
     bodies = [obj for obj in objects if obj.adf.role == "BODY"]
     files = list(dict.fromkeys(file_of(body) for body in bodies))
     near = [obj for file in files for obj in file.all_objects]
     joints = [j for j in joints_of(near) if j.adf.child_object in bodies]
-    hanging = [obj for obj in near if obj.adf.role in MIRRORED and owner_of(obj) in bodies]
+    parented = [obj for obj in near if obj.adf.role in MIRRORED and owner_of(obj) in bodies]
     made: dict[bpy.types.Object, bpy.types.Object] = {}
     notes: list[str] = []
-    for obj in (*bodies, *hanging, *joints):
-        yield f"Mirroring '{obj.name}'", len(made) / (len(bodies) + len(hanging) + len(joints))
+    for obj in (*bodies, *parented, *joints):
+        yield f"Mirroring '{obj.name}'", len(made) / (len(bodies) + len(parented) + len(joints))
         if obj.adf.role == "BODY":
             made[obj] = _shaped(obj, reflection, None)
         elif obj.adf.role == "JOINT":
             made[obj] = _joint(obj, reflection, made, notes)
         else:
-            made[obj] = _hanging(obj, made[owner_of(obj)])
+            made[obj] = _parented(obj, made[owner_of(obj)])
     return list(made.values()), notes
 
 
@@ -122,7 +122,7 @@ def _shaped(obj: bpy.types.Object, reflection: np.ndarray, owner: bpy.types.Obje
     if owner is None:
         place(copy, reflection @ rest_pose(obj) @ FLIP_X)
     else:
-        hang(copy, owner, FLIP_X @ relative_pose(owner_of(obj), obj) @ FLIP_X)
+        parent_to(copy, owner, FLIP_X @ relative_pose(owner_of(obj), obj) @ FLIP_X)
     copy.scale = obj.scale
     if obj.type == "MESH":
         copy.data = flipped(obj)
@@ -146,7 +146,7 @@ def _part(part: bpy.types.Object, body: bpy.types.Object, image: bpy.types.Objec
     own = making.copied_part(part, image)
     scale = np.array(part.scale)
     flip = _symmetry(part)
-    hang(own, image, FLIP_X @ relative_pose(body, part) @ flip)
+    parent_to(own, image, FLIP_X @ relative_pose(body, part) @ flip)
     own.scale = scale
     if part.adf.role == "HULL":
         own.data = flipped(part)
@@ -168,11 +168,11 @@ def _symmetry(part: bpy.types.Object) -> np.ndarray:
     return FLIP_Z if shape.kind in ("CYLINDER", "CAPSULE", "CONE") else FLIP_X
 
 
-def _hanging(obj: bpy.types.Object, owner: bpy.types.Object) -> bpy.types.Object:
+def _parented(obj: bpy.types.Object, owner: bpy.types.Object) -> bpy.types.Object:
     if obj.adf.role in SHAPED:
         return _shaped(obj, np.eye(4), owner)
     copy = _copy(obj)
-    hang(copy, owner, FLIP_X @ relative_pose(owner_of(obj), obj) @ FLIP_X)
+    parent_to(copy, owner, FLIP_X @ relative_pose(owner_of(obj), obj) @ FLIP_X)
     copy.scale = obj.scale
     if obj.adf.role == "SENSOR":
         for ray in copy.adf.sensor.array:
@@ -189,7 +189,7 @@ def _joint(
     copy.adf.parent_text = copy.adf.child_text = ""
     kind = joint.adf.joint.type
     flip = FLIP_X if kind == "linear spring" else FLIP_Z
-    making.hang_on(copy, copy.adf.parent_object, reflection @ rest_pose(joint) @ flip)
+    making.parent_in_place(copy, copy.adf.parent_object, reflection @ rest_pose(joint) @ flip)
     if kind.startswith("six dof"):
         _mirror_axes(copy.adf.joint)
     elif kind in ("revolute", "prismatic", "linear spring", "torsion spring"):
@@ -219,9 +219,9 @@ def _mirror_axes(group: bpy.types.PropertyGroup) -> None:
 
 
 def zero_of(joint: bpy.types.Object) -> float:
-    """Where a joint of the file stands at rest, from its zero: radians, or metres of one that slides.
+    """The position of a joint of the file at rest, in radians, or metres if it slides.
 
-    New joints, and those whose bodies do not stand where it holds them, stand at zero.
+    It is zero for new joints, and for those whose bodies are not where the joint holds them.
     """
     file, parent, child = file_of(joint), joint.adf.parent_object, joint.adf.child_object
     if not joint.adf.was or not file.adf.source or None in (parent, child):
@@ -248,7 +248,7 @@ def zero_of(joint: bpy.types.Object) -> float:
 
 @lru_cache(maxsize=1)
 def _parsed(source: str) -> MappingNode:
-    """The text of a file as nodes, which all its joints are looked up in."""
+    """The text of a file as nodes, in which its joints are looked up."""
     return parse(source, Path("model.yaml"))
 
 

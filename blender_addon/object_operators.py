@@ -122,7 +122,7 @@ class ADF_OT_clear(bpy.types.Operator):
 
 
 class ADF_OT_add(bpy.types.Operator):
-    """Add an object of the file at the 3D cursor; it hangs on the active body where that makes sense"""
+    """Add an object of the file at the 3D cursor; parented to the active body if its role allows it"""
 
     bl_idname = "adf.add"
     bl_label = "Add ADF Object"
@@ -135,7 +135,7 @@ class ADF_OT_add(bpy.types.Operator):
     def execute(self, context):
         collection = target_file(context, self.role)
         name = self.name or self.role.replace("_", " ").title()
-        body = active_body(context) if self.hang and self.role in making.HANGING else None
+        body = active_body(context) if self.hang and self.role in making.PARENTED else None
         obj = making.new_object(collection, self.role, name, making.cursor_pose(context.scene), body)
         group = getattr(obj.adf, self.role.lower())
         if self.role == "SENSOR":

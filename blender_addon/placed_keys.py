@@ -169,7 +169,7 @@ def _shape_item(one: PlacedShape, item: Keys, before: list | None, far: float, f
 
 
 def _far(placed: Placed) -> float:
-    """The greatest coordinate of what hangs on an object, in its frame."""
+    """The largest coordinate of an object's children, in its frame."""
     frames = [s.T_owner for shapes in placed.shapes.values() for s in shapes]
     frames += [placed.inertial] if placed.inertial is not None else []
     return max((float(np.abs(T[:3, 3]).max()) for T in frames), default=0.0)

@@ -19,7 +19,7 @@ def place(obj: bpy.types.Object, T: np.ndarray) -> None:
     obj.rotation_quaternion = (w, x, y, z)
 
 
-def hang(obj: bpy.types.Object, parent: bpy.types.Object, T: np.ndarray) -> None:
+def parent_to(obj: bpy.types.Object, parent: bpy.types.Object, T: np.ndarray) -> None:
     """Parent an object at a pose in the parent's rigid frame; the parent's scale is taken out."""
     obj.parent = parent
     obj.matrix_parent_inverse = Matrix(np.linalg.inv(scaling(parent)).tolist())

@@ -25,7 +25,7 @@ def joints_of(scene_objects):
 
 
 def behind(joint):
-    """The bodies that move with a joint's child: all that hang on it by other joints, but not its parent."""
+    """The bodies that move with a joint's child: all that other joints connect to it, but not its parent."""
     collection = making.file_of(joint)
     joints = [j for j in joints_of(collection.all_objects) if j is not joint]
     found, open_ends = [], [joint.adf.child_object]
@@ -96,7 +96,7 @@ def is_previewing(scene):
 
 
 class ADF_OT_move_joint(bpy.types.Operator):
-    """Show the active joint at another position, with everything that hangs on it"""
+    """Show the active joint at another position, with all bodies behind it"""
 
     bl_idname = "adf.move_joint"
     bl_label = "Preview Joint"

@@ -27,7 +27,7 @@ from .ligature.authoring.shapes import Shape, shape_mesh
 from .ligature.mesh import Mesh, MeshError, load_mesh
 from .mesh_making import MeshMaker, shape_data
 from .mesh_reading import mesh_print
-from .placing import hang, place, place_joint, place_light, place_view
+from .placing import parent_to, place, place_joint, place_light, place_view
 from .poses import SHAPED, placed, rest_pose
 from .properties import ROLE_OF_KIND
 from .references import owner_names, qualified
@@ -216,7 +216,7 @@ class _Importer:
         self.collection.adf.imported_keys = json.dumps([obj.adf.key for obj in made])
 
     def make(self, words: str) -> Steps[list[bpy.types.Object]]:
-        """Make the objects, bodies first, since others hang on them."""
+        """Make the objects, bodies first, because they are the parents of others."""
         elements = {e.key: e for listed in self.document.lists.values() for e in listed}
         bodies_first = sorted(elements.values(), key=lambda e: (e.kind != "body", e.kind == "joint"))
         for number, element in enumerate(bodies_first):
@@ -324,7 +324,7 @@ class _Importer:
         frame = self._new(f"{obj.name} inertial", None, "INERTIAL", shapes=True)
         frame.empty_display_type = "ARROWS"
         frame.empty_display_size = 0.01
-        hang(frame, obj, T)
+        parent_to(frame, obj, T)
 
     def _add_shapes(self, obj: bpy.types.Object, values: dict) -> None:
         inertial = matrix_of(values.get("inertial offset")) if obj.adf.role != "SOFT_BODY" else np.eye(4)
@@ -347,7 +347,7 @@ class _Importer:
             self.shapes[shape] = shape_data(*shape_mesh(shape), kind.title())
         child = self._new(f"{obj.name} {use.lower()}", self.shapes[shape], "SHAPE", shapes=True)
         set_shape(child, shape, use, order)
-        hang(child, obj, T)
+        parent_to(child, obj, T)
 
     def _add_collision_mesh(self, element: Element, obj: bpy.types.Object, values: dict) -> None:
         if "collision shape" in values or "compound collision shape" in values or not values.get("collision mesh"):
@@ -362,7 +362,7 @@ class _Importer:
             hull.display_type = "WIRE"
             hull.hide_render = True
             hull.color = SHAPE_COLOUR["COLLISION"]
-            hang(hull, obj, np.eye(4))
+            parent_to(hull, obj, np.eye(4))
 
     def _find(self, text: str, kinds: tuple[str, ...] = ("body",)) -> bpy.types.Object | None:
         """The object that a reference means: of this file first, then of any other that is open."""
@@ -388,7 +388,7 @@ class _Importer:
         self.objects[element.key] = obj
         T = place_joint(values, parent, child)
         if parent is not None:
-            hang(obj, parent, T)
+            parent_to(obj, parent, T)
         else:
             place(obj, T)
 
@@ -397,7 +397,7 @@ class _Importer:
         obj = self.objects[element.key]
         parent = self._find(obj.adf.parent_text, tuple(ROLE_OF_KIND))
         if parent is not None and parent is not obj:
-            hang(obj, parent, rest_pose(obj))
+            parent_to(obj, parent, rest_pose(obj))
             obj.adf.hung = True
 
 

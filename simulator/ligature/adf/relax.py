@@ -1,9 +1,8 @@
-"""Makes flow collections that leave their indentation readable, as yaml-cpp reads them.
+"""Indents flow collections that are indented too little, so that they can be read.
 
-YAML wants the lines of a ``{…}`` or ``[…]`` to be indented deeper than the key they belong to;
-yaml-cpp does not mind, and real files rely on it (ADF specification §1.1). Blanks are inserted at
-line starts only, so that lines stay lines and every place can be counted back. Lines and columns
-count from 0 here, as YAML libraries do.
+YAML requires the lines of a ``{…}`` or ``[…]`` to be indented deeper than their key. yaml-cpp does not check this, and
+real files rely on it (ADF specification §1.1). Spaces are inserted only at line starts, so that every line and column
+of the original can be computed. Lines and columns count from 0, as in YAML libraries.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ import re
 from dataclasses import dataclass, field
 
 INDENT = 32
-"""Blanks put before a flow line; deeper than any block mapping of a scene file."""
+"""Spaces inserted before a line of a flow collection; more than any block mapping of a scene file has."""
 
 
 @dataclass(frozen=True)
 class Relaxed:
-    """``text`` with blanks inserted before some ``lines``, and the way back to the places before."""
+    """``text`` with spaces inserted before some ``lines``; `original` gives the places before the insertion."""
 
     text: str
     lines: list[int] = field(default_factory=list)

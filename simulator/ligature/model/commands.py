@@ -29,7 +29,7 @@ from ligature.model.scene import Scene
 
 
 class CommandType(enum.IntEnum):
-    """What a number in a command means; the values are those of ``ambf_msgs/RigidBodyCmd``."""
+    """The quantity that a command sets; the values are those of ``ambf_msgs/RigidBodyCmd``."""
 
     FORCE = 0
     POSITION = 1
@@ -43,7 +43,7 @@ RELEASED = ("body", "actuator", "camera", "light", "arm")
 """Kinds of objects whose commands a `Release` clears."""
 
 MAX_POSITION = 1e4
-"""Metres from the origin of a pose; 1e9 m between two attached bodies leaves the doubles no digits to act in."""
+"""Metres from the origin of a pose; at 1e9 m between two attached bodies, doubles have no digits left."""
 
 MAX_VELOCITY = 1e4
 """Metres or radians per second of a twist."""
@@ -60,7 +60,7 @@ _TARGETS: dict[CommandType, Field] = {
 
 @dataclass(frozen=True)
 class Command(Message):
-    """What the simulation carries out, and records keep."""
+    """A command that the simulation executes and records contain."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class ActuatorCommand(Command, code=2):
 
     @property
     def slot(self) -> Hashable:
-        """To attach and to release are different things, of which neither replaces the other."""
+        """Attaching and releasing have a slot each: neither replaces the other."""
         return self.object, self.actuate
 
 
@@ -175,16 +175,16 @@ PHASE_TOPIC = "ligature/phase"
 
 @dataclass(frozen=True)
 class MarkPhase(Command, code=13):
-    """The operator tells which ``phase`` of the work begins; an empty text ends the present one.
+    """The operator marks the begin of a ``phase`` of the work; an empty text ends the current one.
 
-    Nothing in the simulation changes: records keep the mark, and datasets made from them have it as a label.
+    The simulation does not change. Records contain the mark, and datasets made from them have it as a label.
     """
 
     phase: str = wire(Text())
 
     @classmethod
     def of(cls, text: str) -> MarkPhase:
-        """The mark that a person means by ``text``; raises ValueError for what is no name of a phase."""
+        """The mark for the name ``text`` of a phase; raises ValueError for an invalid name."""
         mark = cls(text.strip())
         mark.check()
         return mark

@@ -1,4 +1,4 @@
-"""How far shapes extend: the boxes and centroids that masses are estimated from, where a file gives none (§12.6).
+"""Bounding boxes and centroids of shapes, from which masses are estimated that a file does not give (§12.6).
 
 Shapes are placed in the body frame B; metres.
 """
@@ -11,14 +11,14 @@ from ligature.model.frames import Array, inverse
 from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Sphere, TriMesh
 
 HULL_MARGIN_OF_ESTIMATE = 0.04
-"""Bullet's default margin in metres; the reference estimates the inertia of hulls with it still in place."""
+"""Bullet's default margin in metres; AMBF estimates the inertia of hulls with it."""
 
 
 def estimate_size(parts: tuple[Collider, ...], T_body_inertial: Array, margin: float) -> Array | None:
     """Edge lengths (3,) of the box around all shapes along the axes of I; None without a finite shape.
 
-    The boxes are Bullet's, which the reference takes (§12.6): that of a turned shape is the box around
-    its own box, except for spheres and cones.
+    The boxes are those of Bullet, as in AMBF (§12.6): the box of a rotated shape bounds the shape's own box, except for
+    spheres and cones.
     """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     to_inertial = inverse(T_body_inertial)

@@ -30,7 +30,7 @@ MOST_FACES = 60_000
 """Faces beyond which no triangle is divided further."""
 
 ASIDE = 1e-3
-"""Share of the way to its faces by which a vertex is moved to find the cell that carries it."""
+"""Fraction of the distance to its faces by which a vertex is moved to find the cell that contains it."""
 
 NEAR, ALIKE = 1e-9, 1e-4
 """Metres, and differences of unit vectors, below which vertices count as the same."""
@@ -53,7 +53,7 @@ class TissueSurface:
     tissue
         The body.
     piece
-        What is drawn of it at rest.
+        Its triangles at rest.
     walls
         Whether this piece has the walls of the slits too.
     fineness
@@ -122,7 +122,7 @@ def tissue_surfaces(scene: Scene, pieces: Sequence[Piece], fineness: float = FIN
 
 
 class Marks:
-    """What punctures leave on the surface of one body of tissue."""
+    """Marks of punctures on the surface of one body of tissue."""
 
     def __init__(self, scene: Scene, tissue: TissueBody) -> None:
         self._index = tissue.index
@@ -211,9 +211,9 @@ def _middles(surface: Triangles) -> Array:
 
 
 def _smooth_groups(surface: Triangles, embedding: Embedding) -> NDArray[np.int64]:
-    """Which vertices (v,) share a normal: those that have one place and normal at rest, and move together.
+    """Groups (v,) of vertices that share a normal: they have the same position and normal at rest, and move together.
 
-    Those that move together are known by where they go when every node moves in its own way.
+    Vertices move together if they have the same position after a random displacement of all nodes.
     """
     nodes = int(embedding.nodes.max(initial=0)) + 1
     moved = embedding.positions(np.random.default_rng(0).standard_normal((nodes, 3)))

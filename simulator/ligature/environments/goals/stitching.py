@@ -22,11 +22,11 @@ DRIVER, PULLER = 0, 1
 class Suture(Insert):
     """One throw of a suture with two arms, from the needle in the first arm's jaws before the entry.
 
-    The first arm drives it in at the entry and out at the exit as in `Insert`; the second one takes it there, near its
-    tip; the first lets go; and the second draws the rest of the needle out, and 30 mm of thread. Done when all of that
-    has been so in this order, and the second arm's jaws, and no others, have held the needle for the last 0.5 s, with
-    the thread through both holes. Lost when nobody holds the needle, after 2 s where tissue has it, or when neither
-    needle nor thread is in the exit any more.
+    The first arm drives the needle through entry and exit, as in `Insert`. The second arm grasps it near its tip, the
+    first releases it, and the second pulls out the rest of the needle and 30 mm of thread. The task is done when these
+    steps have happened in this order, and only the second arm has held the needle for the last 0.5 s, with the thread
+    through both holes. It is lost when no arm holds the needle (for 2 s while it is in tissue), or when neither needle
+    nor thread is in the exit any more.
     """
 
     text = "drive the needle through the tissue, take it with the other arm, and pull its thread through"
