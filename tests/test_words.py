@@ -90,7 +90,7 @@ ALLOWED = {
     ("simulator/ligature/cockpit/", "grip"): GRIP, ("docs/teleoperation.md", "grip"): GRIP,
     ("tests/fuzz/readers.py", "grip"): GRIP, ("tests/teleop/", "grip"): GRIP, ("tests/teleop/", "grips"): GRIP,
     ("tests/ros/", "grip"): GRIP, ("tests/bench/teleop_suture.py", "grip"): GRIP,
-    ("simulator/ligature/cockpit/cockpit.py", "hold"): HOLD, ("simulator/ligature/robots/commands.py", "hold"): HOLD,
+    ("simulator/ligature/cockpit/motion.py", "hold"): HOLD, ("simulator/ligature/robots/commands.py", "hold"): HOLD,
     ("simulator/ligature/ros/arms/commands.py", "hold"): HOLD, ("tests/fuzz/test_commands.py", "hold"): HOLD,
     ("simulator/ligature/bus/", "memory"): SHARED, ("simulator/ligature/bus/", "_memory"): SHARED,
     ("tests/bus/test_events.py", "memory"): SHARED, ("tests/bench/soak.py", "memory"): SHARED,

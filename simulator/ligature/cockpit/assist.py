@@ -164,7 +164,7 @@ class Assist:
             self.stop(f"{self._arms[self._arm].name} stopped: it is no longer enabled and homed.")
             return
         if self._tip_force > PRESSED:
-            self.stop(f"{self._arms[self._arm].name} stopped: it presses on something. Lead it away by hand.")
+            self.stop(f"{self._arms[self._arm].name} stopped: it presses on something. Move it away by hand.")
             return
         try:
             next(self._steps)

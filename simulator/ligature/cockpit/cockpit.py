@@ -1,7 +1,7 @@
-"""The cockpit's loop: snapshots to browsers, what the operator does to the bus, and the hand that must not slip.
+"""The cockpit's loop: states to browsers, and what the operator does to the bus.
 
 Browsers speak on the network's thread; whatever they send waits in one queue for the loop, so that all decisions are
-made on one thread. Metres, radians, seconds.
+made on one thread. Seconds.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from ligature.bus.events import PHASE, RUN
 from ligature.cockpit.address import Address
 from ligature.cockpit.arm_facts import ArmFacts
 from ligature.cockpit.arm_panel import ArmControls, ArmStatus
-from ligature.cockpit.assist import Assist
 from ligature.cockpit.audience import Audience
-from ligature.cockpit.camera_panel import MOST_CUT, NO_PICTURES, CameraControls
+from ligature.cockpit.camera_panel import MOST_CUT, CameraControls
 from ligature.cockpit.curves import Curves
-from ligature.cockpit.deadman import AWAKE, GONE, LEFT, DeadMan
+from ligature.cockpit.deadman import DeadMan
 from ligature.cockpit.gate import Gate
-from ligature.cockpit.hands import NEAREST, Hands, Sightline
-from ligature.cockpit.orders import Order, View
+from ligature.cockpit.hands import NEAREST
+from ligature.cockpit.motion import Motion
+from ligature.cockpit.orders import Order
 from ligature.cockpit.page import (
     CAMERA_HEIGHT,
     LEFT_WIDTH,
@@ -39,33 +39,24 @@ from ligature.cockpit.page import (
     paint,
     serve,
 )  # fmt: skip
-from ligature.cockpit.pictures import HEIGHT, Pictures, Wish, sights
-from ligature.cockpit.pursuit import ArmPursuits
+from ligature.cockpit.pictures import Pictures
 from ligature.cockpit.ros_panel import Health, Remote, RosPanel, TeleopControls, obey_teleop
 from ligature.cockpit.simulation_panel import Clockwork, SimulationControls, SimulationPanel
-from ligature.cockpit.stage import Stage, first_view, work_place
-from ligature.cockpit.starter import Starter
+from ligature.cockpit.stage import Stage, first_view
+from ligature.cockpit.views import Views
 from ligature.cockpit.wire import Wire
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import new_state
-from ligature.robots.commands import Hold, StateCommand
 
 PERIOD = 0.01
 STAGE_PERIOD, WORDS_PERIOD, CURVES_PERIOD, PICTURE_PERIOD = 0.05, 0.2, 0.4, 0.02
 """Seconds between turns of the loop, poses, words and controls, curves, and looks for a new picture."""
-
-SMALL_VIEW = View(False, HEIGHT)
-"""View of a browser that has not reported one yet."""
 
 AFTER_FAILURE = 1.0
 """Seconds after which a part of the page that failed is tried again."""
 
 CLAIM_TIMEOUT = 30.0
 """Seconds after *Start* was pressed in which a browser gets control; later it has to be pressed again."""
-
-AGAIN = "Press again to continue from here."
-BY_HAND = f"Your hand took over. {AGAIN}"
-"""Why the assistance has stopped, and how to continue."""
 
 REPORTED = ("warning", "error")
 """Events of an arm that are shown beside it."""
@@ -94,23 +85,18 @@ class Cockpit:
         self._address = address
         self._wire = Wire()
         self.server = serve(address, Gate(address, token, warn), self._wire)
-        self._deadman = DeadMan(self.server, self._wire)
         self._inbox: deque[tuple[str, int, Any]] = deque()
         self._clockwork = Clockwork(self._outbox.push)
         self._speed = "1"
         self._record_as, self._recorded, self._reported = "", "", ""
         self._phase = ""
         facts = [ArmFacts.of(scene, index) for index in range(len(scene.arms))]
-        self._pursuits = [ArmPursuits(index) for index in range(len(facts))]
-        self._hands = Hands(facts, self._pursuits)
-        self._starter = Starter(facts, self._outbox.push)
-        self._assist = Assist(scene, facts, self._pursuits)
-        self._resets, self._followed = 0, float(self._state["sim_time"][0])
-        self._views: dict[int, View] = {}
+        self._views = Views(scene, self._state)
         self._begins = (-1, 0.0)
         self._curves = Curves(scene, task)
         self._lay_out(facts, ros, title)
-        self._controls: list[ArmControls] = []
+        deadman = DeadMan(self.server, self._wire)
+        self._motion = Motion(scene, self._state, self._arms, deadman, self._outbox.push, warn)
         self._run_controls: SimulationControls | None = None
         self._camera_controls: CameraControls | None = None
         self._teleop_controls: TeleopControls | None = None
@@ -132,9 +118,7 @@ class Cockpit:
         self._arms = [ArmStatus(server, f, f.index == first) for f in facts]
         self._ros = None if ros is None else RosPanel(server, *ros)
         panels = []
-        self._sights = {sight.name: sight for sight in sights(scene)}
-        self._sight = next(iter(self._sights), NO_PICTURES)
-        if self._sights:
+        if self._views.sights:
             panels.append(server.gui.add_panel())
             with panels[-1].add_tab("Cameras"):
                 self._camera_folder = server.gui.add_folder("View")
@@ -173,7 +157,7 @@ class Cockpit:
                     self._obey(word, value)
             except Exception as error:  # nothing that one browser does ends the page for the others
                 self._report(f"'{word}' of a browser failed", error)
-        self._follow(now, now - self._last)
+        self._motion.follow(self._operating, self._views, now, now - self._last)
         self._last = now
         self._curves.observe(self._state[0], float(self._block.figures["real_time_factor"][0]))
         for show, due in self._due.items():
@@ -205,7 +189,7 @@ class Cockpit:
         def act(word: str, value: Any) -> None:
             self._inbox.append((word, own, value))
 
-        self._controls = [
+        self._motion.controls = [
             ArmControls(client, status, state, lambda word, arm, value: act(word, (arm, value)))
             for status in self._arms
         ]
@@ -219,26 +203,24 @@ class Cockpit:
             self._phase,
             act,
         )
-        if self._sights:
-            names = tuple(self._sights)
-            self._camera_controls = CameraControls(client, self._camera_folder, names, self._sight, self._tube, act)
+        if self._views.sights:
+            names, chosen = tuple(self._views.sights), self._views.chosen
+            self._camera_controls = CameraControls(client, self._camera_folder, names, chosen, self._tube, act)
         if self._ros is not None:
             self._teleop_controls = TeleopControls(client, self._ros, act)
         if self._begins[0] == own and time.monotonic() - self._begins[1] < CLAIM_TIMEOUT:
-            self._starter.begin()
+            self._motion.starter.begin()
         self._begins = (-1, 0.0)
 
     def _end_operating(self, why: str, there: bool) -> None:
         """The operator is gone; ``there``: whether the browser still shows the controls."""
-        self._stop_all(why)
+        self._motion.stop_all(why)
         if there:
-            for controls in (*self._controls, self._run_controls, self._camera_controls, self._teleop_controls):
+            for controls in (*self._motion.controls, self._run_controls, self._camera_controls, self._teleop_controls):
                 if controls is not None:
                     controls.remove()
-        self._controls, self._run_controls, self._camera_controls, self._teleop_controls = [], None, None, None
-
-        self._starter.end()
-        self._hands.rest()
+        self._run_controls, self._camera_controls, self._teleop_controls = None, None, None
+        self._motion.end()
 
     # --- the page's own script -------------------------------------------------------------------
 
@@ -249,7 +231,7 @@ class Cockpit:
             return
         word, value = order
         if word == "view":
-            self._views[client] = value
+            self._views.report(client, value)
         elif word == "dark":
             paint(handle.gui, value)
         elif word == "csv":
@@ -258,115 +240,47 @@ class Cockpit:
         elif word == "start":
             self._start(handle)
         elif client == self._audience.desk.operator:
-            self._handle_hand_order(word, value, handle)
+            self._motion.obey_hand(word, value, time.monotonic(), self._views.camera)
 
     def _start(self, client: ClientHandle) -> None:
         look_now(client, *first_view(self._scene, self._state))
         if self._audience.desk.operator == client.client_id:
-            self._starter.begin()
+            self._motion.starter.begin()
         else:
             self._begins = client.client_id, time.monotonic()
             self._audience.claim(client.client_id)
-
-    def _handle_hand_order(self, word: str, value: Any, client: ClientHandle) -> None:
-        state, hands = self._state[0], self._hands
-        if word in ("next", "drag") or (word == "move" and any(value)):
-            self._assist.stop(BY_HAND)
-        if word == "move":
-            self._forget_note(hands.selected)
-            hands.move(value, time.monotonic())
-        elif word == "silent":
-            hands.rest()
-        elif word == "hold":
-            self._hold()
-        elif word == "next":
-            hands.next()
-        elif word == "speed":
-            hands.mode = value
-        elif word == "assist":
-            self._forget_note(hands.selected)
-            hands.rest()
-            self._assist.begin(value, hands.selected, state)
-        elif word == "drive":
-            self._assist.drive(value, hands.selected, state)
-        elif word == "drag":
-            sight = self._camera_sight
-            arm = None if sight is None else hands.drag(state, value, sight)
-            if arm is not None:
-                self._forget_note(arm)
-
-    def _hold(self) -> None:
-        """Hold all arms where they are."""
-        self._hands.rest()
-        for arm, pursuits in enumerate(self._pursuits):
-            if pursuits.stop():
-                self._outbox.push(Hold(arm))
-        self._assist.stop(f"Every arm holds. {AGAIN}")
-
-    def _forget_note(self, arm: int) -> None:
-        if 0 <= arm < len(self._arms):
-            self._arms[arm].note = ""
-
-    @property
-    def _camera_sight(self) -> Sightline | None:
-        """Line of sight of the camera whose picture is shown, of the first of two."""
-        sight = self._sights.get(self._sight)
-        if sight is None:
-            return None
-        index = sight.eyes[0][0]
-        return Sightline.of(self._scene.cameras[index], self._state["camera_world"][0, index])
-
-    def _sightline(self, client: ClientHandle) -> Sightline:
-        """Line of sight of a browser: the camera's if its picture is large, else that of the 3D view."""
-        if self._views.get(client.client_id, SMALL_VIEW).large and self._camera_sight is not None:
-            return self._camera_sight
-        try:
-            return Sightline.browser(client.camera.wxyz)
-        except AssertionError:  # a browser that has not shown anything yet
-            return self._camera_sight or Sightline(np.eye(3), np.zeros(3))
 
     def _inform(self) -> None:
         """Send each script the values that it shows."""
         desk = self._audience.desk
         ready = [arm.facts.ready(self._state[0]) for arm in self._arms]
-        hands = self._hands
+        hands, assist = self._motion.hands, self._motion.assist
         chosen = self._arms[hands.selected].facts.name if hands.selected >= 0 else ""
-        wish = self._wish()
-        sight = self._camera_sight
-        aim = None if sight is None or chosen == "" else self._aim(sight)
-        help_ = self._assist.facts(hands.selected, self._state[0])
+        wish = self._views.wish(self._audience.clients)
+        aim = None if chosen == "" else self._views.aim(assist.aim(hands.selected, self._state[0]))
+        help_ = assist.facts(hands.selected, self._state[0])
         for client in self._audience.clients:
             self._wire.inform(
                 client,
                 {
                     "operates": client == desk.operator,
                     "free": desk.operator is None and not desk.kept(time.monotonic()),
-                    "starting": self._starter.active,
+                    "starting": self._motion.starter.active,
                     "ready": hands.selected >= 0 and ready[hands.selected],
                     "arm": chosen,
                     "speed": hands.mode,
                     "eyes": 0 if wish is None else len(wish.sight.eyes),
-                    "pair": wish is not None and len(self._sights[self._sight].eyes) > 1,
+                    "pair": wish is not None and self._views.is_stereo,
                     "assist": help_,
                     "aim": aim,
                 },
             )
 
-    def _aim(self, sight: Sightline) -> list[float] | None:
-        """Where the selected arm has to go next: from and to in the picture, then millimetres apart and in depth."""
-        ends = self._assist.aim(self._hands.selected, self._state[0])
-        if ends is None:
-            return None
-        away, deeper = float(np.linalg.norm(ends[1] - ends[0])), sight.depth(ends[1]) - sight.depth(ends[0])
-        places = np.concatenate([sight.place(end) for end in ends])
-        shown = [*places.round(4).tolist(), round(1e3 * away, 1), round(1e3 * deeper, 1)]
-        return shown if np.isfinite(places).all() else None
-
     # --- what the operator does ----------------------------------------------------------------
 
     def _obey(self, word: str, value: Any) -> None:
         if word in ("command", "gizmo", "joint", "grip", "drag"):
-            self._obey_arm(word, *value)
+            self._motion.obey_control(word, *value)
         elif word == "pause":
             self._clockwork.pause(bool(value))
         elif word == "step":
@@ -377,7 +291,7 @@ class Cockpit:
             self._speed = value
             self._clockwork.pace(float(value))
         elif word == "reset":
-            self._stop_all("")
+            self._motion.stop_all("")
             self._clockwork.reset()
         elif word == "record as":
             self._record_as = str(value)
@@ -386,7 +300,7 @@ class Cockpit:
         elif word == "phase":
             self._mark(str(value))
         elif word == "sight":
-            self._sight = value
+            self._views.chosen = value
         elif word == "cut":
             self._cut(value)
         elif word == "tube":
@@ -401,93 +315,11 @@ class Cockpit:
         if client is not None:
             client.camera.near = float(np.clip(distance, NEAREST, 1e-3 * MOST_CUT))
 
-    def _obey_arm(self, word: str, arm: int, value: Any) -> None:
-        state, facts, pursuits = self._state[0], self._arms[arm].facts, self._pursuits[arm]
-        if word == "gizmo":
-            self._controls[arm].show_gizmo(value)
-            return
-        self._arms[arm].note = ""
-        self._assist.stop(BY_HAND)
-        if word == "command":
-            pursuits.stop()
-            if value == "Hold":
-                self._outbox.push(Hold(arm))
-            else:
-                self._outbox.push(StateCommand(arm, value.lower()))
-        elif word == "joint":
-            joint, target = value
-            pursuits.joint(facts.setpoints(state), joint, target, facts.speed)
-        elif word == "grip":
-            pursuits.jaw(float(state["arm"][arm]["jaw_setpoint_js"][0]), value, facts.grip_verb)
-        elif word == "drag":
-            self._controls[arm].lost_gizmo()
-            start = facts.in_reference(state, facts.tip_in_world(state))
-            pursuits.pose(start, facts.in_reference(state, value))
-
-    def _follow(self, now: float, dt: float) -> None:
-        """Send the next goals of motions in progress, slowed or stopped while the operator's browser is silent."""
-        client, state = self._operating, self._state[0]
-        # goals move in simulated time: an arm keeps a hand's speed in a simulation that is slow, held up, or paused
-        step = float(np.clip(state["sim_time"] - self._followed, 0.0, AWAKE))
-        self._followed = float(state["sim_time"])
-        if client is not None:
-            if self._starter.advance(state) and self._camera_sight is not None:
-                place = work_place(self._scene, self._state)
-                self._hands.bring(state, place, self._camera_sight, self._assist.arm)
-            if int(state["resets"]) != self._resets:
-                self._resets = int(state["resets"])
-                self._assist.forget()
-            self._assist.advance(state)
-            if self._assist.busy:
-                self._hands.selected = self._assist.arm  # it takes the arm that reaches the needle
-            if self._hands.busy:
-                self._hands.advance(state, self._sightline(client), now, dt)
-        driven = [i for i, pursuits in enumerate(self._pursuits) if pursuits.active]
-        following = bool(driven or self._assist.busy or self._dragged)
-        self._deadman.watch(None if client is None else client.client_id, following, dt)
-        by_hand, by_plan = self._deadman.paces(dt)
-        silence = self._deadman.silence
-        if silence > LEFT:
-            self._stop_all(f"the operator's browser has not answered for {silence:.0f} s")
-        elif silence > GONE:
-            self._give_up(f"the operator's browser has not answered for {1e3 * silence:.0f} ms")
-        for arm in driven:
-            pace = by_plan if self._pursuits[arm].planned else by_hand
-            if pace * step > 0.0:
-                for command in self._pursuits[arm].advance(pace * step):
-                    self._outbox.push(command)
-
     @property
     def _operating(self) -> ClientHandle | None:
         """The operator's browser."""
         operator = self._audience.desk.operator
         return None if operator is None else self._audience.clients.get(operator)
-
-    @property
-    def _dragged(self) -> set[int]:
-        """The arms whose tips are dragged."""
-        dragged = {arm for arm, controls in enumerate(self._controls) if controls.dragging}
-        return dragged if self._hands.dragging is None else dragged | {self._hands.dragging}
-
-    def _give_up(self, why: str) -> None:
-        """Hold all arms that are driven by hand, and show why."""
-        dragged = self._dragged
-        for arm, (status, pursuits) in enumerate(zip(self._arms, self._pursuits, strict=True)):
-            steered = pursuits.active and not pursuits.planned
-            if steered or arm in dragged:
-                pursuits.stop()
-                self._outbox.push(Hold(arm))
-                if why and status.note != f"hold: {why}":
-                    status.note = f"hold: {why}"
-                    self._warn(f"{status.facts.name} holds: {why}")
-        self._hands.rest()
-
-    def _stop_all(self, why: str) -> None:
-        """Hold every arm that the operator drives, and what is done for the operator, and show why."""
-        for pursuits in self._pursuits:
-            pursuits.planned = False
-        self._give_up(why)
-        self._assist.stop(f"It stopped: {why}. {AGAIN}" if why else "")
 
     @property
     def _recording(self) -> bool:
@@ -515,10 +347,11 @@ class Cockpit:
         if self._audience.clients:
             self._stage.update(self._state)
             operated = self._audience.desk.operator is not None
-            self._stage.show_aim(self._assist.aim(self._hands.selected, self._state[0]) if operated else None)
-            for arm, controls in enumerate(self._controls):
-                if not self._pursuits[arm].active:
-                    controls.place_gizmo(self._state[0])
+            motion, state = self._motion, self._state[0]
+            self._stage.show_aim(motion.assist.aim(motion.hands.selected, state) if operated else None)
+            for controls, pursuits in zip(motion.controls, motion.pursuits, strict=False):
+                if not pursuits.active:
+                    controls.place_gizmo(state)
         return STAGE_PERIOD
 
     def _show_words(self, now: float) -> float:
@@ -531,9 +364,7 @@ class Cockpit:
             elif event.name in REPORTED:
                 self._arms[event.arm].note = str(event.value)
                 if "servo" in str(event.value):
-                    self._pursuits[event.arm].stop()
-                    if event.arm == self._assist.arm:
-                        self._assist.stop(f"It stopped: {event.value}. {AGAIN}")
+                    self._motion.stop_rejected(event.arm, str(event.value))
         if self._tick != int(state["tick"]):
             self._tick, self._moved_at = int(state["tick"]), now
         if self._audience.clients:
@@ -541,27 +372,14 @@ class Cockpit:
             self._panel.refresh(self._run_words())
             for arm in self._arms:
                 arm.refresh(state)
-            for controls, pursuits in zip(self._controls, self._pursuits, strict=False):
+            for controls, pursuits in zip(self._motion.controls, self._motion.pursuits, strict=False):
                 controls.refresh(state, not pursuits.active)
             if self._run_controls is not None:
                 self._run_controls.show_recording(self._recording)
             self._inform()
             self._show_ros()
-        self._pictures.want(self._wish())
+        self._pictures.want(self._views.wish(self._audience.clients))
         return WORDS_PERIOD
-
-    def _wish(self) -> Wish | None:
-        """The picture to draw for the browsers: as large as the largest request."""
-        sight = self._sights.get(self._sight)
-        self._views = {client: view for client, view in self._views.items() if client in self._audience.clients}
-        views = [self._views.get(client, SMALL_VIEW) for client in self._audience.clients]
-        seen = [view for view in views if view.height > 0]
-        large = [view for view in seen if view.large]
-        if sight is None or not seen:
-            return None
-        if large and not any(view.stereo for view in large):
-            sight = sight.mono
-        return Wish(sight, max([HEIGHT, *(view.height for view in large)]), bool(large))
 
     def _show_ros(self) -> None:
         if self._ros is None:
@@ -590,7 +408,7 @@ class Cockpit:
         return lines
 
     def _show_picture(self, now: float) -> float:
-        if self._sights:
+        if self._views.sights:
             picture = self._pictures.newest()
             if picture is not None:
                 self._wire.show(picture)
