@@ -10,6 +10,7 @@ import pytest
 from ligature.model.frames import axis_rotation, frame, matrix_pose7, pose7_matrix
 from ligature.tasks import MissingBodies, Scenery, judge_estimate, judge_insertion, judge_suture
 from ligature.tasks.passages import PassageWatch
+from ligature.tasks.scores import SutureScore
 
 from tests.tasks.conftest import drive, hole_poses
 
@@ -111,3 +112,10 @@ def test_the_points_of_the_challenges_needle_are_where_its_evaluation_has_them(c
     assert scenery.points == pytest.approx(np.array(wanted), abs=1.5e-3)
     names = [[scene.bodies[b].identity.name for b in side] for side in (scenery.entries, scenery.exits)]
     assert names == [[f"Entry{i}" for i in range(1, 5)], [f"Exit{i}" for i in range(1, 5)]]
+
+
+def test_one_throw_is_counted_as_one() -> None:
+    def first(pairs: int) -> str:
+        return SutureScore(True, 20.9, 0.0, (1e-4,) * (2 * pairs)).lines()[0]
+
+    assert (first(1), first(2)) == ("1 throw in 20.9 s", "2 throws in 20.9 s")

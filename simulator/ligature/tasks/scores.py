@@ -182,9 +182,9 @@ class SutureScore:
         """One figure a line."""
         if not self.success:
             return [f"not done: {self.why}"]
-        worst = 1e3 * max(self.misses)
+        worst, throws = 1e3 * max(self.misses), len(self.misses) // 2
         return [
-            f"{len(self.misses) // 2} throws in {self.completion_time:.1f} s",
+            f"{throws} throw{'s' * (throws != 1)} in {self.completion_time:.1f} s",
             f"holes missed by {1e3 * float(np.mean(self.misses)):.2f} mm on average, {worst:.2f} mm at worst",
         ]
 
