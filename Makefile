@@ -72,13 +72,11 @@ lint: developers
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
-# those that watch real time come alone, one after the other
+# they watch real time, and mostly wait: all others run meanwhile, where they leave time
 IN_REAL_TIME := tests/ros tests/cockpit \
   $(foreach test,ambf_simulator master physics recorder replay set_up supervisor,tests/cli/test_$(test).py)
 unit: developers blender-module
-	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python $(PYTHON) -m pytest -m "not slow" -n 2 --dist loadfile \
-		tests $(IN_REAL_TIME:%=--ignore=%); first=$$?; \
-	sh .ci/real_time_tests.sh $(PYTHON) $(IN_REAL_TIME) && exit $$first
+	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python sh .ci/unit_tests.sh $(PYTHON) $(IN_REAL_TIME)
 
 # the newest Blender as a Python module, beside the binary; without network the rest is tested without it
 blender-module: developers

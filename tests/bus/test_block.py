@@ -159,10 +159,11 @@ def dead_pid() -> int:
     return dead.pid
 
 
-def test_blocks_of_dead_runs_are_removed() -> None:
-    leftover = FOLDER / f"ligature-{dead_pid()}-12345678"
+def test_blocks_of_dead_runs_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ligature.bus.leftovers.FOLDER", tmp_path)  # other runs that start remove leftovers too
+    leftover = tmp_path / f"ligature-{dead_pid()}-12345678"
     leftover.write_bytes(b"x")
-    mine = FOLDER / f"ligature-{os.getpid()}-12345678"
+    mine = tmp_path / f"ligature-{os.getpid()}-12345678"
     mine.write_bytes(b"x")
     assert leftover.name in remove_leftovers()
     assert not leftover.exists() and mine.exists()
@@ -177,8 +178,9 @@ def test_the_block_of_one_run_is_removed_whoever_lives_and_may_be_gone_already()
     remove(mine.name)
 
 
-def test_leftovers_of_another_user_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    leftover = FOLDER / f"ligature-{dead_pid()}-87654321"
+def test_leftovers_of_another_user_are_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ligature.bus.leftovers.FOLDER", tmp_path)
+    leftover = tmp_path / f"ligature-{dead_pid()}-87654321"
     leftover.touch()
 
     def refuse(*_: object, **__: object) -> None:

@@ -1,0 +1,27 @@
+#!/bin/sh
+# All tests, in two halves at once: sh .ci/unit_tests.sh PYTHON REAL_TIME_TESTS…
+#
+# The tests that watch real time mostly wait. What they leave of the processors goes to all others: two workers of lower
+# priority, whose output comes when the tests that watch real time are done.
+set -u
+python=$1
+shift
+ignored=
+for path in "$@"; do ignored="$ignored --ignore=$path"; done
+mkdir -p build/logs
+log=build/logs/unit_tests.log
+: >"$log"
+# a shell starts what is in the background deaf to Ctrl-C, which tests of Ctrl-C would inherit
+# shellcheck disable=SC2086
+nice -n 5 env --default-signal=INT,QUIT \
+    "$python" -m pytest -m "not slow" -n 2 --dist loadfile tests $ignored >"$log" 2>&1 </dev/null &
+others=$!
+trap 'kill "$others" 2>/dev/null' EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+sh .ci/real_time_tests.sh "$python" "$@"
+status=$?
+echo "the other tests, which ran meanwhile:"
+tail -n +1 -f --pid="$others" "$log"
+wait "$others" || status=$?
+exit "$status"
