@@ -2,8 +2,9 @@
 # try in $try and the script's own arguments. In the room: `inside COMMAND…` runs as root, in /home/project.
 #
 # Needs root and mmdebstrap; without the room the script prints the reason and ends with 0. BARE_SYSTEM=DIR keeps the
-# bare system in DIR and takes it again. All mounts and processes live in namespaces of their own, so that they end with
-# the script, however it ends. A function `furnish ROOM` puts into the room what the try needs.
+# bare system in DIR and takes it again; with `--prepare` the script does no more than build it there. All mounts and
+# processes live in namespaces of their own, so that they end with the script, however it ends. A function `furnish ROOM`
+# puts into the room what the try needs.
 project=$(cd "$(dirname "$0")/.." && pwd)
 skip() {
     echo "$try: not tried: $*"
@@ -29,9 +30,11 @@ if [ "${1:-}" != --inside ]; then
     bare=${BARE_SYSTEM:-$work/bare}
     if [ ! -e "$bare/etc/debian_version" ]; then
         echo "$try: building a bare Debian in $bare, about 2 minutes"
-        mmdebstrap --quiet --variant=minbase --include=make,ca-certificates bookworm "$bare" >&2 ||
+        mmdebstrap --quiet --variant=minbase --include=make,ca-certificates bookworm "$bare.part" >&2 ||
             skip "mmdebstrap could not build a Debian 12"
+        mv "$bare.part" "$bare"
     fi
+    [ "${1:-}" != --prepare ] || exit 0
     mkdir "$work/room"
     cp -a "$bare/." "$work/room/"
     mkdir -p "$work/room/home/project"

@@ -1,10 +1,12 @@
-"""Every command that reads a scene or a mesh, given every kind of other file: it names what it got and what to do."""
+"""Every command that reads a file, given every kind of other file: it names what it got and what to do."""
 
 from __future__ import annotations
 
 import gzip
 import io
 import struct
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -44,6 +46,7 @@ CONTENTS = {
     "an SDF model": b"<sdf version='1.6'><model name='m'/></sdf>",
     "an MJCF model": b"<mujoco><worldbody/></mujoco>",
     "an XML file": b"<?xml version='1.0'?><launch/>",
+    "a record of a run": b'{"format": "ligature record 1"}\n' + REST,
     "a ROS bag": b"#ROSBAG V2.0\n" + REST,
     "an HDF5 file": b"\x89HDF\r\n\x1a\n" + REST,
     "a zip archive": archive(),
@@ -55,16 +58,24 @@ CONTENTS = {
 SCENES = ("check", "inertia", "fmt", "bench", "render", "diff", "poses")
 NAMES = ("file.yaml", "file", "file.ply")
 MESHES = {"file.obj": "an OBJ mesh", "file.stl": "an STL mesh", "file.3ds": ""}
+RECORDINGS = {
+    "replay": (["replay"], ("a ROS bag", "a record of a run")),
+    "score": (["score", "suture"], ("a ROS bag", "a record of a run")),
+    "dataset info": (["dataset", "info"], ("an HDF5 file",)),
+    "dataset join": (["dataset", "join"], ("an HDF5 file",)),
+    "dataset export": (["dataset", "export"], ("an HDF5 file",)),
+}
+"""Commands that read what was recorded, and the kinds that they read."""
 
 
-def printed(folder: Path, command: str, name: str, content: bytes) -> str:
+def printed(folder: Path, command: str | list[str], name: str, content: bytes) -> str:
     """What a command prints about a file, as one line; it must fail without an exception of Python's."""
     file = folder / name
     file.write_bytes(content)
-    more = {"diff": [str(file)], "render": ["--camera", "c"], "poses": ["--out", str(folder / "out.npz")]}.get(
-        command, []
-    )
-    result = CliRunner().invoke(app, [command, str(file), *more])
+    words = [command] if isinstance(command, str) else command
+    out = {"diff": [str(file)], "render": ["--camera", "c"], "poses": ["--out", str(folder / "out.npz")]}
+    more = [str(folder / "exported")] if words[-1] == "export" else out.get(words[0], [])
+    result = CliRunner().invoke(app, [*words, str(file), *more])
     assert result.exit_code != 0
     assert isinstance(result.exception, SystemExit), repr(result.exception)
     return " ".join(result.output.split())
@@ -83,6 +94,35 @@ def test_a_mesh_command_names_what_it_got(command: str, tmp_path: Path) -> None:
         for name, own in MESHES.items():
             if what != own and not (own == "an STL mesh" and what == "an OBJ mesh"):
                 assert f"'{name}' is {what}, not a" in printed(tmp_path, command, name, content), (what, name)
+
+
+def test_decompose_names_what_it_got_by_another_name_and_what_it_reads(tmp_path: Path) -> None:
+    for what, content in CONTENTS.items():
+        for name in NAMES:
+            text = printed(tmp_path, "decompose", name, content)
+            renamed = any(f"but not named as one; rename it to 'file{ending}'" in text for ending in (".obj", ".stl"))
+            assert f"'{name}' is {what}, " in text and (renamed or "use .obj, .stl, .3ds: " in text), (what, name)
+
+
+@pytest.mark.parametrize(("command", "own"), RECORDINGS.values(), ids=RECORDINGS)
+def test_a_command_for_recordings_names_what_it_got(command: list[str], own: tuple[str, ...], tmp_path: Path) -> None:
+    for number, (what, content) in enumerate(CONTENTS.items()):
+        name = NAMES[number % len(NAMES)]
+        text = printed(tmp_path, command, name, content)
+        if what not in own:
+            assert f"{name}' is {what}, not a " in text and "; " in text.partition(" is ")[2], (what, name, text)
+
+
+@pytest.mark.parametrize("command", ["run", "cockpit"])
+def test_a_run_names_what_it_got(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In processes of their own, so that all kinds but one are left to what they share with `check`."""
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    (tmp_path / "file.yaml").write_bytes(CONTENTS["a PLY mesh"])
+    done = subprocess.run(
+        [sys.executable, "-m", "ligature", command, "file.yaml"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2 and "'file.yaml' is a PLY mesh, not a scene file; " in done.stdout
 
 
 @pytest.mark.parametrize("text", ["bodies: []", "world config: x", "{a: 1}", "environment: {}"])

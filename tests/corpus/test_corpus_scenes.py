@@ -69,10 +69,15 @@ def test_arms_list_their_joints_in_command_order(scene: Scene) -> None:
     ]  # fmt: skip
 
 
-def test_every_body_starts_at_its_location_or_is_reported(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Positions of joints come from the locations; where those and a joint disagree, or a loop closes, it is stated."""
-    # nothing moves here: hulls do, and CoACD would take two minutes
+@pytest.fixture
+def hulls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Moving meshes collide as their hulls: where nothing moves those do, and CoACD would take two minutes."""
     monkeypatch.setattr("ligature.physics.shapes.convex_pieces", lambda points, *_: [hull_vertices(points)])
+
+
+@pytest.mark.usefixtures("hulls")
+def test_every_body_starts_at_its_location_or_is_reported(corpus: Path) -> None:
+    """Positions of joints come from the locations; where those and a joint disagree, or a loop closes, it is stated."""
     compared = 0
     for file in sorted((corpus / "suturing_scene").rglob("*.yaml")) + sorted((corpus / "multibodies").rglob("*.yaml")):
         if file.name.startswith("launch"):
@@ -260,6 +265,7 @@ def test_joints_at_zero_agree_with_the_locations(corpus: Path, name: str, count:
     assert scene.joints and differ == count
 
 
+@pytest.mark.usefixtures("hulls")
 @pytest.mark.parametrize("strict", [False, True])
 def test_no_file_makes_a_traceback(corpus: Path, strict: bool) -> None:
     from ligature.cli.check import findings

@@ -26,6 +26,7 @@ QUALIFIED = frozenset({
 """The same by their whole names, where the last part means something else elsewhere."""
 
 STRANGERS: dict[str, tuple[str, ...]] = {
+    "adf/contents.py:mistaken": ("bag", "dataset"),
     "adf/nodes.py:_Composer.__init__": (".yaml",),
     "adf/reader.py:_opened": (".yaml",),
     "adf/reader.py:_content": (".yaml",),

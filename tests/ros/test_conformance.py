@@ -343,6 +343,7 @@ def test_a_master_sinks_in_effort_modes_unless_gravity_compensation_carries_it(
     master.send("use_gravity_compensation", Bool(True))
     master.send("body/servo_cf", WrenchStamped())
     until(lambda: np.abs(master.measured_js()[2] - carried).max() < 1e-3, "the motors carry the weight", 10.0)
+    steady(master.measured_jp, within=1e-4)
     at = master.measured_jp()
     stays(
         lambda: np.abs(master.measured_jp() - at).max() < 1e-3,

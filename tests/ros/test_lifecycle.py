@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ligature.cli.master import master_answers
@@ -54,6 +55,20 @@ def watch(tmp_path: Path) -> Iterator[Callable[[dict[str, str]], Program]]:
 def seen(program: Program) -> list[tuple[float, float, int]]:
     rows = [line.split() for line in list(program.lines) if len(line.split()) == 3]
     return [(float(a), float(b), int(c)) for a, b, c in rows]
+
+
+@pytest.fixture
+def start(start: Callable[..., Program]) -> Iterator[Callable[..., Program]]:
+    """Starts commands that end with the test: one that failed leaves no node whose name the next test needs."""
+    programs: list[Program] = []
+
+    def run(*command: object, **options: Any) -> Program:
+        programs.append(start(*command, **options))
+        return programs[-1]
+
+    yield run
+    for program in programs:
+        program.end(30.0)
 
 
 def alive(pid: int) -> bool:

@@ -1,8 +1,11 @@
-"""What a file is that is no scene file, by how it begins, and what to do with it."""
+"""What a file is that is not of the kind that was expected, by how it begins, and what to do with it."""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
+
+from ligature.paths import regular_file
 
 BEGINNING = 4096
 """Bytes of a file that are looked at."""
@@ -26,6 +29,7 @@ _SIGNS = (
     (rb"<.*<?sdf\b", "an SDF model", _ROBOT),
     (rb"<.*<?mujoco\b", "an MJCF model", _ROBOT),
     (rb"<\?xml|<!DOCTYPE|<html", "an XML file", _OTHER),
+    (rb'\{"format": "ligature record', "a record of a run", "'ligature replay' simulates it again"),
     (rb"#ROSBAG", "a ROS bag", "'ligature replay' plays it back"),
     (rb"\x89HDF", "an HDF5 file", "'ligature dataset info' describes datasets"),
     (rb"PK\x03\x04", "a zip archive", _UNPACK),
@@ -47,6 +51,16 @@ def content_of(data: bytes) -> tuple[str, str] | None:
         if pattern.match(data, start):
             return what, remedy
     return None if not _binary_stl(data) else ("an STL mesh", _MESH)
+
+
+def mistaken(path: Path, wanted: str) -> str:
+    """``'PATH' is WHAT`` for a file that is recognised as something else than ``wanted``, else empty.
+
+    Raises OSError where there is no file to read.
+    """
+    with regular_file(path).open("rb") as file:
+        content = content_of(file.read(BEGINNING))
+    return "" if content is None or content[0] == wanted else f"'{path}' is {content[0]}"
 
 
 def _binary_stl(data: bytes) -> bool:

@@ -74,8 +74,10 @@ def _recorded(task: str, file: Path, scene: Path | None) -> Figures:
 
 
 def _in_bag(task: str, file: Path, scene: Path | None) -> Figures:
-    from ligature.ros.bags import judge
+    from ligature.ros.bags import judge, opened
 
+    with opened(file):
+        pass
     if scene is None:
         raise ValueError("a bag contains poses but no scene; name the launch file with '--scene'")
     found, attempt = judge(file, ligature.load(str(scene)), task)

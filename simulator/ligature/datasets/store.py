@@ -17,6 +17,7 @@ from typing import Any
 
 import h5py
 
+from ligature.adf.contents import mistaken
 from ligature.datasets.soundness import Unsound, check
 from ligature.paths import reason, regular_file
 
@@ -183,7 +184,7 @@ def opened(path: Path) -> h5py.File:
     try:
         file = h5py.File(regular_file(path), "r")
     except OSError as error:
-        raise DatasetError(f"cannot read the dataset '{path}': {reason(error)}") from error
+        raise DatasetError(_unreadable(path, error)) from error
     try:
         if not str(file.attrs.get("format", "")).startswith("ligature dataset"):
             raise DatasetError(f"'{path}' is an HDF5 file, but not a Ligature dataset")
@@ -193,6 +194,14 @@ def opened(path: Path) -> h5py.File:
         file.close()
         raise
     return file
+
+
+def _unreadable(path: Path, error: OSError) -> str:
+    """Why HDF5 cannot read a file."""
+    with suppress(OSError):
+        if other := mistaken(path, "an HDF5 file"):
+            return f"{other}, not a dataset; 'ligature replay FILE --dataset' makes one of a record or a bag"
+    return f"cannot read the dataset '{path}': {reason(error)}"
 
 
 @contextmanager

@@ -20,10 +20,9 @@ def load_mesh(path: Path, resolver: Resolver) -> Mesh:
 
     Raises `MeshError`, or `ResolutionError` when it may not be opened.
     """
-    extension = path.suffix.lower()
+    extension, data = path.suffix.lower(), resolver.read_bytes(path)
     if extension not in EXTENSIONS:
-        raise failure(path, f"the mesh format of '{path.name}' is not supported", hint=f"use {', '.join(EXTENSIONS)}")
-    data = resolver.read_bytes(path)
+        raise _unsupported(path, data)
     try:
         return _read(data, path, extension, resolver)
     except MeshError:
@@ -32,6 +31,21 @@ def load_mesh(path: Path, resolver: Resolver) -> Mesh:
             raise
         message = f"'{path.name}' is {content[0]}, not {_KINDS[extension]}"
         raise failure(path, message, hint=content[1]) from None
+
+
+def _unsupported(path: Path, data: bytes) -> MeshError:
+    """The error for a file whose name ends otherwise."""
+    use = f"use {', '.join(EXTENSIONS)}"
+    content = content_of(data)
+    if content is None:
+        return failure(path, f"the mesh format of '{path.name}' is not supported", hint=use)
+    what, remedy = content
+    ending = next((extension for extension, kind in _KINDS.items() if kind == what), "")
+    if ending:
+        return failure(
+            path, f"'{path.name}' is {what}, but not named as one", hint=f"rename it to '{path.stem}{ending}'"
+        )
+    return failure(path, f"'{path.name}' is {what}, whose format is not supported", hint=f"{use}: {remedy}")
 
 
 def _read(data: bytes, path: Path, extension: str, resolver: Resolver) -> Mesh:

@@ -14,6 +14,7 @@ import rosbag
 from numpy.typing import NDArray
 
 from ligature import definitions
+from ligature.adf.contents import mistaken
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 REPORTS = "/surgical_robotics_challenge/completion_report"
 """Root of the topics on which teams of the challenge report (interface reference §4.5)."""
 
+
+BAG = "a ROS bag"
 
 MOST_CHUNK_BYTES = 256 << 20
 """Most bytes of a chunk when it is decompressed; recorders begin a new one after 0.75 MiB, or after one message."""
@@ -41,6 +44,10 @@ def opened(path: Path) -> Iterator[rosbag.Bag]:
 
     What is in it comes from `topics` and `messages`, which do the same.
     """
+    with _blamed(path):
+        other = mistaken(path, BAG)
+    if other:
+        raise BagError(f"{other}, not {BAG}; give a bag, or a record of 'ligature run --record'")
     with _blamed(path):
         bag = rosbag.Bag(str(path))
     with bag:
