@@ -1,4 +1,4 @@
-"""Starts a node that many clients connect to at the same moment.
+"""Starts a node that many clients connect to at the same moment, whatever some of them do.
 
 rospy lets five connections wait to be taken. A recorder of everything, or a surgeon's console, opens a hundred at once;
 those beyond the five are dropped by the kernel and tried again after 1, 3, 7, 15 seconds: topics seem silent so long.
@@ -10,6 +10,7 @@ import rospy
 import rospy.impl.tcpros_base as tcpros
 from rosgraph.xmlrpc import ThreadingXMLRPCServer
 
+from ligature.ros.handshakes import apart
 from ligature.ros.intake import bound_messages
 from ligature.ros.registrations import claim
 
@@ -29,4 +30,6 @@ def start_node(name: str) -> None:
     if removed:
         rospy.logwarn(removed)
     tcpros.start_tcpros_server()
-    tcpros._tcpros_server.tcp_ros_server.server_sock.listen(WAITING)
+    server = tcpros._tcpros_server.tcp_ros_server
+    server.inbound_handler = apart(server.inbound_handler)
+    server.server_sock.listen(WAITING)

@@ -1,0 +1,63 @@
+"""Clients that connect and say nothing, or nonsense, stop nobody else.
+
+rospy reads what a client says first on the one thread that takes connections, for as long as that takes: a client that
+stops there keeps all later subscribers and callers waiting, and the first that talks nonsense ends the thread. Here
+each connection introduces itself on a thread of its own, within a time.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import rospy
+
+SECONDS = 5.0
+"""Seconds that a client has to introduce itself."""
+
+MOST_BYTES = 64 * 1024
+"""Most bytes of an introduction; those of clients have some hundred."""
+
+Handler = Callable[[socket.socket, Any], None]
+
+
+def apart(handler: Handler) -> Handler:
+    """``handler`` of new connections, which returns at once and raises nothing."""
+
+    def take(client: socket.socket, address: Any) -> None:
+        threading.Thread(target=_introduce, args=(handler, client, address), name="handshake", daemon=True).start()
+
+    return take
+
+
+def _introduce(handler: Handler, client: socket.socket, address: Any) -> None:
+    """Hand a connection over; one that is late, or that is no client of ROS, is closed."""
+    late = threading.Timer(SECONDS, _end, (client,))
+    late.daemon = True
+    late.start()
+    try:
+        _check(client)
+        handler(client, address)
+    except Exception as error:
+        rospy.logdebug(f"closed a connection from {address}: {error}")
+        _end(client)
+        client.close()
+    finally:
+        late.cancel()
+
+
+def _check(client: socket.socket) -> None:
+    """Look how long the introduction will be, before anything is read; raises ValueError."""
+    start = client.recv(4, socket.MSG_PEEK | socket.MSG_WAITALL)
+    if len(start) < 4 or struct.unpack("<I", start)[0] > MOST_BYTES:
+        raise ValueError("it does not introduce itself as a client of ROS does")
+
+
+def _end(client: socket.socket) -> None:
+    """End whatever waits for a client."""
+    with suppress(OSError):
+        client.shutdown(socket.SHUT_RDWR)
