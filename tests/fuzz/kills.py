@@ -21,6 +21,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from ligature.bus.leftovers import FOLDER
 from ligature.process import end_with_parent
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -81,7 +82,7 @@ def kill(number: int, scene: Path = SCENE) -> Kill:
     begin = time.monotonic()
     for _ in range(3):
         with suppress(ProcessLookupError):
-            os.kill(program.pid, rng.choice((signal.SIGTERM, signal.SIGTERM, signal.SIGINT)))
+            os.kill(program.pid, rng.choice((signal.SIGTERM, signal.SIGINT, signal.SIGHUP)))
         time.sleep(rng.uniform(0.0, 3e-4))
     while (left := _marked(mark, program)) and time.monotonic() - begin < LIMIT:
         time.sleep(0.01)
@@ -90,7 +91,8 @@ def kill(number: int, scene: Path = SCENE) -> Kill:
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
     program.wait()
-    return Kill(stage, lived, len(found), ended, tuple(left.values()))
+    blocks = [f"shared memory {path.name}" for path in FOLDER.glob(f"ligature-{program.pid}-*")]
+    return Kill(stage, lived, len(found), ended, (*left.values(), *blocks))
 
 
 def _wait_for(program: subprocess.Popen[bytes], stage: str) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import pty
 import signal
 import subprocess
+import termios
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -162,3 +165,31 @@ def test_three_signals_within_a_millisecond_leave_no_process(number: int) -> Non
     """`python -m tests.fuzz.kills` does so at 200 moments on a busy machine."""
     done = kill(number)
     assert done.processes >= 3 and not done.left, str(done)
+
+
+@pytest.mark.parametrize("hears", [True, False], ids=["terminal", "nohup"])
+def test_a_terminal_that_is_closed_ends_a_run_unless_that_is_ignored(own_env: dict[str, str], hears: bool) -> None:
+    terminal, its_end = pty.openpty()
+
+    def begin() -> None:
+        fcntl.ioctl(its_end, termios.TIOCSCTTY, 0)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL if hears else signal.SIG_IGN)
+
+    command = [BIN / "ligature", "run", SMALL, "-p", "200", "--no-cameras"]
+    run = subprocess.Popen(
+        command, env=own_env, stdin=its_end, stdout=its_end, stderr=its_end, start_new_session=True, preexec_fn=begin
+    )
+    os.close(its_end)
+    output = b""
+    while b"physics ready" not in output:
+        output += os.read(terminal, 4096)
+    os.close(terminal)
+    try:
+        if not hears:
+            stays(lambda: run.poll() is None, "the run goes on", 0.5)
+            run.terminate()
+        assert run.wait(5.0) >= 0, "it ended by itself"
+        assert not list(Path("/dev/shm").glob(f"ligature-{run.pid}-*"))
+    finally:
+        run.kill()
+        run.wait()

@@ -19,6 +19,9 @@ from typing import NoReturn
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of writing to a full disk."""
 
+GONE = (errno.EPIPE, errno.EIO)
+"""Errors of writing to a reader that has seen enough, or to a terminal that was closed."""
+
 LONG = 120
 """Characters of a path that a message quotes."""
 
@@ -60,10 +63,10 @@ def _end(error: OSError) -> NoReturn:
     if error.filename is not None:  # too long a name, a full disk, no permission
         name = os.fsdecode(error.filename)
         _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
-    if error.errno not in (*FULL, errno.EPIPE):
+    if error.errno not in (*FULL, *GONE):
         raise error
     open_null(1)  # else Python tries at its end once more to write what is left, and fails in its own words
-    if error.errno == errno.EPIPE:  # whoever read has seen enough
+    if error.errno in GONE:
         raise SystemExit(1) from None
     _fail(f"error: the output cannot be written: {error.strerror}")
 

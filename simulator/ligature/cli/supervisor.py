@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from queue import Empty, Queue
 from typing import NoReturn
@@ -124,8 +125,11 @@ class Supervisor:
         self._env = dict(os.environ, **_ENVIRONMENT)
 
     def run(self) -> int:
-        """Run until Ctrl-C, a signal, or the end of the physics process."""
-        self._signalled = stop_on_signal((signal.SIGINT, signal.SIGTERM), LAST_TIMEOUT)
+        """Run until Ctrl-C, a signal, the end of the terminal, or the end of the physics process."""
+        asked = [signal.SIGINT, signal.SIGTERM]
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+            asked.append(signal.SIGHUP)
+        self._signalled = stop_on_signal(asked, LAST_TIMEOUT)
         try:
             self._start()
             while not self._stopping:
@@ -258,7 +262,8 @@ class Supervisor:
 
     def _end_all(self) -> None:
         self._over = True
-        self._progress.stop()
+        with suppress(OSError):  # the terminal may be gone
+            self._progress.stop()
         deadline = time.monotonic() + END_TIMEOUT
         order = [self._children[n] for n in (*_DRAWING, "tasks", "ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
