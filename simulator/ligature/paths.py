@@ -6,6 +6,7 @@ import errno
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 
 def reason(error: OSError) -> str:
@@ -29,9 +30,26 @@ def regular_file(path: Path) -> Path:
 
     Reading a pipe waits for who writes to it, and a device such as ``/dev/zero`` has no end.
     """
-    mode = path.stat().st_mode
+    _check_regular(path.stat().st_mode, path)
+    return path
+
+
+def open_file(path: Path) -> BinaryIO:
+    """``path``, opened to be read, where it is a file; raises OSError as `regular_file` does.
+
+    What was opened is looked at, so that a file may become a pipe at any moment: opening that does not wait either.
+    """
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        _check_regular(os.fstat(number).st_mode, path)
+        return os.fdopen(number, "rb")
+    except BaseException:
+        os.close(number)
+        raise
+
+
+def _check_regular(mode: int, path: Path) -> None:
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
     if not stat.S_ISREG(mode):
         raise OSError(errno.EINVAL, "is not a regular file", str(path))
-    return path

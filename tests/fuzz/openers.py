@@ -15,7 +15,7 @@ SOURCE = Path(__file__).resolve().parents[2] / "simulator" / "ligature"
 
 CALLS = frozenset({
     "read_bytes", "read_text", "Bag", "InferenceSession", "from_xml_path", "from_xml_string", "fromstring", "memmap",
-    "fromfile", "loadtxt", "genfromtxt", "read_table", "imread", "exec_module", "fdopen", "FileIO",
+    "fromfile", "loadtxt", "genfromtxt", "read_table", "imread", "exec_module", "fdopen", "FileIO", "open_file",
 })  # fmt: skip
 """Functions and methods that read files, whoever has them."""
 
@@ -53,6 +53,7 @@ STRANGERS: dict[str, tuple[str, ...]] = {
 """Places that read files of strangers, and what fuzzes them."""
 
 OURS: dict[str, str] = {
+    "paths.py:open_file": "opens for all that name it, which are places themselves",
     "cli/command.py:_open_streams": "opens streams of the null device in place of closed ones",
     "cli/command.py:open_null": "opens the null device",
     "cli/check.py:_shaders": "shaders, which are only tried for whether they can be read",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ligature.paths import regular_file
+from ligature.paths import open_file
 
 BEGINNING = 4096
 """Bytes of a file that are looked at."""
@@ -58,7 +58,7 @@ def mistaken(path: Path, wanted: str) -> str:
 
     Raises OSError where there is no file to read.
     """
-    with regular_file(path).open("rb") as file:
+    with open_file(path) as file:
         content = content_of(file.read(BEGINNING))
     return "" if content is None or content[0] == wanted else f"'{path}' is {content[0]}"
 

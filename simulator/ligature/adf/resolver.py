@@ -15,7 +15,7 @@ from pathlib import Path
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.lacking import instead_of_url, lack_of
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
-from ligature.paths import real_path
+from ligature.paths import open_file, real_path
 
 MAX_BYTES = 256 * 1024 * 1024
 """Largest file that is read unless the caller sets otherwise."""
@@ -107,9 +107,10 @@ class Resolver:
             lack = lack_of(real)
             if lack is not None:
                 raise self._refusal(f"'{real}' {lack.fault}", mark, lack.hint)
-            if real.stat().st_size > limit:
-                raise self._refusal(f"'{real}' is larger than {limit} bytes", mark, "split it, or reduce it")
-            return real.read_bytes()
+            with open_file(real) as file:
+                if os.fstat(file.fileno()).st_size > limit:
+                    raise self._refusal(f"'{real}' is larger than {limit} bytes", mark, "split it, or reduce it")
+                return file.read()
         except OSError as error:
             raise self._refusal(f"'{real}' cannot be read: {error.strerror}", mark, "give another file") from error
 

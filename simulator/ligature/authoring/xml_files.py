@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
 
-from ligature.paths import regular_file
+from ligature.paths import open_file
 
 MOST_BYTES = 1 << 26
 MOST_ELEMENTS, MOST_LEVELS = 1_000_000, 100
@@ -48,7 +48,8 @@ def check_xml(path: Path) -> None:
     parser.StartDoctypeDeclHandler = declared
     parser.StartElementHandler, parser.EndElementHandler = begins, ends
     try:
-        parser.Parse(regular_file(path).read_bytes(), True)
+        with open_file(path) as file:
+            parser.Parse(file.read(), True)
     except expat.ExpatError as error:
         why = expat.errors.messages[error.code]
         raise XmlError(f"{path}:{error.lineno}:{error.offset + 1}: error: not well-formed XML: {why}") from None

@@ -22,7 +22,7 @@ from typing import BinaryIO
 from ligature.bus.codec import CodecError, decode, encode
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
-from ligature.paths import regular_file
+from ligature.paths import open_file
 
 FORMAT = "ligature record 3"
 END, BEGIN = 0xFFFFFFFF, 0xFFFFFFFE
@@ -189,9 +189,10 @@ class Record:
     @classmethod
     def read(cls, path: Path) -> Record:
         """The record ``path``; raises `RecordError`, and OSError."""
-        if regular_file(path).stat().st_size > MOST_FILE_BYTES:
-            raise RecordError(f"{path}: has more than {MOST_FILE_BYTES >> 30} GiB, the maximum size of a record")
-        data = path.read_bytes()
+        with open_file(path) as file:
+            if os.fstat(file.fileno()).st_size > MOST_FILE_BYTES:
+                raise RecordError(f"{path}: has more than {MOST_FILE_BYTES >> 30} GiB, the maximum size of a record")
+            data = file.read()
         header, begin = _header(data, path)
         commands: list[tuple[int, Command]] = []
         asked = (1, 0, "")
@@ -236,7 +237,7 @@ class Record:
 
 def is_record(path: Path) -> bool:
     """Whether a file begins as a record does."""
-    with regular_file(path).open("rb") as file:
+    with open_file(path) as file:
         return file.read(64).startswith(b'{"format": "ligature record')
 
 

@@ -17,7 +17,7 @@ from ligature.authoring.robot import exported, read_sdf, read_urdf, sdf_text, to
 from ligature.authoring.save import SaveError, checked_text, save_all
 from ligature.authoring.xml_files import XmlError, check_xml
 from ligature.cli.numbers import counted
-from ligature.paths import real_path
+from ligature.paths import real_path, reason
 
 MODELS = (".yaml", ".yml", ".ambf")
 READ = (".urdf", ".sdf", ".world", ".xml", *MODELS)
@@ -47,6 +47,9 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
         return 1
     except (MissingReaderError, XmlError) as error:
         console.print(str(error), style="red", markup=False)
+        return 1
+    except OSError as error:
+        console.print(f"{source}: {reason(error)}", style="red", markup=False)
         return 1
     except Exception as error:  # what a library raises for bad files is its own affair
         name = "an MJCF" if _is_mjcf(source) else "a URDF" if kind != ".sdf" else "an SDF"

@@ -6,6 +6,7 @@ SI units; every range is drawn from uniformly, and the same seed draws the same.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 import yaml
 
 from ligature.model.scene import Scene
-from ligature.paths import regular_file
+from ligature.paths import open_file
 
 MOST_BYTES, MOST_LEVELS = 1 << 16, 3
 """Of a file of ranges."""
@@ -257,9 +258,10 @@ def _checked(name: str, value: Any, bound: Bound) -> Range:
 def _read(path: Path) -> Any:
     """The mapping in a YAML file."""
     try:
-        if regular_file(path).stat().st_size > MOST_BYTES:
-            raise ValueError(f"it has more than {MOST_BYTES >> 10} KiB")
-        text = path.read_text("utf-8")
+        with open_file(path) as file:
+            if os.fstat(file.fileno()).st_size > MOST_BYTES:
+                raise ValueError(f"it has more than {MOST_BYTES >> 10} KiB")
+            text = file.read().decode("utf-8")
         _check_flat(text)
         found = yaml.safe_load(text)
     except (OSError, ValueError, yaml.YAMLError) as error:

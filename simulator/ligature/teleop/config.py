@@ -19,7 +19,7 @@ from ligature.adf.nodes import Node, Scalar, Sequence, parse
 from ligature.adf.scalars import flag, number
 from ligature.model.commands import MarkPhase
 from ligature.model.frames import frame, rpy_matrix
-from ligature.paths import regular_file
+from ligature.paths import open_file
 from ligature.teleop.calibration import Calibration, Unclear, axes_of_angles, axes_of_words
 from ligature.teleop.devices import KINDS, module
 from ligature.teleop.feedback import FeedbackSettings
@@ -117,7 +117,8 @@ def read(path: Path) -> TeleopConfig:
 
 def text_of(path: Path) -> str:
     """What is in a text file; raises `AdfError` with the place of what is no text."""
-    data = regular_file(path).read_bytes()
+    with open_file(path) as file:
+        data = file.read()
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from ligature.paths import regular_file
+from ligature.paths import open_file
 from ligature.teleop.devices.device import Reading
 
 
@@ -93,7 +93,7 @@ VERBS: dict[str, type] = {
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:
-    with regular_file(path).open("rb") as file:
+    with open_file(path) as file:
         for number, line in enumerate(file, 1):
             try:
                 row = json.loads(line)

@@ -17,7 +17,7 @@ from ligature.adf.frames import Array
 from ligature.authoring.shapes import Shape
 from ligature.authoring.xml_files import check_xml
 from ligature.mesh.inertia import MassProperties
-from ligature.paths import regular_file
+from ligature.paths import open_file
 
 Colour = tuple[float, float, float, float]
 
@@ -105,7 +105,8 @@ def links_by_name(links: Iterable[Link]) -> dict[str, Link]:
 def root_of(path: Path, tag: str) -> ElementTree.Element:
     """The outermost element of a file; raises `RobotError` for another ``tag``, `XmlError` for what is no XML."""
     check_xml(path)
-    root = ElementTree.fromstring(regular_file(path).read_bytes())
+    with open_file(path) as file:
+        root = ElementTree.fromstring(file.read())
     if root.tag != tag:
         raise RobotError(f"the outermost element is <{root.tag}>, not <{tag}>")
     return root
