@@ -17,6 +17,7 @@ from typing import Any
 import ligature
 import numpy as np
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7
+from ligature.paths import reason
 from ligature.render.context import RenderUnavailable
 from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
@@ -279,6 +280,10 @@ class Film:
 
     def __init__(self, simulation: ligature.Simulation, folder: Path, camera: str = "cameraL") -> None:
         self._simulation, self._folder = simulation, folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            sys.exit(f"error: '{folder}': {reason(error)}")
         self._camera = simulation.cameras[camera]
         self._frames: list[Image.Image] = []
         self._next = 0.0
@@ -300,14 +305,19 @@ class Film:
         """
         if not self._frames:
             return f"no pictures: {self.unavailable}"
-        self._folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self._write()
+        except OSError as error:
+            return f"no pictures: '{self._folder}' cannot be written: {reason(error)}"
+        return f"pictures in {self._folder}"
+
+    def _write(self) -> None:
         for number, index in enumerate(np.linspace(0, len(self._frames) - 1, 8).round().astype(int), 1):
             self._frames[index].save(self._folder / f"suture_{number}.png")
         part = self._folder / "suture.webp.part"
         first, *rest = self._frames
         first.save(part, format="WEBP", save_all=True, append_images=rest, duration=FILM_SHOWN, quality=FILM_QUALITY)
         part.replace(self._folder / "suture.webp")
-        return f"pictures in {self._folder}"
 
 
 def operate(

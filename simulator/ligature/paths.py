@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -46,6 +48,15 @@ def open_file(path: Path) -> BinaryIO:
     except BaseException:
         os.close(number)
         raise
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """An OSError within names ``path``: that of a full disk names no file, that of a temporary one a file of ours."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, reason(error), str(path)) from error
 
 
 def _check_regular(mode: int, path: Path) -> None:

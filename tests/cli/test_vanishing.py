@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 from ligature.cli import command
 
-from tests.cli.test_odd_paths import BOX, TRI, URDF
+from tests.cli.test_odd_paths import BOX, TRI, URDF, WRITERS
 
 READERS = {
     "check": (["check", "FILE"], "scene.yaml"),
@@ -111,3 +112,32 @@ def test_a_file_that_changes_after_a_look_at_it_is_reported_or_read(
     printed = "".join(capfd.readouterr())
     assert "Traceback" not in printed and "[Errno" not in printed
     assert ended.value.code in (0, 1, 2, None) and (not ended.value.code or printed.strip()), printed
+
+
+@pytest.mark.parametrize("words", WRITERS.values(), ids=WRITERS)
+def test_a_disk_that_is_full_amid_a_file_is_reported_with_its_name(words: list[str], tmp_path: Path) -> None:
+    for one, text in FILES.items():
+        (tmp_path / one).write_text(text, encoding="latin-1")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    run = (
+        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)); "
+        "from ligature.cli import command; command.ligature()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", run, *("written.obj" if word == "OUT" else word for word in words)],
+        cwd=tmp_path, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    printed = done.stdout + done.stderr
+    assert done.returncode in (1, 2) and "File too large" in printed, printed
+    assert "written." in printed and "Traceback" not in printed and "[Errno" not in printed
+    left = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert {path: left.pop(path) for path in before} == before
+    assert not left or words[0] == "poses", left
+
+
+def test_a_film_that_has_no_folder_ends_before_it_is_made(tmp_path: Path) -> None:
+    from examples.suture import Film
+
+    (tmp_path / "file").touch()
+    with pytest.raises(SystemExit, match="Not a directory"):
+        Film(None, tmp_path / "file" / "film")  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError
 from ligature.adf.nodes import parse
-from ligature.paths import real_path, reason
+from ligature.paths import naming, real_path, reason
 
 WRITERS = 16
 """Files that are written at a time."""
@@ -141,14 +141,15 @@ def _content(path: Path) -> bytes | None:
 def _staged(path: Path, data: bytes) -> str:
     """A temporary file beside ``path`` with its content on the disk."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(name, 0o644)
-    except OSError:
-        os.unlink(name)
-        raise
+    with naming(path):
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(name, 0o644)
+        except OSError:
+            os.unlink(name)
+            raise
     return name

@@ -13,6 +13,7 @@ from rich.console import Console
 import ligature
 from ligature.adf import AdfError
 from ligature.cli.numbers import counted
+from ligature.paths import naming
 
 PROGRESS_SECONDS = 0.5
 """Seconds between two lines ``N of M frames``, which editors show as progress."""
@@ -52,6 +53,7 @@ def poses(
     times = ticks * 1e-3
     data = io.BytesIO()
     np.savez(data, identifiers=np.array(names), times=times, poses=np.array(frames))
-    out.write_bytes(data.getbuffer())
+    with naming(out):
+        out.write_bytes(data.getbuffer())
     console.print(f"{out}: {counted(len(names), 'body', 'bodies')}, {counted(len(frames), 'frame')}", markup=False)
     return 0

@@ -95,7 +95,8 @@ def record_bag(
     except BaseException as error:
         store.close(empty=False)
         if isinstance(error, OSError | RuntimeError) and not isinstance(error, DatasetError):
-            raise DatasetError(f"cannot write the dataset '{out}': {error}") from error
+            why = reason(error) if isinstance(error, OSError) else str(error)
+            raise DatasetError(f"cannot write the dataset '{out}': {why}") from error
         raise
     return len(times)
 

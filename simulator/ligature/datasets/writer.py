@@ -292,7 +292,8 @@ class DatasetWriter:
                 self._store.close(empty=False)
             except (OSError, RuntimeError) as second:
                 kept += f" ({second})" if self.count else ""
-            raise DatasetError(f"cannot write the dataset '{self._path}': {error}{kept}") from error
+            why = reason(error) if isinstance(error, OSError) else str(error)
+            raise DatasetError(f"cannot write the dataset '{self._path}': {why}{kept}") from error
 
     def __enter__(self) -> DatasetWriter:
         return self

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ligature.model.optics import Calibration
+from ligature.paths import naming
 from ligature.render.target import Frame
 
 FORMATS = ("npy", "png", "exr")
@@ -29,8 +30,9 @@ def staged(path: Path) -> Iterator[Path]:
     """A file beside ``path`` to write to, which takes its name when all is written; nothing half-written has it."""
     part = path.with_name(f".{path.name}.part")
     try:
-        yield part
-        os.replace(part, path)
+        with naming(path):
+            yield part
+            os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
 
