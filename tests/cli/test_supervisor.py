@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import os
 import signal
+import socket
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from queue import Queue
 
@@ -15,6 +17,8 @@ from ligature.bus.leftovers import FOLDER
 from ligature.cli.options import RunOptions
 from ligature.cli.supervisor import Child, Event, Supervisor
 from rich.console import Console
+
+from tests.conftest import ROOT
 
 
 def child(code: str) -> tuple[Child, Queue[Event]]:
@@ -68,6 +72,31 @@ def test_a_process_starts_again() -> None:
     assert [next_of(events)[1] for _ in range(2)] == ["log", "ended"]
 
 
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    """The handlers of signals stay those of the tests."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("handlers")
+def test_a_master_that_ends_is_reported_with_its_last_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
+    failing = [sys.executable, "-c", "import sys; print('first'); sys.exit('its log is somebody else\\'s')"]
+    monkeypatch.setattr("ligature.cli.master.command", lambda _: failing)
+    text = io.StringIO()
+    scene = ROOT / "scenes" / "suturing_small" / "launch.yaml"
+    assert Supervisor(RunOptions(str(scene)), Console(file=text, soft_wrap=True)).run() == 1
+    assert (
+        f"for http://127.0.0.1:{port} does not answer: its log is somebody else's; start 'roscore'" in text.getvalue()
+    )
+
+
+@pytest.mark.usefixtures("handlers")
 def test_a_run_that_cannot_have_a_master_states_why_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -75,12 +104,7 @@ def test_a_run_that_cannot_have_a_master_states_why_and_leaves_nothing(
     text = io.StringIO()
     options = RunOptions(str(tmp_path / "[red]launch.yaml"), notes=("-t 0: the step is fixed",))
     supervisor = Supervisor(options, Console(file=text, soft_wrap=True))
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        assert supervisor.run() == 1
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+    assert supervisor.run() == 1
     lines = text.getvalue().splitlines()
     assert lines == [
         f"loading {tmp_path}/[red]launch.yaml",

@@ -199,8 +199,17 @@ class Supervisor:
                 return True
             time.sleep(0.05)
         if not self._stopping:
-            self._fail(f"the ROS master started for {uri} does not answer; start 'roscore' and try again")
+            why = "" if child.process.poll() is None else self._last_line("master")
+            self._fail(f"the ROS master started for {uri} does not answer{why}; start 'roscore' and try again")
         return False
+
+    def _last_line(self, process: str) -> str:
+        """The last line that a process that has ended printed, for a message; takes all events till then."""
+        line = ""
+        with suppress(Empty):
+            while (event := self._events.get(timeout=1.0))[:2] != (process, "ended"):
+                line = f": {event[2].strip()}" if event[:2] == (process, "log") and event[2].strip() else line
+        return line
 
     def _handle(self, process: str, event: str, text: str) -> None:
         if event == "ready":
