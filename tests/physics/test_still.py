@@ -218,3 +218,86 @@ def test_nothing_sleeps_where_bullet_keeps_it_elsewhere(monkeypatch: pytest.Monk
             with monkeypatch.context() as patch:
                 patch.setattr(bullet, name, getattr(bullet, name) + shift)
                 assert len(bullet.find_sleepers(boxes)) == 0, f"{name} {shift:+d}: another version of PyBullet"
+
+
+def _sprung(rng: np.random.Generator) -> tuple[str, list[float], list[float], list[float]]:
+    """Weights on springs that hang from a post, among balls that nothing pulls; their masses, stiffness, damping."""
+    count = int(rng.integers(1, 4))
+    mass = (10.0 ** rng.uniform(-3, 0, count)).tolist()
+    stiffness = [m * 10.0 ** rng.uniform(3, 5) for m in mass]
+    damping = [2.0 * rng.uniform(0.2, 1.5) * np.sqrt(k * m) for k, m in zip(stiffness, mass, strict=True)]
+    names, joints = ["Post"], ""
+    parts = (
+        "Post: {name: Post, mass: 0, collision shape: BOX, collision geometry: {x: 0.01, y: 0.01, z: 0.01}, "
+        f"{SMOOTH}, location: {{position: {{x: 0, y: 0, z: 0.5}}}}}}\n"
+    )
+    for k in range(4):
+        names.append(f"Ball{k}")
+        parts += (
+            f"Ball{k}: {{name: Ball{k}, mass: 0.1, collision shape: SPHERE, collision geometry: {{radius: 0.01}}, "
+            f"{SMOOTH}, location: {{position: {{x: {0.1 * k}, y: 0.2, z: 0}}}}}}\n"
+        )
+    falls = SMOOTH.replace("gravity: {x: 0, y: 0, z: 0}", "gravity: {x: 0, y: 0, z: -9.81}")
+    for k in range(count):
+        x, inertia = 0.1 * (k + 1), 1e-3 * mass[k]
+        names.append(f"Weight{k}")
+        parts += (
+            f"Weight{k}: {{name: Weight{k}, mass: {mass[k]!r}, collision shape: BOX, collision geometry: "
+            f"{{x: 0.02, y: 0.02, z: 0.02}}, inertia: {{ix: {inertia}, iy: {inertia}, iz: {inertia}}}, {falls}, "
+            f"location: {{position: {{x: {x}, y: 0, z: 0}}}}}}\n"
+        )
+        still = "{x: 0, y: 0, z: 0}"
+        joints += (
+            f"Spring{k}: {{name: Spring{k}, type: six dof spring, parent: Post, child: Weight{k}, "
+            f"parent axis: {{x: 0, y: 0, z: 1}}, child axis: {{x: 0, y: 0, z: 1}}, parent pivot: "
+            f"{{x: {x}, y: 0, z: -0.5}}, child pivot: {still}, joint limits: {{linear: {{low: {{x: 0, y: 0, z: -0.1}}, "
+            f"high: {{x: 0, y: 0, z: 0.1}}}}, angular: {{low: {{x: -1, y: 0, z: 0}}, high: {{x: 1, y: 0, z: 0}}}}}}, "
+            f"stiffness: {{linear: {{x: 0, y: 0, z: {stiffness[k]!r}}}, angular: {{x: {stiffness[k] * 1e-3!r}, "
+            f"y: 0, z: 0}}}}, damping: {{linear: {{x: 0, y: 0, z: {damping[k]!r}}}, angular: "
+            f"{{x: {damping[k] * 1e-3!r}, y: 0, z: 0}}}}}}\n"
+        )
+    hung = ", ".join(f"Spring{k}" for k in range(count))
+    head = f"namespace: /ambf/env/\nbodies: [{', '.join(names)}]\njoints: [{hung}]\n"
+    return head + parts + joints, mass, stiffness, damping
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_weights_on_springs_sleep_at_their_sag_and_wake_when_touched(
+    seed: int, tmp_path: Path, pair: Callable[[Scene], tuple[Simulation, Simulation]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(seed)
+    text, mass, *_ = _sprung(rng)
+    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+    scene = ligature.load(tmp_path / "model.yaml")
+    with monkeypatch.context() as patch:
+        patch.setattr(bullet._Clients, "begin", 0)
+        plain = Simulation(scene)
+    runs = (*pair(scene), plain)
+    hung = next(k for k, tree in enumerate(runs[0]._world.engine.trees) if tree.axes)
+    trees, axes = runs[0]._world.engine.motions.trees, runs[0]._world.joints._axes
+
+    def settle() -> None:
+        for simulation in runs:
+            simulation.step(4000)
+        assert len({simulation.state_hash() for simulation in runs}) == 1
+        assert trees.asleep[hung], "a spring at its sag never sleeps"
+        assert not trees.joints[1].any()
+
+    settle()
+    where = trees.joints[0].copy()
+    slides = axes.stiffness * np.abs(where - axes.rest)
+    assert np.sort(slides)[-len(mass) :] == pytest.approx(np.sort(9.81 * np.array(mass)), rel=1e-9)
+    for simulation in runs:
+        simulation.step(1000)
+    assert (trees.joints[0] == where).all(), "what sleeps does not creep"
+    for simulation in runs:
+        ball = simulation.bodies["Ball0"]
+        ball.set_pose([0.1, 0.0, 0.05, 0, 0, 0, 1])
+        ball.command_twist([0.0, 0.0, -0.5, 0.0, 0.0, 0.0])
+        simulation.step(80)
+        ball.release()
+    assert not trees.asleep[hung] and np.abs(trees.joints[0] - where).max() > 1e-6, "the ball moves a weight"
+    for simulation in runs:
+        simulation.bodies["Ball0"].set_pose([0.0, 0.2, 0.05, 0, 0, 0, 1])
+    settle()
+    assert trees.joints[0] == pytest.approx(where, abs=1e-9)

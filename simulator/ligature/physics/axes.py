@@ -30,7 +30,7 @@ from ligature.physics.bullet import (
     set_velocity,
     submit,
 )
-from ligature.physics.trees import BASE_U, Trees, follow, load_joints, open_trees, read_tree
+from ligature.physics.trees import BASE_U, REST_SPEED, Trees, follow, load_joints, open_trees, read_tree
 from ligature.tables import opener
 
 Array = NDArray[np.float64]
@@ -54,6 +54,11 @@ FREE_SPEED = 1e3
 
 STOP_GAIN = 0.2
 """Share of its way back that a stopped joint goes in a tick."""
+
+RESIDUE = 1e-12
+"""Effort of a joint that stands, in N·m or N or as part of its spring's if that is above 1, which counts as none.
+
+No spring balances a weight to the last bit: what remains moves a joint by parts of a picometre, but for ever."""
 
 SERVO_GAIN = 200.0
 """Closing speed over following error in 1/s: the set-point is reached with a time constant of 5 ms."""
@@ -143,6 +148,8 @@ def act(handle: int, tree_table: Integers, axis_table: Integers, dt: float) -> N
             load_joints(trees, k)
         for i in range(begin, end):
             _bound(axes, trees, i, dt)
+            if axes.sprung[i]:
+                _balance(axes, trees, i)
         trees.quiet[k] = trees.quiet[k] and _unchanged(axes, trees, k)
         if handle == 0 or (trees.quiet[k] and trees.still[k]):
             continue
@@ -196,6 +203,16 @@ def _follow_law(axes: Axes, trees: Trees, k: int, dt: float) -> None:
         trees.push[k] = axes.target[k]
     if axes.sprung[k]:
         trees.push[k] += axes.stiffness[k] * (axes.rest[k] - position) - axes.damping[k] * velocity
+
+
+@inlined
+def _balance(axes: Axes, trees: Trees, k: int) -> None:
+    """Take the effort of a sprung axis that stands as none where its spring bears the weight; see `RESIDUE`."""
+    velocity = trees.joints[1, k]
+    if abs(velocity) < REST_SPEED:
+        spring = axes.stiffness[k] * abs(axes.rest[k] - trees.joints[0, k])
+        if abs(trees.push[k] + axes.damping[k] * velocity) <= RESIDUE * max(1.0, spring):
+            trees.push[k] = 0.0
 
 
 @inlined

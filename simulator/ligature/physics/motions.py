@@ -114,7 +114,18 @@ class Motions:
         pybullet.stepSimulation(physicsClientId=self._client)
         kernels.expire(self.table)
         self.read_all()
+        for tree in range(len(self._uids)):
+            if kernels.creeps_one(self.table, tree):
+                self._halt(tree)
+        self.trees.quiet[:] = True
         return bool(kernels.sound(self.table, limit))
+
+    def _halt(self, tree: int) -> None:
+        """Let the joints of a tree stand where they are."""
+        rows = self.slices[tree]
+        self.velocity[rows] = 0.0
+        for link, position in zip(self._links[tree], self.position[rows].tolist(), strict=True):
+            pybullet.resetJointState(self._uids[tree], link, position, 0.0, physicsClientId=self._client)
 
     def begin(self) -> None:
         """No tick is over yet, so that no motor has an effort and no joint a reaction: Bullet has those of before."""

@@ -28,6 +28,8 @@ from ligature.physics.bullet import (
     let_sleep,
     real_at,
     set_angular_velocity,
+    set_joint_positions,
+    set_joint_velocities,
     set_linear_velocity,
     slept,
     submit,
@@ -42,6 +44,9 @@ TURNS, SLIDES = int(pybullet.JOINT_REVOLUTE), int(pybullet.JOINT_PRISMATIC)
 
 BASE_Q, BASE_U = 7, 6
 """Numbers of the base before those of the first axis, among Bullet's coordinates and velocities."""
+
+REST_SPEED = 1e-12
+"""Speed in rad/s or m/s below which joints that nothing pushes stand: at this one, an hour makes 4 nm."""
 
 
 class Trees(NamedTuple):
@@ -171,6 +176,8 @@ def _read_moved(handle: int, trees: Trees, k: int) -> None:
         trees.before[i] = trees.joints[0, i]
         rested = rested and trees.joints[1, i] == 0.0
     read_tree(handle, trees, k)
+    if creeps(trees, k):
+        _halt(handle, trees, k)
     still = rested and trees.quiet[k] and trees.sleepers_begin[k] < trees.sleepers_begin[k + 1]
     for a in range(7):
         still = still and trees.wanted[a] == trees.pose[row, a]
@@ -182,6 +189,30 @@ def _read_moved(handle: int, trees: Trees, k: int) -> None:
             for a in range(6):
                 still = still and trees.reaction[i, a] == 0.0
     trees.still[k] = still
+
+
+@inlined
+def creeps(trees: Trees, k: int) -> bool:
+    """Whether the joints of tree ``k``, on which nothing but Bullet acts, are to stand: springs arrive only nearly."""
+    moves = False
+    for i in range(trees.first[k], trees.first[k + 1]):
+        speed = abs(trees.joints[1, i])
+        if not (trees.limp[i] and speed < REST_SPEED):
+            return False
+        moves = moves or speed > 0.0
+    return moves and trees.quiet[k] and not trees.going[k]
+
+
+@inlined
+def _halt(handle: int, trees: Trees, k: int) -> None:
+    """Let the joints of tree ``k`` stand where they are."""
+    first, end = trees.first[k], trees.first[k + 1]
+    for i in range(first, end):
+        trees.joints[1, i] = 0.0
+    command = init_motion(handle, trees.uid[k])
+    set_joint_positions(command, end - first, trees.joints[0, first:].ctypes.data)  # without, Bullet sets no velocity
+    set_joint_velocities(handle, command, end - first, trees.joints[1, first:].ctypes.data)
+    submit(handle, command)
 
 
 @inlined
@@ -209,6 +240,12 @@ def below(trees: Trees, limit: float) -> bool:
 def expire(table: Integers) -> None:
     """`pass_tick` for a table of `Trees`."""
     pass_tick(open_trees(table))
+
+
+@kernel
+def creeps_one(table: Integers, k: int) -> bool:
+    """`creeps` for a table of `Trees`."""
+    return creeps(open_trees(table), k)
 
 
 @kernel
