@@ -222,8 +222,8 @@ CACHES: dict[str, str] = {
     # what sensors make of the state
     **dict.fromkeys(
         (
-            *(f"GhostArrays.{name}" for name in ("apart", "measured", "room", "inside", "due")),
-            *(f"Ghosts._{name}" for name in ("apart", "measured", "room", "inside", "due")),
+            *(f"GhostArrays.{name}" for name in ("apart", "measured", "room", "inside", "due", "seen", "moved")),
+            *(f"Ghosts._{name}" for name in ("apart", "measured", "room", "inside", "due", "seen", "moved")),
             "Contacts._tick",
             "Contacts._found",
             "Contacts._numbers",

@@ -52,15 +52,20 @@ def put(sim: Simulation, T: np.ndarray, offset: Sequence[float]) -> tuple[bool, 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from([1e-4, 1e-3, 1e-2]))
 def test_what_is_sensed_follows_from_the_distance_after_any_walk(sim: Simulation, seed: int, size: float) -> None:
-    """The ghost's body turns and moves, the ball moves about it, in steps of every size."""
+    """The ghost's body turns and moves, the ball moves about it, both, either or none, in steps of every size."""
     rng = np.random.default_rng(seed)
     T, offset, seen = np.eye(4), rng.normal(size=3), set()
     offset *= (BALL + GHOST) / np.linalg.norm(offset)
     for _ in range(60):
-        axis = rng.normal(size=3)
-        T[:3, :3] = T[:3, :3] @ axis_rotation(axis / np.linalg.norm(axis), 10.0 * size * rng.normal())
-        T[:3, 3] += size * rng.normal(size=3)
-        offset += size * rng.normal(size=3)
+        ghost_moves, ball_moves = rng.integers(2, size=2)
+        if ghost_moves:
+            axis, before = rng.normal(size=3), (T @ np.append(AT, 1.0))[:3]
+            T[:3, :3] = T[:3, :3] @ axis_rotation(axis / np.linalg.norm(axis), 10.0 * size * rng.normal())
+            T[:3, 3] += size * rng.normal(size=3)
+            if not ball_moves:
+                offset -= (T @ np.append(AT, 1.0))[:3] - before
+        if ball_moves:
+            offset += size * rng.normal(size=3)
         sensed, gap = put(sim, T, offset)
         if abs(gap) > SURE:
             assert sensed == (gap < 0.0)

@@ -105,12 +105,15 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         """Write the state of all arms."""
         if self._arms:
             for m, arm in enumerate(self._arms):
-                self._guarded("write_state", arm, self._records.look, m, state)
+                try:
+                    self._records.look(m, state)
+                except Exception as error:
+                    self._fault("write_state", arm, error)
             motions = self._world.engine.motions
             motions.prepare()
-            self._records.write(motions.handle, motions.table)
-            for m, master in self._masters:
-                state["arm"]["gravity_jf"][0, m] = master.gravity_jf()
+            if self._records.write(motions.handle, motions.table):
+                for m, master in self._masters:
+                    state["arm"]["gravity_jf"][0, m] = master.gravity_jf()
 
     def take_problems(self) -> list[Diagnostic]:
         """What was found since the last call."""

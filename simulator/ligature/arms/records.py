@@ -182,10 +182,12 @@ class ArmRecords:
         feels, wrench = self._wrenches[m]
         self._arrays.wrench[m] = wrench() if feels is None or feels() else 0.0
 
-    def write(self, handle: int, trees: Integers) -> None:
-        """Write numbers that have changed; ``handle`` and ``trees`` are those of `Motions`."""
-        if describe_arms(handle, trees, self._table):
+    def write(self, handle: int, trees: Integers) -> bool:
+        """Write numbers that have changed, and return whether any have; the arguments are those of `Motions`."""
+        found = bool(describe_arms(handle, trees, self._table))
+        if found:
             self._numbers[:] = self._arrays.numbers
+        return found
 
     def _attach(self, state: StateRecord) -> None:
         """Write to another record from now on."""

@@ -65,6 +65,8 @@ class GhostArrays(NamedTuple):
     room: Array  # (g, n) how far the two may move until they have to be measured again
     inside: Flags  # (g, n)
     due: Flags  # (g, n) whether a pair has to be measured
+    seen: Array  # (g + n, 7) poses of ghosts and bodies as they were last
+    moved: Flags  # (g + n,) scratch: whether they are others now
 
 
 _open_ghosts = opener(
@@ -74,7 +76,7 @@ _open_ghosts = opener(
             for rank, kind in [
                 (1, np.int64), (2, float), (2, float), (2, np.int64), (2, float), (1, float), (1, np.int64),
                 (1, np.int64), (1, float), (1, float), (1, np.int64), (1, float), (1, float), (3, float), (3, float),
-                (2, float), (2, np.bool_), (2, np.bool_),
+                (2, float), (2, np.bool_), (2, np.bool_), (2, float), (1, np.bool_),
             ]
         )
     )
@@ -164,9 +166,15 @@ def _pairs_to_measure(table: Integers, ghost_world: Array, body_pose: Array) -> 
     due, inside, room, solid = ghosts.due, ghosts.inside, ghosts.room, ghosts.solid
     ghost_reach, reach = ghosts.ghost_reach, ghosts.reach
     apart, measured = ghosts.apart, ghosts.measured
-    back, found = np.empty(7), False
-    for g in range(due.shape[0]):
+    back, found, count = np.empty(7), False, due.shape[0]
+    for g in range(count):
+        ghosts.moved[g] = _replace(ghosts.seen[g], ghost_world[g])
+    for i in range(solid.shape[0]):
+        ghosts.moved[count + i] = _replace(ghosts.seen[count + i], body_pose[solid[i]])
+    for g in range(count):
         for i in range(due.shape[1]):
+            if not (ghosts.moved[g] or ghosts.moved[count + i] or due[g, i]):
+                continue
             square, ghost, body = 0.0, ghost_world[g], body_pose[solid[i]]
             for a in range(3):
                 square += (ghost[a] - body[a]) ** 2
@@ -185,6 +193,16 @@ def _pairs_to_measure(table: Integers, ghost_world: Array, body_pose: Array) -> 
             due[g, i] = not moved <= room[g, i]
             found = found or due[g, i]
     return found
+
+
+@compiled
+def _replace(seen: Array, pose: Array) -> bool:
+    """Put a ``pose`` (7,) into ``seen``; whether it is another one."""
+    other = False
+    for a in range(7):
+        other = other or seen[a] != pose[a]
+        seen[a] = pose[a]
+    return other
 
 
 @compiled
@@ -242,6 +260,7 @@ class Ghosts(Subsystem):
         self._apart, self._measured = np.zeros((*shape, 7)), np.zeros((*shape, 7))
         self._room = np.full(shape, -1.0)
         self._inside, self._due = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        self._seen, self._moved = np.full((sum(shape), 7), np.nan), np.zeros(sum(shape), dtype=bool)
         self._arrays = GhostArrays(*(np.ascontiguousarray(getattr(self, f"_{name}")) for name in GhostArrays._fields))
         self._table = table_of(self._arrays)
 

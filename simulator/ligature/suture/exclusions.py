@@ -42,15 +42,15 @@ class Exclusions:
         self._pads, self._inside = np.zeros((2, *shapes.skip.shape), dtype=np.bool_)
         self._never = self.of_scene.copy()
         self._any = False
-        self._due = np.ones(len(shapes.skip), dtype=np.bool_)
+        self._due, self._waits = np.ones(len(shapes.skip), dtype=np.bool_), True
 
     def look(self, parts: slice = slice(None)) -> None:
         """Look for overlaps with ``parts`` in the next tick: they, or the rod, were put somewhere."""
-        self._due[parts] = True
+        self._due[parts], self._waits = True, True
 
     def step(self) -> list[tuple[int, int, float]]:
         """Find what is inside bodies after a move, and push it out; returns part, element, depth of deep overlaps."""
-        found = self._find() if self._due.any() else []
+        found = self._find() if self._waits else []
         if self._any and self._rod.draw_out(self._never, self._inside):
             self._write()
         return found
@@ -59,7 +59,7 @@ class Exclusions:
         """Flag what is inside the parts that are due; returns what of an attached rod lies deep in them."""
         before = self._inside.copy()
         self._rod.find_inside(self._due, self._inside)
-        self._due[:] = False
+        self._due[:], self._waits = False, False
         self._write()
         if not self._rod.description.attachments:
             return []
@@ -82,6 +82,7 @@ class Exclusions:
     def restart(self) -> None:
         """Begin anew where the rod is now, between no pads."""
         self._pads[:], self._inside[:], self._due[:] = False, False, True
+        self._waits = True
         self._write()
 
     def snapshot(self) -> dict[str, Any]:
@@ -91,4 +92,5 @@ class Exclusions:
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Continue from `snapshot`."""
         self._pads[:], self._inside[:], self._due[:] = snapshot["pads"], snapshot["inside"], snapshot["due"]
+        self._waits = bool(self._due.any())
         self._write()
