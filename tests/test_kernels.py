@@ -91,6 +91,35 @@ def test_a_kernel_that_is_new_links_with_one_that_was_kept(tmp_path: Path) -> No
     assert [done.stdout.strip() for done in (first, second, third)] == ["4.0", "4.0 1 6.0 0", "6.0 1"], second.stderr
 
 
+MULTIPLYING = """
+import sys
+import numpy as np
+from ligature import kernels
+@kernels.compiled
+def total(a):
+    return a.sum()
+@kernels.compiled
+def square(a):
+    return a @ a
+@kernels.compiled
+def solved(a, b):
+    return np.linalg.solve(a, b)
+def loaded():
+    return "scipy.linalg" in sys.modules
+"""
+
+
+@pytest.mark.parametrize("call", ["square(a)[0, 1]", "solved(a, a)[1, 1]"])
+def test_linear_algebra_is_imported_by_kernels_that_use_it_alone(call: str, tmp_path: Path) -> None:
+    (tmp_path / "multiplying.py").write_text(MULTIPLYING)
+    path = os.pathsep.join([str(tmp_path), str(PACKAGE.parent)])
+    environment = {"PYTHONPATH": path, "LIGATURE_CACHE": str(tmp_path / "cache")}
+    text = f"from multiplying import *; a = np.eye(3) + 1.0; print(total(a), loaded(), round({call}, 9), loaded())"
+    compiled, kept = run(text, **environment), run(text, **environment)
+    value = "5.0" if call.startswith("square") else "1.0"
+    assert compiled.stdout.strip() == kept.stdout.strip() == f"12.0 False {value} True", compiled.stderr + kept.stderr
+
+
 @pytest.mark.parametrize("variable", ["LIGATURE_CACHE", "XDG_CACHE_HOME", "HOME"])
 def test_who_can_write_nowhere_gets_a_private_folder_and_one_line(program: str, tmp_path: Path, variable: str) -> None:
     (tmp_path / "file").write_text("")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib
 import logging
 import os
 import re
@@ -22,6 +23,7 @@ from typing import Any, TypeVar
 
 import llvmlite.binding
 import numba
+import numba.np.linalg
 from numba.core import event
 
 from ligature.cache import CacheError, cache_folder
@@ -44,6 +46,21 @@ _CONSTANTS = (
 """Sources without kernels whose contents are compiled into kernels."""
 
 _log = logging.getLogger(__name__)
+
+
+def _import_without_scipy() -> None:
+    """Import Numba's functions of arrays without SciPy's linear algebra, of which they only ask whether it is there.
+
+    It takes 15 MB. Code that uses it imports it when it is compiled, and when it is called.
+    """
+    ensure, numba.np.linalg.ensure_blas = numba.np.linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        numba.np.linalg.ensure_blas = ensure
+
+
+_import_without_scipy()
 
 
 def sources() -> list[Path]:
