@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ligature.adf import AdfError
 from ligature.model.commands import PlaceCommand
+from ligature.model.handles import Handles
 from ligature.model.optics import Calibration, stereo_partners
 from ligature.model.scene import Camera
 from ligature.render.calibration import calibrations
@@ -20,7 +21,7 @@ from ligature.render.look import Look
 from ligature.render.renderer import Renderer
 from ligature.render.sensor import IDEAL, ImageSensor
 from ligature.render.target import Exposure, Frame
-from ligature.simulation import Handles, Simulation
+from ligature.simulation import Simulation
 
 Array = NDArray[np.float64]
 
