@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 PARALLEL, ANTIPARALLEL = 0.001, 3.14
 """Angles between which two axes have a rotation axis of their own; part of the format (§15.1)."""
 
+_IDENTITY = np.eye(4)
+
 
 def rpy_matrix(r: float, p: float, y: float) -> Array:
     """Rotation (3, 3) of an orientation block."""
@@ -48,7 +50,7 @@ def pose_matrix(xyz: ArrayLike, rpy: ArrayLike) -> Array:
 
 def frame(R: Array, p: ArrayLike) -> Array:
     """Pose (4, 4) of a rotation (3, 3) and an origin (3,)."""
-    T = np.eye(4)
+    T = _IDENTITY.copy()
     T[:3, :3] = R
     T[:3, 3] = p
     return T
@@ -56,7 +58,7 @@ def frame(R: Array, p: ArrayLike) -> Array:
 
 def inverse(T: Array) -> Array:
     """Inverse of a pose (4, 4)."""
-    out = np.eye(4)
+    out = _IDENTITY.copy()
     out[:3, :3] = T[:3, :3].T
     out[:3, 3] = -T[:3, :3].T @ T[:3, 3]
     return out
@@ -90,7 +92,7 @@ def matrix_quaternion(R: Array) -> Array:
 
 def quaternion_matrix(q: ArrayLike) -> Array:
     """Rotation (3, 3) of the unit quaternion ``q`` x y z w."""
-    x, y, z, w = np.asarray(q, dtype=float)
+    x, y, z, w = np.asarray(q, dtype=float).tolist()  # numbers: items of arrays take three times as long
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

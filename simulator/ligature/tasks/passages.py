@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 NEAR = 0.005
 """Half side of the box around a hole within which a crossing counts."""
 
+REACH = 1.8 * NEAR
+"""Distance from a hole within which all of its box is: its corners are √3 half sides away."""
+
 
 @dataclass(frozen=True)
 class Passage:
@@ -40,23 +43,32 @@ class PassageWatch:
 
     def __init__(self, scenery: Scenery) -> None:
         self._scenery = scenery
-        self._holes = [(body, pair, False) for pair, body in enumerate(scenery.entries, 1)]
-        self._holes += [(body, pair, True) for pair, body in enumerate(scenery.exits, 1)]
-        self._before: dict[int, Array] = {}
+        self._holes = [(pair, False) for pair, _ in enumerate(scenery.entries, 1)]
+        self._holes += [(pair, True) for pair, _ in enumerate(scenery.exits, 1)]
+        self._bodies = np.array([*scenery.entries, *scenery.exits], dtype=np.int64)
+        self._before: tuple[Array, Array, NDArray[np.bool_]] | None = None
         self.passages: list[Passage] = []
 
     def observe(self, time: float, body_pose: Array) -> None:
         """Take the poses (bodies, 7) of one moment."""
-        tip = self._scenery.needle_points(body_pose)[2]
-        for body, pair, is_exit in self._holes:
-            T = pose7_matrix(body_pose[body])
-            local = T[:3, :3].T @ (tip - T[:3, 3])
-            before = self._before.get(body)
-            self._before[body] = local
-            if before is not None and _crossed(before, local, is_exit):
-                share = before[2] / (before[2] - local[2])
-                at = before + share * (local - before)
+        tip, poses = self._scenery.needle_points(body_pose)[2], body_pose[self._bodies]
+        near = ((poses[:, :3] - tip) ** 2).sum(axis=1) < REACH**2
+        before, self._before = self._before, (tip, poses, near)
+        if before is None:
+            return
+        for k in np.flatnonzero(near | before[2]).tolist():
+            was, now = _in_hole(before[1][k], before[0]), _in_hole(poses[k], tip)
+            pair, is_exit = self._holes[k]
+            if _crossed(was, now, is_exit):
+                share = was[2] / (was[2] - now[2])
+                at = was + share * (now - was)
                 self.passages.append(Passage(time, pair, is_exit, (float(at[0]), float(at[1]))))
+
+
+def _in_hole(pose: Array, tip: Array) -> Array:
+    """The tip (3,) in the frame of a hole with a ``pose`` (7,)."""
+    T = pose7_matrix(pose)
+    return np.asarray(T[:3, :3].T @ (tip - T[:3, 3]))
 
 
 def _crossed(before: Array, after: Array, is_exit: bool) -> bool:

@@ -153,11 +153,10 @@ def _because(score: InsertionScore, why: str) -> InsertionScore:
 def _closest(scenery: Scenery, body_pose: Array) -> tuple[int, bool, float]:
     """Pair of the hole closest to the tip, whether it is an exit, and how far the tip is beyond it along its z."""
     tip = scenery.needle_points(body_pose)[2]
-    holes = [(body, pair, False) for pair, body in enumerate(scenery.entries, 1)]
-    holes += [(body, pair, True) for pair, body in enumerate(scenery.exits, 1)]
-    body, pair, is_exit = min(holes, key=lambda hole: float(np.linalg.norm(body_pose[hole[0], :3] - tip)))
-    T = pose7_matrix(body_pose[body])
-    return pair, is_exit, float((T[:3, :3].T @ (tip - T[:3, 3]))[2])
+    pairs, holes = len(scenery.entries), [*scenery.entries, *scenery.exits]
+    nearest = int(((body_pose[holes, :3] - tip) ** 2).sum(axis=1).argmin())
+    T = pose7_matrix(body_pose[holes[nearest]])
+    return nearest % pairs + 1, nearest >= pairs, float((T[:3, :3].T @ (tip - T[:3, 3]))[2])
 
 
 @dataclass(frozen=True)
