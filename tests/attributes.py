@@ -246,7 +246,14 @@ CACHES: dict[str, str] = {
         "what of the state record is up to date",
     ),
     **dict.fromkeys(
-        ("Mounts._table", "Mounts._field_table", "Ghosts._table", "Colliders._table", "Engine.place_table"),
+        (
+            "Mounts._table",
+            "Mounts._field_table",
+            "Ghosts._table",
+            "Colliders._table",
+            "Engine.place_table",
+            "World._always",
+        ),  # fmt: skip
         "addresses of arrays",
     ),
     "Contacts.events": "`sense` fills it from the state",

@@ -176,7 +176,7 @@ def test_what_the_joints_raise_lets_them_go_limp_and_is_reported_once(
         raise ZeroDivisionError("broken on purpose")
 
     with monkeypatch.context() as patch:
-        patch.setattr("ligature.physics.joints.act", broken)
+        patch.setattr("ligature.physics.world.prepare", broken)
         simulation.step(1)
     assert {problem.code for problem in simulation.problems} == {"failed"}
     count = len(simulation.problems)

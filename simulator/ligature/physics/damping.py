@@ -6,7 +6,6 @@ import numpy as np
 
 from ligature.physics.articulation import is_alone
 from ligature.physics.engine import Engine
-from ligature.physics.trees import slow_down
 
 
 class Damping:
@@ -27,14 +26,8 @@ class Damping:
         damped = (factors < 1.0).any(axis=1)
         self.trees, self.factors = np.array(alone, dtype=np.int64)[damped], factors[damped]
         self._places = [engine.place_of[engine.trees[k].root] for k in self.trees]
-        self._motions = engine.motions
 
     def step(self) -> None:
-        """Slow them down by a tick's part."""
-        if not self._places:
-            return
-        if self._motions.handle:
-            slow_down(self._motions.handle, self._motions.table, self.trees, self.factors)
-        else:
-            for place, (linear, angular) in zip(self._places, self.factors.tolist(), strict=True):
-                place.slow_down(linear, angular)
+        """Slow them down by a tick's part, where compiled code cannot."""
+        for place, (linear, angular) in zip(self._places, self.factors.tolist(), strict=True):
+            place.slow_down(linear, angular)

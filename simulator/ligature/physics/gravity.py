@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ligature.physics.control import TreeControl
 from ligature.physics.engine import Engine
-from ligature.physics.trees import push_bodies
 
 Array = NDArray[np.float64]
 
@@ -31,16 +30,9 @@ class Lifts:
         self.bodies, self.forces = np.array(bodies, dtype=np.int64), np.array(forces).reshape(-1, 3)
 
     def step(self) -> None:
-        """Apply the forces for one tick."""
-        if not self.bodies.size:
-            return
-        engine = self._engine
-        motions = engine.motions
-        if motions.handle:
-            push_bodies(motions.handle, motions.table, engine.place_table, self.bodies, self.forces)
-            return
+        """Apply the forces for one tick, where compiled code cannot."""
         for body, force in zip(self.bodies.tolist(), self.forces, strict=True):
-            engine.place_of[body].apply_force(force)
+            self._engine.place_of[body].apply_force(force)
 
 
 def gravity_lifts(engine: Engine, controls: Sequence[TreeControl]) -> Lifts:

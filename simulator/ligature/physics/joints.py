@@ -44,14 +44,12 @@ class Joints:
         self.moving = [control for control in self.controls if control.links]
 
     def act(self) -> None:
-        """Set motors and efforts of all joints for the coming tick."""
+        """Set motors and efforts of all joints for the coming tick, where compiled code cannot."""
         motions = self._engine.motions
-        if not motions.handle:
-            motions.everything()
-        act(motions.handle, motions.table, self.table, self._engine.dt)
-        if not motions.handle:
-            for control in self.moving:
-                control.send()
+        motions.everything()
+        act(0, motions.table, self.table, self._engine.dt)
+        for control in self.moving:
+            control.send()
 
     def held(self) -> list[dict[str, Any]]:
         """The commands of all joints now, for `follow`."""

@@ -20,7 +20,7 @@ from ligature.model.subsystem import Subsystem, copied
 from ligature.physics.body_commands import BodyCommands
 from ligature.physics.chunks import MOST_REPLACED, Chunks
 from ligature.physics.closures import Closures
-from ligature.physics.coasting import coast
+from ligature.physics.coasting import coast, prepare
 from ligature.physics.collisions import Collisions
 from ligature.physics.contact_wrenches import ContactWrenches
 from ligature.physics.damping import Damping
@@ -138,6 +138,11 @@ class World(Subsystem):
         self._closures = Closures(engine)
         self._readout = Readout(engine.client, self.scene, engine.trees, engine.motions, engine.place_of)
         self._parting = Parting(engine)
+        motions, damping, lifts = engine.motions, self._damping, self._lifts
+        self._always = (
+            motions.handle, motions.table, self.joints.table, engine.place_table, damping.trees, damping.factors,
+            lifts.bodies, lifts.forces,
+        )  # fmt: skip
 
     def _begin(self) -> None:
         """Prepare a restart; with a new Bullet client if this one keeps state that cannot be cleared, or failed.
@@ -206,17 +211,24 @@ class World(Subsystem):
         """Controllers, springs and gravity of the coming tick."""
         self.impulses.clear()
         try:
-            self.joints.act()
+            self._prepare()
         except Exception as error:  # no command ends a run
             self.report(failure("the controllers of all joints", error))
             self.joints.release_tree()
-        self._damping.step()
-        self._lifts.step()
         for body, command in self.commands.all:
             try:
                 command.apply()
             except Exception as error:
                 self._clear(body, error)
+
+    def _prepare(self) -> None:
+        """Laws of joints, damping and gravity, as one compiled call where that can reach Bullet."""
+        if self.engine.motions.handle:
+            prepare(*self._always, self.dt)
+        else:
+            self.joints.act()
+            self._damping.step()
+            self._lifts.step()
 
     def _clear(self, body: int, error: Exception) -> None:
         """Clear the commands of a body, and of all joints of its tree, whose controller failed."""
@@ -243,17 +255,13 @@ class World(Subsystem):
 
         Returns how many ticks passed, with the same bits as those of `pre_step` and `step`; 0 where anything else acts.
         """
-        engine, motions = self.engine, self.engine.motions
         if (
-            not motions.handle or self.commands.all or self.masses.added or self.collisions.waits
+            not self.engine.motions.handle or self.commands.all or self.masses.added or self.collisions.waits
             or self._parting.watches or self.chunks.bodies or self.scene.closures
         ):  # fmt: skip
             return 0
         self.impulses.clear()
-        passed, sound = coast(
-            motions.handle, motions.table, self.joints.table, engine.place_table, self._damping.trees,
-            self._damping.factors, self._lifts.bodies, self._lifts.forces, MAX_SPEED, self.dt, ticks,
-        )  # fmt: skip
+        passed, sound = coast(*self._always, self.dt, MAX_SPEED, ticks)
         if not sound:
             self._heal()
         return int(passed)
