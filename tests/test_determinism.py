@@ -309,7 +309,7 @@ def test_a_restore_puts_back_every_attribute_that_steps_change(name: str) -> Non
         ("suturing_small", rod, "NODES_KEPT", "w"),
         ("suturing_small", rod, "_KEPT", "tension"),
         ("suturing_small", colliders, "_KEPT", "near"),
-        ("suturing_small", impulses, "_KEPT", "_total"),
+        ("suturing_small", impulses, "_KEPT", "total"),
         (next((n for n in QUICK if "gripper2/" in n), ""), rays, "STICK_KEPT", "_on_sensed"),
     ],
 )

@@ -6,6 +6,7 @@ World axes, SI units.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Jaw
 from ligature.physics import World
-from ligature.physics.queries import Gaps
+from ligature.physics.queries import Gap
 
 Array = NDArray[np.float64]
 
@@ -52,10 +53,20 @@ class Facing(NamedTuple):
 
 
 class Fingers:
-    """Both fingers of ``jaw``, by index 0 or 1."""
+    """Both fingers of ``jaw``, by index 0 or 1.
+
+    Attributes
+    ----------
+    jaw
+        What the scene says of them.
+    axes, opening
+        (2,) axes of the world that turn them, and the directions in which these open.
+    """
 
     def __init__(self, jaw: Jaw, world: World) -> None:
         self.jaw, self._world = jaw, world
+        self.axes = np.array([world.joints.axis(joint) for joint in jaw.joints])
+        self.opening = np.array(jaw.opening)
         self._slowed = False
 
     def axis(self) -> tuple[Array, Array]:
@@ -69,20 +80,21 @@ class Fingers:
         direction = np.array(_turned((-turn * axis).tolist(), lever.tolist()))
         return np.asarray(direction / max(float(np.linalg.norm(direction)), 1e-12))
 
-    def _facing(self, finger: int, axis: Array, pivot: Array, gaps: Gaps) -> Facing | None:
+    def _facing(self, finger: int, axis: Array, pivot: Array, gaps: Sequence[Gap]) -> Facing | None:
         """The nearest of the points to which a pad is near that the pad faces, None without any."""
         turn = self.jaw.opening[0] if finger == 0 else -self.jaw.opening[0]
-        (ax, ay, az), closing = axis.tolist(), (-turn * axis).tolist()
-        # numbers, for arrays of three take ten times as long
-        levers, normals = (gaps.point - pivot).tolist(), gaps.normal.tolist()
-        for k, ((x, y, z), (nx, ny, nz)) in enumerate(zip(levers, normals, strict=True)):
+        (ax, ay, az), closing, (px, py, pz) = axis.tolist(), (-turn * axis).tolist(), pivot.tolist()
+        for gap in gaps:  # numbers, for arrays of three take ten times as long
+            (x, y, z), (nx, ny, nz) = gap.point, gap.normal
+            x, y, z = x - px, y - py, z - pz
             along = x * ax + y * ay + z * az
             dx, dy, dz = _turned(closing, [x - along * ax, y - along * ay, z - along * az])
             size = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-12)
             if nx * dx + ny * dy + nz * dz < -FACING * size:
-                lever = gaps.point[k] - pivot
+                point = np.array(gap.point)
+                lever = point - pivot
                 lever = lever - (lever @ axis) * axis
-                return Facing(float(gaps.distance[k]), gaps.point[k], float(np.linalg.norm(lever)))
+                return Facing(gap.distance, point, float(np.linalg.norm(lever)))
         return None
 
     def facing(self, body: int, within: float) -> tuple[Facing, Facing] | None:
@@ -90,8 +102,7 @@ class Fingers:
         axis, pivot = self.axis()
         found = []
         for finger, own in enumerate(self.jaw.fingers):
-            gaps = self._world.queries.gaps(own, body, within)
-            face = None if gaps is None else self._facing(finger, axis, pivot, gaps)
+            face = self._facing(finger, axis, pivot, self._world.queries.gaps(own, body, within))
             if face is None:
                 return None
             found.append(face)
@@ -99,7 +110,7 @@ class Fingers:
 
     def near(self, body: int) -> bool:
         """Whether a body touches a finger."""
-        return any(self._world.queries.gaps(own, body, 0.0) is not None for own in self.jaw.fingers)
+        return any(self._world.queries.gaps(own, body, 0.0) for own in self.jaw.fingers)
 
     def driven(self) -> bool:
         """Whether a command drives a finger; undriven fingers grasp nothing."""
@@ -128,14 +139,14 @@ class Fingers:
         lever = 0.5 * self.jaw.reach
         self.approach((Facing(0.0, box[0], lever), Facing(0.0, box[1], lever)))
 
-    def stop(self, positions: tuple[float, float], effort: tuple[float, float]) -> None:
+    def stop(self, positions: Iterable[float], effort: tuple[float, float]) -> None:
         """Stop both fingers at ``positions``; they press with ``effort``."""
         self._slowed = True
         for joint, opening, at, tau in zip(self.jaw.joints, self.jaw.opening, positions, effort, strict=True):
             self._world.joints.stop(joint, at, -opening * tau)
 
     def moved(
-        self, positions: tuple[float, float], distances: tuple[float, float], levers: tuple[float, float]
+        self, positions: Iterable[float], distances: tuple[float, float], levers: tuple[float, float]
     ) -> tuple[float, float]:
         """Joint positions at which the pads have closed by further ``distances`` in metres."""
         one, two = (
@@ -143,6 +154,12 @@ class Fingers:
             for at, opening, distance, lever in zip(positions, self.jaw.opening, distances, levers, strict=True)
         )
         return one, two
+
+    def sort_motors(self) -> None:
+        """Have motors keep both fingers that were stopped without `stop`."""
+        self._slowed = True
+        for joint in self.jaw.joints:
+            self._world.joints.control_of(joint).sort()
 
     def release(self) -> None:
         """Return both fingers to their commands."""

@@ -20,6 +20,7 @@ from ligature.tables import opener
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 SWEEPS = 20
 """Gauss-Seidel sweeps over the grasps of one body and the rows that slip."""
@@ -36,6 +37,20 @@ TURN_STIFFNESS, TURN_DAMPING = 2.0, 5e-3
 """Stiffness and damping of pads in rotation, N m/rad and N m s/rad: 1 N at the tip of a needle turns it by half a
 degree."""
 
+LINE_ARM = 0.5
+"""Mean arm of friction on an evenly pressed line, in halves of its length: a wire across a pad."""
+
+LEAST_FORCE = 1e-9
+"""Least normal force in newtons, which keeps the limits positive."""
+
+
+@inlined
+def friction_limits(friction: float, half_width: float, normal_force: float) -> tuple[float, float, float]:
+    """Largest tangential force (N), moment about the normal (N m) and normal force of both pads of a patch together."""
+    press = max(normal_force, LEAST_FORCE)
+    force = 2.0 * friction * press
+    return force, force * LINE_ARM * half_width, press
+
 
 @inlined
 def _spring(row: int, dt: float) -> tuple[float, float]:
@@ -49,17 +64,19 @@ class GraspArrays(NamedTuple):
 
     patch: Array  # (g, 7) pose of the patch in the inertial frame of the jaw's holder
     held: Array  # (g, 7) pose of the body's inertial frame in the patch, as held
-    limits: Array  # (g, 3) maximum tangential force, moment about the normal, and normal force
+    pads: Array  # (g, 3) friction and half width of the pads, and the force between the fingers
     load: Array  # (g, 6) on the body, in patch axes: N, N m
     slid: Array  # (g, 2) slip of the body: m, rad
     pace: Array  # (g, 6) velocity of the holder at the patch in the last tick, in patch axes
     lag: Array  # (g, 6) displacement that the body lags behind the holder, in patch axes
-    slides: NDArray[np.bool_]  # (g, 2) whether the body slips along the pads, and pulls them apart
+    slides: Flags  # (g, 2) whether the body slips along the pads, and pulls them apart
 
 
 class Motions(NamedTuple):
     """The body and the holders of its g grasps at the start of a tick, inertial frames, world axes."""
 
+    bodies: Integers  # (1 + g,) indices of the body and the holders in the scene
+    pushable: Flags  # (1 + g,) whether impulses move them
     body_pose: Array  # (7,)
     body_twist: Array  # (6,) after the tick without the grasps
     inverse: Array  # (4,) inverse of the body's mass and principal moments
@@ -76,6 +93,7 @@ class Scratch(NamedTuple):
 
     at: Array  # (g, 3) patches in the world
     R: Array  # (g, 3, 3)
+    limits: Array  # (g, 3) see `friction_limits`
     error: Array  # (g, 6) of the body off its held pose
     drift: Array  # (g, 6) velocity of the holders there, in patch axes
     Y: Array  # (g, 6, 6) impulse for a unit of velocity
@@ -93,7 +111,8 @@ class Scratch(NamedTuple):
 def motions(g: int) -> Motions:
     """Arrays for the motion of a body and ``g`` holders."""
     z = np.zeros
-    return Motions(z(7), z(6), z(4), z((g, 7)), z((g, 6)), z((g, 6)), z(6), z(6), z((1 + g, 6)))
+    bodies, pushable = np.zeros(1 + g, dtype=np.int64), np.zeros(1 + g, np.bool_)
+    return Motions(bodies, pushable, z(7), z(6), z(4), z((g, 7)), z((g, 6)), z((g, 6)), z(6), z(6), z((1 + g, 6)))
 
 
 def grasp_arrays(g: int) -> GraspArrays:
@@ -107,8 +126,10 @@ def grasp_arrays(g: int) -> GraspArrays:
 def scratch(g: int) -> Scratch:
     """Scratch for ``g`` grasps."""
     z = np.zeros
-    return Scratch(z((g, 3)), z((g, 3, 3)), z((g, 6)), z((g, 6)), z((g, 6, 6)), z(6), z((3, 3)), z((3, 3)), z((6, 6)),
-                   z(6), z(6), z(3), z(3), z(3))  # fmt: skip
+    return Scratch(
+        z((g, 3)), z((g, 3, 3)), z((g, 3)), z((g, 6)), z((g, 6)), z((g, 6, 6)), z(6), z((3, 3)), z((3, 3)), z((6, 6)),
+        z(6), z(6), z(3), z(3), z(3),
+    )  # fmt: skip
 
 
 open_motions, open_grasps, open_scratch = opener(motions(1)), opener(grasp_arrays(1)), opener(scratch(1))
@@ -281,7 +302,7 @@ def _sweep(g: int, body_pose: Array, inverse_mass: float, grasps: GraspArrays, r
         for k in range(6):
             change += room.Y[g, row, k] * ask[k]
         load[row] -= change
-    slides, pulls_apart = _bound(load, room.Y[g], grasps.limits[g], room, dt)
+    slides, pulls_apart = _bound(load, room.Y[g], room.limits[g], room, dt)
     for row in range(6):
         step[row] += load[row]
     _push(room.twist, inverse_mass, room.W, room.R[g], rx, ry, rz, step)
@@ -342,7 +363,8 @@ def solve(motion_table: Integers, grasp_table: Integers, room_table: Integers, d
         room.twist[k] = body_twist[k]
     for g in range(n):
         _place(g, body_pose, palm_pose, grasps, room)
-        at, h = room.at[g], palm_pose[g]
+        at, h, pads, limits = room.at[g], palm_pose[g], grasps.pads[g], room.limits[g]
+        limits[0], limits[1], limits[2] = friction_limits(pads[0], pads[1], pads[2])
         _velocity(room.R[g], palm_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
         _fill_impedance(g, inverse_mass, at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
         for row in range(6):

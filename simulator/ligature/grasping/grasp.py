@@ -15,18 +15,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.grasping.friction import grasp_arrays, motions, predict_free, scratch, solve
+from ligature.grasping.friction import (
+    friction_limits,
+    grasp_arrays,
+    motions,
+    scratch,
+    solve,
+)
 from ligature.grasping.motion import Motion
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.tables import table_of
 
 Array = NDArray[np.float64]
-
-LINE_ARM = 0.5
-"""Mean arm of friction on an evenly pressed line, in halves of its length: a wire across a pad."""
-
-LEAST_FORCE = 1e-9
-"""Least normal force in newtons, which keeps the limits positive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class Patch:
 
     def limits(self, normal_force: float) -> tuple[float, float]:
         """Largest tangential force (N) and largest moment about the normal (N m) of both pads together."""
-        force = 2.0 * self.friction * max(normal_force, LEAST_FORCE)
-        return force, force * LINE_ARM * self.half_width
+        force, moment, _ = friction_limits(self.friction, self.half_width, float(normal_force))
+        return force, moment
 
 
 def share_of_limit(force: Array, moment: float, limits: tuple[float, float]) -> float:
@@ -64,31 +64,55 @@ class Grasp:
 
     Attributes
     ----------
-    patch_pose
-        (7,) pose of the patch in the inertial frame of the jaw's holder.
-    normal_force
-        Force between the fingers in newtons; the owner keeps it up to date.
-    load
-        (6,) force and moment on the body at the patch, in patch axes, in the last tick.
-    slipped
-        (2,) metres and radians that the body has slipped since it was grasped.
+    arrays
+        What the law needs and keeps of this one grasp.
     """
 
     def __init__(self, patch: Patch, T_palm_body: Array) -> None:
         self.patch = patch
-        self.patch_pose = matrix_pose7(patch.T_palm_patch)
-        self.held = matrix_pose7(inverse(patch.T_palm_patch) @ T_palm_body)
-        self.normal_force = 0.0
-        self.load = np.zeros(6)
-        self.slipped = np.zeros(2)
-        self.slides = np.zeros(2, dtype=np.bool_)
-        self.pace, self.lag = np.zeros(6), np.zeros(6)
+        self.arrays = grasp_arrays(1)
+        self.arrays.pads[0] = patch.friction, patch.half_width, 0.0
+        self._place(T_palm_body)
+
+    def _place(self, T_palm_body: Array) -> None:
+        """Hold the body at ``T_palm_body`` by the patch where it is."""
+        self.arrays.patch[0] = matrix_pose7(self.patch.T_palm_patch)
+        self.arrays.held[0] = matrix_pose7(inverse(self.patch.T_palm_patch) @ T_palm_body)
+
+    @property
+    def held(self) -> Array:
+        """Pose (7,) of the body's inertial frame in the patch, as held."""
+        return self.arrays.held[0]
+
+    @property
+    def normal_force(self) -> float:
+        """Force between the fingers in newtons; the owner keeps it up to date."""
+        return float(self.arrays.pads[0, 2])
+
+    @normal_force.setter
+    def normal_force(self, force: float) -> None:
+        self.arrays.pads[0, 2] = force
+
+    @property
+    def load(self) -> Array:
+        """Force and moment (6,) on the body at the patch, in patch axes, in the last tick."""
+        return self.arrays.load[0]
+
+    @property
+    def slipped(self) -> Array:
+        """Metres and radians (2,) that the body has slipped since it was grasped."""
+        return self.arrays.slid[0]
+
+    @property
+    def slides(self) -> NDArray[np.bool_]:
+        """Whether the body slips along the pads, and pulls them apart (2,)."""
+        return self.arrays.slides[0]
 
     def begin(self, palm: Motion) -> None:
         """Record the holder's velocity at the start of the grasp."""
         T = self.world_patch(palm.pose)
         velocity = palm.velocity_at(T[:3, 3])
-        self.pace = np.concatenate([T[:3, :3].T @ velocity[:3], T[:3, :3].T @ velocity[3:]])
+        self.arrays.pace[0] = np.concatenate([T[:3, :3].T @ velocity[:3], T[:3, :3].T @ velocity[3:]])
 
     def world_patch(self, palm_pose: Array) -> Array:
         """Pose (4, 4) of the patch with the holder's inertial frame at ``palm_pose`` (7,)."""
@@ -98,8 +122,7 @@ class Grasp:
         """Move the patch on the holder; body and loads stay."""
         T_palm_body = self.patch.T_palm_patch @ pose7_matrix(self.held)
         self.patch = replace(self.patch, T_palm_patch=T_palm_patch)
-        self.patch_pose = matrix_pose7(T_palm_patch)
-        self.held = matrix_pose7(inverse(T_palm_patch) @ T_palm_body)
+        self._place(T_palm_body)
 
     def share(self) -> float:
         """Used share of the limit surface in the last tick, 0 to 1."""
@@ -113,16 +136,32 @@ class GraspSolver:
     ----------
     motions
         Motion of the body and the holders; the caller fills it in.
+    motion_table, room_table
+        The addresses of these arrays, and of scratch, for compiled code.
     """
 
     def __init__(self, count: int) -> None:
-        self.motions, self._grasps, self._scratch = motions(count), grasp_arrays(count), scratch(count)
-        self._tables = table_of(self.motions), table_of(self._grasps), table_of(self._scratch)
+        self.motions, self._arrays, self._scratch = motions(count), grasp_arrays(count), scratch(count)
+        self.motion_table, self.room_table = table_of(self.motions), table_of(self._scratch)
+        self._table, self._taken = table_of(self._arrays), (self._arrays, table_of(self._arrays))
 
-    def predict_free(self, own_mass: float, gravity: Array, dt: float) -> Array:
-        """See `ligature.grasping.friction.predict_free`; returns `Motions.attached_load`."""
-        predict_free(self._tables[0], self._tables[2], own_mass, gravity, dt)
-        return self.motions.attached_load
+    def take(self, grasps: Sequence[Grasp]) -> NDArray[np.int64]:
+        """The addresses of the arrays of ``grasps`` for one solution, to be followed by `give_back`."""
+        if len(grasps) == 1:  # its own arrays serve
+            if self._taken[0] is not grasps[0].arrays:
+                self._taken = grasps[0].arrays, table_of(grasps[0].arrays)
+            return self._taken[1]
+        for g, grasp in enumerate(grasps):
+            for together, own in zip(self._arrays, grasp.arrays, strict=True):
+                together[g] = own[0]
+        return self._table
+
+    def give_back(self, grasps: Sequence[Grasp]) -> None:
+        """Put the arrays of several grasps back where `take` took them from."""
+        if len(grasps) > 1:
+            for g, grasp in enumerate(grasps):
+                for together, own in zip(self._arrays, grasp.arrays, strict=True):
+                    own[0] = together[g]
 
     def solve(self, grasps: Sequence[Grasp], dt: float) -> Array:
         """Impulses (1 + g, 6) of one tick on the body and on the holders, each about its centre of mass.
@@ -130,16 +169,8 @@ class GraspSolver:
         `Motions.body_twist` is the twist after the tick without the grasps. Holders keep their velocity within the
         tick: the springs of a needle do not move an arm of kilograms.
         """
-        held = self._grasps
-        for g, grasp in enumerate(grasps):
-            held.patch[g], held.held[g], held.slid[g] = grasp.patch_pose, grasp.held, grasp.slipped
-            held.pace[g], held.lag[g] = grasp.pace, grasp.lag
-            held.limits[g, :2] = grasp.patch.limits(grasp.normal_force)
-            held.limits[g, 2] = max(grasp.normal_force, LEAST_FORCE)
-        solve(*self._tables, dt)
-        for g, grasp in enumerate(grasps):
-            grasp.held[:], grasp.load[:], grasp.slipped[:] = held.held[g], held.load[g], held.slid[g]
-            grasp.pace[:], grasp.lag[:], grasp.slides[:] = held.pace[g], held.lag[g], held.slides[g]
+        solve(self.motion_table, self.take(grasps), self.room_table, dt)
+        self.give_back(grasps)
         return self.motions.impulse
 
 
@@ -152,11 +183,3 @@ def solve_once(grasps: Sequence[Grasp], palms: Sequence[Motion], body: Motion, d
     for g, palm in enumerate(palms):
         at.palm_pose[g], at.palm_twist[g] = palm.pose, palm.twist
     return solver.solve(grasps, dt)
-
-
-def warm_up() -> None:
-    """Compile the kernels or load them from the cache, so that the first grasp of a run does not wait."""
-    origin = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    still = Motion(origin, np.zeros(6), 1.0, np.ones(3))
-    solve_once([Grasp(Patch(np.eye(4), 1e-3, 0.5), np.eye(4))], [still], still, 1e-3)
-    GraspSolver(1).predict_free(1.0, np.zeros(3), 1e-3)

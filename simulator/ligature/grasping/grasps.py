@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ligature.grasping import thread_grasps
 from ligature.grasping.actuator_grasps import ActuatorGrasps
-from ligature.grasping.fingers import LEAST_LEVER, TOUCH, Facing, Fingers
-from ligature.grasping.grasp import Patch, warm_up
+from ligature.grasping.exchange import AFRESH, CREPT, RELEASED, keep, warm_up
+from ligature.grasping.fingers import TOUCH, Facing, Fingers
+from ligature.grasping.grasp import Patch
 from ligature.grasping.impulses import BodyGrasp, ImpulseExchange, begin
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import UnknownNameError
@@ -32,12 +33,6 @@ Array = NDArray[np.float64]
 
 SEARCH_PERIOD = 5
 """Ticks between two searches for bodies between open fingers."""
-
-CREEP = 0.2e-3
-"""Slip in metres after which a jaw checks that the body is still between its pads."""
-
-JUMP = 0.01
-"""Displacement in metres of a holder within a tick beyond which it was put elsewhere."""
 
 PRESENT = 0.3e-3
 """Sum of the gaps of both pads, in metres, beyond which they have lost the body."""
@@ -64,20 +59,15 @@ class Held:
 class JawGrasp(BodyGrasp):
     """A body between the pads of one jaw.
 
-    ``levers`` (m) are those of the pads about the axis of the fingers, ``positions`` (rad) the joint positions at which
-    the fingers stop, ``palm_at`` (3,) the position of the palm in the last tick, and ``checked`` (m) the slip at
-    the last check.
+    ``levers`` (2,) in metres are those of the pads about the axis of the fingers, ``positions`` (2,) in radians the
+    joint positions at which the fingers stop, ``palm_at`` (3,) the position of the palm in the last tick, and
+    ``checked`` (m) the slip at the last check.
     """
 
-    levers: tuple[float, float]
-    positions: tuple[float, float]
-    palm_at: list[float]
+    levers: Array
+    positions: Array
+    palm_at: Array
     checked: float = 0.0
-
-    def jumped(self, palm_at: list[float]) -> bool:
-        """Whether the holder, now at ``palm_at`` (3,), was put elsewhere since the last call."""
-        before, self.palm_at = self.palm_at, palm_at
-        return any(abs(now - then) > JUMP for now, then in zip(palm_at, before, strict=True))
 
 
 class Grasps(Subsystem, Mapping[str, Held | None]):
@@ -212,8 +202,8 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         T_palm_patch = inverse(pose7_matrix(palm)) @ _patch_pose(fingers, faces)
         friction = self._friction(jaw, self._scene.bodies[body].friction)
         grasp, ride = begin(self._world, jaw.palm, body, Patch(T_palm_patch, jaw.half_width, friction))
-        levers = faces[0].lever, faces[1].lever
-        held = JawGrasp(body, jaw.palm, grasp, ride, levers, fingers.positions(), palm[:3].tolist())
+        levers, positions = np.array([face.lever for face in faces]), np.array(fingers.positions())
+        held = JawGrasp(body, jaw.palm, grasp, ride, levers, positions, palm[:3].copy())
         self._jaw_grasps[index] = held
         self._replace_contacts(index, held)
         self._world.masses.set_held(body, True, grasped=True)
@@ -266,7 +256,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def _replace_contacts(self, index: int, held: JawGrasp) -> None:
         """Replace Bullet's contacts and motors by the friction law."""
         self._disable_collision(index, held.body, True)
-        self._fingers[index].stop(held.positions, (0.0, 0.0))
+        self._fingers[index].stop(held.positions.tolist(), (0.0, 0.0))
 
     def _disable_collision(self, index: int, body: int, disabled: bool) -> None:
         for finger in self._scene.jaws[index].fingers:
@@ -277,15 +267,19 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
 
     def _keep(self, index: int, held: JawGrasp) -> None:
         """Set the commanded normal force; release the body when the jaw opens or the body slipped out."""
-        fingers = self._fingers[index]
-        efforts = fingers.efforts()
-        force = min(effort / max(lever, LEAST_LEVER) for effort, lever in zip(efforts, held.levers, strict=True))
-        if force <= 0.0 or held.jumped(self._world.centre(fingers.jaw.palm).tolist()):
+        fingers, motions, arrays = self._fingers[index], self._world.engine.motions, held.grasp.arrays
+        motions.prepare()
+        found = keep(
+            motions.handle, motions.table, self._world.engine.place_table, self._world.joints.table, held.palm,
+            fingers.axes, fingers.opening, held.levers, held.positions, held.palm_at, arrays.pads[0], arrays.slid[0],
+            held.checked,
+        )  # fmt: skip
+        if found & RELEASED:
             self._release(index)
             return
-        held.grasp.normal_force = force
-        fingers.stop(held.positions, (force * held.levers[0], force * held.levers[1]))
-        if held.grasp.slipped[0] > held.checked + CREEP:
+        if found & AFRESH:
+            fingers.sort_motors()
+        if found & CREPT:
             self._follow_slip(index, held)
 
     def _follow_slip(self, index: int, held: JawGrasp) -> None:
@@ -299,8 +293,9 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             return
         T_palm_world = inverse(pose7_matrix(self._world.motion(fingers.jaw.palm)[0]))
         held.grasp.move_patch(T_palm_world @ _patch_pose(fingers, faces))
-        held.levers = faces[0].lever, faces[1].lever
-        held.positions = fingers.moved(held.positions, (0.5 * room, 0.5 * room), held.levers)
+        levers = faces[0].lever, faces[1].lever
+        held.levers[:] = levers
+        held.positions[:] = fingers.moved(held.positions.tolist(), (0.5 * room, 0.5 * room), levers)
 
     def _release(self, index: int) -> None:
         """End a grasp; collisions stay disabled until the fingers are clear of the body."""
@@ -316,15 +311,15 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
     def _exchange_impulses(self) -> None:
         """Apply the impulses of all grasps, body by body."""
         by_body: dict[int, list[BodyGrasp]] = {}
-        if self._actuator_grasps.release(slipped=True):
-            self._rods.update_masses(self._world.masses)
-        for grasp in self._actuator_grasps.grasps:
-            by_body.setdefault(grasp.body, []).append(grasp)
-        for index, held in enumerate(self._jaw_grasps):
-            if held is not None:
-                actuated = self._actuated()
-                if held.body not in [actuated[a] for a in self._actuators[index]]:
-                    by_body.setdefault(held.body, []).append(held)
+        if self._actuator_grasps:
+            if self._actuator_grasps.release(slipped=True):
+                self._rods.update_masses(self._world.masses)
+            for grasp in self._actuator_grasps.grasps:
+                by_body.setdefault(grasp.body, []).append(grasp)
+        actuated = self._actuated()
+        for held, actuators in zip(self._jaw_grasps, self._actuators, strict=True):
+            if held is not None and held.body not in [actuated[a] for a in actuators]:
+                by_body.setdefault(held.body, []).append(held)
         for grasps in by_body.values():
             self._impulses.apply(grasps)
 

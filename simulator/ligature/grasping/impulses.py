@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.grasping.exchange import exchange
+from ligature.grasping.friction import Motions
 from ligature.grasping.grasp import Grasp, GraspSolver, Patch
 from ligature.grasping.motion import Motion
 from ligature.model.frames import inverse, pose7_matrix
@@ -48,21 +50,33 @@ class ImpulseExchange:
     def apply(self, grasps: Sequence[BodyGrasp]) -> None:
         """Apply the impulses of ``grasps``, all of one body, in the coming tick."""
         world, body = self._world, grasps[0].body
-        if len(grasps) not in self._solvers:
-            self._solvers[len(grasps)] = GraspSolver(len(grasps))
-        solver = self._solvers[len(grasps)]
-        at = solver.motions
-        world.read_motion(body, at.body_pose, at.body_twist)
+        solver = self._solvers.get(len(grasps))
+        if solver is None:
+            solver = self._solvers[len(grasps)] = GraspSolver(len(grasps))
+        at, described, laden = solver.motions, world.scene.bodies[body], world.masses.is_laden(body)
+        at.bodies[0] = body
         for g, grasp in enumerate(grasps):
-            world.read_motion(grasp.palm, at.palm_pose[g], at.palm_twist[g])
-            at.ride[g] = grasp.ride
+            at.bodies[1 + g], at.ride[g] = grasp.palm, grasp.ride
+        at.pushable[:] = [world.commands.pushable(other) for other in at.bodies.tolist()]
         mass, inertia = world.masses.mass_of(body)
-        at.inverse[0], at.inverse[1:], at.pending[:] = 1.0 / mass, 1.0 / inertia, world.impulses.pending(body)
-        described = world.scene.bodies[body]
-        world.masses.carry(body, solver.predict_free(described.mass, described.gravity, world.dt))
+        held = [grasp.grasp for grasp in grasps]
+        motions = world.engine.motions
+        motions.prepare()
+        exchange(
+            motions.handle, motions.table, world.engine.place_table, world.impulses.total, world.impulses.acted,
+            solver.motion_table, solver.take(held), solver.room_table, mass, inertia, described.mass,
+            described.gravity, laden, world.dt,
+        )  # fmt: skip
+        solver.give_back(held)
         for g, grasp in enumerate(grasps):
             grasp.ride[:] = at.ride[g]
-        impulses = solver.solve([grasp.grasp for grasp in grasps], world.dt)
-        world.impulses.apply(body, impulses[0, :3], impulses[0, 3:])
-        for grasp, impulse in zip(grasps, impulses[1:], strict=True):
-            world.impulses.apply(grasp.palm, impulse[:3], impulse[3:])
+        if not motions.handle:
+            self._load(at)
+
+    def _load(self, at: Motions) -> None:
+        """Have Bullet apply what was exchanged, where compiled code cannot."""
+        bodies = at.bodies.tolist()
+        self._world.masses.carry(bodies[0], at.attached_load)
+        for body, pushable, impulse in zip(bodies, at.pushable.tolist(), at.impulse, strict=True):
+            if pushable:
+                self._world.impulses.load(body, impulse[:3], impulse[3:])

@@ -247,6 +247,52 @@ def _bound(axes: Axes, trees: Trees, k: int, dt: float) -> None:
 
 
 @inlined
+def asked_of(axes: Axes, trees: Trees, k: int, stiffness: float) -> float:
+    """Effort that the command of an axis asks for, were the axis stopped where it is.
+
+    A motor with a set-point pulls in proportion to its following error, with ``stiffness`` (N·m/rad, N/m)
+    unless it has a yield stiffness; one with a velocity pulls with all its strength.
+    """
+    mode, target = axes.mode[k], axes.target[k]
+    behind = target - trees.joints[0, k]
+    if axes.turns[k]:
+        behind = (behind + np.pi) % (2 * np.pi) - np.pi
+    if mode == FORCE:
+        return target
+    if mode == VELOCITY:
+        return np.sign(target) * axes.strength[k]
+    if mode == SERVO and axes.yield_stiffness[k] != 0.0:
+        return axes.yield_stiffness[k] * behind
+    if mode == POSITION and axes.force_output[k]:
+        return axes.asked[k]
+    return stiffness * behind if mode in (SERVO, POSITION) else 0.0
+
+
+@kernel
+def requested_effort(tree_table: Integers, axis_table: Integers, k: int, stiffness: float) -> float:
+    """`asked_of` for tables of `Trees` and `Axes`."""
+    return asked_of(open_axes(axis_table), open_trees(tree_table), k, stiffness)
+
+
+@inlined
+def stop_at(axes: Axes, trees: Trees, k: int, position: float, effort: float) -> bool:
+    """Keep an axis at ``position`` from now on, whatever its command; it reports ``effort``.
+
+    Returns whether nothing stopped it before: then motors are to be sorted anew.
+    """
+    afresh = not axes.stopped[k]
+    axes.stopped[k], axes.stop[k], axes.slowed[k] = True, position, False
+    trees.sent[k], trees.sent_effort[k] = True, effort if effort != 0.0 else 0.0
+    return afresh
+
+
+@kernel
+def stop(tree_table: Integers, axis_table: Integers, k: int, position: float, effort: float) -> bool:
+    """`stop_at` for tables of `Trees` and `Axes`."""
+    return stop_at(open_axes(axis_table), open_trees(tree_table), k, position, effort)
+
+
+@inlined
 def _send_motors(handle: int, trees: Trees, axes: Axes, k: int) -> None:
     """Set the motors of tree ``k``."""
     begin, end = trees.first[k], trees.first[k + 1]

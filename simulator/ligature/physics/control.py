@@ -75,7 +75,7 @@ class TreeControl:
         self._spring_setup(owners)
         self.mode, self.target, self.owned = own.mode, own.target, own.owned
         self._position = motions.position[rows]
-        self._sort()
+        self.sort()
 
     def _spring_setup(self, owners: list[Joint]) -> None:
         """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
@@ -176,39 +176,29 @@ class TreeControl:
         self.mode[rows] = mode
         self.axes.kick[rows] = 0.0
         self.axes.kick_ticks[rows] = 0
-        self._sort()
+        self.sort()
 
     def release(self, joint: int) -> None:
         """Let one joint go limp, unless an arm owns it."""
         if not self.owned[self.row[joint]]:
             self._switch(self.row[joint], FREE, 0.0)
 
-    def stop(self, joint: int, position: float, effort: float) -> None:
-        """Keep one joint at ``position``, whatever it is commanded to do, until `let`; it reports ``effort``."""
-        row, own = self.row[joint], self.axes
-        fresh = not own.stopped.item(row)
-        own.stopped[row], own.stop[row] = True, position
-        own.slowed[row] = False
-        self._motions.send(self.first_axis + row, effort)
-        if fresh:
-            self._sort()
-
     def limit_velocity(self, joint: int, low: float, high: float, strength: float) -> None:
-        """Keep the velocity of one motor between ``low`` and ``high``, its effort below ``strength``, until `let`."""
+        """Keep the velocity of one motor within ``low`` and ``high``, its effort below ``strength``, until `resume`."""
         row, own = self.row[joint], self.axes
         fresh = not own.slowed[row]
         own.slowed[row] = True
         own.lower_speed[row], own.upper_speed[row], own.upper_effort[row] = low, high, strength
         if fresh:
-            self._sort()
+            self.sort()
 
     def resume(self, joint: int) -> None:
-        """End `stop` and `slow`."""
+        """End `Joints.stop` and `limit_velocity`."""
         row, own = self.row[joint], self.axes
         self._motions.send(self.first_axis + row, None)
         if own.slowed[row] or own.stopped[row]:
             self._clear_bounds(row)
-            self._sort()
+            self.sort()
 
     def _clear_bounds(self, rows: int | slice) -> None:
         """Remove all stops and speed limits of axes."""
@@ -216,25 +206,6 @@ class TreeControl:
         own.stopped[rows], own.slowed[rows] = False, False
         for array in (own.stop, own.lower_speed, own.upper_speed, own.upper_effort):
             array[rows] = 0.0
-
-    def requested_effort(self, joint: int, stiffness: float) -> float:
-        """Effort that the command of one joint asks for, were the joint stopped where it is.
-
-        A motor with a set-point pulls in proportion to its following error, with ``stiffness`` (N·m/rad, N/m)
-        unless it has a yield stiffness; one with a velocity pulls with all its strength.
-        """
-        row = self.row[joint]
-        mode, target = self.mode.item(row), self.target.item(row)
-        behind = self._way(row, target - self._position.item(row))
-        if mode == FORCE:
-            return target
-        if mode == VELOCITY:
-            return float(np.sign(target) * self.axes.strength[row])
-        if mode == SERVO:
-            return (self.axes.yield_stiffness.item(row) or stiffness) * behind
-        if mode == POSITION:
-            return float(self.axes.asked[row] if self.axes.force_output[row] else stiffness * behind)
-        return 0.0
 
     def _switch(self, row: int, mode: int, target: float) -> None:
         before = self.mode[row]
@@ -244,7 +215,7 @@ class TreeControl:
             self.axes.kick[row] = 0.0
             self.axes.kick_ticks[row] = 0
         if mode != before:
-            self._sort()
+            self.sort()
 
     def _way(self, row: int, error: float) -> float:
         """``error``, wrapped to the shorter direction for a joint that turns without limits."""
@@ -263,7 +234,7 @@ class TreeControl:
     def carry(self) -> None:
         """From now on the joints bear `Motions.force` of their tree's links, too."""
         self._laden[0] = True
-        self._sort()
+        self.sort()
 
     def send(self) -> None:
         """Have PyBullet take motors and efforts of this tick, where compiled code cannot."""
@@ -281,7 +252,7 @@ class TreeControl:
                 physicsClientId=self._client,
             )  # fmt: skip
 
-    def _sort(self) -> None:
+    def sort(self) -> None:
         """Sort the axes into those that a motor drives and those that an effort pushes; stop idle motors."""
         own = self.axes
         by_motor = (own.mode == VELOCITY) | (own.mode == SERVO) | (own.mode == POSITION)
@@ -305,7 +276,7 @@ class TreeControl:
         """Continue from `snapshot`."""
         for name, values in snapshot.items():
             getattr(self.axes, name)[:] = values
-        self._sort()
+        self.sort()
 
     def held(self) -> dict[str, Any]:
         """The commands now, for `follow`."""
@@ -324,7 +295,7 @@ class TreeControl:
         own.mode[~aimed] = held["mode"][~aimed]
         for row in np.flatnonzero(aimed).tolist():
             self._aim(row, float(held["target"][row]))
-        self._sort()
+        self.sort()
 
 
 _COMMANDED = ("target", "pace", "max_velocity", "max_deceleration", "yield_stiffness", "owned")

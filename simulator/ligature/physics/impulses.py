@@ -17,34 +17,43 @@ Array = NDArray[np.float64]
 
 
 class Impulses:
-    """The impulses and moments (6,) of the coming tick by body, about centres of mass."""
+    """The impulses and moments (6,) of the coming tick by body, about centres of mass.
+
+    Attributes
+    ----------
+    total
+        (bodies, 6) so far.
+    acted
+        (bodies,) whether there are any; the others' totals are of earlier ticks.
+    """
 
     def __init__(self, engine: Engine, commands: BodyCommands) -> None:
         self._engine, self._commands = engine, commands
-        self._total = np.zeros((len(engine.scene.bodies), 6))
-        self._bodies: set[int] = set()
+        self.total = np.zeros((len(engine.scene.bodies), 6))
+        self.acted = np.zeros(len(engine.scene.bodies), np.bool_)
 
     @property
     def bodies(self) -> Set[int]:
         """The bodies that impulses act on in the coming tick so far."""
-        return self._bodies
+        return set(np.flatnonzero(self.acted).tolist())
 
     def apply(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) and ``moment`` (3,).
 
         A driven body feels it and moves as commanded.
         """
-        total = self._total[body]
-        if body in self._bodies:
+        total = self.total[body]
+        if self.acted[body]:
             total[:3] += impulse
             total[3:] += moment
         else:
-            self._bodies.add(body)
+            self.acted[body] = True
             total[:3], total[3:] = impulse, moment
         if self._commands.pushable(body):
-            self._load(body, impulse, moment)
+            self.load(body, impulse, moment)
 
-    def _load(self, body: int, impulse: Array, moment: Array) -> None:
+    def load(self, body: int, impulse: Array, moment: Array) -> None:
+        """Have Bullet apply what is in `total` already."""
         engine, motions = self._engine, self._engine.motions
         if motions.handle:
             load_body(motions.handle, motions.table, engine.place_table, body, impulse, moment, engine.dt)
@@ -53,11 +62,11 @@ class Impulses:
 
     def pending(self, body: int) -> Array:
         """Impulse and moment (6,) that act in the coming tick so far."""
-        return self._total[body].copy() if body in self._bodies else np.zeros(6)
+        return self.total[body].copy() if self.acted[body] else np.zeros(6)
 
     def clear(self) -> None:
         """A tick begins."""
-        self._bodies.clear()
+        self.acted[:] = False
 
     def snapshot(self) -> dict[str, Any]:
         """What lasts from tick to tick."""
@@ -68,5 +77,5 @@ class Impulses:
         put_back(self, snapshot)
 
 
-_KEPT = ("_total", "_bodies")
+_KEPT = ("total", "acted")
 """Attributes that last from tick to tick."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ligature.model.commands import CommandType
 from ligature.model.scene import Body
-from ligature.physics.axes import FREE, act, axes
+from ligature.physics.axes import FREE, act, axes, requested_effort, stop
 from ligature.physics.control import TreeControl
 from ligature.physics.engine import Engine
 from ligature.tables import table_of
@@ -103,9 +103,17 @@ class Joints:
         control = self._control_of[joint]
         control.set_state([control.row[joint]], [position], velocity)
 
+    def axis(self, joint: int) -> int:
+        """Number of a joint's axis among those of the world, -1 for a joint that closes a loop."""
+        control = self._control_of.get(joint)
+        return -1 if control is None else control.first_axis + control.row[joint]
+
     def stop(self, joint: int, position: float, effort: float) -> None:
-        """Stop a joint at ``position`` whatever its command; it reports ``effort``."""
-        self._control_of[joint].stop(joint, position, effort)
+        """Stop a joint at ``position`` whatever its command, until `resume`; it reports ``effort``."""
+        motions, control = self._engine.motions, self._control_of[joint]
+        motions.rouse(self.controls.index(control))
+        if stop(motions.table, self.table, self.axis(joint), float(position), float(effort)):
+            control.sort()
 
     def limit_velocity(self, joint: int, low: float, high: float, strength: float) -> None:
         """Keep the velocity of a joint's motor between ``low`` and ``high``, and its effort below ``strength``."""
@@ -134,8 +142,9 @@ class Joints:
         return found
 
     def requested_effort(self, joint: int, stiffness: float) -> float:
-        """Effort that a joint's command requests; see `TreeControl.requested_effort`."""
-        return self._control_of[joint].requested_effort(joint, stiffness)
+        """Effort that a joint's command requests; see `ligature.physics.axes.asked_of`."""
+        motions = self._engine.motions
+        return float(requested_effort(motions.table, self.table, self.axis(joint), stiffness))
 
     # --- snapshots --------------------------------------------------------------------------
 

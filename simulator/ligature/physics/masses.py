@@ -87,8 +87,12 @@ class Masses:
 
     def carry(self, body: int, wrench: Array) -> None:
         """Apply ``wrench`` (6,) in the coming tick, which moves the added mass of a body with its holders."""
-        if body in self._attached_loads:
+        if self.is_laden(body):
             self._attached_loads[body][0].apply_wrench(wrench.tolist())
+
+    def is_laden(self, body: int) -> bool:
+        """Whether a body has added mass."""
+        return body in self._attached_loads
 
     @property
     def added(self) -> bool:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet
@@ -23,16 +22,12 @@ _FAR = [0.0, 0.0, -1000.0]
 """Position of the probes of ghosts between queries."""
 
 
-@dataclass(frozen=True, eq=False)
-class Gaps:
-    """Pairs of nearest points of one body with another, nearest first.
+class Gap(NamedTuple):
+    """Nearest points of two convex parts: ``point`` (3,) on the one, and ``normal`` (3,) from the other to the one."""
 
-    ``distance`` (n,), ``point`` (n, 3) on the one, and ``normal`` (n, 3) from the other to the one.
-    """
-
-    distance: Array
-    point: Array
-    normal: Array
+    distance: float
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float]
 
 
 class BulletQueries:
@@ -154,12 +149,9 @@ class BulletQueries:
         found = {body_at[at] for at in met if at in body_at}
         return sorted(found - set(bodies)), np.array([low, high])
 
-    def gaps(self, body: int, other: int, within: float) -> Gaps | None:
-        """Nearest points of the convex parts of two bodies that are closer than ``within``; None without any."""
-        rows = sorted((row[8], row[5], row[7]) for found in self._closest(body, other, within) for row in found)
-        if not rows:
-            return None
-        return Gaps(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
+    def gaps(self, body: int, other: int, within: float) -> list[Gap]:
+        """Nearest points of the convex parts of two bodies that are closer than ``within``, nearest first."""
+        return sorted(Gap(row[8], row[5], row[7]) for found in self._closest(body, other, within) for row in found)
 
     def overlap(self, bodies: set[int]) -> tuple[float, int, int]:
         """How deep in metres one of ``bodies`` overlaps another body, and both; (0, -1, -1) when none does."""

@@ -344,6 +344,12 @@ def load_body(
     bring_up(handle, trees, places.tree[body], places.link[body] >= 0)
     for a in range(3):
         trees.wanted[a], trees.wanted[3 + a] = impulse[a] / dt, moment[a] / dt
+    load(handle, trees, places, body)
+
+
+@inlined
+def load(handle: int, trees: Trees, places: Places, body: int) -> None:
+    """Apply the wanted force and torque in the coming tick, the force at the centre of mass of a body, as read."""
     submit(handle, _push(handle, trees, places, body))
     command = init_forces(handle)  # a command of its own: Bullet puts the second of two over the first
     add_torque(command, places.uid[body], places.link[body], trees.wanted_at[0] + 24, WORLD_FRAME)
