@@ -195,8 +195,10 @@ class Simulation:
         self._beside_bodies = [
             s for _, subsystems in self._phases for s in subsystems if not isinstance(s, World | Controllers)
         ]
-        self._beside_bodies.sort(key=lambda s: (type(s).idle_ticks is not Subsystem.idle_ticks, s is not self._suture))
-        """Whoever else steps; first those that may never be idle."""
+        self._beside_bodies.sort(
+            key=lambda s: (type(s).idle_ticks is not Subsystem.idle_ticks, s is not self._suture, s is self.arms)
+        )
+        """Whoever else steps; first those that may never be idle, last the arms, which look at all joints."""
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._handlers: dict[type[Message], Callable[[Any], None]] = {

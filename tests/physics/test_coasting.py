@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import ligature
@@ -13,6 +14,7 @@ from ligature import Simulation
 from ligature.model.commands import BodyCommand, Command, CommandType, Release, WatchContacts
 from ligature.model.scene import Scene
 from ligature.robots.commands import Adopt, MoveJr, ServoJr, ServoJv
+from ligature.robots.operating_state import State
 
 from tests.conftest import ROOT
 
@@ -23,12 +25,19 @@ def scene() -> Scene:
     return ligature.load(ROOT / "scenes" / "peg_transfer" / "launch.yaml", [0, 1, 2])
 
 
+def firm(scene: Scene) -> Scene:
+    """``scene`` with nothing that a jaw could grasp: jaws do not search there."""
+    blocks = [body.index for body in scene.bodies if body.identity.name.startswith("Block")]
+    return replace(scene, bodies=tuple(replace(b, mass=0.0) if b.index in blocks else b for b in scene.bodies))
+
+
 @pytest.fixture
-def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[[], tuple[Simulation, Simulation, list[int]]]:
+def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Simulation, Simulation, list[int]]]:
     """Two simulations, of which the second one never coasts, and the ticks that the first one coasts."""
 
-    def make() -> tuple[Simulation, Simulation, list[int]]:
-        first, second, passed = Simulation(scene()), Simulation(scene()), [0]
+    def make(of: Scene | None = None) -> tuple[Simulation, Simulation, list[int]]:
+        of = of or scene()
+        first, second, passed = Simulation(of), Simulation(of), [0]
         coast = first._world.coast
 
         def counted(ticks: int) -> int:
@@ -63,7 +72,7 @@ def _commands(rng: np.random.Generator) -> list[Command]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_run_that_coasts_has_the_bits_of_one_that_does_not(
-    seed: int, pair: Callable[[], tuple[Simulation, Simulation, list[int]]]
+    seed: int, pair: Callable[..., tuple[Simulation, Simulation, list[int]]]
 ) -> None:
     *runs, passed = pair()
     rng = np.random.default_rng(seed)
@@ -80,8 +89,32 @@ def test_a_run_that_coasts_has_the_bits_of_one_that_does_not(
     assert passed[0] > 60
 
 
+@pytest.mark.parametrize("timeout", [0.012, 0.5])
+def test_an_arm_off_its_course_stops_in_the_same_tick(
+    timeout: float,
+    pair: Callable[..., tuple[Simulation, Simulation, list[int]]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("ligature.robots.device.FOLLOWING_TIMEOUT", timeout)
+    *runs, passed = pair(firm(scene()))
+    rng = np.random.default_rng(7)
+    for simulation in runs:
+        arm = simulation.arms["PSM1"]
+        arm._following_bounds = [1e-3] * 6
+        arm.adopt()
+    for k in range(12):
+        step = tuple(rng.choice([0.0, 0.02], 6).tolist())
+        for simulation in runs:
+            simulation.apply(ServoJr(0, step))
+            simulation.step(int(17 + k))
+        assert len({simulation.state_hash() for simulation in runs}) == 1, k
+        assert len({simulation.arms["PSM1"].operating_state for simulation in runs}) == 1, k
+    assert (runs[0].arms["PSM1"].operating_state.state is State.FAULT) == (timeout < 0.1)
+    assert passed[0] > 60
+
+
 def test_a_body_that_diverges_while_coasting_is_put_back_in_the_same_tick(
-    pair: Callable[[], tuple[Simulation, Simulation, list[int]]],
+    pair: Callable[..., tuple[Simulation, Simulation, list[int]]],
 ) -> None:
     *runs, passed = pair()
     for simulation in runs:

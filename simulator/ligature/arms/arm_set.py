@@ -93,8 +93,14 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
                 self._guarded("following-error check", arm, arm.watch, WATCH_PERIOD * self._dt)
 
     def idle_ticks(self, tick: int) -> int:
-        """The ticks until following errors are checked, while all arms stay at their set-points."""
-        return WATCH_PERIOD - 1 - tick % WATCH_PERIOD if all(arm.is_idle for arm in self._arms) else 0
+        """The ticks until following errors are checked, while all arms stay at their set-points.
+
+        A check now that would find nothing is none.
+        """
+        if not all(arm.is_idle for arm in self._arms):
+            return 0
+        left = WATCH_PERIOD - 1 - tick % WATCH_PERIOD
+        return WATCH_PERIOD if left == 0 and all(arm.is_on_course for arm in self._arms) else left
 
     def pass_idle(self, ticks: int) -> None:
         """Count the time of all arms."""

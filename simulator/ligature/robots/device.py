@@ -6,6 +6,7 @@ Seconds of simulated time. A command that is not carried out raises `Rejected` a
 from __future__ import annotations
 
 import math
+import operator
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -301,19 +302,35 @@ class Device:
 
     def watch(self, seconds: float) -> None:
         """Look after following errors; called every ``seconds``, seldom."""
-        if self._state is not State.ENABLED or self.joints.mode in (Mode.OFF, Mode.EFFORT):
+        followed = self._followed()
+        if followed is None:
             self._astray = 0.0
             return
-        q, bounds = self.joints.measured()[0].tolist(), self._following_bounds  # numbers: arrays of six take longer
+        q, errors = followed
         if not all(map(math.isfinite, q)):
             self.fault("a joint value is not finite")
             return
-        errors = [abs(now - wanted) for now, wanted in zip(q, self.joints.setpoint[0].tolist(), strict=True)]
+        bounds = self._following_bounds
         shares = [error / bound for error, bound in zip(errors, bounds, strict=True)]
         worst = shares.index(max(shares))
         self._astray = self._astray + seconds if errors[worst] > bounds[worst] else 0.0
         if self._astray > FOLLOWING_TIMEOUT:
             self.fault(f"joint {self.joints.names[worst]} is {errors[worst]:.3g} away from its set-point")
+
+    @property
+    def is_on_course(self) -> bool:
+        """Whether `watch` would do nothing now."""
+        if self._astray:
+            return False
+        followed = self._followed()
+        return followed is None or all(map(operator.le, followed[1], self._following_bounds))
+
+    def _followed(self) -> tuple[list[float], list[float]] | None:
+        """Joint values and following errors, None where there is no set-point to follow."""
+        if self._state is not State.ENABLED or self.joints.mode in (Mode.OFF, Mode.EFFORT):
+            return None
+        q = self.joints.measured()[0].tolist()  # numbers: arrays of six take longer
+        return q, [abs(now - wanted) for now, wanted in zip(q, self.joints.setpoint[0].tolist(), strict=True)]
 
     # --- snapshots --------------------------------------------------------------------------
 
