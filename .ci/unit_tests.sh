@@ -2,7 +2,8 @@
 # All tests, in two halves at once: sh .ci/unit_tests.sh PYTHON REAL_TIME_TESTS…
 #
 # The tests that watch real time mostly wait. What they leave of the processors goes to all others: two workers of lower
-# priority, whose output comes when the tests that watch real time are done.
+# priority, whose output comes when the tests that watch real time are done. What these fail for once, they may try again
+# when nothing runs beside them.
 set -u
 python=$1
 shift
@@ -19,7 +20,7 @@ others=$!
 trap 'kill "$others" 2>/dev/null' EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
-sh .ci/real_time_tests.sh "$python" "$@"
+LIGATURE_RETRY_AFTER=$others sh .ci/real_time_tests.sh "$python" "$@"
 status=$?
 echo "the other tests, which ran meanwhile:"
 tail -n +1 -f --pid="$others" "$log"

@@ -35,7 +35,7 @@ def test_good():
 
 @pytest.mark.parametrize(
     ("late", "broken", "retry", "status"),
-    [(0, 0, "1", 0), (1, 0, "1", 0), (3, 0, "1", 0), (3, 0, "0", 1), (4, 0, "1", 1), (0, 1, "1", 1), (2, 1, "1", 1)],
+    [(0, 0, "1", 0), (1, 0, "1", 0), (3, 0, "1", 0), (3, 0, "0", 1), (9, 0, "1", 1), (0, 1, "1", 1), (2, 1, "1", 1)],
 )
 def test_few_that_fail_run_once_more(tmp_path: Path, late: int, broken: int, retry: str, status: int) -> None:
     (tmp_path / "test_some.py").write_text(TESTS.format(late=late, broken=broken))
@@ -63,12 +63,23 @@ def test_gives_way():
     assert os.nice(0) - {before} == {nice}
 def test_result():
     time.sleep({seconds})
+    open("{own} is over", "w").close()
     assert {passes}
 """
 
 
-def halves(folder: Path, real_time: bool = True, others: bool = True, seconds: float = 0.0) -> subprocess.Popen[str]:
-    """Both halves of the tests of ``folder``, which pass or fail, as a process group of their own."""
+def halves(
+    folder: Path,
+    real_time: object = True,
+    others: object = True,
+    seconds: float = 0.0,
+    lag: float = 0.0,
+    retry: int = 0,
+) -> subprocess.Popen[str]:
+    """Both halves of the tests of ``folder``, which pass or fail, as a process group of their own.
+
+    Each takes ``seconds``, the one that does not watch real time ``lag`` more.
+    """
     (folder / ".ci").symlink_to(ROOT / ".ci")
     (folder / "tests" / "watching").mkdir(parents=True)
     (folder / "pyproject.toml").write_text("[tool.pytest.ini_options]\naddopts = '-p no:cacheprovider'\n")
@@ -76,11 +87,11 @@ def halves(folder: Path, real_time: bool = True, others: bool = True, seconds: f
         HALF.format(own="watching", other="other", before=os.nice(0), nice=0, passes=real_time, seconds=seconds)
     )
     (folder / "tests" / "test_two.py").write_text(
-        HALF.format(own="other", other="watching", before=os.nice(0), nice=5, passes=others, seconds=seconds)
+        HALF.format(own="other", other="watching", before=os.nice(0), nice=5, passes=others, seconds=seconds + lag)
     )
     return subprocess.Popen(
         ["sh", ".ci/unit_tests.sh", sys.executable, "tests/watching"],
-        cwd=folder, env={"PATH": "/usr/bin:/bin", "LIGATURE_RETRY": "0"}, stdout=subprocess.PIPE,
+        cwd=folder, env={"PATH": "/usr/bin:/bin", "LIGATURE_RETRY": str(retry)}, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, text=True, start_new_session=True,
     )  # fmt: skip
 
@@ -93,6 +104,14 @@ def test_both_halves_run_at_once_and_count(tmp_path: Path, real_time: bool, othe
     first, then = output.split("the other tests, which ran meanwhile:")
     for part, passes in ((first, real_time), (then, others)):
         assert ("4 passed" if passes else "1 failed, 3 passed") in part, output
+
+
+def test_what_fails_runs_once_more_when_the_other_half_is_over(tmp_path: Path) -> None:
+    run = halves(tmp_path, "os.path.exists('other is over')", lag=5.0, retry=1)
+    output, _ = run.communicate(timeout=200)
+    assert run.returncode == 0 and "passed the second time only:\ntests/watching/test_one.py::test_result" in output, (
+        output
+    )
 
 
 def test_ctrl_c_ends_both_halves(tmp_path: Path) -> None:
