@@ -474,8 +474,8 @@ class Knotter(TwoArms):
             if taut() or step > 4:
                 off = frame(np.eye(3), [-0.012, 0.0, 0.0]) @ self.tools[LEFT]
                 self.go({LEFT: off}, speed=SLOW, until=lambda: self.pull() > PULL)
-                give = {RIGHT: [-0.003, 0.0, 0.0], LEFT: [0.004, 0.0, 0.0]}
-                self.go({name: frame(np.eye(3), way) @ self.tools[name] for name, way in give.items()}, speed=SLOW)
+                slack = {RIGHT: [-0.003, 0.0, 0.0], LEFT: [0.004, 0.0, 0.0]}
+                self.go({name: frame(np.eye(3), way) @ self.tools[name] for name, way in slack.items()}, speed=SLOW)
         raise Missed(f"the loop did not slip off {RIGHT}")
 
     def tighten(self) -> None:

@@ -76,7 +76,7 @@ def test_tables_of_a_throw_go_from_its_first_to_its_last_angle(throw: int) -> No
 
 
 def test_the_short_end_stands_where_the_right_arm_bends_it() -> None:
-    """Without the yield of the scene's thread it springs back to where it lay, 40 mm away."""
+    """Without the yield of the scene's thread it springs back by tens of millimetres."""
     knotter = square_knot.Knotter(ligature.Simulation(ligature.load(square_knot.SCENE)))
     knotter.take(square_knot.RIGHT, square_knot.REACHES, knotter.tail, 1)
     knotter.stand()
