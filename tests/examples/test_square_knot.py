@@ -90,9 +90,8 @@ def test_the_short_end_stands_where_the_right_arm_bends_it() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_two_arms_make_a_throw_around_the_vessel() -> None:
-    knotter = square_knot.Knotter(ligature.Simulation(ligature.load(square_knot.SCENE)))
-    knotter.take(square_knot.LEFT, square_knot.TAKES, len(knotter.thread) - square_knot.HELD, -1)
-    knotter.throw()
-    assert knotter.score().determinant == 3
-    assert knotter.score().around
+def test_two_arms_make_a_square_knot_that_holds() -> None:
+    simulation = ligature.Simulation(ligature.load(square_knot.SCENE))
+    score, stopped = square_knot.operate(simulation)
+    assert stopped == ""
+    assert score.success, score.lines()
