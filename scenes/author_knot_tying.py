@@ -37,8 +37,8 @@ SUTURE = {
     "density": 1100.0, "youngs modulus": 1.0e8, "damping time": 0.004, "yield strain": 0.01, "friction": 0.55,
 }  # fmt: skip
 """As supple as a solid filament of 2 GPa and 0.24 mm. A knot of two throws needs a friction of 0.25 to 0.3 between two
-strands, the product of both; 0.15 to 0.4 is measured on sutures. A bend above 40 per metre stays: the short end, bent
-once, stands by itself where the jaws are to find it."""
+strands, the product of both. A bend above 40 per metre stays: the short end, bent once, stands by itself where the jaws
+are to find it."""
 
 
 def block() -> dict[str, Any]:
