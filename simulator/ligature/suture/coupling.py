@@ -66,7 +66,7 @@ def _travel(
 
 
 @inlined
-def opening(
+def _opening(
     nodes: Nodes, work: Work, touches: Touches, c: int
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """Gap of contact ``c`` now, the slip its friction resists (3), and its levers on both nodes (6)."""
@@ -155,7 +155,7 @@ def add_contacts(nodes: Nodes, touches: Touches, work: Work, stiffness: float, d
     scale = stiffness * dt * dt
     for c in range(touches.count[0]):
         K, f, begun, n = work.K[c], touches.push[c], touches.begun[c], touches.normal[c]
-        gap, wx, wy, wz, ax, ay, az, bx, by, bz = opening(nodes, work, touches, c)
+        gap, wx, wy, wz, ax, ay, az, bx, by, bz = _opening(nodes, work, touches, c)
         begun[0], begun[1], begun[2] = wx, wy, wz
         room = gap - touches.target[c]
         touches.room[c] = room
@@ -201,44 +201,25 @@ def _moved(nodes: Nodes, work: Work, touches: Touches, c: int, side: int) -> tup
 
 
 @kernel
-def find_forces(nodes: Nodes, touches: Touches, work: Work, dt: float) -> None:
-    """Displacements and forces of all contacts by the last solve, to ``work.moved`` and ``work.solved``."""
+def settle_contacts(nodes: Nodes, touches: Touches, work: Work, stiffness: float, dt: float) -> bool:
+    """Forces of the contacts as solved, and which of them touch and stick; True if the solve assumed otherwise."""
+    changed = False
     per_dt2 = 1.0 / (dt * dt)
     for c in range(touches.count[0]):
-        f, moved, solved = touches.push[c], work.moved[c], work.solved[c]
+        n, force, w, f = touches.normal[c], touches.force[c], touches.ended[c], touches.push[c]
         ax, ay, az = _moved(nodes, work, touches, c, 0)
         bx, by, bz = _moved(nodes, work, touches, c, 1)
-        moved[0], moved[1], moved[2] = ax - bx, ay - by, az - bz
-        kx, ky, kz = rotate(work.K[c], moved[0], moved[1], moved[2])
-        solved[0], solved[1], solved[2] = per_dt2 * (f[0] - kx), per_dt2 * (f[1] - ky), per_dt2 * (f[2] - kz)
-
-
-@kernel
-def settle_contacts(touches: Touches, work: Work, stiffness: float, share: float) -> bool:
-    """Forces of the contacts after a share of the solved step, and which of them touch and stick.
-
-    True if the solve assumed otherwise.
-    """
-    changed = share < 1.0
-    for c in range(touches.count[0]):
-        n, force, w = touches.normal[c], touches.force[c], touches.ended[c]
-        u, solved = work.moved[c], work.solved[c]
-        if share == 1.0:
-            force[0], force[1], force[2] = solved[0], solved[1], solved[2]
-        else:
-            for a in range(3):
-                force[a] += share * (solved[a] - force[a])
+        ux, uy, uz = ax - bx, ay - by, az - bz
+        kx, ky, kz = rotate(work.K[c], ux, uy, uz)
+        force[0], force[1], force[2] = per_dt2 * (f[0] - kx), per_dt2 * (f[1] - ky), per_dt2 * (f[2] - kz)
         if rigid(touches, c):
             continue
-        ux, uy, uz = share * u[0], share * u[1], share * u[2]
         un = ux * n[0] + uy * n[1] + uz * n[2]
         begun = touches.begun[c]
         w[0], w[1], w[2] = begun[0] + ux - un * n[0], begun[1] + uy - un * n[1], begun[2] + uz - un * n[2]
         press = force[0] * n[0] + force[1] * n[1] + force[2] * n[2]
         if touches.bilateral[c]:
             press = touches.press[c]
-        elif share < 1.0:
-            press = -stiffness * (touches.room[c] + un)
         if touches.closed[c] and press >= 0.0:
             changed = _settle_friction(touches, c, w, press, stiffness) or changed
         elif touches.closed[c]:

@@ -30,7 +30,7 @@ def _add_joint_force(load: Array, r: Array, B: Array, sign: float, out: Array) -
 
 
 @inlined
-def joint_load(n: int, work: Work, joints: Joints, i: int, out: Array) -> None:
+def _joint_load(n: int, work: Work, joints: Joints, i: int, out: Array) -> None:
     """Total force and moment (6,) of the joints on the centre of chain node ``i``, times dt²."""
     for a in range(6):
         out[a] = 0.0
@@ -47,7 +47,7 @@ def add_reactions(n: int, joints: Joints, touches: Touches, work: Work, impulse:
     In N s, with the moment about the node's centre.
     """
     for i in range(n):
-        joint_load(n, work, joints, i, work.sum6)
+        _joint_load(n, work, joints, i, work.sum6)
         for a in range(6):
             impulse[i, a] += work.sum6[a] / dt
     for c in range(touches.count[0]):

@@ -11,16 +11,9 @@ from __future__ import annotations
 import math
 
 from ligature.kernels import inlined, kernel
-from ligature.suture.balance import (
-    balanced_share,
-    energy_of_contacts,
-    find_imbalance,
-    return_to_start,
-    work_of_contacts,
-)
 from ligature.suture.chain import factor, solve
 from ligature.suture.coupled_solve import couple, gather
-from ligature.suture.coupling import add_contacts, conclude_contacts, find_forces, settle_contacts
+from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
 from ligature.suture.layout import Joints, Nodes, Touches, Work
 from ligature.suture.passage_forces import add_passage_forces, settle_passages
 from ligature.suture.passages import Passages
@@ -182,9 +175,9 @@ def _stiffen_by_tension(n: int, joints: Joints, work: Work, i: int) -> None:
         H[i, 3, 4], H[i, 3, 5], H[i, 4, 5] = H[i, 4, 3], H[i, 5, 3], H[i, 5, 4]
 
 
-@inlined
-def _largest_swing(n: int, nodes: Nodes, work: Work) -> float:
-    """Largest swing of a lever in the correction ``work.d``.
+@kernel
+def correct(n: int, total: int, nodes: Nodes, work: Work) -> float:
+    """Move all nodes by the correction ``work.d``; returns the largest swing of a lever.
 
     Rolling about the line between its pivots moves no pivot, and does not count.
     """
@@ -199,27 +192,15 @@ def _largest_swing(n: int, nodes: Nodes, work: Work) -> float:
         arm = rx * rx + ry * ry + rz * rz
         if arm > 0.0:
             largest = max(largest, (sx * sx + sy * sy + sz * sz) / arm)
-    return math.sqrt(largest)
-
-
-@inlined
-def _correct(total: int, nodes: Nodes, work: Work, share: float) -> None:
-    """Move all nodes by a share of the correction ``work.d``."""
+    largest = math.sqrt(largest)
+    scale = 1.0 if largest < MAX_SWING else MAX_SWING / largest
     for i in range(total):
         if nodes.fixed[i] or not nodes.met[i]:
             continue
         for a in range(3):
-            nodes.x[i, a] += share * work.d[i, a]
-        turn(nodes.q, i, share * work.d[i, 3], share * work.d[i, 4], share * work.d[i, 5])
-
-
-@inlined
-def _take_loads(n: int, joints: Joints, work: Work, share: float) -> None:
-    """Loads of the joints after a share of the solved step."""
-    for j in range(n - 1):
-        load, solved = joints.load[j], work.load[j]
-        for a in range(6):
-            load[a] = solved[a] if share == 1.0 else load[a] + share * (solved[a] - load[a])
+            nodes.x[i, a] += scale * work.d[i, a]
+        turn(nodes.q, i, scale * work.d[i, 3], scale * work.d[i, 4], scale * work.d[i, 5])
+    return largest
 
 
 @kernel
@@ -244,20 +225,18 @@ def finish(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: flo
 @kernel
 def advance(
     n: int, total: int, nodes: Nodes, joints: Joints, touches: Touches, work: Work, passages: Passages, owner: int,
-    springs: Springs, stiffness: float, dt: float, damped: bool, elapsed: float, careful: bool,
-) -> tuple[int, bool, bool]:  # fmt: skip
+    springs: Springs, stiffness: float, dt: float, damped: bool, elapsed: float,
+) -> tuple[int, bool]:  # fmt: skip
     """One step of ``total`` nodes, the first ``n`` of them a chain.
 
     It ends ``elapsed`` seconds after the tick began. ``passages`` are those of all rods; this one is ``owner``, with
-    ``springs`` of its own. A ``careful`` one never adds energy, but resists sliding if contacts do not settle.
+    ``springs`` of its own.
 
-    Returns the Newton steps taken, whether contacts and shape settled, and whether contacts gave no more energy than
-    they held. Contacts in ``touches`` were found at the poses of the step's start; ``stiffness`` is theirs (N/m).
+    Returns the Newton steps taken and whether contacts and shape settled. Contacts in ``touches`` were
+    found at the poses of the step's start; ``stiffness`` is theirs (N/m).
     """
     predict(total, nodes, work, dt, damped)
-    if careful:
-        return_to_start(total, nodes, touches, work)
-    steps, settled, left, held = 0, False, 1.0, energy_of_contacts(touches, stiffness)
+    steps, settled = 0, False
     while steps < MAX_NEWTON and not settled:
         steps += 1
         linearise(n, total, nodes, joints, work, dt)
@@ -265,27 +244,20 @@ def advance(
         add_contacts(nodes, touches, work, stiffness, dt)
         add_passage_forces(passages, owner, nodes, work, elapsed, dt)
         add_springs(springs, nodes, work, dt)
-        if careful and steps == 1:
-            find_imbalance(n, total, nodes, joints, touches, work)
         low, high, rows = gather(n, total, nodes, touches, work)
         top = high if high >= 0 else n // 2
         factor(n, top, nodes.fixed, work.H, work.lever, work.B, work.compliance, work.Y, work.Z, work.felt)
         solve(n, top, work.lever, work.B, work.Y, work.Z, work.c, work.g, work.d, work.load, work.felt_load)
         if rows > 0:
             couple(n, low, high, rows, nodes, touches, work)
-        find_forces(nodes, touches, work, dt)
-        largest = _largest_swing(n, nodes, work)
-        way, share = 1.0 if largest < MAX_SWING else MAX_SWING / largest, 1.0
-        if careful:
-            way = share = min(way, balanced_share(total, nodes, touches, work, stiffness, dt, left))
-            left *= 1.0 - share
-        changed = settle_contacts(touches, work, stiffness, share)
-        _correct(total, nodes, work, way)
+        changed = settle_contacts(nodes, touches, work, stiffness, dt)
+        largest = correct(n, total, nodes, work)
         changed = settle_passages(passages, owner, nodes, elapsed) or changed
-        _take_loads(n, joints, work, share)
+        for j in range(n - 1):
+            for a in range(6):
+                joints.load[j, a] = work.load[j, a]
         settled = largest < LARGE_SWING and not changed
     settle_springs(springs, nodes)
-    sound = settled or work_of_contacts(nodes, touches, work, stiffness) <= held
     conclude_contacts(touches, stiffness)
     finish(n, total, nodes, joints, work, dt)
-    return steps, settled, sound
+    return steps, settled

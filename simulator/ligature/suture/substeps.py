@@ -1,8 +1,8 @@
 """A whole tick of a rod in one call: usually one step, several where contacts do not settle.
 
 A thread that snaps into a new shape, as when a knot closes, changes its contacts faster than one step
-can follow; a tick in which they do not settle is undone and repeated in shorter steps. Where these do not settle
-either, and the contacts would throw the thread, a careful step takes their place (`balance`). World axes, SI units.
+can follow; a tick in which they do not settle is undone and repeated in shorter steps. World
+axes, SI units.
 """
 
 from __future__ import annotations
@@ -99,8 +99,8 @@ def _scale_loads(joints: layout.Joints, factor: float) -> None:
 @inlined
 def _one_step(
     rod: layout.RodArrays, old: layout.Touches, new: layout.Touches, passages: Passages, owner: int,
-    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float, careful: bool,
-) -> tuple[int, bool, bool]:  # fmt: skip
+    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float,
+) -> tuple[int, bool]:  # fmt: skip
     """A step of ``h`` seconds that ends ``elapsed`` seconds after the tick began; see `advance` for what it returns."""
     nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
     n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
@@ -111,20 +111,7 @@ def _one_step(
         constants.self_skip[0], h,
     )  # fmt: skip
     return advance(
-        n,
-        total,
-        nodes,
-        joints,
-        new,
-        work,
-        passages,
-        owner,
-        springs,
-        constants.stiffness[0],
-        h,
-        begins,
-        elapsed,
-        careful,
+        n, total, nodes, joints, new, work, passages, owner, springs, constants.stiffness[0], h, begins, elapsed
     )
 
 
@@ -155,40 +142,21 @@ def run_tick(
     old, new, in_c = a, b, False
     # In units of the smallest step: what of the tick is done, the next step, that of the loads, and of those kept.
     done, size, scale, kept = 0, MAX_PARTS, MAX_PARTS, MAX_PARTS
-    steps, careful = 0, False
+    steps = 0
     while done < MAX_PARTS:
         h = dt * size / MAX_PARTS
         if size != scale:
             _scale_loads(joints, (size / scale) ** 2)
             scale = size
-        more, settled, lawful = _one_step(
-            rod,
-            old,
-            new,
-            passages,
-            owner,
-            springs,
-            constraints,
-            points,
-            h,
-            done == 0,
-            dt * (done + size) / MAX_PARTS,
-            careful,
+        more, settled = _one_step(
+            rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
         )
         steps += more
         share = free_share(first, elements, nodes, new, work, counts[1])
-        divide = not (settled and share == 1.0) and size > 1 and steps < MAX_STEPS
-        if divide or not (lawful or careful):
-            # What divided steps cannot settle either must at least add no energy: one careful step takes their place.
+        if not (settled and share == 1.0) and size > 1 and steps < MAX_STEPS:
             _take_back(nodes, joints, work)
             restart_passages(passages, owner)
-            scale = kept
-            if divide:
-                size //= REFINEMENT
-            else:
-                careful = True
-                while size < MAX_PARTS and done % (REFINEMENT * size) == 0:
-                    size *= REFINEMENT
+            size, scale = size // REFINEMENT, kept
             continue
         if share < 1.0:
             shorten(total, nodes, work, share)
