@@ -14,7 +14,7 @@ log=build/logs/unit_tests.log
 : >"$log"
 # a shell starts what is in the background deaf to Ctrl-C, which tests of Ctrl-C would inherit
 # shellcheck disable=SC2086
-nice -n 5 env --default-signal=INT,QUIT \
+nice -n 19 env --default-signal=INT,QUIT \
     "$python" -m pytest -m "not slow" -n 2 --dist loadfile tests $ignored >"$log" 2>&1 </dev/null &
 others=$!
 trap 'kill "$others" 2>/dev/null' EXIT

@@ -35,7 +35,7 @@ def test_good():
 
 @pytest.mark.parametrize(
     ("late", "broken", "retry", "status"),
-    [(0, 0, "1", 0), (1, 0, "1", 0), (3, 0, "1", 0), (3, 0, "0", 1), (9, 0, "1", 1), (0, 1, "1", 1), (2, 1, "1", 1)],
+    [(0, 0, "1", 0), (1, 0, "1", 0), (3, 0, "1", 0), (3, 0, "0", 1), (41, 0, "1", 1), (0, 1, "1", 1), (2, 1, "1", 1)],
 )
 def test_few_that_fail_run_once_more(tmp_path: Path, late: int, broken: int, retry: str, status: int) -> None:
     (tmp_path / "test_some.py").write_text(TESTS.format(late=late, broken=broken))
@@ -56,7 +56,6 @@ def test_meets_the_other_half():
     end = time.monotonic() + 60
     while not os.path.exists("{other}"):
         assert time.monotonic() < end
-        time.sleep(0.01)
 def test_ctrl_c_is_heard():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 def test_gives_way():
@@ -87,7 +86,9 @@ def halves(
         HALF.format(own="watching", other="other", before=os.nice(0), nice=0, passes=real_time, seconds=seconds)
     )
     (folder / "tests" / "test_two.py").write_text(
-        HALF.format(own="other", other="watching", before=os.nice(0), nice=5, passes=others, seconds=seconds + lag)
+        HALF.format(
+            own="other", other="watching", before=os.nice(0), nice=19 - os.nice(0), passes=others, seconds=seconds + lag
+        )
     )
     return subprocess.Popen(
         ["sh", ".ci/unit_tests.sh", sys.executable, "tests/watching"],
