@@ -18,6 +18,7 @@ from typing import Any
 from xmlrpc.client import ServerProxy, dumps
 
 import pytest
+from ligature.ros import handshakes
 from ligature.ros.handshakes import SECONDS
 
 from tests.ros.conftest import BIN, SMALL, Program
@@ -174,6 +175,41 @@ def test_connections_that_stay_silent_are_closed(ports: tuple[int, int]) -> None
         assert client.recv(1) == b""
         client.close()
     assert time.monotonic() - begin < SECONDS + 5.0
+
+
+def test_many_silent_connections_take_turns_and_threads_that_cannot_start_end_nothing(
+    monkeypatch: pytest.MonkeyPatch, kept: list[socket.socket]
+) -> None:
+    monkeypatch.setattr(handshakes, "SECONDS", 0.2)
+    monkeypatch.setattr(handshakes, "MOST_AT_ONCE", 3)
+    served: list[int] = []
+    take = handshakes.apart(lambda client, address: served.append(address))
+
+    def connect(address: int, data: bytes) -> None:
+        here, there = socket.socketpair()
+        kept.extend((here, there))
+        here.sendall(data)
+        take(there, address)
+
+    def shaking() -> int:
+        return sum(thread.name == "handshake" for thread in threading.enumerate())
+
+    others = shaking()
+    for number in range(8):
+        connect(number, b"")
+        assert shaking() - others <= 3
+    connect(8, framed(b"a client"))
+    until(lambda: served == [8], "a client after silent ones is served", 5.0)
+
+    def fail(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(threading.Thread, "start", fail)
+        for number in range(4):
+            connect(number, framed(b"a client"))
+    connect(9, framed(b"a client"))
+    until(lambda: served == [8, 9], "a client is served when threads start again", 5.0)
 
 
 def test_publishers_that_die_or_talk_nonsense_leave_the_arm_to_others(

@@ -22,14 +22,29 @@ SECONDS = 5.0
 MOST_BYTES = 64 * 1024
 """Most bytes of an introduction; those of clients have some hundred."""
 
+MOST_AT_ONCE = 128
+"""Most introductions at once: more clients wait until one has ended, so that silent ones take few descriptors."""
+
 Handler = Callable[[socket.socket, Any], None]
 
 
 def apart(handler: Handler) -> Handler:
     """``handler`` of new connections, which returns at once and raises nothing."""
+    places = threading.BoundedSemaphore(MOST_AT_ONCE)
+
+    def introduce(client: socket.socket, address: Any) -> None:
+        try:
+            _introduce(handler, client, address)
+        finally:
+            places.release()
 
     def take(client: socket.socket, address: Any) -> None:
-        threading.Thread(target=_introduce, args=(handler, client, address), name="handshake", daemon=True).start()
+        places.acquire()
+        try:
+            threading.Thread(target=introduce, args=(client, address), name="handshake", daemon=True).start()
+        except RuntimeError:  # no more threads; this one client is lost, not the thread that takes all
+            places.release()
+            client.close()
 
     return take
 
@@ -38,8 +53,8 @@ def _introduce(handler: Handler, client: socket.socket, address: Any) -> None:
     """Hand a connection over; one that is late, or that is no client of ROS, is closed."""
     late = threading.Timer(SECONDS, _end, (client,))
     late.daemon = True
-    late.start()
     try:
+        late.start()
         _check(client)
         handler(client, address)
     except Exception as error:
