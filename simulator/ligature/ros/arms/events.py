@@ -41,7 +41,7 @@ _LOGS: dict[str, Callable[[str], None]] = {
 WARNING_PAUSE = 2.0
 """Seconds between two equal lines of the log, and between two equal warnings of an arm that is not ready: a stream of
 commands to it would make as many."""
-NOT_READY = "not ready"
+NOT_READY = "arm not ready"
 
 
 def event_topics(kind: ArmKind) -> list[str]:
@@ -133,7 +133,7 @@ class EventTopics:
 
     def _repeats(self, warning: str) -> bool:
         """Whether a warning of an arm that is not ready was published a moment ago."""
-        if not warning.endswith(NOT_READY):
+        if NOT_READY not in warning:
             return False
         now = rospy.get_time()
         if now - self._warned.get(warning, 0.0) < WARNING_PAUSE:
