@@ -514,7 +514,7 @@ def _arms(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:
 def _psm(simulation: Simulation, name: str) -> PsmArm:
     arm = simulation.arms[name]
     if not isinstance(arm, PsmArm):
-        known = [arm.name for arm in simulation.arms if isinstance(arm, PsmArm)]
+        known = [other for other, found in simulation.arms.items() if isinstance(found, PsmArm)]
         raise ValueError(f"'{name}' is not a PSM; choose one of {', '.join(known) or 'none'}")
     return arm
 
