@@ -40,8 +40,8 @@ _PACKAGE = Path(__file__).parent
 _KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic|unrolled)\b", re.MULTILINE)
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
-    "kernels.py", "unrolled.py", "model/state.py", "physics/loop_arrays.py", "suture/layout.py", "suture/passages.py",
-    "tissue/layout.py", "tissue/contact_arrays.py",
+    "kernels.py", "unrolled.py", "grasping/fingers.py", "model/state.py", "physics/loop_arrays.py", "suture/layout.py",
+    "suture/passages.py", "tissue/layout.py", "tissue/contact_arrays.py",
 )  # fmt: skip
 """Sources without kernels whose contents are compiled into kernels."""
 
