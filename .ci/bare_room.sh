@@ -30,6 +30,7 @@ if [ "${1:-}" != --inside ]; then
     bare=${BARE_SYSTEM:-$work/bare}
     if [ ! -e "$bare/etc/debian_version" ]; then
         echo "$try: building a bare Debian in $bare, about 2 minutes"
+        rm -rf --one-file-system "$bare.part" # of a try that was ended
         mmdebstrap --quiet --variant=minbase --include=make,ca-certificates bookworm "$bare.part" >&2 ||
             skip "mmdebstrap could not build a Debian 12"
         mv "$bare.part" "$bare"

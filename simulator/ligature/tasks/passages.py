@@ -43,8 +43,8 @@ class PassageWatch:
 
     def __init__(self, scenery: Scenery) -> None:
         self._scenery = scenery
-        self._holes = [(pair, False) for pair, _ in enumerate(scenery.entries, 1)]
-        self._holes += [(pair, True) for pair, _ in enumerate(scenery.exits, 1)]
+        self._holes = [(pair, False) for pair in range(1, len(scenery.entries) + 1)]
+        self._holes += [(pair, True) for pair in range(1, len(scenery.exits) + 1)]
         self._bodies = np.array([*scenery.entries, *scenery.exits], dtype=np.int64)
         self._before: tuple[Array, Array, NDArray[np.bool_]] | None = None
         self.passages: list[Passage] = []
