@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -11,29 +12,32 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from ligature import kernels
+from ligature import kernel_cache
 
-PACKAGE = Path(kernels.__file__).parent
+PACKAGE = Path(kernel_cache.__file__).parent
 PROGRAM = """
 import logging, sys
-from ligature import kernels
+from pathlib import Path
+from ligature import kernel_cache, kernels
 @kernels.compiled
 def twice(x):
     return 2 * x
-print(twice(21), kernels.kernel_folder(), sum(twice.stats.cache_hits.values()))
+print(twice(21), kernel_cache.kernel_folder(Path(__file__), __name__), sum(twice.stats.cache_hits.values()))
 """
+DECORATORS = ("compiled", "kernel", "inlined", "intrinsic", "unrolled")
 
 
-def constants_of(source: Path) -> set[Path]:
-    """The modules of the package whose constants the kernels of ``source`` read."""
+def read_by_kernels(source: Path) -> set[Path]:
+    """The modules of the package from which the kernels of ``source`` take functions and constants."""
     tree = ast.parse(source.read_text())
     read = {
         name.id
         for function in ast.walk(tree)
         if isinstance(function, ast.FunctionDef)
-        and any(isinstance(d, ast.Name) and d.id in ("compiled", "kernel", "inlined") for d in function.decorator_list)
-        for name in ast.walk(function)
-        if isinstance(name, ast.Name) and name.id.isupper()
+        and any(isinstance(d, ast.Name) and d.id in DECORATORS for d in function.decorator_list)
+        for part in function.body
+        for name in ast.walk(part)
+        if isinstance(name, ast.Name)
     }
     return {
         PACKAGE.joinpath(*node.module.split(".")[1:]).with_suffix(".py")
@@ -50,9 +54,9 @@ def test_no_kernel_is_compiled_but_by_the_decorators_of_all_rooms() -> None:
             assert "njit" not in path.read_text(), path
 
 
-def test_all_files_that_kernels_take_constants_from_decide_which_code_is_taken() -> None:
-    known = set(kernels.sources())
-    missing = {module for source in known for module in constants_of(source)} - known
+@pytest.mark.parametrize("source", sorted(kernel_cache.sources()), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_all_files_that_kernels_read_decide_which_code_is_taken(source: Path) -> None:
+    missing = read_by_kernels(source) - kernel_cache.sources_of(source)
     assert not missing, missing
 
 
@@ -72,6 +76,69 @@ def hits(kernel):
 def run(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
     env = {**os.environ, **environment}
     return subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, timeout=120)
+
+
+def test_an_edit_compiles_what_depends_on_it_and_nothing_else(tmp_path: Path) -> None:
+    """In a copy of the package: its place and its times decide nothing."""
+    copy = tmp_path / "copy" / "ligature"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    edited = copy / "suture" / "layout.py"
+
+    def folders() -> dict[Path, str]:
+        text = (
+            "from pathlib import Path; from ligature.kernel_cache import *; [print(path.relative_to(Path(sys.argv[1]))"
+        )
+        text = f"import sys; sys.argv[1:] = [{str(copy)!r}]; {text}, kernel_folder(path, path.stem)) for path in sources()]"
+        done = run(text, PYTHONPATH=str(copy.parent), LIGATURE_CACHE=str(tmp_path / "cache"))
+        return {PACKAGE / name: folder for name, folder in (line.split() for line in done.stdout.splitlines())}
+
+    before = folders()
+    assert set(before) == kernel_cache.sources()
+    os.utime(copy / "suture" / "chain.py", (0, 0))
+    assert folders() == before
+    edited.write_text(edited.read_text() + "LIMIT = 1\n")
+    changed = {path for path, folder in folders().items() if folder != before[path]}
+    layout = PACKAGE / "suture" / "layout.py"
+    assert changed == {path for path in before if layout in kernel_cache.sources_of(path)}
+    assert PACKAGE / "suture" / "step.py" in changed and PACKAGE / "tissue" / "dense.py" not in changed
+
+
+def test_code_is_shared_by_copies_of_a_file(tmp_path: Path) -> None:
+    environment = {"LIGATURE_CACHE": str(tmp_path / "cache")}
+    for copy, hits in (("one", "0"), ("two", "1")):
+        (tmp_path / copy).mkdir()
+        (tmp_path / copy / "doubling.py").write_text(PROGRAM)
+        path = os.pathsep.join([str(tmp_path / copy), str(PACKAGE.parent)])
+        done = run("import doubling", PYTHONPATH=path, **environment)
+        assert done.stdout.split()[0::2] == ["42", hits], done.stderr
+
+
+TOGETHER = """
+from ligature import kernels
+@kernels.kernel
+def inner(x):
+    for _ in range(3):
+        x = x * x + 1.0
+    return x
+@kernels.kernel
+def outer(x):
+    return inner(x) + inner(2.0 * x)
+"""
+
+
+def test_processes_that_need_a_kernel_at_once_compile_it_once(tmp_path: Path) -> None:
+    (tmp_path / "together.py").write_text(TOGETHER)
+    text = "from together import *; outer(1.0); print(*(sum(k.stats.cache_misses.values()) for k in (inner, outer)))"
+    path = os.pathsep.join([str(tmp_path), str(PACKAGE.parent)])
+    environment = {**os.environ, "PYTHONPATH": path, "LIGATURE_CACHE": str(tmp_path / "cache")}
+    running = [
+        subprocess.Popen([sys.executable, "-c", text], env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(4)
+    ]
+    counts = [[int(word) for word in process.communicate(timeout=240)[0].split()] for process in running]
+    assert [process.returncode for process in running] == [0] * 4
+    assert sum(outer for _, outer in counts) == sum(inner for inner, _ in counts) == 1, counts
+    assert not list((tmp_path / "cache").rglob("*.lock"))
 
 
 @pytest.fixture
@@ -155,10 +222,16 @@ def test_code_of_versions_that_nobody_starts_any_more_goes(program: str, tmp_pat
         os.utime(folder / name, (time.time() - days * 86400,) * 2)
     done = run(program, LIGATURE_CACHE=str(tmp_path / "cache"))
     mine = Path(done.stdout.split()[1])
-    assert {path.name for path in folder.iterdir()} == {mine.name, "fedcba9876543210", "my notes"}
-    os.utime(mine, (0, 0))
+    left = {path.name for path in folder.iterdir()}
+    assert left >= {mine.name, "fedcba9876543210", "my notes"} and "0123456789abcdef" not in left
+    for name in left:
+        os.utime(folder / name, (0, 0))
     assert run(program, LIGATURE_CACHE=str(tmp_path / "cache")).stdout.split()[2] == "1"
     assert time.time() - mine.stat().st_mtime < 600
+    (tmp_path / "tripling.py").write_text(PROGRAM.replace("2 * x", "x + x"))
+    run(program.replace("doubling", "tripling"), LIGATURE_CACHE=str(tmp_path / "cache"))
+    assert {path.name for path in folder.iterdir()} > left - {"fedcba9876543210"}
+    assert "fedcba9876543210" not in {path.name for path in folder.iterdir()}
 
 
 def test_a_disk_that_becomes_full_costs_the_cache_and_not_the_run(program: str, tmp_path: Path) -> None:

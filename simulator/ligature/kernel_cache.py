@@ -1,0 +1,232 @@
+"""Keeps the machine code of kernels on disk, for every checkout and every installation of the same sources.
+
+The code of a module lies below `ligature.cache.cache_folder`, in a folder named by a digest of the sources that it is
+made of: its own, and those of kernels and their constants in all modules that it imports. Numba's own cache looks at
+one file each, by path and time, and would keep a kernel whose callee has changed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import inspect
+import logging
+import os
+import re
+import shutil
+import time
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+from numba.core import caching
+
+from ligature.cache import CacheError, cache_folder
+
+KEPT = 30 * 24 * 3600.0
+"""Seconds for which the machine code of a version is kept after the last start with it."""
+
+LONGEST_TURN, POLL = 120.0, 0.02
+"""Seconds to wait for another process that compiles the same kernel, and between looks."""
+
+_PACKAGE = Path(__file__).parent
+_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic|unrolled)\b", re.MULTILINE)
+_IMPORT = re.compile(rb"^from (ligature[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+_DIGESTED = re.compile(r"[0-9a-f]{16}")
+_CONSTANTS = (
+    "kernels.py", "kernel_cache.py", "unrolled.py", "grasping/fingers.py", "model/state.py", "physics/loop_arrays.py",
+    "suture/layout.py", "suture/passages.py", "tissue/layout.py", "tissue/contact_arrays.py",
+)  # fmt: skip
+"""Sources without kernels whose contents are compiled into kernels."""
+
+_log = logging.getLogger(__name__)
+
+
+@cache
+def _files() -> frozenset[Path]:
+    return frozenset(_PACKAGE.rglob("*.py"))
+
+
+@cache
+def sources() -> frozenset[Path]:
+    """The files of the package that kernels are made of."""
+    found = (path for path in _files() if _KERNEL_SOURCE.search(path.read_bytes()))
+    return frozenset({*found, *(_PACKAGE / name for name in _CONSTANTS)})
+
+
+@cache
+def _imported(module: Path) -> set[Path]:
+    """The files of the package that ``module`` imports, as far as imports stand at the start of a line."""
+    found = set()
+    for package, names in _IMPORT.findall(module.read_bytes()):
+        folder = _PACKAGE.joinpath(*package.decode().split(".")[1:])
+        parts = (folder / word.split()[0] for word in names.decode().strip("()").split(",") if word.split())
+        found |= {part.with_suffix(".py") for part in (folder, *parts)} & _files()
+    return found
+
+
+@cache
+def _digest(source: Path) -> bytes:
+    return hashlib.sha256(source.read_bytes()).digest()
+
+
+def sources_of(module: Path) -> set[Path]:
+    """The files that the kernels of ``module`` are made of: itself, and those of `sources` that it imports."""
+    found, waiting = set[Path](), [module]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting.extend(_imported(path))
+    return {module} | (found & sources())
+
+
+@cache
+def kernel_folder(module: Path, name: str) -> Path | None:
+    """Where the machine code of the kernels of the module ``name`` lies; None where nothing can be written."""
+    if (root := _root()) is None:
+        return None
+    made_of = b"".join(_digest(path) for path in sorted(sources_of(module)))
+    folder = root / hashlib.sha256(name.encode() + made_of).hexdigest()[:16]
+    with contextlib.suppress(OSError):
+        folder.mkdir(exist_ok=True)
+        os.utime(folder)
+    return folder
+
+
+@cache
+def _root() -> Path | None:
+    try:
+        root = cache_folder() / "kernels"
+        root.mkdir(exist_ok=True)
+    except CacheError as error:
+        _log.warning("%s; kernels are compiled again at every start", error)
+        return None
+    except OSError as error:
+        _warn_of_writes(str(error))
+        return None
+    return root
+
+
+@cache
+def _forget_others(root: Path) -> None:
+    """Delete the code of other versions that nothing has started with for `KEPT`: up to 40 MB for each."""
+    for path in sources():
+        kernel_folder(path, ".".join(("ligature", *path.relative_to(_PACKAGE).with_suffix("").parts)))
+    with contextlib.suppress(OSError):
+        for other in root.iterdir():
+            if _DIGESTED.fullmatch(other.name) and time.time() - other.stat().st_mtime > KEPT:
+                shutil.rmtree(other, ignore_errors=True)
+
+
+class _Place(caching._CacheLocator):
+    """The folder of a kernel; what it is made of is in the name of the folder."""
+
+    def __init__(self, folder: Path, line: int) -> None:
+        self._folder, self._line = folder, line
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> int:
+        return 0
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _Place | None:
+        folder = kernel_folder(Path(file).resolve(), function.__module__)
+        return None if folder is None else cls(folder, function.__code__.co_firstlineno)
+
+
+class _Code(caching.CompileResultCacheImpl):
+    _locator_classes = (_Place,)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """Load a kernel; its library, which others link with, stays bitcode: parsed, it is eight times as large.
+
+        Where all kernels are loaded nothing links, and a physics process saves 20 MB.
+        """
+        result = super().rebuild(target_context, payload)
+        library, (_, kind, parts) = result.library, payload[0]
+        if kind == "object":
+            library._shared_module.close()
+            library._shared_module = None
+            library._get_module_for_linking = lambda: llvmlite.binding.parse_bitcode(parts[1])
+        return result
+
+
+class KernelCache(caching.FunctionCache):
+    """The kept code of one kernel. Of processes that need the same kernel, one compiles and the others wait for it.
+
+    A kernel's callees are compiled while it is: the order in which processes take their turns is that of calls, so
+    that they cannot wait for each other.
+    """
+
+    _impl_class = _Code
+    _turn: int | None = None
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The machine code for a signature; None where it is this process's turn to compile it."""
+        found = super().load_overload(sig, target_context)
+        if found is None and self._turn is None and self._take_turn():
+            found = super().load_overload(sig, target_context)
+            if found is not None:
+                self._end_turn()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled; what cannot be kept, for instance on a full disk, is logged."""
+        try:
+            super().save_overload(sig, data)
+            _forget_others(Path(self._cache_path).parent)
+        except OSError as error:
+            _warn_of_writes(str(error))
+        finally:
+            self._end_turn()
+
+    @property
+    def _lock(self) -> Path:
+        return Path(self._cache_path, f"{self._impl.filename_base}.lock")
+
+    def _take_turn(self) -> bool:
+        """Wait until no other process compiles this kernel; False where that cannot be known."""
+        try:
+            file = os.open(self._lock, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+        except OSError:
+            return False
+        end = time.monotonic() + LONGEST_TURN
+        while time.monotonic() < end:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                time.sleep(POLL)
+                continue
+            except OSError:
+                break
+            self._turn = file
+            return True
+        os.close(file)
+        return False
+
+    def _end_turn(self) -> None:
+        if self._turn is not None:
+            with contextlib.suppress(OSError):
+                self._lock.unlink()
+            os.close(self._turn)
+            self._turn = None
+
+
+@cache
+def _warn_of_writes(reason: str) -> None:
+    _log.warning("kernels cannot be kept and will be compiled again at the next start: %s", reason)
+
+
+def keep(dispatcher: Any) -> None:
+    """Keep the code of a kernel, where its source is a file and something can be written."""
+    file = Path(inspect.getfile(dispatcher.py_func))
+    if file.exists() and kernel_folder(file.resolve(), dispatcher.py_func.__module__) is not None:
+        dispatcher._cache = KernelCache(dispatcher.py_func)
