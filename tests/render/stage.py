@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import ligature
@@ -15,6 +16,7 @@ import pytest
 from ligature import Simulation
 from ligature.model.shapes import Box, Sphere
 from ligature.render import Frame, Renderer, RenderUnavailable, view_of
+from ligature.render.context import create_context, draws_on_processor
 from ligature.render.geometry import Triangles, box, of_shape
 from PIL import Image
 
@@ -130,6 +132,11 @@ def difference(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
     return float(gap.mean()), float(np.percentile(gap, 99.5))
 
 
+@cache
+def _draws_on_processor() -> bool:
+    return draws_on_processor(create_context())
+
+
 def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     h, w = a.shape[0] // 2 * 2, a.shape[1] // 2 * 2
     cells = [p[:h, :w].astype(float).reshape(h // 2, 2, w // 2, 2, 3).mean(axis=(1, 3)) for p in (a, b)]
@@ -137,15 +144,18 @@ def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def assert_looks_like(rgb: np.ndarray, path: Path, moved: float = 0.005) -> None:
-    """Compare with the picture at ``path``, of which a share may have ``moved``; or draw it anew when asked to."""
+    """Compare with the picture at ``path``, of which a share may have ``moved``; or draw it anew when asked to.
+
+    The pictures were drawn by Mesa's rasteriser with smoothed edges. A GPU draws four samples a pixel instead.
+    """
     if os.environ.get("LIGATURE_UPDATE_PICTURES"):
         path.parent.mkdir(exist_ok=True, parents=True)
         Image.fromarray(rgb).save(path, optimize=True)
     with Image.open(path) as image:
         expected = np.asarray(image.convert("RGB"))
     assert rgb.shape == expected.shape
-    gap = _gap(rgb, expected)
+    gap, most = _gap(rgb, expected), 12.0 if _draws_on_processor() else 24.0
     still = np.sort(gap, axis=None)[: int(gap.size * (1 - moved))]
-    assert still.mean() < 1.0 and still.max() < 12.0, (
+    assert still.mean() < 1.0 and still.max() < most, (
         f"{path.name} looks different: mean {still.mean():.2f}, {1 - moved:.1%} within {still.max():.1f} of 255"
     )

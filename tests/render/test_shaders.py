@@ -12,6 +12,7 @@ import pytest
 from ligature import Simulation
 from ligature.render import CameraView, Frame, Renderer, RenderUnavailable, view_of
 from ligature.render.context import create_context
+from ligature.render.legacy import findings
 from ligature.render.translate import translate
 
 SHADERS = Path(__file__).parent / "shaders"
@@ -183,6 +184,12 @@ def test_lights_materials_and_shadows_mean_to_an_old_shader_what_they_mean_to_th
     assert (difference > 2).mean() < 0.02  # the edge of the shadow is smoothed by the built-in one only
 
 
+def is_painted(frame: Frame, body: int, colour: tuple[float, float, float]) -> bool:
+    """Whether every inner pixel of a body has one colour of 255; OpenGL leaves open how a half is rounded."""
+    painted = np.unique(frame.rgb[well_inside(frame, body)], axis=0)
+    return len(painted) == 1 and bool((np.abs(painted[0] - colour) <= 0.5).all())
+
+
 def test_a_preprocessing_shader_paints_labels_and_nothing_between_them(tmp_path: Path, stage) -> None:
     renderer, simulation, view = stage()
     for ending in ("vert", "frag"):
@@ -190,8 +197,8 @@ def test_a_preprocessing_shader_paints_labels_and_nothing_between_them(tmp_path:
     files = ligature.model.shapes.ShaderFiles(tmp_path / "labels.vert", tmp_path / "labels.frag")
     frame = renderer.render(simulation.state, view, ("rgb", "ids"), shaders=files)
     assert renderer.problems == []
-    assert set(map(tuple, frame.rgb[well_inside(frame, 1)])) == {(128, 64, 191)}
-    assert set(map(tuple, frame.rgb[well_inside(frame, 2)])) == {(153, 102, 26)}
+    assert is_painted(frame, 1, (127.5, 63.75, 191.25))
+    assert is_painted(frame, 2, (153, 102, 25.5))
 
 
 def test_a_camera_draws_with_its_preprocessing_shaders(tmp_path: Path, stage) -> None:
@@ -200,7 +207,7 @@ def test_a_camera_draws_with_its_preprocessing_shaders(tmp_path: Path, stage) ->
     block = "preprocessing shaders: {path: ./, vertex: labels.vert, fragment: labels.frag}, clipping plane"
     _, simulation, _ = stage(scene=SCENE.replace("clipping plane", block))
     frame = simulation.cameras["C"].capture()
-    assert set(map(tuple, frame.rgb[well_inside(frame, 2)])) == {(153, 102, 26)}
+    assert is_painted(frame, 2, (153, 102, 25.5))
 
 
 def test_depth_compute_shaders_turn_depth_into_points(tmp_path: Path, stage) -> None:
@@ -292,7 +299,7 @@ def test_an_error_in_the_vertex_shader_names_the_vertex_shader(stage: Callable[.
 def test_an_error_of_the_preprocessor_names_the_shader_and_the_line(stage: Callable[..., Drawn]) -> None:
     renderer, *_ = stage(shader("labels.vert"), "uniform float a;\n/* void main() {}\n")
     found = renderer.problems[0].diagnostics[0]
-    assert found.mark.file.name == "own.frag" and "Unterminated comment" in found.message
+    assert found.mark.file.name == "own.frag" and "comment" in found.message
 
 
 def test_shaders_that_do_not_link_are_reported(stage: Callable[..., Drawn]) -> None:
@@ -300,6 +307,23 @@ def test_shaders_that_do_not_link_are_reported(stage: Callable[..., Drawn]) -> N
     renderer, *_ = stage(vertex, "varying vec3 vWay;\nvoid main() { gl_FragColor = vec4(vWay, 1.0); }\n")
     message = renderer.problems[0].diagnostics[0].message
     assert "does not link with own.frag" in message and "vWay" in message
+
+
+LINKER_LOGS = {
+    "Mesa": "Program\n=======\nerror: vertex shader output `vWay' declared as type `vec4', but fragment shader input "
+    "declared as type `vec3'\n",
+    "NVIDIA": 'Program\n=======\nFragment info\n-------------\n0(2) : error C5108: unknown semantics "ATTR0.xyz" '
+    'specified for "vWay"\n',
+    "Apple": "Program\n=======\nERROR: 0:2: Type mismatch of varying 'vWay'\n",
+}
+
+
+@pytest.mark.parametrize("driver", LINKER_LOGS)
+def test_a_linker_is_told_from_a_compiler(driver: str) -> None:
+    files = ligature.model.shapes.ShaderFiles(Path("own.vert"), Path("own.frag"))
+    (found,) = findings(f"GLSL Linker failed\n\n{LINKER_LOGS[driver]}", files)
+    assert found.message.startswith("does not link with own.frag: ") and "vWay" in found.message
+    assert found.mark.file.name == "own.vert"
 
 
 def test_an_attribute_that_no_object_has_is_reported(stage: Callable[..., Drawn]) -> None:

@@ -30,6 +30,8 @@ MAX_SHADER_BYTES = 1 << 20
 _MESA = re.compile(r"^\d+:(\d+)\((\d+)\): (?:preprocessor )?error: (.*)$", re.MULTILINE)
 _NVIDIA = re.compile(r"^\d+\((\d+)\) : (error .*)$", re.MULTILINE)
 _OTHERS = re.compile(r"^ERROR: \d+:(\d+): (.*)$", re.MULTILINE)
+_LINKER = "GLSL Linker failed"
+"""How moderngl begins the log of a program whose stages compile and do not fit together."""
 
 _ATTRIBUTES = {
     "aPosition": "positions", f"{PREFIX}Vertex": "positions",
@@ -86,6 +88,8 @@ def findings(log: str, files: ShaderFiles) -> list[Diagnostic]:
     path = files.fragment if "fragment_shader\n" in log else files.vertex
     found = [(int(m[1]), int(m[2]), m[3]) for m in _MESA.finditer(log)]
     found += [(int(m[1]), 1, m[2]) for pattern in (_NVIDIA, _OTHERS) for m in pattern.finditer(log)]
+    if log.startswith(_LINKER):
+        found = []  # NVIDIA's linker gives lines, but not of which shader
     hint = "the built-in shader is used instead; GLSL 1.10, 1.20 and 3.30 core are understood"
     if not found:
         reason = " ".join(line for line in log.split("\n")[1:] if line.strip(" =") and not line.endswith("_shader"))
