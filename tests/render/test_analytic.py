@@ -52,8 +52,10 @@ def distance(kind: str, p: np.ndarray) -> np.ndarray:
     return np.maximum(slope[0] * rho + slope[1] * (z - HEIGHT / 2), -HEIGHT / 2 - z)
 
 
-def met(kind: str, T_eye_shape: np.ndarray, view: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def met(kind: str, T_eye_shape: np.ndarray, view: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Depth (h, w), inf beside the shape; how far each pixel's ray passes outside (inside: below 0); the normals met.
+
+    The last is the cosine (h, w) between ray and normal.
 
     Along a line the distance to a convex shape is convex: its least value is found by thirds, the entry by halves.
     """
@@ -82,7 +84,8 @@ def met(kind: str, T_eye_shape: np.ndarray, view: CameraView) -> tuple[np.ndarra
     normal = np.stack([distance(kind, hit + e * a) - distance(kind, hit - e * a) for a in np.eye(3)], axis=1) / (2 * e)
     depth = np.where(least < 0, inside / length, np.inf)
     shape = (view.height, view.width)
-    return depth.reshape(shape), least.reshape(shape), (normal @ R.T).reshape(*shape, 3)
+    facing = np.abs(np.einsum("ij,ij->i", normal, d))
+    return depth.reshape(shape), least.reshape(shape), (normal @ R.T).reshape(*shape, 3), facing.reshape(shape)
 
 
 @pytest.mark.parametrize(("pose", "samples"), [*((pose, 0) for pose in POSES), ("askew", 4)])
@@ -104,7 +107,7 @@ def test_depth_ids_and_normals_are_those_of_the_shape(tmp_path: Path, kind: str,
         pytest.skip(str(error))
     view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
     frame = renderer.render(simulation.state, view)
-    depth, least, normal = met(kind, view.view @ pose_matrix(at, rpy), view)
+    depth, least, normal, facing = met(kind, view.view @ pose_matrix(at, rpy), view)
     seen = frame.ids == 1
     assert seen.sum() > 20
     wrong = seen != np.isfinite(depth)
@@ -112,11 +115,10 @@ def test_depth_ids_and_normals_are_those_of_the_shape(tmp_path: Path, kind: str,
     assert not (wrong & (np.abs(least) > (GRAZING + snap) * abs(at[0]))).any(), (
         "a pixel's ray clearly meets, or misses, the shape"
     )
-    steep = np.abs(normal[..., 2]) > 0.05
+    steep = facing > 0.05
     surely = seen & np.isfinite(depth)
-    cosine = np.maximum(np.abs(normal[..., 2]), 0.02)
-    slope = np.sqrt(1 - np.minimum(cosine, 1) ** 2) / cosine
-    reach = (np.where(steep, 1e-5, 2e-4) + snap * slope)[surely] * depth[surely]
+    slope = np.sqrt(1 - np.minimum(facing, 1) ** 2) / np.maximum(facing, 0.05)
+    reach = (np.where(steep, 1e-5, 1e-3) + 1.5 * snap * slope)[surely] * depth[surely]
     assert (np.abs(frame.depth[surely] - depth[surely]) <= reach).all()
     inner = surely & steep
     agreement = np.einsum("hwi,hwi->hw", frame.normals, normal)[inner]
