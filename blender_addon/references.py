@@ -31,7 +31,7 @@ def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
 
 
 def qualified(collection: bpy.types.Collection, obj: bpy.types.Object) -> str:
-    """The object's identifier with its namespace (ADF §4.1)."""
+    """The object's identifier with its namespace (as in AMBF)."""
     own = getattr(obj.adf, identifier(KIND_OF_ROLE[obj.adf.role]))
     return merged(_namespace(collection), getattr(own, "namespace", "")) + obj.adf.key
 

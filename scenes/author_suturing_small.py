@@ -1,8 +1,8 @@
 """Authors the scene `suturing_small`: two PSM-like arms, a block, a needle and a thread, of primitive shapes.
 
 Run ``python scenes/author_suturing_small.py`` to write the ADF files again; the results are committed
-and a test compares. Lengths in metres. The arms follow the modified DH table of the PSM (interface
-reference §6.2, instrument 420006); every body frame is the DH frame of its joint, except the tool
+and a test compares. Lengths in metres. The arms follow the modified DH table of the PSM
+(`ligature.robots.psm`, instrument 420006); every body frame is the DH frame of its joint, except the tool
 yaw link, whose frame is T_7 · RPY(-pi/2, 0, -pi/2) as clients of the suturing challenge expect.
 """
 

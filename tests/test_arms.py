@@ -194,7 +194,7 @@ def placed(sim: Simulation, name: str) -> Arm:
 
 
 def tip_of_bodies(sim: Simulation, arm: Arm) -> np.ndarray:
-    """Pose (4, 4) of the tool in the base by the bodies' own poses (interface reference §6.2)."""
+    """Pose (4, 4) of the tool in the base by the bodies' own poses."""
     (description,) = [a for a in sim.scene.arms if a.name == arm.name]
     base, tip = (pose7_matrix(sim.state["body_pose"][0, b]) for b in (description.base, description.tip))
     T = inverse(base) @ tip

@@ -1,4 +1,4 @@
-"""Compiles kernels and keeps their machine code: the decorators that all rooms share.
+"""Compiles kernels and keeps their machine code: the decorators that all packages share.
 
 Only the first start after an installation compiles, and later ones what has changed since (`ligature.kernel_cache`).
 That is logged every few seconds while it lasts.

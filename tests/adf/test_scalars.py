@@ -1,4 +1,4 @@
-"""Scalar rules of yaml-cpp (ADF specification §1.1)."""
+"""Scalar rules of yaml-cpp."""
 
 from __future__ import annotations
 

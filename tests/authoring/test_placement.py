@@ -38,7 +38,7 @@ def poses() -> st.SearchStrategy[np.ndarray]:
 
 
 def distinct(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether the format turns one axis into the other as they are, so that no tilt is lost (ADF §15.1)."""
+    """Whether the format turns one axis into the other as they are, so that no tilt is lost."""
     return 0.0011 < np.arccos(np.clip(a @ b, -1, 1)) < 3.1399
 
 

@@ -1,4 +1,4 @@
-"""What AMBF's and CRTK's clients offer, ours offers: walked name by name (interface reference §4.2, §4.3)."""
+"""What AMBF's and CRTK's clients offer, ours offers: walked name by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Boxes around shapes, against Bullet itself, and inertial frames that files leave out (ADF specification §12.6)."""
+"""Boxes around shapes, against Bullet itself, and inertial frames that files leave out."""
 
 from __future__ import annotations
 

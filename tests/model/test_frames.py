@@ -1,4 +1,4 @@
-"""Rotations and joint frames against the worked examples of ADF specification §15."""
+"""Rotations and joint frames against worked examples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finding objects by text (ADF specification §4.4)."""
+"""Finding objects by text."""
 
 from __future__ import annotations
 

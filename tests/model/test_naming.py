@@ -1,4 +1,4 @@
-"""Namespaces and topic names (ADF specification §4.2, §4.3)."""
+"""Namespaces and topic names."""
 
 from __future__ import annotations
 

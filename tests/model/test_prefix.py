@@ -1,4 +1,4 @@
-"""A prefix before all namespaces (``--ns``) renames what a scene has and changes nothing else (ADF specification §4.2)."""
+"""A prefix before all namespaces (``--ns``) renames what a scene has and changes nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Visible sensors and actuators are drawn in the window, as large as the file states (ADF specification §17)."""
+"""Visible sensors and actuators are drawn in the window, as large as the file states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Worked examples of the kinematics (interface reference §6): joint values, pose rows 1-3, quaternion x y z w."""
+"""Worked examples of the kinematics: joint values, pose rows 1-3, quaternion x y z w."""
 
 from __future__ import annotations
 

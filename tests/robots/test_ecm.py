@@ -19,7 +19,7 @@ PUBLISHED = {
     "Classic": [(-1.5708, 1.5708), (-0.76794, 1.1344), (0.0, 0.255), (-1.552, 1.552)],
     "Si": [(-2.964, 2.964), (-1.10, 1.04), (0.001, 0.259), (-1.54, 1.54)],
 }
-"""Limits in ECM.json of the dVRK's software 2.4, and of its Si version (interface reference §5.7)."""
+"""Limits in ECM.json of the dVRK's software 2.4, and of its Si version."""
 
 
 def tilted(T, angle, way):

@@ -1,4 +1,4 @@
-"""The state machine of an arm: every state, every command, every request for motion (interface reference §5.2, §5.5)."""
+"""The state machine of an arm: every state, every command, every request for motion."""
 
 from __future__ import annotations
 

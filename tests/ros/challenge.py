@@ -1,4 +1,4 @@
-"""What the suturing challenge's scripts do through an AMBF client, call by call (interface reference §4.5, §7.2).
+"""What the suturing challenge's scripts do through an AMBF client, call by call.
 
 Poses are homogeneous matrices (4, 4) in the world; metres, radians. Waits are in simulated seconds, so that a busy
 machine only makes them longer.

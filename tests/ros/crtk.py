@@ -1,4 +1,4 @@
-"""A small CRTK client for tests, written from the interface reference §5.1–5.5, as demanding as the real ones.
+"""A small CRTK client for tests, as demanding as crtk_python_client and dvrk_python.
 
 Feedback that never came, is older than `FRESH` seconds or carries a stamp of zero is an error. A state whose stamp is
 not newer than the last one is not taken. A move has ended only after it was seen busy. Joint arrays are rad or m,
@@ -191,7 +191,7 @@ class Motion:
 
 
 class Arm(Link):
-    """What ``dvrk.arm`` connects and does (§5.4, second table)."""
+    """What ``dvrk.arm`` connects and does."""
 
     def __init__(self, rospy: Any, name: str) -> None:
         super().__init__(rospy, f"/{name}")

@@ -1,7 +1,7 @@
 """A console of the real kit as other nodes see it: master arms that a hand carries, states, pedals, frames.
 
 Run as a program with the names of arms: ``python -m tests.ros.real_console MTMR``. It publishes what sawIntuitiveResearchKit
-2.4 does (interface reference §5.4): readings at 200 Hz, latched states with a heartbeat, services, pedals. ``hand`` below an
+2.4 does: readings at 200 Hz, latched states with a heartbeat, services, pedals. ``hand`` below an
 arm is where the operator's hand carries it. Poses are in HRSV. Metres, radians.
 """
 

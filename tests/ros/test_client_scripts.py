@@ -1,6 +1,6 @@
 """What the scripts of the CRTK and dVRK Python packages do, call by call, against a running simulator.
 
-Each function `run_…` follows one script that runs unattended (interface reference §7.5, §7.6, mode H), with shorter
+Each function `run_…` follows one script of the dVRK that runs unattended, with shorter
 waits. All arms run theirs at the same time. Whoever has the packages runs them unmodified: see docs/arms.md.
 """
 

@@ -24,7 +24,7 @@ T_HRSV_BASE = {
     "MTML": frame(np.array([[-1, 0, 0], [0, 0.8660254, 0.5], [0, 0.5, -0.8660254]]), (0.18, 0.4, 0.475)),
     "MTMR": frame(np.array([[-1, 0, 0], [0, 0.8660254, 0.5], [0, 0.5, -0.8660254]]), (-0.18, 0.4, 0.475)),
 }
-"""Bases of the masters of the stock simulated systems (interface reference §5.6)."""
+"""Bases of the masters of the stock simulated systems."""
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ LOOK_UPS = {
     "psm1/Actuator0": "/ambf/env/ghosts/psm1/Actuator0",
     "cameraL": "/ambf/env/cameras/cameraL",
 }
-"""What the challenge's scripts look up (interface reference §2.10), and what they must find."""
+"""What the challenge's scripts look up, and what they must find."""
 
 
 def identity(topic: str) -> Identity:

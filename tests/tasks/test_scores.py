@@ -105,7 +105,7 @@ def test_a_scene_without_holes_is_reported() -> None:
 
 @pytest.mark.corpus
 def test_the_points_of_the_challenges_needle_are_where_its_evaluation_has_them(corpus: Path) -> None:
-    """Interface reference §4.6: base, middle and tip in the needle's mesh frame, which is its body frame."""
+    """As in the challenge's evaluation: base, middle and tip in the needle's mesh frame, which is its body frame."""
     scene = ligature.load(corpus / "suturing_scene" / "launch.yaml", models=[10, 11])
     scenery = Scenery.of(scene, pairs=4)
     wanted = [(-0.009513319, 0.001026297, 0), (-0.004098702, 0.008965075, 0), (0.006617809, 0.006973457, 0)]

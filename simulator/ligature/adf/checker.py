@@ -116,7 +116,7 @@ def _check_value(key: Key, value: Node, element: Element, found: list[Diagnostic
 
 
 def _like_block(node: Node) -> bool:
-    """Whether AMBF takes a node as a block: null and lists are empty ones (ADF §1.2, §1.3)."""
+    """Whether AMBF takes a node as a block: null and lists are empty ones."""
     return not isinstance(node, Scalar) or node.null
 
 

@@ -82,7 +82,7 @@ class Element:
         return cast(Vector, self.value(path))
 
     def pose(self, path: str) -> tuple[Vector, Vector]:
-        """Position x y z in metres and orientation r p y in radians (ADF §1.5)."""
+        """Position x y z in metres and orientation r p y in radians (as in AMBF)."""
         return cast("tuple[Vector, Vector]", self.value(path))
 
     def numbers(self, path: str) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 """Rotations, poses and joint frames of the format.
 
-Orientation blocks are r, p, y with ``R = Rz(y) Ry(p) Rx(r)`` (ADF specification §2). Poses (7,) are
+Orientation blocks are r, p, y with ``R = Rz(y) Ry(p) Rx(r)`` (as in AMBF). Poses (7,) are
 x y z qx qy qz qw; ``T_a_b`` (4, 4) is frame b in frame a. Metres and radians.
 """
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 PARALLEL, ANTIPARALLEL = 0.001, 3.14
-"""Angles between which two axes have a rotation axis of their own; part of the format (§15.1)."""
+"""Angles between which two axes have a rotation axis of their own; part of the format."""
 
 _IDENTITY = np.eye(4)
 
@@ -114,7 +114,7 @@ def pose7_matrix(pose: ArrayLike) -> Array:
 
 
 def minimal_rotation(u: ArrayLike, v: ArrayLike) -> Array:
-    """Rotation (3, 3) that turns ``u`` to ``v``, with the format's choice for (anti)parallel axes (§15.1)."""
+    """Rotation (3, 3) that turns ``u`` to ``v``, with the format's choice for (anti)parallel axes."""
     a = np.asarray(u, dtype=float) / np.linalg.norm(u)
     b = np.asarray(v, dtype=float) / np.linalg.norm(v)
     angle = float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
@@ -153,7 +153,7 @@ def joint_frames(
     joint_offset: float = 0.0,
     prismatic: bool = False,
 ) -> JointFrames:
-    """Constraint frames by §15.2; pivots (already scaled) and axes are in the body frames."""
+    """Constraint frames as AMBF builds them; pivots (already scaled) and axes are in the body frames."""
     to_parent, to_child = inverse(T_parent_inertial), inverse(T_child_inertial)
     p_a = to_parent[:3, :3] @ np.asarray(parent_pivot, dtype=float) + to_parent[:3, 3]
     p_b = to_child[:3, :3] @ np.asarray(child_pivot, dtype=float) + to_child[:3, 3]

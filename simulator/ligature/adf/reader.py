@@ -32,7 +32,7 @@ MAX_TEXT = 64 * 1024 * 1024
 """Largest scene file in bytes; the largest real one has 300 kB."""
 
 REFUSING = ("value", "missing", "version")
-"""Codes of the findings for which AMBF refuses a whole file (ADF specification §1.3, §26)."""
+"""Codes of the findings for which AMBF refuses a whole file."""
 
 _DEFAULTED = ("body", "camera", "light")
 """Kinds of which AMBF makes a default object when one is listed but not defined."""
@@ -288,7 +288,7 @@ def _element(document: Document, item: Scalar, kind: str, strict: bool) -> Eleme
 
 
 def _undefined(document: Document, item: Scalar, node: Node | None, kind: str) -> Diagnostic:
-    """AMBF makes a default body, camera or light, and refuses the file for a joint (§4.7)."""
+    """AMBF makes a default body, camera or light, and refuses the file for a joint."""
     severity = Severity.WARNING if kind in _DEFAULTED or (isinstance(node, Scalar) and node.null) else Severity.ERROR
     if node is not None:
         message, hint = f"{kind} '{item.text}' is listed, but its definition is not a block of keys", "it is left out"
@@ -300,7 +300,7 @@ def _undefined(document: Document, item: Scalar, node: Node | None, kind: str) -
 
 
 def _lone_motor(element: Element) -> list[Diagnostic]:
-    """AMBF evaluates 'enable feedback' when 'enable motor' is there, and fails without it (§14)."""
+    """AMBF evaluates 'enable feedback' when 'enable motor' is there, and fails without it."""
     if not element.has("enable motor") or element.has("enable feedback"):
         return []
     message = f"joint '{element.key}' has 'enable motor' without 'enable feedback'"
@@ -308,7 +308,7 @@ def _lone_motor(element: Element) -> list[Diagnostic]:
 
 
 def _typeless_is_revolute(element: Element, found: list[Diagnostic]) -> list[Diagnostic]:
-    """A joint without type is an old revolute one (§27, §30)."""
+    """A joint without type is an old revolute one."""
     if element.has("type"):
         return found
     others = [d for d in found if not (d.code == "missing" and "the key 'type'" in d.message)]

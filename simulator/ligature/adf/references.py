@@ -1,4 +1,4 @@
-"""Namespaces, and finding objects by text: exact, else the only one that contains it (ADF specification §4.2, §4.4)."""
+"""Namespaces, and finding objects by text: exact, else the only one that contains it (as in AMBF)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Indents flow collections that are indented too little, so that they can be read.
 
 YAML requires the lines of a ``{…}`` or ``[…]`` to be indented deeper than their key. yaml-cpp does not check this, and
-real files rely on it (ADF specification §1.1). Spaces are inserted only at line starts, so that every line and column
+real files rely on it (as in AMBF). Spaces are inserted only at line starts, so that every line and column
 of the original can be computed. Lines and columns count from 0, as in YAML libraries.
 """
 

@@ -1,7 +1,7 @@
 """Opens files for a scene, below the scene's own roots only.
 
-Paths in scene files are joined textually to the folder of the file that names them (ADF
-specification §3); symbolic links are resolved before the roots are compared.
+Paths in scene files are joined textually to the folder of the file that names them, as in
+AMBF; symbolic links are resolved before the roots are compared.
 """
 
 from __future__ import annotations

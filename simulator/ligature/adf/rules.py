@@ -1,7 +1,6 @@
 """What single keys cannot show about an element: keys that need each other, and values without effect.
 
-Each rule takes an element whose keys are sound and returns findings; the numbers are sections of the
-ADF specification. Codes are those of `checker`.
+Each rule takes an element whose keys are sound and returns findings. Codes are those of `checker`.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ def _finding(
 
 
 def names(element: Element) -> Iterator[Diagnostic]:
-    """Objects with topics need a name that ROS takes (§4.1, §4.3)."""
+    """Objects with topics need a name that ROS takes."""
     name = element.text("name").replace(" ", "")
     if not name:
         yield _finding(element, Severity.WARNING, "name", "has no name, so its topic has none", "add name: …", "name")
@@ -49,7 +48,7 @@ def names(element: Element) -> Iterator[Diagnostic]:
 
 
 def namespaces(element: Element) -> Iterator[Diagnostic]:
-    """Namespace and name are concatenated as they are (§4.2)."""
+    """Namespace and name are concatenated as they are."""
     namespace = element.text("namespace")
     if namespace and not namespace.endswith("/"):
         hint = f"write '{namespace}/'"
@@ -57,14 +56,14 @@ def namespaces(element: Element) -> Iterator[Diagnostic]:
 
 
 def version(element: Element) -> Iterator[Diagnostic]:
-    """Files of another version than 1.0 are none of this format (§1.4)."""
+    """Files of another version than 1.0 are none of this format."""
     if element.has("adf version") and element.text("adf version") != "1.0":
         message = "'adf version' is not 1.0"
         yield Diagnostic(Severity.ERROR, message, element.mark_of("adf version"), "write 1.0", "version")
 
 
 def frequencies(element: Element) -> Iterator[Diagnostic]:
-    """Rates of publishing (§10.1)."""
+    """Rates of publishing."""
     low, high = element.integer("publish frequency.low"), element.integer("publish frequency.high")
     if low > high:
         message = f"has a low publish frequency of {low} Hz, above the high one of {high} Hz"
@@ -72,7 +71,7 @@ def frequencies(element: Element) -> Iterator[Diagnostic]:
 
 
 def plugins(element: Element) -> Iterator[Diagnostic]:
-    """Plug-in entries need a name and a file (§22); compiled ones are reported where the others are looked for."""
+    """Plug-in entries need a name and a file; compiled ones are reported where the others are looked for."""
     node = element.node.get("plugins")
     if node is None or (isinstance(node, Scalar) and node.null):
         return
@@ -95,7 +94,7 @@ def _is_compiled(entry: Node) -> bool:
 
 
 def shapes(element: Element) -> Iterator[Diagnostic]:
-    """A primitive needs the dimensions of its kind (§12.1)."""
+    """A primitive needs the dimensions of its kind."""
     for shape, geometry in (("shape", "geometry"), ("collision shape", "collision geometry")):
         if element.has(shape):
             yield from _dimensions(element, shape, geometry)
@@ -118,7 +117,7 @@ def _dimensions(element: Element, shape: str, geometry: str) -> Iterator[Diagnos
 
 
 def joint_limits(element: Element) -> Iterator[Diagnostic]:
-    """Limits count when both ends are given; those of a cone twist have three angles (§14)."""
+    """Limits count when both ends are given; those of a cone twist have three angles."""
     kind = element.value("type")
     has_low, has_high = element.has("joint limits.low"), element.has("joint limits.high")
     if kind in _LIMITED and has_low != has_high:
@@ -134,7 +133,7 @@ def joint_limits(element: Element) -> Iterator[Diagnostic]:
 
 
 def joint_springs(element: Element) -> Iterator[Diagnostic]:
-    """A six-DOF joint has blocks of stiffness and damping, all others have numbers (§14)."""
+    """A six-DOF joint has blocks of stiffness and damping, all others have numbers."""
     kind = element.value("type")
     for path in ("damping", "stiffness", "equilibrium point"):
         if not element.has(path):
@@ -154,7 +153,7 @@ def joint_springs(element: Element) -> Iterator[Diagnostic]:
 
 
 def joint_without_effect(element: Element) -> Iterator[Diagnostic]:
-    """Keys that a fixed joint reads and does not use (§24)."""
+    """Keys that a fixed joint reads and does not use."""
     if element.value("type") == "fixed":
         for path in ("joint limits", "controller", "max motor impulse", "controller output type"):
             if element.has(path):
@@ -166,7 +165,7 @@ def joint_without_effect(element: Element) -> Iterator[Diagnostic]:
 
 
 def sensor_rays(element: Element) -> Iterator[Diagnostic]:
-    """A ray sensor needs rays (§17.2), a contact sensor a distance (§17.4)."""
+    """A ray sensor needs rays, a contact sensor a distance."""
     if element.text("type") in _RAYS:
         if not any(element.has(path) for path in ("array", "mesh", "parametric")):
             hint = "add 'array', 'mesh' or 'parametric'"
@@ -182,7 +181,7 @@ def sensor_rays(element: Element) -> Iterator[Diagnostic]:
 
 
 def camera_view(element: Element) -> Iterator[Diagnostic]:
-    """A camera needs a viewing direction, clipping planes in order, and publish intervals from 1 (§18.1)."""
+    """A camera needs a viewing direction, clipping planes in order, and publish intervals from 1."""
     ahead = [a - b for a, b in zip(element.vector("look at"), element.vector("location"), strict=True)]
     up = element.vector("up")
     across = (
@@ -204,14 +203,14 @@ def camera_view(element: Element) -> Iterator[Diagnostic]:
 
 
 def wheels(element: Element) -> Iterator[Diagnostic]:
-    """A wheel needs something that shows it (§21.1)."""
+    """A wheel needs something that shows it."""
     for wheel in element.children("wheels"):
         if not wheel.text("body") and not wheel.text("mesh"):
             yield _finding(wheel, Severity.WARNING, "body", "has neither body nor mesh", "it is left out")
 
 
 def device_target(element: Element) -> Iterator[Diagnostic]:
-    """A device needs something to drive (§8)."""
+    """A device needs something to drive."""
     if not element.text("simulated multibody") and not element.text("root link"):
         hint = "give 'root link' or 'simulated multibody'"
         yield _finding(element, Severity.ERROR, "hardware name", "has nothing to drive", hint, "left out")
@@ -220,7 +219,7 @@ def device_target(element: Element) -> Iterator[Diagnostic]:
 
 
 def world_surroundings(element: Element) -> Iterator[Diagnostic]:
-    """What a world file should name (§6)."""
+    """What a world file should name."""
     if not element.text("environment"):
         hint = "AMBF cannot run without one"
         yield _finding(element, Severity.WARNING, "environment", "names no environment", hint)

@@ -1,4 +1,4 @@
-"""Scalar rules of the format: which text is a number, an integer, a truth value (ADF specification §1.1).
+"""Scalar rules of the format: which text is a number, an integer, a truth value.
 
 Every function takes the text of a YAML scalar and raises ValueError with what was expected.
 """

@@ -7,7 +7,7 @@ from ligature.adf.schema import NOT_SIMULATED, PLURALS, SCHEMA, Fault, Key, Stat
 _INTRODUCTION = """# ADF support
 
 ADF is the YAML format of AMBF's scenes. This page lists every key that Ligature reads, by kind of file or object, with
-type, default and effect. Section numbers (§) are those of the ADF specification. Other keys are reported as unknown,
+type, default and effect. The effects follow the loader of AMBF 2.0. Other keys are reported as unknown,
 with a suggestion. To write your first file, see [your first scene](tutorial_scene.md). `ligature check` lists the keys
 of a file that have no effect. The effects of a key are:
 

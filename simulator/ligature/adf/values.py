@@ -107,7 +107,7 @@ def _texts(key: Key, node: Node) -> tuple[str, ...]:
 
 
 def _integers(key: Key, node: Node) -> tuple[int, ...]:
-    """A single value instead of a list is ignored (ADF §12.7)."""
+    """A single value instead of a list is ignored (as in AMBF)."""
     return tuple(_read(scalars.integer, item) for item in _items(node)) if isinstance(node, Sequence) else ()
 
 

@@ -1,4 +1,4 @@
-"""Writes OBJ and MTL files in the dialect that AMBF reads (ADF §12.4): the same mesh gives the same bytes.
+"""Writes OBJ and MTL files in the dialect that AMBF reads: the same mesh gives the same bytes.
 
 One ``usemtl`` block per part; every material has ``Kd``; texture names are relative and stand alone
 on their lines, since the reference takes the rest of the line for the name. Metres, no axis change.

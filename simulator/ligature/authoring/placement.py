@@ -1,7 +1,7 @@
 """Where things stand, and which keys describe it: joints, cameras, lights, axes of round shapes.
 
 Poses are ``T_a_b`` (4, 4), frame b in frame a, in metres; angles in radians. A view looks along −Z
-with +Y up, as OpenGL and Blender have it; the format's own camera looks along −X with +Z up (ADF §18.1).
+with +Y up, as OpenGL and Blender have it; the format's own camera looks along −X with +Z up.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Pose = tuple[Vector, Vector]
 
 IDENTITY = np.eye(4)
 AXIS_TURNS = {"X": rpy_matrix(0, np.pi / 2, 0), "Y": rpy_matrix(-np.pi / 2, 0, 0), "Z": np.eye(3)}
-"""Rotation (3, 3) that takes local Z to the axis of a round shape (ADF §12.1)."""
+"""Rotation (3, 3) that takes local Z to the axis of a round shape (as in AMBF)."""
 
 SAME_PLACE = 2e-6
 """Metres and radians below which two poses are the same: what single precision leaves of one metre."""
@@ -80,7 +80,7 @@ def rigid(T: Array) -> Array:
 
 
 def view_pose(location: Vector, look_at: Vector, up: Vector) -> Array:
-    """Pose of a view; with identity orientation in the format's sense when it looks nowhere (ADF §18.1)."""
+    """Pose of a view; with identity orientation in the format's sense when it looks nowhere."""
     p = np.asarray(location, dtype=float)
     back = p - np.asarray(look_at, dtype=float)
     right = np.cross(up, back)
@@ -97,7 +97,7 @@ def view_keys(T: Array, distance: float = 1.0) -> tuple[Vector, Vector, Vector]:
 
 
 def light_pose(location: Vector, direction: Vector) -> Array:
-    """Pose of a lamp that shines along its −Z; a zero direction shines along +X (ADF §19)."""
+    """Pose of a lamp that shines along its −Z; a zero direction shines along +X (as in AMBF)."""
     d = np.asarray(direction, dtype=float)
     length = float(np.linalg.norm(d))
     d = np.array([1.0, 0.0, 0.0]) if length < 0.01 else d / length
@@ -116,14 +116,14 @@ def light_keys(T: Array) -> tuple[Vector, Vector]:
 def joint_pose(
     keys: JointKeys, T_parent_inertial: Array = IDENTITY, T_child_inertial: Array = IDENTITY, prismatic: bool = False
 ) -> Array:
-    """Pose of frame A in the parent's body frame (ADF §15.2); its Z, of a prismatic joint its X, is the axis."""
+    """Pose of frame A in the parent's body frame (as in AMBF); its Z, of a prismatic joint its X, is the axis."""
     return T_parent_inertial @ _frames(keys, T_parent_inertial, T_child_inertial, prismatic).T_parent_a
 
 
 def child_pose(
     keys: JointKeys, T_parent_inertial: Array = IDENTITY, T_child_inertial: Array = IDENTITY, prismatic: bool = False
 ) -> Array:
-    """Pose of the child's body frame in the parent's at joint position zero (ADF §15.3)."""
+    """Pose of the child's body frame in the parent's at joint position zero (as in AMBF)."""
     frames = _frames(keys, T_parent_inertial, T_child_inertial, prismatic)
     return T_parent_inertial @ frames.T_parent_child @ inverse(T_child_inertial)
 
@@ -135,7 +135,7 @@ def moved_child_pose(
     T_child_inertial: Array = IDENTITY,
     prismatic: bool = False,
 ) -> Array:
-    """Pose of the child in the parent at a joint position: an angle, or metres of a prismatic joint (ADF §15.3)."""
+    """Pose of the child in the parent at a joint position: an angle, or metres of a prismatic joint (as in AMBF)."""
     T_parent_a = joint_pose(keys, T_parent_inertial, T_child_inertial, prismatic)
     motion = (
         frame(np.eye(3), (position, 0.0, 0.0)) if prismatic else frame(axis_rotation((0, 0, 1), position), (0, 0, 0))
@@ -155,7 +155,7 @@ def joint_keys(
     """Keys of a joint at ``T_parent_joint`` whose child stands at ``T_parent_child`` in joint position zero.
 
     Both axes are the joint frame's own, so that they map onto each other without the format's choice
-    for antiparallel axes; ``offset`` takes the turn that is left (ADF §15.2). Where the child tilts the
+    for antiparallel axes; ``offset`` takes the turn that is left (as in AMBF). Where the child tilts the
     axis by less than 0.001 rad, or turns it over within 0.0016 rad, the format cannot express it: the axes
     are then taken as exactly parallel or antiparallel. ``scales`` are the factors that the simulator
     puts on the pivots of parent and child.

@@ -1,6 +1,6 @@
 """Primitive shapes of the format: as meshes to look at, as solids to weigh, fitted to points.
 
-Shapes stand as in the format (ADF §12.1): centred in their own frame, round ones along ``axis``, a
+Shapes stand as in the format: centred in their own frame, round ones along ``axis``, a
 cone with its apex towards it, a capsule with its caps in its height. Metres.
 """
 

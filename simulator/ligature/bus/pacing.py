@@ -22,7 +22,7 @@ MOST_AHEAD = 10
 
 @dataclass(frozen=True)
 class Throttle(Message, code=6):
-    """A world command (interface reference §2.5): step throttling, its clock, and updates per edge."""
+    """A world command (as in AMBF): step throttling, its clock, and updates per edge."""
 
     enabled: bool = wire(FLAG)
     clock: bool = wire(FLAG)

@@ -1,4 +1,4 @@
-"""Which objects have not been commanded for too long (interface reference §2.4); time is an argument."""
+"""Which objects have not been commanded for too long (as in AMBF); time is an argument."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _WITHOUT_EFFECT = {
 
 
 def parser() -> argparse.ArgumentParser:
-    """The flags of AMBF 2.0 (ADF specification §5), with their long names."""
+    """The flags of AMBF 2.0, with their long names."""
     flags = argparse.ArgumentParser("ambf_simulator", description="Run AMBF launch files on Ligature.")
     flags.add_argument("--launch_file", required=True, help="launch file")
     flags.add_argument(

@@ -187,7 +187,7 @@ class Studio:
         if camera.depth_shaders is not None:
             own = self._renderer.points(depth, view, camera.depth_shaders)
             if own is not None:
-                return own[..., [1, 2, 0]] * np.array([1, -1, -1], dtype=np.float32)  # from the camera frame (§18.1)
+                return own[..., [1, 2, 0]] * np.array([1, -1, -1], dtype=np.float32)  # from the camera frame
         return unproject(depth, view)
 
     def _camera(self, index: int) -> Camera:

@@ -1,4 +1,4 @@
-"""Collision pieces of a mesh: hulls by material, triangle meshes, or points (ADF specification §12.5).
+"""Collision pieces of a mesh: hulls by material, triangle meshes, or points (as in AMBF).
 
 Lengths in metres, in the mesh's own frame after scaling.
 """

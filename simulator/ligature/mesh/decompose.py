@@ -1,7 +1,7 @@
 """Convex decomposition of concave meshes with CoACD: for ADF collision meshes, and for moving triangle meshes.
 
 The ADF form is one OBJ file with one material per convex piece, which is how the format marks that
-a collision mesh is made of hulls (ADF specification §12.5). Metres. Method: Wei et al.,
+a collision mesh is made of hulls (as in AMBF). Metres. Method: Wei et al.,
 "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and Tree Search", 2022.
 """
 

@@ -154,7 +154,7 @@ def _primitive(volume: float, density: float, z: float, gyration: Array) -> Mass
 def box_inertia(mass: float, size: Array) -> Array:
     """Principal moments (3,), kg m², of a solid box of ``mass`` (kg) with edge lengths ``size`` (3,), metres.
 
-    Bullet estimates the inertia of a compound so, from its bounding box (ADF specification §12.6).
+    Bullet estimates the inertia of a compound so, from its bounding box.
     """
     x, y, z = np.asarray(size, dtype=float) ** 2
     return mass / 12.0 * np.array([y + z, x + z, x + y])

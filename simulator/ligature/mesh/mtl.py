@@ -1,4 +1,4 @@
-"""Reads Wavefront MTL files: the materials of an OBJ file, colours in 0..1 (ADF specification §12.4)."""
+"""Reads Wavefront MTL files: the materials of an OBJ file, colours in 0..1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reads Wavefront OBJ files, one part per material (ADF specification §12.4).
+"""Reads Wavefront OBJ files, one part per material.
 
 Parts follow the order of ``newmtl`` in the material libraries; ``o`` and ``g`` do not split.
 """

@@ -1,8 +1,8 @@
 """Finds the manipulators of a scene: by base body, joint chain and tool id, or as the launch file declares them.
 
 An unmodified scene of the suturing challenge has a base body ``base link…`` in a namespace such as ``…/psm1/``, the
-joints of a PSM below it, and a body ``tool id`` whose topic ends in the instrument's number (interface reference
-§2.10, §3.3). The launch key ``ligature arms``, which AMBF ignores, lists arms instead::
+joints of a PSM below it, and a body ``tool id`` whose topic ends in the instrument's number, as in the
+scenes of the suturing challenge. The launch key ``ligature arms``, which AMBF ignores, lists arms instead::
 
     ligature arms:
       - {name: PSM1, kind: psm, base: psm1/BODY base link, tool: LARGE_NEEDLE_DRIVER:420006}

@@ -1,8 +1,8 @@
 """Where joints start, and how loops close: the coordinates that best agree with where the files place the bodies.
 
-A joint starts where its bodies' ``location`` states (ADF specification §15.3 solved for the position); loops are then
+A joint starts where its bodies' ``location`` states; loops are then
 assembled by Gauss-Newton steps of least change over the joints and free bases that take part. I is a body's inertial
-frame, A and B are a joint's frames (§15.2); metres, radians.
+frame, A and B are a joint's frames; metres, radians.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Joints as chains of single axes: how a joint of the format becomes links of a Bullet tree.
 
 A joint relates constraint frame A (on the parent) to frame B (on the child): ``D = A^-1 B`` has the
-translation (x, y, z) along A and the rotation ``Rz(θz) Ry(θy) Rx(θx)`` (ADF specification §15.4).
+translation (x, y, z) along A and the rotation ``Rz(θz) Ry(θy) Rx(θx)`` (as in AMBF).
 Axes are unit vectors in frame A; coordinates 0-2 are metres, 3-5 radians.
 """
 

@@ -346,7 +346,7 @@ class SceneBuilder:
                 self.linked.append((parent, child))
 
     def _body(self, element: Element, key: str, local: list[int], namespace: str) -> int | None:
-        """The body that ``element`` names under ``key``, by the search order of §4.5."""
+        """The body that ``element`` names under ``key``, looked for in AMBF's order."""
         text = element.text(key)
         names = [body.identity.identifier for body in self.bodies]
         local_names = [names[i] for i in local]

@@ -65,7 +65,7 @@ class Command(Message):
 
 @dataclass(frozen=True)
 class BodyCommand(Command, code=1):
-    """Cartesian and joint command of one body (interface reference §3.1, §3.2).
+    """Cartesian and joint command of one body (as in AMBF).
 
     ``target`` is a pose (7,) for POSITION, a twist (6,) for VELOCITY, a wrench (6,) for FORCE.
     ``joint_values[i]`` goes to the i-th active joint of the body's tree, as ``joint_types[i]``.
@@ -87,7 +87,7 @@ class BodyCommand(Command, code=1):
 
 @dataclass(frozen=True)
 class ActuatorCommand(Command, code=2):
-    """Attach a body to a constraint actuator, or release what it holds (interface reference §3.4)."""
+    """Attach a body to a constraint actuator, or release what it holds (as in AMBF)."""
 
     actuator: int = wire(INDEX)
     actuate: bool = wire(FLAG)
@@ -141,7 +141,7 @@ class ParentCommand(_Mounted, code=8):
 
 @dataclass(frozen=True)
 class Release(Command, code=4):
-    """The watchdog of one object expired: its command is cleared (interface reference §2.4)."""
+    """The watchdog of one object expired: its command is cleared (as in AMBF)."""
 
     kind: str = wire(Choice(RELEASED))
     index: int = wire(INDEX)

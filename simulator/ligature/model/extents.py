@@ -1,4 +1,4 @@
-"""Bounding boxes and centroids of shapes, from which masses are estimated that a file does not give (§12.6).
+"""Bounding boxes and centroids of shapes, from which masses are estimated that a file does not give.
 
 Shapes are placed in the body frame B; metres.
 """
@@ -17,7 +17,7 @@ HULL_MARGIN_OF_ESTIMATE = 0.04
 def estimate_size(parts: tuple[Collider, ...], T_body_inertial: Array, margin: float) -> Array | None:
     """Edge lengths (3,) of the box around all shapes along the axes of I; None without a finite shape.
 
-    The boxes are those of Bullet, as in AMBF (§12.6): the box of a rotated shape bounds the shape's own box, except for
+    The boxes are those of Bullet, as in AMBF: the box of a rotated shape bounds the shape's own box, except for
     spheres and cones.
     """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)

@@ -134,7 +134,7 @@ class _Reading:
         shaders = None if world is None else shader_files(world.top, "shaders", world.path.parent)
         files.world = _settings(world, shaders, _chosen_arms(_listed_arms(launch), arms))
         if world is not None:
-            # the environment comes before everything and without the world's shader (§29.21)
+            # the environment comes before everything and without the world's shader
             if world.top.has("environment"):
                 self._add(self._referred(world.top, "environment", world))
             self._add(world)

@@ -1,4 +1,4 @@
-"""The format's rotations, poses and joint frames, by the names that the rooms above know them."""
+"""The format's rotations, poses and joint frames, under the names that other packages use."""
 
 from ligature.adf.frames import (
     ANTIPARALLEL,

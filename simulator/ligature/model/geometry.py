@@ -103,7 +103,7 @@ def visual(element: Element, context: FileContext, shaders: ShaderFiles | None) 
 
 
 def colour_of(element: Element) -> Colour | None:
-    """The material override of §10.2, or None to keep the mesh file's own."""
+    """The colours that ``use material`` sets, or None to keep those of the mesh file."""
     if not element.flag("use material"):
         return None
     if element.has("color rgba"):
@@ -220,7 +220,7 @@ def _point_radius(element: Element) -> float:
 
 
 def _body_low(element: Element) -> str:
-    """Body-level folder of collision meshes: low, else high (§3)."""
+    """Body-level folder of collision meshes: low, else high."""
     return element.text("low resolution path") or element.text("high resolution path")
 
 

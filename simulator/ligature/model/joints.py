@@ -70,7 +70,7 @@ def joint_of(
 
 
 def _limits(element: Element, kind: JointType) -> tuple[float | None, float | None]:
-    """Both limits or none; a fixed joint has none, a revolute one with low > high neither (§14)."""
+    """Both limits or none; a fixed joint has none, a revolute one with low > high neither."""
     low, high = element.value("joint limits.low"), element.value("joint limits.high")
     limited = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
     if low is None or high is None or kind not in limited or low > high:

@@ -1,4 +1,4 @@
-"""The format's look-up by text, by the name that the rooms above know it, and what a name that finds nothing raises."""
+"""The format's look-up by text for other packages, and the exception for a name that finds nothing."""
 
 from ligature.adf.references import candidates, find_by_text
 

@@ -23,11 +23,11 @@ from ligature.model.piercing import Tissue
 from ligature.model.scene import Actuator, Attachment, Body, Camera, Ghost, Identity, Light, SensorType, Slip
 
 MIN_CUTOFF, MAX_CUTOFF = 1e-3, np.pi / 2
-"""Half angles in radians to which that of a light is clamped (§19); its shadow map needs one above 0."""
+"""Half angles in radians to which that of a light is clamped; its shadow map needs one above 0."""
 
 
 def ghost_of(element: Element, context: FileContext) -> Callable[..., Ghost]:
-    """Makes a ghost object (§16) of ``index`` and ``identity``; raises `GeometryError` when it has no shape."""
+    """Makes a ghost object of ``index`` and ``identity``; raises `GeometryError` when it has no shape."""
     fallback = pose_matrix(*element.pose("inertial offset")) if element.has("inertial offset") else np.eye(4)
     shapes = colliders(element, context, fallback)
     if not shapes:
@@ -67,7 +67,7 @@ def _tissue(element: Element) -> Tissue:
 
 
 def light_of(element: Element) -> Callable[..., Light]:
-    """Makes a light (§19) of ``index`` and ``identity``."""
+    """Makes a light of ``index`` and ``identity``."""
     direction = np.array(element.vector("direction")) if element.has("direction") else None
     rpy = element.vector("location.orientation")
     return partial(
@@ -85,7 +85,7 @@ def light_of(element: Element) -> Callable[..., Light]:
 
 
 def camera_of(element: Element, folder: Path) -> Callable[..., Camera]:
-    """Makes a camera (§18) of ``index`` and ``identity``; shader paths are joined to ``folder``."""
+    """Makes a camera of ``index`` and ``identity``; shader paths are joined to ``folder``."""
     T = camera_frame(*(np.array(element.vector(k)) for k in ("location", "look at", "up")))
     stereo = None
     if element.has("stereo"):
@@ -124,7 +124,7 @@ def camera_of(element: Element, folder: Path) -> Callable[..., Camera]:
 
 
 def sensor_rays(element: Element, folder: Path, resolver: Resolver) -> Array:
-    """Start and end points (n, 2, 3) of a sensor's rays in its own frame (§17.2); a contact sensor has none.
+    """Start and end points (n, 2, 3) of a sensor's rays in its own frame; a contact sensor has none.
 
     Raises `GeometryError` for a negative range, and for a direction that is not of length 1.
     """
@@ -228,7 +228,7 @@ def _intrinsics(element: Element) -> dict[str, float] | None:
 
 
 def camera_frame(location: Array, target: Array, up: Array) -> Array:
-    """Camera frame (4, 4) in its parent's: it looks along -X at ``target``, +Z is up (§18.1).
+    """Camera frame (4, 4) in its parent's: it looks along -X at ``target``, +Z is up.
 
     A camera that looks at itself or along ``up`` stays at the parent's origin, as in the reference.
     """
@@ -241,7 +241,7 @@ def camera_frame(location: Array, target: Array, up: Array) -> Array:
 
 
 def light_frame(location: Array, direction: Array | None, rpy: tuple[float, float, float]) -> Array:
-    """Light frame (4, 4) in its parent's: it shines along +X, the other axes as the reference publishes (§19)."""
+    """Light frame (4, 4) in its parent's: it shines along +X, the other axes as the reference publishes."""
     if direction is None or np.linalg.norm(direction) < 0.01:
         return pose_matrix(location, rpy)
     x = direction / np.linalg.norm(direction)

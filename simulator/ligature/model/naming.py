@@ -1,4 +1,4 @@
-"""Names, namespaces and identifiers of objects (ADF specification §4.1 to §4.3, §4.7).
+"""Names, namespaces and identifiers of objects, as AMBF forms them.
 
 Files refer to each other's objects without the prefix of the command line (``--ns``): it is put before all names
 when every reference is settled, so that it cannot change what a text means.
@@ -55,7 +55,7 @@ class Names:
 
 
 def prefixed(scene: Scene, prefix: str) -> Scene:
-    """``scene`` with ``prefix`` before every namespace, without a separator (§4.2), as ``--ns`` has it."""
+    """``scene`` with ``prefix`` before every namespace, without a separator, as ``--ns`` has it."""
     if not prefix:
         return scene
     world = replace(scene.world, prefix=prefix, topic=topic_name(prefix + scene.world.namespace, "World"))

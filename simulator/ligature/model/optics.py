@@ -1,6 +1,6 @@
 """Cameras as measuring instruments: frames, pinhole matrices, stereo pairs and what calibration files hold.
 
-Frames: camera C looks along -X, +Y is image right, +Z image up (ADF specification §18.1); optical O is
+Frames: camera C looks along -X, +Y is image right, +Z image up (as in AMBF); optical O is
 ROS's and OpenCV's, x right, y down, z forward. Pixels are counted from the centre of the top left one, as in
 OpenCV: the middle of a picture w wide is (w - 1) / 2. Metres and radians.
 """
@@ -67,7 +67,7 @@ def pinhole(projection: Array, width: int, height: int) -> Array:
 
 
 def eye_offset(camera: Camera, eye: str) -> float:
-    """Metres from the camera to one of its `EYES` along image right; 0 for the camera itself (§18.2)."""
+    """Metres from the camera to one of its `EYES` along image right; 0 for the camera itself."""
     if camera.stereo is None or not eye:
         return 0.0
     return camera.stereo[0] * (-0.5 if eye == "left" else 0.5)

@@ -1,4 +1,4 @@
-"""Deferred parents: who an object rides on, settled while objects arrive (ADF specification §4.6)."""
+"""Deferred parents: which body carries an object, settled while objects arrive, as in AMBF."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
 
 
 def _estimated_offset(shapes: tuple[Collider, ...]) -> Array:
-    """Inertial frame (4, 4) in B of a body that gives none: at the centroid of its collision mesh (§12.6)."""
+    """Inertial frame (4, 4) in B of a body that gives none: at the centroid of its collision mesh."""
     centroid = mesh_centroid(shapes)
     return np.eye(4) if centroid is None else frame(np.eye(3), centroid)
 

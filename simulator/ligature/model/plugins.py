@@ -1,4 +1,4 @@
-"""Plug-ins that the files of a scene name (ADF specification §22): which, where they are, what they are given.
+"""Plug-ins that the files of a scene name (as in AMBF): which, where they are, what they are given.
 
 Nothing is loaded here: `ligature.plugins` runs them, for users who allow it.
 """

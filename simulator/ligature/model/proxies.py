@@ -1,4 +1,4 @@
-"""Proxies of input devices (ADF specification §8): models of their own whose root link a hand drives. World axes."""
+"""Proxies of input devices (as in AMBF): models of their own whose root link a hand drives. World axes."""
 
 from __future__ import annotations
 

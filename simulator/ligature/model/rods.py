@@ -1,4 +1,4 @@
-"""Recognises threads: chains of round bodies joined by bending springs become one elastic rod (DESIGN §4.1).
+"""Recognises threads: chains of round bodies joined by bending springs become one elastic rod.
 
 A chain is four or more bodies with one capsule, cylinder or sphere each, joined one after the other
 by ``six dof spring`` joints whose translation is locked. ``ligature rod: false`` on the file, a body

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Identity:
-    """How an object is called (ADF specification §4).
+    """How an object is called (as in AMBF).
 
     ``identifier`` is the qualified identifier with its remap suffix, for example
     ``/ambf/env/phantom/BODY Needle``; ``topic`` is the ROS name below which its topics live, for
@@ -55,7 +55,7 @@ class Identity:
 
 
 class OutputType(enum.Enum):
-    """What a controller's output is applied as (ADF specification §13, §15.6)."""
+    """What a controller's output is applied as (as in AMBF)."""
 
     FORCE = "force"
     VELOCITY = "velocity"
@@ -72,7 +72,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class CartesianController:
-    """Cartesian controller of a body (ADF specification §13)."""
+    """Cartesian controller of a body (as in AMBF)."""
 
     linear: Gains = Gains()
     angular: Gains = Gains()
@@ -86,8 +86,8 @@ class Body:
 
     ``inertia`` (3,) are the principal moments about I; ``T_body_inertial`` is I in B;
     ``T_world_body`` the initial pose; ``gravity`` (3,) in world axes is already settled (body over
-    model over world). ``joints`` are the active descendant joints in command-vector order (ADF
-    specification §11), ``children`` the matching child bodies. ``no_collision_with`` holds the
+    model over world). ``joints`` are the active descendant joints in the order of AMBF's
+    joint commands, ``children`` the matching child bodies. ``no_collision_with`` holds the
     bodies whose contacts with this one are switched off by joints, files or groups. ``needle`` is what
     the file states of `ligature.model.needles`, None for nothing. ``inertia_estimated``: the file gave none.
     ``tissue`` is what a body of soft tissue consists of; its shapes and visual are then those of the body at rest.
@@ -160,11 +160,11 @@ class SixDof:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """One joint between two bodies (ADF specification §14, §15).
+    """One joint between two bodies (as in AMBF).
 
     ``axis`` (3,) is a_A, the unit joint axis in the parent's inertial frame. ``T_parent_a`` is the
     constraint frame A in the parent's inertial frame, ``T_child_b`` frame B in the child's inertial
-    frame (§15.2). ``T_parent_child_zero`` is the child's body frame in the parent's body frame at
+    frame. ``T_parent_child_zero`` is the child's body frame in the parent's body frame at
     joint position zero. ``low``/``high`` are None when the joint has no limits.
     """
 
@@ -209,7 +209,7 @@ class Attachment:
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """A volume that senses what overlaps it and never produces a contact force (§16).
+    """A volume that senses what overlaps it and never produces a contact force.
 
     ``hole`` is what the file states of `ligature.model.holes`, None for nothing.
     """
@@ -226,7 +226,7 @@ class Ghost:
 
 
 class SensorType(enum.Enum):
-    """Sensor types (§17); the values are those of the ``type`` field of the messages."""
+    """Sensor types; the values are those of the ``type`` field of the messages."""
 
     PROXIMITY = "PROXIMITY"
     RESISTANCE = "RESISTANCE"
@@ -235,7 +235,7 @@ class SensorType(enum.Enum):
 
 @dataclass(frozen=True)
 class Resistance:
-    """Parameters of a resistance sensor (§17.3)."""
+    """Parameters of a resistance sensor."""
 
     static_friction: float = 0.0
     damping: float = 0.1
@@ -282,7 +282,7 @@ class Slip:
 
 @dataclass(frozen=True, eq=False)
 class Actuator:
-    """A constraint actuator (§17.5); ``T_body_actuator`` (4, 4) in the parent's body frame.
+    """A constraint actuator; ``T_body_actuator`` (4, 4) in the parent's body frame.
 
     It holds rigidly, or with ``slip`` between pads that are normal to its z axis.
     """
@@ -298,7 +298,7 @@ class Actuator:
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A camera (§18); the camera frame looks along -X, +Y is image right, +Z is image up."""
+    """A camera; the camera frame looks along -X, +Y is image right, +Z is image up."""
 
     index: int
     identity: Identity
@@ -329,7 +329,7 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A spot light (§19) shining along the +X axis of its frame."""
+    """A spot light shining along the +X axis of its frame."""
 
     index: int
     identity: Identity
@@ -342,7 +342,7 @@ class Light:
 
 @dataclass(frozen=True)
 class InputDevice:
-    """An input device of the launch file (§8), as written; teleoperation gives it a meaning.
+    """An input device of the launch file, as written; teleoperation gives it a meaning.
 
     ``proxy`` is the body that its hand drives, the root link of its proxy; -1 when that was not asked for.
     """
@@ -409,7 +409,7 @@ class Closure:
 
 @dataclass(frozen=True, eq=False)
 class RodChain:
-    """A chain of bodies that is simulated as one elastic rod (DESIGN §4.1), from end to end.
+    """A chain of bodies that is simulated as one elastic rod from end to end (docs/suture.md).
 
     ``bodies`` are the elements in order, ``joints`` the joints between neighbours. ``anchors`` are
     the joints that attach an element to a body outside the chain. ``radius`` in metres, ``lengths``
@@ -461,7 +461,7 @@ class ArmKind(enum.Enum):
 
 @dataclass(frozen=True)
 class ArmDescription:
-    """Which bodies are an arm (interface reference §5).
+    """Which bodies are an arm (as in the dVRK).
 
     ``base`` is the body whose frame the arm stands in, ``joints`` the joints of the chain from the base outwards,
     ``jaw`` the finger joints, ``tip`` the body that the chain ends in, ``tool`` the instrument's model number or

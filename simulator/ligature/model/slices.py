@@ -1,4 +1,4 @@
-"""Reads a stack of pictures as a field of values from 0 to 1 (ADF specification §21.2)."""
+"""Reads a stack of pictures as a field of values from 0 to 1 (as in AMBF)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Soft bodies of AMBF (ADF specification §20) as tissue that nothing holds.
+"""Soft bodies of AMBF as tissue that nothing holds.
 
 Bullet's soft body is a surface of M kg with n nodes and springs along its edges; each iteration of a step takes away
 the share ``kLST`` of what a spring is too long. For one spring between two nodes that leaves the stiffness

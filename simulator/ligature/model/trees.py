@@ -20,7 +20,7 @@ MAX_LINKS = 112
 
 @dataclass
 class _Below:
-    """Descendants of a body, (child body, joint) in the order of §11, and its ancestors."""
+    """Descendants of a body, (child body, joint) in the order of AMBF's joint commands, and its ancestors."""
 
     pairs: list[tuple[int, int]] = field(default_factory=list)
     children: set[int] = field(default_factory=set)
@@ -34,7 +34,7 @@ class _Below:
 
 
 def command_vectors(n_bodies: int, joints: Sequence[Joint]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """For every body the active joints below it and their child bodies, in command order (§11)."""
+    """For every body the active joints below it and their child bodies, in command order."""
     below = [_Below() for _ in range(n_bodies)]
     for joint in joints:
         if joint.parent == joint.child:
@@ -113,7 +113,7 @@ def silent_pairs(
     files: Iterable[Sequence[int]],
     groups: Sequence[tuple[int, ...]],
 ) -> list[frozenset[int]]:
-    """For every body those it does not collide with (§12.7).
+    """For every body those it does not collide with.
 
     ``linked`` are pairs of jointed bodies, ``files`` the bodies of files without inter-collision,
     ``groups`` the collision groups of each body.

@@ -1,4 +1,4 @@
-"""Volumes (ADF specification §21.2): a stack of pictures becomes a body in the shape of its iso-surface.
+"""Volumes: as in AMBF, a stack of pictures becomes a body in the shape of its iso-surface.
 
 Frames and units as in `ligature.model.scene`.
 """

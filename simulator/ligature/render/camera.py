@@ -1,6 +1,6 @@
 """Camera mathematics: projection, view and intrinsics of an ADF camera.
 
-Camera frame C (ADF specification §18.1): the camera looks along -X, +Y is image right, +Z image up.
+Camera frame C (as in AMBF): the camera looks along -X, +Y is image right, +Z image up.
 OpenGL eye frame: x right, y up, -z forward. Pinhole matrices count pixels as `ligature.model.optics` does.
 Metres and radians.
 """
@@ -87,7 +87,7 @@ def orthographic(width: float, aspect: float, near: float, far: float) -> Array:
 
 
 def from_intrinsics(values: dict[str, float], width: int, height: int, near: float, far: float) -> Array:
-    """OpenGL projection (4, 4) of pixel intrinsics fx, fy, cx, cy, s (ADF specification §18.2)."""
+    """OpenGL projection (4, 4) of pixel intrinsics fx, fy, cx, cy, s (as in AMBF)."""
     fx, fy = values.get("fx", 100.0), values.get("fy", 100.0)
     cx, cy, skew = values.get("cx", 0.0), values.get("cy", 0.0), values.get("s", 0.0)
     return np.array(
@@ -103,7 +103,7 @@ def from_intrinsics(values: dict[str, float], width: int, height: int, near: flo
 def projection_matrix(camera: Camera, width: int, height: int, eye: str = "") -> Array:
     """OpenGL projection (4, 4) of an ADF camera, or one of its eyes, for a picture of ``width`` x ``height`` pixels.
 
-    The frustum of an eye leans towards the middle by a quarter of the separation at the focal length (§18.2).
+    The frustum of an eye leans towards the middle by a quarter of the separation at the focal length.
     """
     near, far = camera.near, camera.far
     if camera.intrinsics is not None:

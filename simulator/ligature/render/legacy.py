@@ -216,7 +216,7 @@ SHADOW_COORDS = 1
 
 
 def _source(settings: LightSettings, T_eye_light: Array) -> dict[str, Any]:
-    """The members of ``gl_LightSource[i]`` of a light of the scene; white, as ADF has no colour of lights (§19)."""
+    """The members of ``gl_LightSource[i]`` of a light of the scene; white, as ADF has no colour of lights."""
     spot, directional = settings.kind is LightKind.SPOT, settings.kind is LightKind.DIRECTIONAL
     position = (*-T_eye_light[:3, 0], 0.0) if directional else (*T_eye_light[:3, 3], 1.0)
     constant, linear, quadratic = (1.0, 0.0, 0.0) if directional else settings.attenuation

@@ -1,6 +1,6 @@
 """Lights of a scene in the shaders' format, in eye space, and their shadows.
 
-A light shines along +X of its frame (ADF specification §19). Metres and radians. Nothing here inverts by
+A light shines along +X of its frame (as in AMBF). Metres and radians. Nothing here inverts by
 `numpy.linalg`: it wakes OpenBLAS's threads even for four rows, and they spin for longer than a picture takes.
 """
 

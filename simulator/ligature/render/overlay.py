@@ -85,7 +85,7 @@ def joint_axes(scene: Scene, state: NDArray[np.void], size: float) -> list[Segme
 
 
 def senses(scene: Scene, state: NDArray[np.void], pixel: float) -> list[Segment]:
-    """What visible sensors and actuators look like: rays, green until they hit, contact points, actuators (§17).
+    """What visible sensors and actuators look like: rays, green until they hit, contact points, actuators.
 
     ``pixel`` is the length in metres of one pixel of a contact sensor's marks.
     """

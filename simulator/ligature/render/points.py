@@ -1,4 +1,4 @@
-"""Runs ``depth compute shaders`` of a scene file over a depth picture (ADF specification §18.2, §18.3)."""
+"""Runs ``depth compute shaders`` of a scene file over a depth picture (as in AMBF)."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 FRAME_RATE = 120.0
-"""Frames a second of the clock that intervals count (interface reference §2.7)."""
+"""Frames a second of the clock that intervals count (as in AMBF)."""
 
 REPEAT = 0.5
 """Seconds after which a state that was shown already is shown again, while a simulation rests."""

@@ -1,4 +1,4 @@
-"""The sky box of a world file: six pictures around everything (ADF specification §6)."""
+"""The sky box of a world file: six pictures around everything (as in AMBF)."""
 
 from __future__ import annotations
 

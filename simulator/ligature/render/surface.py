@@ -70,7 +70,7 @@ class Surface:
 
 
 def surface_of(override: Colour | None, material: Material | None) -> Surface:
-    """The surface of a mesh part: ADF colours replace the material's, textures stay (specification §10.2)."""
+    """The surface of a mesh part: ADF colours replace the material's, textures stay."""
     if override is not None:
         own = material or Material("")
         look = evident(override, own.texture is not None)

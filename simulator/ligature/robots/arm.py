@@ -1,6 +1,6 @@
 """A CRTK arm: servo and moves in joint and Cartesian space, free of any transport.
 
-Names are those of CRTK (interface reference §5). ``local`` poses are in the arm's base frame; `measured_cp` and
+Names are those of CRTK. ``local`` poses are in the arm's base frame; `measured_cp` and
 `servo_cp` have the base frame applied that `set_base_frame` set. Poses are accepted as x y z qx qy qz qw (7,) or as
 matrices (4, 4) and returned as (7,). Twists and wrenches (6,) are linear then angular. Radians, metres, seconds of
 simulated time. A command that is not carried out raises `Rejected` and changes nothing.
@@ -151,7 +151,7 @@ class Arm(Device):
     # --- readiness --------------------------------------------------------------------------
 
     def direct(self, method: str, *values: Any) -> None:
-        """Carry out a motion for a client that knows no states, as the suturing challenge's node does (§4.7).
+        """Carry out a motion for a client that knows no states, as the suturing challenge's node does.
 
         The arm is enabled where it stands and need not be homed; the tip may begin anywhere and keeps no depth, poses
         are in the base. Joints are clipped to their limits all the same.

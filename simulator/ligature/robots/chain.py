@@ -21,7 +21,7 @@ HALF_PI = np.pi / 2
 
 
 class Convention(enum.Enum):
-    """Where a link's own frame sits (interface reference §6.1)."""
+    """Where a link's own frame sits (as in the dVRK)."""
 
     MODIFIED = "modified"
     """Craig: RotX(alpha) TransX(a) RotZ(theta) TransZ(d); the joint turns about the link's own z."""

@@ -1,6 +1,6 @@
 """The commands of CRTK arms: each knows its verb, its fields, and the method of the arm that it calls.
 
-A verb is the topic's name below the arm's (interface reference §5.4). Radians, metres, N, N m; frames as the arm's
+A verb is the topic's name below the arm's (as in the dVRK). Radians, metres, N, N m; frames as the arm's
 methods have them. How many joint values a verb takes depends on the arm, which rejects what does not fit it.
 """
 

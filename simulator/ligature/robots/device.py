@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 POWER_UP_SECONDS = 0.2
 SHORTEST_BUSY = 0.05
-"""Seconds that a move is busy at least, so that clients see it begin (interface reference §5.2 rule 3)."""
+"""Seconds that a move is busy at least, so that clients see it begin."""
 
 FOLLOWING_TIMEOUT = 1.0
 """Seconds for which a following error may exceed its bound before the arm stops with a fault."""
@@ -88,7 +88,7 @@ class Device:
 
     @property
     def is_homed(self) -> bool:
-        """Whether joint values are known; an arm without power does not count as homed (interface reference §5.2)."""
+        """Whether joint values are known; an arm without power does not count as homed (as in the dVRK)."""
         return self._homed and self._state in (State.ENABLED, State.PAUSED)
 
     @property

@@ -2,7 +2,8 @@
 
 The base frame of the ECM sits at the remote centre of motion (RCM), z against the shaft at joints zero. The tip frame
 of an endoscope looks along its +z, x to the right and y down in the image; that of the challenge's camera looks along
-its -z, y up. Joints: yaw, pitch, insertion, roll. Tables: interface reference §6.5, §6.6.
+its -z, y up. Joints: yaw, pitch, insertion, roll. Tables:
+``ECM.json`` and ``ECM_Si.json`` of the dVRK's sawIntuitiveResearchKit 2.4, and the challenge's ``ecmFK``.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ ENDOSCOPES = MappingProxyType(
         for view, angle in _ANGLES.items()
     }
 )
-"""Pose T_link4_tip (4, 4) of each endoscope by its CRTK name (§5.4, §6.5)."""
+"""Pose T_link4_tip (4, 4) of each endoscope by its CRTK name."""
 
 LIMITS = MappingProxyType(
     {
@@ -52,10 +53,10 @@ LIMITS = MappingProxyType(
         "Si": ((-2.964, 2.964), (-1.10, 1.04), (0.001, 0.259), (-1.54, 1.54)),
     }
 )
-"""(low, high) of the joints of each manipulator (§5.7)."""
+"""(low, high) of the joints of each manipulator."""
 
 SRC_LIMITS = ((-1.5, 1.5), (-1.5, 1.5), (-0.1, 0.1), (-1.57, 1.57))
-"""(low, high) of the joints of the challenge's camera (§4.5)."""
+"""(low, high) of the joints of the challenge's camera."""
 
 OFF_THE_LINE = 1e-6
 """Metres by which a pose may miss the line of sight of the challenge's camera."""
@@ -131,7 +132,8 @@ class Ecm(Chain):
 class SrcCamera(Chain):
     """The camera of the surgical robotics challenge: four joints that displace it from where the scene has it.
 
-    Poses are those of the camera in its initial frame. The fixed fifth link of §6.6 (alpha pi, theta pi/2) is the tip.
+    Poses are those of the camera in its initial frame. The challenge's fixed fifth link (alpha pi, theta pi/2) is the
+    tip.
     """
 
     def __init__(self) -> None:

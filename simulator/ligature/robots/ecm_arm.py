@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 HOME = np.array([0.0, 0.0, 0.12, 0.0])
 MAX_VELOCITY = np.array([np.pi / 6, np.pi / 6, 0.06, np.pi / 6])
 MAX_ACCELERATION = np.array([np.pi / 2, np.pi / 2, 0.06, np.pi / 2])
-"""Limits of moves (interface reference §5.5)."""
+"""Limits of moves."""
 
 SERVO_MAX_VELOCITY = np.array([4.0, 4.0, 0.6, 4.0])
 SERVO_MAX_DECELERATION = np.array([50.0, 50.0, 20.0, 100.0])
@@ -24,7 +24,7 @@ SERVO_MAX_DECELERATION = np.array([50.0, 50.0, 20.0, 100.0])
 FOLLOWING_BOUND = np.array([0.6, 0.6, 0.06, 1.5])
 
 LEAST_INSERTION = 0.04
-"""Insertion in metres that inverse kinematics keeps (§6.5)."""
+"""Insertion in metres that inverse kinematics keeps."""
 
 
 class EcmArm(Arm):

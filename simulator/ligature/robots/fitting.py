@@ -51,7 +51,7 @@ def master_side(name: str) -> str:
 
 
 def console_pose(side: str) -> Array:
-    """Where a master stands before the operator's view (interface reference §5.6), (4, 4)."""
+    """Where a master stands before the operator's view (as in the dVRK), (4, 4)."""
     x = 0.180 if side == "left" else -0.180
     return frame(rpy_matrix(5.0 * np.pi / 6.0, 0.0, np.pi), (x, 0.400, 0.475))
 

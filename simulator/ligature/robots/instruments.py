@@ -1,6 +1,6 @@
 """The instruments of the da Vinci Research Kit as data: lengths, joint limits, names.
 
-Metres and radians. Source: interface reference §6.4.
+Metres and radians. Source: ``share/tool`` of the dVRK's sawIntuitiveResearchKit 2.4.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from ligature.robots.chain import Array
 
 STANDARD_TIP = ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0))
-"""Rotation from the wrist yaw link to the tip of most instruments (§6.2)."""
+"""Rotation from the wrist yaw link to the tip of most instruments."""
 
 
 class InstrumentLengths(NamedTuple):

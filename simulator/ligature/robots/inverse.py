@@ -173,6 +173,6 @@ def nearest_turn(angle: float, near: float, low: float, high: float) -> float:
 
 @compiled
 def aim_shaft(x: float, y: float, z: float, q: Array) -> None:
-    """Yaw and pitch, into ``q``, that turn the shaft along x y z (eqs. 8 and 9 of the paper)."""
+    """Yaw and pitch, into ``q``, that turn the shaft along x y z (Munawar and others 2022, eqs. 8 and 9)."""
     q[0] = np.arctan2(x, -z)
     q[1] = -np.arctan2(y, np.sqrt(x * x + z * z))

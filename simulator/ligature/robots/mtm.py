@@ -2,7 +2,8 @@
 
 The base frame is that of the first joint. Joints: outer yaw, shoulder pitch, elbow pitch, wrist platform, wrist
 pitch, wrist yaw, wrist roll. The last four axes meet in one point, so the first three joints place the tip and the
-last four turn it, with one freedom to spare. Table (standard convention): interface reference §6.5.
+last four turn it, with one freedom to spare. Table (standard
+convention): ``MTML.json`` and ``MTMR.json`` of the dVRK's sawIntuitiveResearchKit 2.4.
 """
 
 from __future__ import annotations
@@ -46,10 +47,10 @@ LIMITS = MappingProxyType(
         "right": ((-1.13446, 0.698132), (-0.31416, 1.13446), (-0.872665, 0.610865), (-1.6580, 3.5779), *_COMMON),
     }
 )
-"""(low, high) of the joints in radians (§5.7)."""
+"""(low, high) of the joints in radians."""
 
 GRIPPER = (0.0, np.deg2rad(60.0))
-"""Nominal range of the gripper angle in radians (§5.4)."""
+"""Nominal range of the gripper angle in radians."""
 
 INSIDE = 1e-7
 """Radians by which a platform angle at the edge of what the wrist allows is kept inside, for rounding."""

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 HOME = np.zeros(7)
 MAX_VELOCITY = np.array([np.pi / 2] * 6 + [2 * np.pi])
 MAX_ACCELERATION = np.array([np.pi / 4] * 6 + [2 * np.pi])
-"""Limits of moves (interface reference §5.5)."""
+"""Limits of moves."""
 
 FOLLOWING_BOUND = np.full(7, np.inf)
 INERTIA = np.array([0.15, 0.15, 0.1, 0.02, 0.01, 0.01, 0.005])
@@ -32,7 +32,7 @@ DAMPING = np.array([0.6, 0.6, 0.4, 0.1, 0.05, 0.05, 0.03])
 """Of each joint in kg·m² and N·m·s: those of a light arm of half a metre that a hand stops within a second."""
 
 GRIPPER_LIMITS = np.array([[-0.698132], [1.047198]])
-"""Opening of the gripper; pressed beyond closed it is negative (interface reference §7.4)."""
+"""Opening of the gripper; pressed beyond closed it is negative (as in the dVRK)."""
 
 CLOSED = 0.0
 """Opening at which the gripper counts as closed."""

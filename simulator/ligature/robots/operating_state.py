@@ -1,4 +1,4 @@
-"""The operating state of a CRTK device: which command is allowed in which state (interface reference §5.2).
+"""The operating state of a CRTK device: which command is allowed in which state.
 
 The table is that of the real dVRK 2.x, which differs from CRTK's text in ``pause`` and ``home`` of a disabled arm.
 """

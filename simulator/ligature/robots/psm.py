@@ -2,7 +2,9 @@
 
 The base frame sits at the remote centre of motion (RCM), z against the shaft at joints zero. Joints: yaw, pitch,
 insertion, roll, wrist pitch, wrist yaw. Points: *palm*, where roll and wrist pitch axes meet at the end of the
-shaft; *pinch*, on the wrist yaw axis, ``wrist`` from the palm. Tables: interface reference §6.2.
+shaft; *pinch*, on the wrist yaw axis, ``wrist`` from the palm. Tables: ``PSM.json`` and
+``PSM_Si.json`` of the dVRK's sawIntuitiveResearchKit 2.4, and the challenge's own. Equations: Munawar and others,
+Open Simulation Environment for Learning and Practice of Robot-Assisted Surgical Suturing (2022), section III-D.
 """
 
 from __future__ import annotations
@@ -50,7 +52,7 @@ class PsmLengths:
 
     @property
     def tool_to_rcm(self) -> float:
-        """Insertion at which the palm is at the RCM (L_tool2rcm of the paper, eq. 10)."""
+        """Insertion at which the palm is at the RCM (L_tool2rcm in Munawar and others, eq. 10)."""
         return self.rcc - self.shaft
 
 
@@ -70,13 +72,13 @@ MANIPULATORS = MappingProxyType(
         "Si": Manipulator(0.4826, (-2.964, 2.964), (-1.265, 1.301), (0.0, 0.29)),
     }
 )
-"""The manipulators of the research kit (§6.2, §5.7)."""
+"""The manipulators of the research kit."""
 
 SRC_LENGTHS = MappingProxyType({400006: PsmLengths(0.4389, 0.416, 0.009), 420006: PsmLengths(0.4318, 0.4826, 0.009)})
-"""Lengths with which the surgical robotics challenge models its two instruments (§6.2)."""
+"""Lengths with which the surgical robotics challenge models its two instruments."""
 
 SRC_ROLL = (-3.05433, 3.05433)
-"""Roll limits of the challenge's solver (§6.2)."""
+"""Roll limits of the challenge's solver."""
 
 MODELS = (*MANIPULATORS, "SRC")
 """Values for the ``model`` of a `Psm`."""
@@ -132,9 +134,10 @@ class Psm(Chain):
     def inverse(self, T_base_tip: ArrayLike, seed: ArrayLike | None = None) -> InverseResult:
         """Joint values that bring the tip to ``T_base_tip`` (..., 4, 4).
 
-        The positions follow eqs. 4-10 of the paper; roll and wrist come from the rotation left over, by arctangents
-        alone, so small angles are not rounded (eqs. 12-14 lose those below 1.4 mrad). The solution is unique within
-        the limits but for whole turns of the roll, which stays closest to that of ``seed`` (6,) or (..., 6), or zero.
+        The positions follow eqs. 4-10 of Munawar and others; roll and wrist follow from the remaining rotation, by
+        arctangents alone, so that small angles are not rounded (eqs. 12-14 lose those below 1.4 mrad). The solution is
+        unique within the limits but for whole turns of the roll, which stays closest to that of ``seed`` (6,) or
+        (..., 6), or zero.
         A pose is singular when the wrist yaw axis or the palm passes through the RCM.
         """
         poses, shape = pose_rows(T_base_tip)

@@ -22,7 +22,7 @@ HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
 MAX_VELOCITY = np.array([np.pi / 2, np.pi / 2, 0.2, 6 * np.pi, 6 * np.pi, 6 * np.pi])
 MAX_ACCELERATION = np.array([np.pi / 2, np.pi / 2, 0.2, 4 * np.pi, 4 * np.pi, 4 * np.pi])
 JAW_MAX_VELOCITY, JAW_MAX_ACCELERATION = 6 * np.pi, 4 * np.pi
-"""Limits of moves (interface reference §5.5)."""
+"""Limits of moves."""
 
 SERVO_MAX_VELOCITY = np.array([10.0, 10.0, 1.5, 40.0, 40.0, 40.0])
 """Speeds at which the drives catch up with a set-point at most: beyond those of moves, below those of accidents."""
@@ -33,7 +33,7 @@ SERVO_MAX_DECELERATION = np.array([100.0, 100.0, 50.0, 4000.0, 4000.0, 4000.0])
 FOLLOWING_BOUND = np.array([0.6, 0.6, 0.06, 1.5, 1.5, 1.5])
 
 LEAST_DEPTH, ENTRY_DEPTH = 0.045, 0.043
-"""Depths of the end of the shaft below the remote centre: kept by Cartesian motion, and needed to begin it (§5.5)."""
+"""Depths of the end of the shaft below the remote centre: kept by Cartesian motion, and needed to begin it."""
 
 OPEN_ANGLE, CLOSED_ANGLE = np.deg2rad(60.0), np.deg2rad(-20.0)
 

@@ -25,7 +25,7 @@ from ligature.tasks.attempt import TASKS, Attempt, Score
 Array = NDArray[np.float64]
 
 REPORTS = "/surgical_robotics_challenge/completion_report"
-"""Root of the topics on which teams of the challenge report (interface reference §4.5)."""
+"""Root of the topics on which teams of the challenge report."""
 
 
 BAG = "a ROS bag"

@@ -1,6 +1,6 @@
-"""The camera node: pictures, calibrations, clouds and frames of cameras on ROS (interface reference §2.7).
+"""The camera node: pictures, calibrations, clouds and frames of cameras on ROS.
 
-It publishes what it is given; drawing is another room's. Frames: ``<camera>`` is the camera frame of AMBF,
+It publishes pictures that another process draws. Frames: ``<camera>`` is the camera frame of AMBF,
 ``<camera>_optical`` beside it is ROS's, and both hang below ``world``. All begin with the prefix of the scene.
 """
 

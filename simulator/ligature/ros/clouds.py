@@ -1,7 +1,7 @@
 """Point clouds of clients, which cameras draw: ``sensor_msgs/PointCloud`` on the topics of a parameter, as with AMBF.
 
 ``World/point_cloud_topics`` lists the topics; ``<topic>/radius`` sets the size of the points in pixels. The frame of a
-cloud is the body with the identifier ``header.frame_id``, the world where that is empty (interface reference §2.8).
+cloud is the body with the identifier ``header.frame_id``, the world where that is empty (as in AMBF).
 """
 
 from __future__ import annotations

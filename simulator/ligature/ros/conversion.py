@@ -1,7 +1,7 @@
 """Between state records and AMBF messages: plain functions and message templates, no ROS node.
 
 Poses are x y z qx qy qz qw. Rigid bodies report world poses; everything attached reports its pose
-in its parent's frame (interface reference §1).
+in its parent's frame (as in AMBF).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from ligature.model.state import MAX_CONTACT_EVENTS
 Record = NDArray[np.void]
 
 SMALLEST_QUATERNION = 0.1
-"""Quaternions shorter than this are taken as no rotation (interface reference §3.1)."""
+"""Quaternions shorter than this are taken as no rotation (as in AMBF)."""
 
 
 def fill_pose(message: Pose, pose: Sequence[float]) -> None:
@@ -96,7 +96,7 @@ class BodyTemplate(Template):
         self._wanted = (body.publish_children_names, body.publish_joint_names, body.publish_joint_positions)
 
     def ask(self, children: bool, names: bool, positions: bool) -> bool:
-        """Switch lists on; a command cannot switch them off (ADF specification §23). Whether there are more now.
+        """Switch lists on; a command cannot switch them off (as in AMBF). Whether there are more now.
 
         Commands come in on other threads: the message itself is written in `content` alone, so that no client sees
         names without positions.

@@ -1,4 +1,4 @@
-"""Which name an object has on ROS (interface reference §2.10).
+"""Which name an object has on ROS.
 
 ``ambf`` gives every object AMBF's own name. ``src`` is for the suturing challenge's scripts, which look objects up
 by a part of their name and give up when several match: the needle and the camera body stand directly below the

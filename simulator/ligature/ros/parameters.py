@@ -1,4 +1,4 @@
-"""Object parameters on the parameter server (interface reference §2.6): written at start, followed while running.
+"""Object parameters on the parameter server (as in AMBF): written at start, followed while running.
 
 The ROS process writes them and follows ``parent_name``; the camera process follows what pictures depend on.
 """

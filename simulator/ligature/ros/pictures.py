@@ -1,7 +1,7 @@
 """From arrays to picture messages: plain functions, no ROS node.
 
 Pictures have row 0 at the top and are in optical frames (x right, y down, z forward); point clouds are in the
-camera frame (looks along -X, +Y right, +Z up) and begin with the bottom row (ADF specification §18.3). Metres.
+camera frame (looks along -X, +Y right, +Z up) and begin with the bottom row (as in AMBF). Metres.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ WARNING_PAUSE = 2.0
 
 WORLD: Key = ("world", 0)
 RESETS = {"Reset": False, "Reset/Bodies": True, "ResetBodies": True}
-"""Topics below the world's Command, and whether they put back bodies only (interface reference §2.2)."""
+"""Topics below the world's Command, and whether they reset bodies only."""
 
 _RELEASED = ("body", "actuator", "camera", "light")
 COMMANDS = {

@@ -1,6 +1,6 @@
 """Tasks on ROS: takes the reports that participants of the suturing challenge send, publishes scores and measures.
 
-Reports have the challenge's topics and types (interface reference §4.5). What is published stands below
+Reports have the challenge's topics and types. What is published stands below
 ``/ligature/tasks/NAME``; docs/tasks.md lists it. SI units.
 """
 

@@ -1,7 +1,6 @@
 """Constraint actuators: attach or grasp a body by name, by sensor or with an offset, and release it.
 
-Semantics of the reference (interface reference §3.4, ADF specification §17.5): the body is held
-wherever it is, without tolerance; a request while something is held changes nothing.
+As in AMBF, the body is held wherever it is, without tolerance; a request while something is held changes nothing.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Contact sensors: which bodies touch the sensor's body, where, and how deep (ADF specification §17.4).
+"""Contact sensors: which bodies touch the sensor's body, where, and how deep (as in AMBF).
 
 World axes, metres; points and normals are on the other body.
 """

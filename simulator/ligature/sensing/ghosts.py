@@ -1,7 +1,7 @@
 """Ghost objects: which bodies and rod elements overlap a volume that follows its parent.
 
 World axes, metres. A body overlaps a ghost when one of its contact distances to it is below zero
-(ADF specification §16, revision B).
+(as in AMBF since August 2024).
 """
 
 from __future__ import annotations

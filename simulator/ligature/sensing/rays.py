@@ -1,7 +1,7 @@
 """Ray sensors: proximity measurements, and the penalty forces of resistance sensors.
 
 World axes, SI units. A ray's measurement is 1 minus the hit fraction: 0 for nothing or at the far
-end, 1 at the origin (ADF specification §17.2).
+end, 1 at the origin (as in AMBF).
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def _segments(sensor: Sensor, T_world_parent: Array) -> Array:
 
 
 class _Stick:
-    """Where each ray of a resistance sensor last stuck, and the forces that follow (§17.3)."""
+    """Where each ray of a resistance sensor last stuck, and the forces that follow."""
 
     def __init__(self, sensor: Sensor) -> None:
         self._sensor = sensor

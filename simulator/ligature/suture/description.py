@@ -196,7 +196,7 @@ def yield_angle(strain: float, radius: float, length: Array) -> Array:
 
 
 def from_chain(scene: Scene, chain: RodChain) -> RodDescription:
-    """The rod of a recognised chain: its bodies' masses and shapes, its joints' springs (ADF §15.4)."""
+    """The rod of a recognised chain: its bodies' masses and shapes, its joints' springs (as in AMBF)."""
     bodies = [scene.bodies[i] for i in chain.bodies]
     joints = [scene.joints[i] for i in chain.joints]
     n = len(bodies)

@@ -2,8 +2,8 @@
 
 A needle or a thread that first crosses the opening of a hole marks a puncture, a point and axes fixed in the hole's
 body. From then on the tissue pushes it back to the puncture like a spring, with friction along the path: viscous
-F = -K v as in the paper of the challenge, and Coulomb friction that keeps a released needle in place. A sideways
-force above the strength tears the tissue: the puncture moves on. World axes, SI units.
+F = -K v as in the suturing challenge (Munawar and others 2022), and Coulomb friction that keeps a released needle in
+place. A sideways force above the strength tears the tissue: the puncture moves on. World axes, SI units.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 Score = EstimationScore | InsertionScore | SutureScore
 
 TASKS = {"pose_estimation": 1, "insertion": 2, "suture": 3}
-"""Names of the tasks, with the numbers that the challenge gives them (interface reference §4.6)."""
+"""Names of the tasks, with the numbers that the challenge gives them."""
 
 CAMERA = "CameraFrame"
 """Name of the body in whose frame needle poses are reported."""

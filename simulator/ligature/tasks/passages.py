@@ -1,7 +1,7 @@
 """When the needle's tip goes through a hole: crossings of the hole's plane, as the suturing challenge counts them.
 
 In the frame of a hole body, z runs along the suture's way: an entry is crossed with z going from positive to negative,
-an exit from negative to positive (interface reference §4.6). Metres, seconds.
+an exit from negative to positive (as in the suturing challenge). Metres, seconds.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How well a task was done: the challenge's three tasks, with what its reports state. Metres, seconds.
 
-Success and fields are those of interface reference §4.6; `lines` are what a person reads, `report` what a program does.
+Success and fields are those of the challenge's evaluation; `lines` are for people, `report` is for programs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A pair on ROS as the dVRK's teleoperation component: ``MTMR_PSM1/…`` (interface reference §5.4).
+"""A pair on ROS as the dVRK's teleoperation component: ``MTMR_PSM1/…``.
 
 Besides the topics of the dVRK there is ``status``, which states in words what a pair does or what stands in its way.
 """

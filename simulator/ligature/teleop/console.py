@@ -1,4 +1,4 @@
-"""The surgeon's console as teleoperation hears it: switches, pedals, selections (interface reference §5.4, §5.8)."""
+"""The surgeon's console as teleoperation hears it: switches, pedals, selections (as in the dVRK)."""
 
 from __future__ import annotations
 

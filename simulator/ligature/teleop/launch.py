@@ -1,4 +1,4 @@
-"""The input devices of a scene's launch file as a teleoperation (§8 of the format).
+"""The input devices of a scene's launch file as a teleoperation.
 
 The hardware's name determines the kind and the topics, the root link the arm. Metres, radians, newtons.
 """

@@ -1,7 +1,7 @@
 """One leader and one follower from switched off to following, in the states of the dVRK's teleoperation component.
 
 DISABLED until it is wanted, SETTING_ARMS_STATE until both sides are there and ready, ALIGNING_MTM until the leader has
-the follower's orientation, then ENABLED (interface reference §5.4). Radians, seconds.
+the follower's orientation, then ENABLED (as in the dVRK). Radians, seconds.
 """
 
 from __future__ import annotations

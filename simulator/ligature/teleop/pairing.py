@@ -1,7 +1,7 @@
 """One leader that moves one follower: increments of position, absolute orientation, gripper to jaw.
 
 Both sides are seen as the operator sees them: the leader's hand in the frame of the view before the operator's eyes,
-the follower's tip in the frame of the camera that makes the view (interface reference §5.4, teleoperation). Poses are
+the follower's tip in the frame of the camera that makes the view, as in the dVRK. Poses are
 matrices (4, 4), metres and radians; times are seconds. A grip is 0 when closed and 1 when open.
 """
 

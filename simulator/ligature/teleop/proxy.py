@@ -1,4 +1,4 @@
-"""The proxy of an input device (ADF specification §8) as a follower, by AMBF's topics of its root link.
+"""The proxy of an input device as a follower, by AMBF's topics of its root link.
 
 It stands for an arm where a scene has none that is free. Metres, radians; the grip goes from 0, closed, to 1.
 """

@@ -1,4 +1,4 @@
-"""A running teleoperation from afar: what its pairs report, what a console may ask (interface reference §5.4)."""
+"""A running teleoperation from afar: what its pairs report, what a console may ask (as in the dVRK)."""
 
 from __future__ import annotations
 

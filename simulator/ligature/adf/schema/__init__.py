@@ -1,7 +1,6 @@
 """The one table of the format: every key of every kind of object, its type, unit, default and meaning.
 
-Reader, checker, writer and the support table in ``docs/adf.md`` are generated from it. Section
-numbers are those of the ADF specification.
+Reader, checker, writer and the support table in ``docs/adf.md`` are generated from it.
 """
 
 from ligature.adf.schema.attached import ACTUATOR, CAMERA, CLIPPING, LIGHT, SENSOR, VOLUME

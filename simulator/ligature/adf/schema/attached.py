@@ -1,4 +1,4 @@
-"""Rows of the schema for what rides on bodies: sensors, actuators, cameras, lights, volumes (ADF §17–§19, §21)."""
+"""Rows of the schema for what rides on bodies: sensors, actuators, cameras, lights, volumes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SENSOR = (
     Key("parametric.start offset", N, unit="m", doc="distance of the starts from S", required=True),
     Key("visible", F, False, doc="draw the sensor in the window"),
     Key("visible size", N, 0.02, "m", "radius of the markers; pixels for a contact sensor"),
-    Key("friction", MAP, doc="of a resistance sensor, §17.3"),
+    Key("friction", MAP, doc="of a resistance sensor"),
     Key("friction.static", N, 0.0, doc="stick stiffness"),
     Key("friction.damping", N, 0.1, doc="stick damping"),
     Key("friction.dynamic", N, 0.0, doc="sliding gain"),
@@ -45,7 +45,7 @@ SENSOR = (
     Key("contact area", N, 0.1, "m", "radius within which the stick point stays"),
     Key("contact stiffness", N, 0.0, "N", "normal force at full measurement"),
     *ignored(("contact damping",), "no effect"),
-    Key("distance threshold", N, 0.0, "m", "contact points up to this distance count, §17.4"),
+    Key("distance threshold", N, 0.0, "m", "contact points up to this distance count"),
     Key("process contact details", F, True, doc="draw the contact points"),
     *ignored(("direction", "count", "resolution"), "single ray of old files"),
     *ignored(("variable",), "belongs into `friction`"),

@@ -1,4 +1,4 @@
-"""Blocks of keys that several kinds of object share: identity, looks, collision, shaders, gains (ADF §10, §12)."""
+"""Blocks of keys that several kinds of object share: identity, looks, collision, shaders, gains (as in AMBF)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SHAPE_KEYS = {
     "CONE": ("radius", "height"),
     "PLANE": ("normal", "offset"),
 }
-"""Keys that the geometry of a shape must have (ADF §12.1)."""
+"""Keys that the geometry of a shape must have (as in AMBF)."""
 
 AXES = {a: a.upper() for a in "xyzXYZ"}
 OUTPUT_TYPES = {
@@ -56,7 +56,7 @@ IDENTITY = (
     Key("publish frequency.high", U, 1000, "Hz", "rate while commands arrive", required=True),
     PLUGINS,
 )
-PARENT = (Key("parent", T, "", doc="reference to the parent object, §4.5"),)
+PARENT = (Key("parent", T, "", doc="reference to the parent object"),)
 
 
 def _rgb(part: str, default: float) -> tuple[Key, ...]:
@@ -132,7 +132,7 @@ COLLISION = (
         "collision mesh type",
         C,
         "CONCAVE_MESH",
-        doc="how the mesh collides, §12.5",
+        doc="how the mesh collides",
         choices=MESH_TYPES,
         fault=Fault.VALUE,
     ),
@@ -163,5 +163,5 @@ def gains(block: str, doc: str, required: bool) -> tuple[Key, ...]:
 
 
 OUTPUT_TYPE = Key(
-    "controller output type", C, doc="quantity that the output commands, §13", choices=OUTPUT_TYPES, fault=Fault.VALUE
+    "controller output type", C, doc="quantity that the output commands", choices=OUTPUT_TYPES, fault=Fault.VALUE
 )

@@ -1,4 +1,4 @@
-"""Rows of the schema for bodies, joints, ghosts, soft bodies, vehicles and sutures (ADF §12–§16, §20, §21)."""
+"""Rows of the schema for bodies, joints, ghosts, soft bodies, vehicles and sutures."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ BODY = (
     Key("damping.linear", N, 0.04, doc="velocity × (1 − d)^dt; clipped to 0 to 1"),
     Key("damping.angular", N, 0.1, doc="velocity × (1 − d)^dt; clipped to 0 to 1"),
     Key("restitution", N, 0.1, doc="coefficient of restitution"),
-    Key("controller", MAP, doc="Cartesian controller, §13"),
+    Key("controller", MAP, doc="Cartesian controller"),
     *gains("controller.linear", "gains of the linear half", required=True),
     *gains("controller.angular", "gains of the angular half", required=True),
     OUTPUT_TYPE,
@@ -200,9 +200,9 @@ def _limits(half: str, unit: str) -> tuple[Key, ...]:
 
 JOINT = (
     *IDENTITY,
-    Key("parent", T, "", doc="parent body, §4.5", required=True, fault=Fault.OBJECT),
-    Key("child", T, "", doc="child body, §4.5", required=True, fault=Fault.OBJECT),
-    Key("type", C, doc="joint type, §14", required=True, choices=JOINT_TYPES),
+    Key("parent", T, "", doc="parent body", required=True, fault=Fault.OBJECT),
+    Key("child", T, "", doc="child body", required=True, fault=Fault.OBJECT),
+    Key("type", C, doc="joint type", required=True, choices=JOINT_TYPES),
     Key("parent pivot", V, unit="m", doc="joint origin in the parent's body frame", required=True),
     Key("child pivot", V, unit="m", doc="joint origin in the child's body frame", required=True),
     Key("parent axis", V, doc="joint axis in the parent's body frame", required=True),
@@ -216,13 +216,13 @@ JOINT = (
     *each("xyz", N, "joint limits.{}", 0.7, "rad", "half angle of a cone twist about frame {}"),
     *_limits("linear", "m"),
     *_limits("angular", "rad"),
-    *gains("controller", "joint PID, §15.6", required=False),
+    *gains("controller", "joint PID", required=False),
     OUTPUT_TYPE,
     Key("max motor impulse", N, 0.1, "N·m·s, N·s", "motor strength for each ms"),
     *unused(
         (
-            Key("joint erp", N, 0.1, doc="error reduction of the constraint, §15.4; articulations have no error"),
-            Key("joint cfm", N, 0.1, doc="constraint force mixing, §15.4; articulations do not yield"),
+            Key("joint erp", N, 0.1, doc="error reduction of the constraint; articulations have no error"),
+            Key("joint cfm", N, 0.1, doc="constraint force mixing; articulations do not yield"),
         )
     ),
     *_six("damping", 0.7, "N·s/m, N·m·s/rad", "damper of a spring; revolute and prismatic joints ignore it", 0.0),
@@ -296,7 +296,7 @@ SOFT_BODY = (
     Key("location", POSE, POSE_ZERO, "m, rad", "initial pose"),
     Key("mass", N, 1.0, "kg", "total mass, above 0", least=0.0, most=HEAVIEST),
     *unused((Key("randomize constraints", F, doc="any value randomises their order"),)),
-    Key("config", MAP, doc="Bullet's soft-body parameters, §20; how they count: docs/tissue.md"),
+    Key("config", MAP, doc="Bullet's soft-body parameters; how they count: docs/tissue.md"),
     Key("config.kLST", N, 1.0, doc="linear stiffness, 0 to 1; gives Young's modulus"),
     Key("config.piterations", I, 1, doc="position iterations; they raise the stiffness"),
     Key("config.kMT", N, 0.0, doc="pose matching, 0 to 1; adds to Young's modulus"),

@@ -1,4 +1,4 @@
-"""Rows of the schema for the four kinds of file and for input devices (ADF §5–§9)."""
+"""Rows of the schema for the four kinds of file and for input devices."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ OVERLAP = 1e-4
 
 @rule("mass-missing")
 def mass_missing(subject: Subject) -> Iterator[Finding]:
-    """Without ``mass`` the loader reads no inertial key and takes 1 kg (ADF §12.1)."""
+    """Without ``mass`` the loader reads no inertial key and takes 1 kg."""
     for body in subject.bodies.values():
         if not body.has("mass"):
             yield Finding(
@@ -88,7 +88,7 @@ def _geometric_moments(subject: Subject, body: Element) -> Array | None:
 
 @rule("capsule-too-short")
 def capsule_too_short(subject: Subject) -> Iterator[Finding]:
-    """A capsule's height holds both caps (ADF §12.1)."""
+    """A capsule's height holds both caps."""
     for element in _shaped(subject):
         for shape, _ in subject.shapes(element):
             if shape.kind == "CAPSULE" and shape.height < 2.0 * shape.radius * (1.0 - 1e-6):
@@ -109,7 +109,7 @@ def plane_in_compound(subject: Subject) -> Iterator[Finding]:
 
 @rule("group-out-of-range")
 def group_out_of_range(subject: Subject) -> Iterator[Finding]:
-    """Groups are 0 to 999 (ADF §12.7)."""
+    """Groups are 0 to 999."""
     for element in _shaped(subject):
         groups = [int(g) for g in element.numbers("collision groups")]
         wrong = [g for g in groups if not 0 <= g <= 999]
@@ -196,7 +196,7 @@ def _thickness(shape: Shape) -> float:
 
 @rule("name-clash")
 def name_clash(subject: Subject) -> Iterator[Finding]:
-    """Blanks are removed from names, and equal names share topics (ADF §4.1)."""
+    """Blanks are removed from names, and equal names share topics."""
     users: dict[tuple[str, str], Element] = {}
     for element in subject.objects:
         if element.kind in ("joint", "suture", "input device") or element.flag("passive"):

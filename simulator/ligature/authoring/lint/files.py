@@ -34,7 +34,7 @@ def duplicate_identifier(subject: Subject) -> Iterator[Finding]:
 
 @rule("mesh-missing")
 def mesh_missing(subject: Subject) -> Iterator[Finding]:
-    """A body whose mesh cannot be loaded is not created (ADF §12.2)."""
+    """A body whose mesh cannot be loaded is not created."""
     for element, key, path in _mesh_files(subject):
         if path.name in subject.unsaved:
             continue
@@ -63,7 +63,7 @@ def mesh_empty(subject: Subject) -> Iterator[Finding]:
 
 @rule("material-dialect")
 def material_dialect(subject: Subject) -> Iterator[Finding]:
-    """The reference takes the rest of a texture line for the name: no options, no absolute paths (ADF §12.4)."""
+    """The reference takes the rest of a texture line for the name: no options, no absolute paths."""
     for element, _, path in _mesh_files(subject):
         library = path.with_suffix(".mtl")
         if not library.is_file() or not subject.resolver.exists(library):

@@ -126,7 +126,7 @@ def travel_too_long(subject: Subject) -> Iterator[Finding]:
 
 @rule("axes-nearly-antiparallel")
 def axes_nearly_antiparallel(subject: Subject) -> Iterator[Finding]:
-    """Between 3.13 and π loaders choose different turns (ADF §15.1)."""
+    """Between 3.13 and π loaders choose different turns."""
     for joint, parent, child in _ends(subject):
         a = _turn(parent).T @ np.asarray(joint.vector("parent axis"))
         b = _turn(child).T @ np.asarray(joint.vector("child axis"))
@@ -163,7 +163,7 @@ def joint_residual(subject: Subject) -> Iterator[Finding]:
 
 
 def residual(joint: Element, kind: str, parent: Element, child: Element) -> tuple[float, float]:
-    """Metres and radians by which the bodies' places violate a joint, its free axes aside (ADF §15.4)."""
+    """Metres and radians by which the bodies' places violate a joint, its free axes aside."""
     T_pi, T_ci = matrix_of(parent.value("inertial offset")), matrix_of(child.value("inertial offset"))
     offset = joint.value("offset")
     frames = joint_frames(

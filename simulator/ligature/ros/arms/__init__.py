@@ -1,4 +1,4 @@
-"""CRTK topics and services of the arms, as the da Vinci Research Kit has them (interface reference §5)."""
+"""CRTK topics and services of the arms, as the da Vinci Research Kit has them."""
 
 from ligature.ros.arms.node import ArmsNode
 

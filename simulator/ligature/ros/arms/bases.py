@@ -1,7 +1,7 @@
 """Base frames that follow the camera, as the console of a dVRK with set-up joints keeps them. Metres.
 
 The tip of one arm, the reference, is the frame in which all others report and take their poses; the reference itself is
-in the frame of the cart, which stands where the world does (interface reference §5.6).
+in the frame of the cart, which coincides with the world, as in the dVRK.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The arms under the names that the suturing challenge's own CRTK node gives them: ``/CRTK/psm1/…`` and the like.
+"""The arms under the names that the suturing challenge's own CRTK node gives them, such as ``/CRTK/psm1/…``.
 
-That node (interface reference §4.7) knows no operating states: its arms move when asked to, and closing a jaw on
-something takes hold of it by the actuator of the tool. Radians, metres; frames as in §4.7.
+That node has no operating states: its arms move on every command, and a jaw that closes on something attaches it by the
+actuator of the tool. Radians, metres; poses are in the base frame of the arm.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ TASK_3_JOINTS = (-0.4, -0.22, 0.139, -1.64, -0.37, -0.11)
 TASK_3_ARM = "PSM2"
 TASK_3_OPEN = 0.8
 TASK_3_GRASP = frame(rpy_matrix(-np.pi / 2, 0.0, 0.0), (0.00997302, -0.00521514, 0.00323717))
-"""Pose of the needle in the tool yaw link, with which task 3 begins (§4.5)."""
+"""Pose of the needle in the tool yaw link, with which task 3 begins."""
 
 TASK_3_SECONDS = {"reach": 1.5, "bring": 3.0, "grasp": 0.3}
 ARRIVED = 5e-4

@@ -1,6 +1,6 @@
 """The surgeon's console on ROS: teleoperation switches, foot pedals, power, and the set-up joints.
 
-Topics as in interface reference §5.4, aliases of older systems as in §5.8. Who teleoperates listens to these topics;
+Topics are those of the dVRK's console 2.4, with the names of older versions. Teleoperation listens to these topics;
 the console itself moves nothing but the power of the arms.
 """
 

@@ -57,7 +57,7 @@ def operating_state(values: list[Any], stamp: Any) -> OperatingState:
 
 
 class Clock:
-    """Stamps that never repeat: a client takes no state that is not newer than its last (§5.2 rule 1)."""
+    """Stamps that never repeat: a client takes no state that is not newer than its last."""
 
     def __init__(self) -> None:
         self._last = rospy.Time()

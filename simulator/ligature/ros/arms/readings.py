@@ -1,6 +1,6 @@
 """What an arm publishes at a steady rate: topic, message type, and how the state record fills a message.
 
-Radians, metres, N·m, N; frames as in interface reference §5.6.
+Radians, metres, N·m, N; frames as in the dVRK (docs/arms.md).
 """
 
 from __future__ import annotations

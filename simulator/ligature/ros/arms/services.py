@@ -1,4 +1,4 @@
-"""Services of an arm: its state on demand, forward and inverse kinematics (interface reference §5.4)."""
+"""Services of an arm: its state on demand, forward and inverse kinematics (as in the dVRK)."""
 
 from __future__ import annotations
 

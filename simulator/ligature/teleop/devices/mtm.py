@@ -1,6 +1,6 @@
-"""Master arms by CRTK: ``<topic>measured_cp``, ``gripper/measured_js``, ``body/servo_cf`` (interface reference §7.4).
+"""Master arms by CRTK: ``<topic>measured_cp``, ``gripper/measured_js``, ``body/servo_cf``.
 
-Poses are in the frame of the console (HRSV): x to the operator's left, y up, z away into the picture (§5.6). Systems of
+Poses are in the frame of the console (HRSV): x to the operator's left, y up, z away into the picture. Systems of
 dVRK 1.x are heard under ``position_cartesian_current`` and ``state_gripper_current``. Metres, radians, newtons.
 """
 
@@ -24,7 +24,7 @@ from ligature.teleop.messages import Listener, pose_numbers
 Array = NDArray[np.float64]
 
 DEFAULTS = Calibration(axes=axes_of_words("left", "up", "away"), closed=-0.35, opened=1.05)
-"""A gripper's angle is the jaw's, from 60° open to fingers pressed beyond closed (§5.4, §7.4)."""
+"""A gripper's angle is the jaw's, from 60° open to fingers pressed beyond closed."""
 
 OPTIONS: dict[str, Any] = {}
 

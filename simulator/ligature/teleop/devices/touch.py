@@ -1,4 +1,4 @@
-"""Haptic pens: ``<topic>pose``, ``<topic>button`` with grey and white, ``<topic>force_feedback`` (paper, §III-D2).
+"""Haptic pens: ``<topic>pose``, ``<topic>button`` with grey and white, ``<topic>force_feedback``.
 
 Drivers differ in axes and units, which the calibration and ``unit`` take up. Metres, newtons.
 """
