@@ -37,9 +37,9 @@ def lay_out(folder: Path) -> None:
     (folder / "commands.md").write_text(reference.commands(), "utf-8")
     (folder / "topics.md").write_text(reference.topics(), "utf-8")
     (folder / "api").mkdir()
-    (folder / "api" / "ligature.md").write_text(reference.package(), "utf-8")
-    for room in reference.ROOMS:
-        (folder / "api" / f"{room}.md").write_text(reference.api(room), "utf-8")
+    (folder / "api" / "ligature.md").write_text(reference.top(), "utf-8")
+    for package in (*reference.PUBLIC, *reference.PARTS):
+        (folder / "api" / f"{package}.md").write_text(reference.api(package), "utf-8")
 
 
 def _linked(text: str, folder: Path) -> str:

@@ -160,7 +160,7 @@ def _first(text: str | None) -> str:
 
 # --- Python -----------------------------------------------------------------------------------
 
-ROOMS = (
+PUBLIC = (
     "adf",
     "mesh",
     "authoring",
@@ -175,19 +175,33 @@ ROOMS = (
     "tissue",
     "client",
 )
-"""What programs import; the other packages serve a run and are described in the architecture."""
+"""What programs import, in the order of their pages."""
+
+PARTS = (
+    "physics",
+    "suture",
+    "soft",
+    "grasping",
+    "arms",
+    "sensing",
+    "bus",
+    "ros",
+    "teleop",
+    "cockpit",
+)
+"""The parts of a simulation and of a run, for those who read or change them; `cli` has the page of its commands."""
 
 
-def modules(room: str) -> list[str]:
+def modules(package: str) -> list[str]:
     """The modules of a package that have public objects, by their names."""
-    folder = PACKAGE / room
+    folder = PACKAGE / package
     if not folder.is_dir():
-        return [f"ligature.{room}"]
+        return [f"ligature.{package}"]
     paths = sorted(path for path in folder.rglob("*.py") if path.name != "__init__.py" and "names" not in path.parts)
     names = [
         ".".join(("ligature", *path.relative_to(PACKAGE).with_suffix("").parts)) for path in paths if _public(path)
     ]
-    return [f"ligature.{room}", *names]
+    return [f"ligature.{package}", *names]
 
 
 def _public(path: Path) -> bool:
@@ -195,17 +209,29 @@ def _public(path: Path) -> bool:
     return any(isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_") for node in found)
 
 
-def api(room: str) -> str:
-    """The page of one package: what it exports under the package's name, the rest under the names of its modules."""
-    exported = _exported("ligature") | _exported(f"ligature.{room}")
-    text = [f"# ligature.{room}\n", f"```{{eval-rst}}\n.. automodule:: ligature.{room}\n```\n"]
-    for name in modules(room)[1:]:
-        left_out = ", ".join(sorted(exported))
+def api(package: str) -> str:
+    """The page of one package: what it exports under the package's name, the rest under the names of its modules.
+
+    Of `PARTS` the modules are only listed.
+    """
+    text = [f"# ligature.{package}\n", f"```{{eval-rst}}\n.. automodule:: ligature.{package}\n```\n"]
+    if package in PARTS:
+        rows = [(f"`{name}`", _cell(_summary(name))) for name in modules(package)[1:]]
+        return "\n".join([*text, "## Modules\n", _table(("module", "content"), rows)])
+    left_out = ", ".join(sorted(_exported("ligature") | _exported(f"ligature.{package}")))
+    for name in modules(package)[1:]:
         text.append(f"## {name}\n\n```{{eval-rst}}\n.. automodule:: {name}\n   :exclude-members: {left_out}\n```\n")
     return "\n".join(text)
 
 
-def package() -> str:
+def _summary(name: str) -> str:
+    """The first sentences of a module, of which nothing is imported."""
+    path = PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")
+    text = _first(ast.get_docstring(ast.parse(path.read_text("utf-8"))))
+    return text.removesuffix("::").replace("``", "`")
+
+
+def top() -> str:
     """The page of the package itself, name by name: it imports what it exports at the first use."""
     module = importlib.import_module("ligature")
     kinds = {name: "class" if isinstance(getattr(module, name), type) else "function" for name in module.__all__}

@@ -1,4 +1,4 @@
-"""The page of the architecture and the import contracts name every room."""
+"""The page of the architecture and the import contracts name every package."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+sys.path.insert(0, str(ROOT / "docs" / "site"))
+import reference  # noqa: E402
+
 PACKAGE = Path(ligature.__file__).parent
-ROOMS = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+PACKAGES = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
 MODULES = {path.stem for path in PACKAGE.glob("[a-z]*.py")}
 CONTRACTS = {
     contract["name"]: contract
@@ -32,22 +35,30 @@ def listed(names: list[str]) -> set[str]:
     return {word.removeprefix("ligature.") for name in names for word in name.split(" | ")}
 
 
-def test_every_room_and_module_has_a_row() -> None:
+def test_every_package_and_module_has_a_row() -> None:
     rows = set(re.findall(r"^\| `(\w+)`", (ROOT / "docs" / "architecture.md").read_text(), flags=re.MULTILINE))
-    assert rows == ROOMS | MODULES
+    assert rows == PACKAGES | MODULES
 
 
-def test_the_layers_hold_every_room() -> None:
-    assert listed(CONTRACTS["Data runs one way"]["layers"]) | BESIDE | {"client"} == ROOMS | MODULES
+def test_every_package_has_a_page_in_the_reference() -> None:
+    documented = [*reference.PUBLIC, *reference.PARTS]
+    assert len(documented) == len(set(documented))
+    assert set(documented) == PACKAGES - {"cli"} | {"simulation"}  # `cli` has the generated page of commands
+    listed = re.findall(r"^api/(\w+)$", (ROOT / "docs" / "python.md").read_text(), flags=re.MULTILINE)
+    assert listed == ["ligature", *documented]
 
 
-def test_the_client_may_use_no_other_room() -> None:
+def test_the_layers_hold_every_package() -> None:
+    assert listed(CONTRACTS["Data runs one way"]["layers"]) | BESIDE | {"client"} == PACKAGES | MODULES
+
+
+def test_the_client_may_use_no_other_package() -> None:
     forbidden = listed(CONTRACTS["The client stands alone"]["forbidden_modules"]) - {"numpy"}
-    assert forbidden == (ROOMS | MODULES) - {"client"}
+    assert forbidden == (PACKAGES | MODULES) - {"client"}
 
 
 @pytest.mark.parametrize("library", ["pybullet", "moderngl", "glfw", "viser", "websockets", "rospy", "rosbag"])
-def test_a_contract_of_all_rooms_keeps_a_library_in_its_own(library: str) -> None:
+def test_a_contract_of_all_packages_keeps_a_library_in_its_own(library: str) -> None:
     (contract,) = (c for c in CONTRACTS.values() if library in c.get("forbidden_modules", ()))
     assert contract["source_modules"] == ["ligature"]
     assert contract["ignore_imports"]

@@ -27,7 +27,22 @@ WATCH_PERIOD = 5
 
 
 class ArmSet(Subsystem, Mapping[str, Arm]):
-    """The arms of a running scene by name."""
+    """The arms of a running scene by name.
+
+    Parameters
+    ----------
+    scene
+        The scene with the arms.
+    world
+        The rigid bodies whose joints the arms drive.
+    dt
+        Length of a tick in seconds.
+
+    Raises
+    ------
+    UnknownNameError
+        If an arm is asked for that the scene does not have; the message lists the arms.
+    """
 
     def __init__(self, scene: Scene, world: World, dt: float = 1e-3) -> None:
         self._world, self._dt = world, dt

@@ -80,7 +80,17 @@ class BusError(RuntimeError):
 
 
 class Block:
-    """One mapped block; made by `create` or `attach`."""
+    """One mapped block; made by `create` or `attach`.
+
+    Parameters
+    ----------
+    path
+        The file in shared memory.
+    dtype
+        Layout of the states.
+    owner
+        Whether this process creates the file, and removes it in the end.
+    """
 
     def __init__(self, path: Path, dtype: StateDtype, owner: bool) -> None:
         self.path = path
@@ -130,10 +140,30 @@ class Block:
         patience: float | None = None,
         empty: bool = False,
     ) -> Block:
-        """Map the block ``name`` once it holds a state; with ``empty``, once it exists.
+        """Map the block ``name`` as soon as it holds a state.
 
-        Raises `BusError` when it does not within ``timeout`` seconds, when ``cancelled`` returns True meanwhile, or
-        when the block has another layout. ``patience`` is the former name of ``timeout``.
+        Parameters
+        ----------
+        name, dtype
+            Name of the file and layout of the states, as for `create`.
+        timeout
+            Longest wait in seconds.
+        cancelled
+            Is called during the wait; the wait ends if it returns True.
+        patience
+            The former name of ``timeout``.
+        empty
+            Whether a block without a state is enough.
+
+        Returns
+        -------
+        Block
+            The mapped block.
+
+        Raises
+        ------
+        BusError
+            If the wait ends without a state, or if the block has another layout.
         """
         if patience is not None:
             warn_deprecated("patience", "timeout")
@@ -186,7 +216,7 @@ class Block:
         return self.age < PHYSICS_TIMEOUT
 
     def note(self, severity: int, text: str) -> None:
-        """Keep a finding for `/diagnostics`, in place of the same one, or of the oldest."""
+        """Keep the finding ``text`` of ``severity`` for `/diagnostics`, in place of the same one or of the oldest."""
         findings = self.figures["findings"][0]
         words = text.encode("utf-8")[: findings.dtype["text"].itemsize]
         same = np.flatnonzero(findings["text"] == words)

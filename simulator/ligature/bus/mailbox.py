@@ -21,7 +21,7 @@ SILENCE = 0.5
 
 
 class Mailbox:
-    """Commands from the ``rings`` of all front ends."""
+    """The commands of all front ends for one ``scene``, checked; ``rings`` are the front ends' rings by name."""
 
     def __init__(self, scene: Scene, rings: Mapping[str, Ring]) -> None:
         self._rings = rings

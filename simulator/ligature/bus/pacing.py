@@ -14,7 +14,7 @@ WORLD = ("world", 0)
 
 DEFAULT_SKIP = 10
 BACKLOG = 0.05
-"""Seconds of delay that are made up for; what is later than that stays lost, and is reported."""
+"""Delay in seconds that the loop catches up; a longer delay stays, and is reported."""
 
 MOST_AHEAD = 10
 """Batches that a client's clock may be ahead, as many as a subscriber's queue holds; further edges are lost."""
@@ -29,20 +29,22 @@ class Throttle(Message, code=6):
     skip: int = wire(COUNT)
 
     @property
-    def object(self) -> tuple[str, int]:  # noqa: D102
+    def object(self) -> tuple[str, int]:
+        """The world."""
         return WORLD
 
     @property
     def slot(self) -> None:
-        """Each edge of the clock counts."""
+        """None: each edge of the clock counts, so that no command replaces another."""
 
     @property
-    def releases(self) -> bool:  # noqa: D102
+    def releases(self) -> bool:
+        """Whether the command ends throttling."""
         return not self.enabled
 
 
 MIN_SPEED, MAX_SPEED = 0.01, 100.0
-"""Bounds of simulated over wall time that may be asked for."""
+"""Bounds of the speed, simulated over wall time, that a command may set."""
 
 
 @dataclass(frozen=True)

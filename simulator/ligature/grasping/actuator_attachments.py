@@ -19,13 +19,39 @@ Array = NDArray[np.float64]
 
 
 class ActuatorAttachments:
-    """Attaches, grasps and releases bodies of a scene for its actuators."""
+    """Attaches, grasps and releases bodies of a scene for its actuators.
+
+    Parameters
+    ----------
+    scene, world, rods
+        The scene, its rigid bodies and its threads.
+    grasps
+        Takes the bodies that actuators with ``ligature slip`` hold by friction.
+    """
 
     def __init__(self, scene: Scene, world: World, rods: Rods, grasps: ActuatorGrasps) -> None:
         self._rod_bodies, self._world, self._rods, self._grasps = scene.rod_bodies, world, rods, grasps
 
     def attach(self, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
-        """Attach two frames rigidly; returns a handle. Raises ValueError when the bodies cannot be attached."""
+        """Attach two bodies rigidly.
+
+        Parameters
+        ----------
+        parent, child
+            Indices of the body that holds and of the body or rod element that is held.
+        T_parent_frame, T_child_frame
+            Frames (4, 4) in their body frames B, which coincide from now on.
+
+        Returns
+        -------
+        object
+            A handle for `holds` and `release`.
+
+        Raises
+        ------
+        ValueError
+            If ``child`` is an element of a rod and ``parent`` has no collision shape.
+        """
         if child in self._rod_bodies:
             self._rods.attach(parent, child, T_parent_frame, T_child_frame)
             return ("element", parent, child)
@@ -34,7 +60,22 @@ class ActuatorAttachments:
         return ("weld", handle, child)
 
     def grasp(self, slip: Slip, parent: int, child: int, T_parent_frame: Array, T_child_frame: Array) -> Any:
-        """Hold a body by friction where it is, an element of a rod rigidly; returns a handle."""
+        """Hold a body where it is by friction, or an element of a rod rigidly.
+
+        Parameters
+        ----------
+        slip
+            Normal force, friction and size of the pads.
+        parent, child
+            Indices of the body that holds and of the body or rod element that is held.
+        T_parent_frame, T_child_frame
+            Frames (4, 4) in their body frames B; the pads are in the first, the second is for rod elements.
+
+        Returns
+        -------
+        object
+            A handle for `holds` and `release`.
+        """
         if child in self._rod_bodies:
             return self.attach(parent, child, T_parent_frame, T_child_frame)
         number = self._grasps.add(slip, parent, child, T_parent_frame)

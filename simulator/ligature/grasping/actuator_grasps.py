@@ -12,7 +12,7 @@ from ligature.physics import World
 
 
 class ActuatorGrasps:
-    """The grasps of the actuators of a scene with ``ligature slip``, by number."""
+    """The grasps of those actuators of ``scene`` that have ``ligature slip``, by number; they act on ``world``."""
 
     def __init__(self, scene: Scene, world: World) -> None:
         self._scene, self._world = scene, world
@@ -28,9 +28,21 @@ class ActuatorGrasps:
         return [grasp for grasp, _ in self._grasps.values()]
 
     def add(self, slip: Slip, parent: int, child: int, T_parent_frame: np.ndarray) -> int:
-        """Grasp ``child`` where it is, between pads in a frame (4, 4) of body ``parent``.
+        """Grasp a body where it is.
 
-        Returns the grasp's number.
+        Parameters
+        ----------
+        slip
+            Normal force, friction and size of the pads.
+        parent, child
+            Indices of the body that holds and of the body that is held.
+        T_parent_frame
+            Frame (4, 4) of the pads in the parent's body frame B.
+
+        Returns
+        -------
+        int
+            The number of the grasp, for `holds` and `remove`.
         """
         bodies = self._scene.bodies
         T_palm_patch = inverse(bodies[parent].T_body_inertial) @ T_parent_frame

@@ -75,6 +75,8 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
 
     Parameters
     ----------
+    scene, world, rods
+        The scene, its rigid bodies and its threads.
     actuator_grasps
         The grasps of actuators; they are solved together with those of jaws.
     actuated

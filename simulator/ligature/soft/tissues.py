@@ -16,7 +16,19 @@ if TYPE_CHECKING:
 
 
 class Tissues(Subsystem):
-    """The bodies of tissue; `BeforeRods` begins their tick, this ends it."""
+    """The bodies of soft tissue of a scene; `BeforeRods` begins their tick, this ends it.
+
+    Parameters
+    ----------
+    scene
+        The scene with the tissue.
+    bodies
+        Gives motion and masses of the rigid bodies and takes impulses on them; the simulation passes its `World`.
+    rods
+        The threads, which pass through the tissue and lie on it.
+    dt
+        Length of a tick in seconds.
+    """
 
     def __init__(self, scene: Scene, bodies: SutureBodies, rods: Rods, dt: float) -> None:
         self._rods = rods
@@ -30,14 +42,14 @@ class Tissues(Subsystem):
         self._problems: list[Diagnostic] = []
 
     def begin(self) -> None:
-        """Do what comes before the rods' own step."""
+        """Begin the tick, before the rods are solved."""
         for rod in self._rods.rods:
             rod.clear_springs()
         for piece in self.pieces:
             piece.begin()
 
     def step(self, tick: int) -> None:
-        """Do what comes after the rods' own step."""
+        """End the tick, after the rods were solved."""
         for name, piece in zip(self._names, self.pieces, strict=True):
             piece.end()
             if piece.contacts.overflow and name not in self._reported:

@@ -94,9 +94,19 @@ class Rods:
                 self._heal(rod)
 
     def attach(self, body: int, element_body: int, T_body_a: Array, T_element_b: Array) -> None:
-        """Attach frame b of an element to frame a (4, 4) of a body; both are given in body frames B.
+        """Attach an element of a rod to a body rigidly.
 
-        Raises ValueError when ``element_body`` is no element of a rod or ``body`` has no collision shape.
+        Parameters
+        ----------
+        body, element_body
+            Indices of the body and of the element in the scene.
+        T_body_a, T_element_b
+            Frames (4, 4) in the body frames B of the two; they coincide while the attachment holds.
+
+        Raises
+        ------
+        ValueError
+            If ``element_body`` is not an element of a rod, or ``body`` has no collision shape.
         """
         if element_body not in self._places:
             raise ValueError(f"body {element_body} is not an element of a rod")
@@ -104,7 +114,7 @@ class Rods:
         rod.attach(element, body, T_element_b, T_body_a)
 
     def detach(self, body: int, element_body: int) -> None:
-        """Remove an attachment that `attach` made."""
+        """Remove the attachment of ``element_body`` to ``body`` that `attach` made."""
         rod, element = self._element(element_body)
         rod.detach(element, body)
 
@@ -143,7 +153,10 @@ class Rods:
         return self.rods[number], element
 
     def push(self, body: int, force: Array, point: Array, stiffness: Array) -> None:
-        """Push an element with ``force`` (3,) at ``point`` (3,) in the coming tick; see `Rod.push`."""
+        """Push the element ``body`` with ``force`` (3,) at ``point`` (3,) in the coming tick.
+
+        `Rod.push` explains ``stiffness`` (3, 3). World axes, N, m, N/m.
+        """
         rod, element = self._element(body)
         rod.push(element, force, point, stiffness)
 
@@ -152,7 +165,7 @@ class Rods:
         return self._exclusions[number].of_scene
 
     def exclude(self, number: int, bodies: Sequence[int], element: int | None) -> None:
-        """Disable collision of ``bodies`` with the elements around ``element`` of a rod; None enables it again."""
+        """Disable collision of ``bodies`` with the elements around ``element`` of rod ``number``; None enables it."""
         places = np.arange(len(self.rods[number].positions))
         beside = np.abs(places - element) < NEXT_TO_PADS if element is not None else None
         for body in bodies:
@@ -173,12 +186,12 @@ class Rods:
             rod.write(state["body_pose"][0], state["body_twist"][0], state["rod_tension"][0])
 
     def is_attached(self, body: int, element_body: int) -> bool:
-        """Whether `attach` holds an element to a body."""
+        """Whether `attach` holds the element ``element_body`` to ``body``."""
         rod, element = self._element(element_body)
         return any((constraint.element, constraint.body) == (element, body) for constraint in rod.constraints)
 
     def reset(self) -> None:
-        """Put every rod back to its initial shape, at rest."""
+        """Reset every rod to its initial shape, at rest."""
         for rod, exclusions in zip(self.rods, self._exclusions, strict=True):
             rod.reset()
             exclusions.restart()

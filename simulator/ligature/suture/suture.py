@@ -14,7 +14,17 @@ from ligature.suture.rods import Rods
 
 
 class Suture(Subsystem):
-    """All rods and holes of a scene among its rigid bodies."""
+    """All rods and tissue holes of a scene, coupled to its rigid bodies.
+
+    Parameters
+    ----------
+    scene
+        The scene with the rods and holes.
+    bodies
+        Gives motion and masses of the rigid bodies and takes impulses on them; the simulation passes its `World`.
+    dt
+        Length of a tick in seconds.
+    """
 
     def __init__(self, scene: Scene, bodies: SutureBodies, dt: float) -> None:
         self._bodies = bodies
