@@ -1,4 +1,4 @@
-"""Packs the extension: its own files, the rooms adf, mesh and authoring, cache and paths, and the wheels it needs.
+"""Packs the extension: its own files, the packages adf, mesh and authoring, cache and paths, and the wheels it needs.
 
 ``python blender_addon/pack.py OUT`` writes the legacy zip (Blender 3.4 to 4.1) and the extension zip
 (4.2 and later); ``--stage FOLDER`` only lays the legacy form out in a folder, for tests. Imports of
@@ -18,7 +18,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 SIMULATOR = HERE.parent / "simulator" / "ligature"
-ROOMS = ("adf", "mesh", "authoring")
+SHARED = ("adf", "mesh", "authoring")
 MODULES = ("cache.py", "paths.py")
 LEFT_OUT = {"mesh/distance.py", "mesh/quality.py", "mesh/coacd_process.py"}
 """Modules that need numba or SciPy, which Blender does not have."""
@@ -48,10 +48,10 @@ def stage(target: Path, vendored: bool) -> Path:
     shutil.copyfile(GUIDE, addon / GUIDE.name)
     (addon / "ligature").mkdir()
     (addon / "ligature" / "__init__.py").write_text(
-        '"""The rooms of Ligature that authors need."""\n', encoding="utf-8"
+        '"""The packages of Ligature that authors need."""\n', encoding="utf-8"
     )
-    for room in ROOMS:
-        for source in sorted((SIMULATOR / room).rglob("*.py")):
+    for package in SHARED:
+        for source in sorted((SIMULATOR / package).rglob("*.py")):
             name = source.relative_to(SIMULATOR)
             if name.as_posix() not in LEFT_OUT:
                 _copy(source, addon / "ligature" / name, "." * len(name.parts))

@@ -48,10 +48,10 @@ def without_what_is_right(source: str, hinted: dict[str, int], options: tuple[st
             yield line, text
 
 
-@pytest.mark.parametrize("room", ["adf", "mesh", "teleop", "cli"])
-def test_errors_of_files_and_options_say_what_would_be_right(room: str) -> None:
-    options = OPTIONS if room == "cli" else ()
-    paths = sorted((PACKAGE / room).rglob("*.py"))
+@pytest.mark.parametrize("package", ["adf", "mesh", "teleop", "cli"])
+def test_errors_of_files_and_options_say_what_would_be_right(package: str) -> None:
+    options = OPTIONS if package == "cli" else ()
+    paths = sorted((PACKAGE / package).rglob("*.py"))
     made = sum(name in HINTED or name in options for path in paths for _, name, _ in calls(path.read_text("utf-8")))
     assert made >= 5
     found = [

@@ -1,4 +1,4 @@
-"""No room of the package, and no module, imports itself through others, types included."""
+"""No package, and no module, imports itself through others, types included."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tests.bench.walks import Walk, returns, stretches
 MODULES = sources(".")
 
 
-@pytest.mark.parametrize("of_rooms", [True, False], ids=["rooms", "modules"])
-def test_imports_run_in_no_circle(of_rooms: bool) -> None:
-    graph = arrows(MODULES, of_rooms, with_types=True)
+@pytest.mark.parametrize("of_packages", [True, False], ids=["packages", "modules"])
+def test_imports_run_in_no_circle(of_packages: bool) -> None:
+    graph = arrows(MODULES, of_packages, with_types=True)
     assert sum(map(len, graph.values())) > 100
     assert circles(graph) == set()
 

@@ -27,7 +27,7 @@ from PIL import Image
 
 from tests.fuzz.seeds import ASCII_STL, MTL, OBJ
 
-ROOMS = Path(ligature.__file__).parent
+PACKAGE = Path(ligature.__file__).parent
 AT = {"x": 0.0, "y": 0.0, "z": 0.0}
 POSE = {"position": {"x": 0.1, "y": 0.2, "z": 0.3}, "orientation": {"r": 0.1, "p": 0.2, "y": 0.3}}
 OTHER = {"position": {"x": 0.3, "y": 0.1, "z": 0.2}, "orientation": {"r": 0.3, "p": 0.1, "y": 0.2}}
@@ -377,9 +377,9 @@ def readers() -> str:
     """All source text outside `ligature.model` and the reader of files."""
     return "\n".join(
         path.read_text("utf-8")
-        for path in sorted(ROOMS.rglob("*.py"))
-        if path.relative_to(ROOMS).parts[0] not in ("adf", "authoring", "tissue")
-        and not (path.relative_to(ROOMS).parts[0] == "model" and path.name in BUILDERS)
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if path.relative_to(PACKAGE).parts[0] not in ("adf", "authoring", "tissue")
+        and not (path.relative_to(PACKAGE).parts[0] == "model" and path.name in BUILDERS)
     )
 
 

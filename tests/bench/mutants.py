@@ -4,8 +4,8 @@
 
 A mutant is a module with one operator, comparison, constant or condition changed, or one statement left out. The tests of
 the module run against it in a process of their own, forked after the packages that do not change were imported, so that a
-mutant takes as long as its tests. ``TESTS`` are paths below `tests`, divided by commas: those of the module's room where
-`PARTS` has none; a room is all of its modules. Without arguments `PARTS` are done. Kernels run as Python, for machine code
+mutant takes as long as its tests. ``TESTS`` are paths below `tests`, divided by commas: those of the module's package where
+`PARTS` has none; a package is all of its modules. Without arguments `PARTS` are done. Kernels run as Python, for machine code
 that is kept would hide what changed; tests marked `machine_code` are left out then.
 """
 
@@ -195,8 +195,8 @@ def parts_of(words: list[str]) -> dict[str, str]:
     found = {}
     for word in words:
         name, _, tests = word.partition("=")
-        room = ROOT / "simulator" / "ligature" / name.replace(".", "/")
-        modules = sorted(room.rglob("*.py")) if room.is_dir() else [room.with_suffix(".py")]
+        package = ROOT / "simulator" / "ligature" / name.replace(".", "/")
+        modules = sorted(package.rglob("*.py")) if package.is_dir() else [package.with_suffix(".py")]
         for path in modules:
             if path.name != "__init__.py":
                 module = ".".join(path.relative_to(ROOT / "simulator" / "ligature").with_suffix("").parts)

@@ -1,9 +1,9 @@
-"""Draws which room of the package imports which, at two revisions, and counts circles.
+"""Draws which package imports which, at two revisions, and counts circles.
 
     python -m tests.bench.structure [REVISION ...] [--out FILE]
 
 A revision is what git knows by that name; ``.`` is the working tree. Imports within functions count, those for types alone
-are counted apart. Without arguments the state before rooms, commands and snapshots were put in order is compared with the
+are counted apart. Without arguments the state before packages, commands and snapshots were put in order is compared with the
 working tree. The drawing is ``build/structure.png``.
 """
 
@@ -59,17 +59,17 @@ def _imports(node: ast.AST, names: set[str], for_types: bool) -> Iterator[tuple[
         yield from _imports(child, names, for_types or guarded)
 
 
-def room_of(module: str) -> str:
-    """The room, or the module outside rooms, that a module belongs to."""
+def package_of(module: str) -> str:
+    """The package, or the module outside packages, that a module belongs to."""
     return module.split(".")[1] if "." in module else module
 
 
-def arrows(modules: dict[str, str], of_rooms: bool, with_types: bool) -> Arrows:
-    """What each room, or module, imports of others."""
+def arrows(modules: dict[str, str], of_packages: bool, with_types: bool) -> Arrows:
+    """What each package, or module, imports of others."""
     found: Arrows = {}
     for name, text in modules.items():
         for target, for_types in imports(text, set(modules)):
-            begin, end = (room_of(name), room_of(target)) if of_rooms else (name, target)
+            begin, end = (package_of(name), package_of(target)) if of_packages else (name, target)
             found.setdefault(begin, set())
             found.setdefault(end, set())
             if begin != end and (with_types or not for_types):
@@ -97,7 +97,7 @@ def circles(graph: Arrows) -> set[frozenset[str]]:
 
 
 def layers(graph: Arrows) -> dict[str, int]:
-    """Height of each room over what imports nothing; rooms of a circle are as high as what it stands on."""
+    """Height of each package over what imports nothing; packages of a circle are as high as what it stands on."""
     far = {name: reached(graph, name) for name in graph}
     heights: dict[str, int] = {}
 
@@ -163,14 +163,14 @@ def main() -> int:
     graphs = {}
     for revision in given.revisions:
         modules = sources(revision)
-        rooms = arrows(modules, of_rooms=True, with_types=False)
-        graphs["the working tree" if revision == "." else revision] = rooms
+        packages = arrows(modules, of_packages=True, with_types=False)
+        graphs["the working tree" if revision == "." else revision] = packages
         report(
-            f"{revision}: {len(modules)} modules, {len(rooms)} rooms, {sum(map(len, rooms.values()))} arrows between rooms"
+            f"{revision}: {len(modules)} modules, {len(packages)} packages, {sum(map(len, packages.values()))} arrows between packages"
         )
-        for of_rooms, kind in ((True, "rooms"), (False, "modules")):
+        for of_packages, kind in ((True, "packages"), (False, "modules")):
             for with_types in (False, True):
-                found = circles(arrows(modules, of_rooms, with_types))
+                found = circles(arrows(modules, of_packages, with_types))
                 named = "; ".join(", ".join(sorted(group)) for group in found)
                 report(f"  circles of {kind}{', types included' * with_types}: {len(found)} {named}".rstrip())
     draw(graphs, given.out)

@@ -1,4 +1,4 @@
-"""The packed add-on: relative imports only, no Blender in the shared rooms, equal bytes for equal content."""
+"""The packed add-on: relative imports only, no Blender in the shared packages, equal bytes for equal content."""
 
 from __future__ import annotations
 

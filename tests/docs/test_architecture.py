@@ -31,7 +31,7 @@ BESIDE = {"bundle", "definitions", "deprecation", "process"}
 
 
 def listed(names: list[str]) -> set[str]:
-    """Rooms and modules in a list of a contract."""
+    """Packages and modules in a list of a contract."""
     return {word.removeprefix("ligature.") for name in names for word in name.split(" | ")}
 
 

@@ -1,4 +1,4 @@
-"""Rods and bodies that the tests of the suture room share."""
+"""Rods and bodies that the tests of the suture package share."""
 
 from __future__ import annotations
 

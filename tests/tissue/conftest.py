@@ -1,4 +1,4 @@
-"""A pad of tissue and a needle on a spring that the tests of the room share."""
+"""A pad of tissue and a needle on a spring that the tests of the package share."""
 
 from __future__ import annotations
 

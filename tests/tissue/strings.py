@@ -1,4 +1,4 @@
-"""A thread of our own for the tests of the room: point masses on springs, solved with what holds it in tissue."""
+"""A thread of our own for the tests of the package: point masses on springs, solved with what holds it in tissue."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The ROS master: names of simulators, and does it still know this node.
+"""The ROS master: names of running simulators, and whether the master still has this node.
 
-A master that hangs or restarts must not hold up publishing, so it is watched on a thread of its own. Of our rooms the
-client needs this too, so nothing of the simulator is imported here.
+A thread of its own watches the master, so that a master that hangs or restarts does not delay publishing. `ligature.client`
+uses this module too, so it imports nothing of the simulator.
 """
 
 from __future__ import annotations
