@@ -232,7 +232,7 @@ class Simulation:
         """
         self._check_open()
         if ticks < 0:
-            raise ValueError(f"ticks is {ticks}; it must be 0 or more, for time does not run backwards")
+            raise ValueError(f"ticks is {ticks}; it must be 0 or more")
         while ticks > 0:
             passed = self._coast(ticks) if ticks > 1 else 0
             if not passed:
@@ -445,10 +445,10 @@ class Simulation:
         """
         self._check_open()
         if not isinstance(snapshot, Snapshot):
-            raise TypeError(f"a {type(snapshot).__name__} is no snapshot; give what 'snapshot' returned")
+            raise TypeError(f"a {type(snapshot).__name__} is not a snapshot; restore what 'snapshot' returned")
         if snapshot.scene != self._scene_digest:
             raise ValueError(
-                "the snapshot is of another scene or tick; restore it in a simulation made in the same way"
+                "the snapshot is of another scene or tick length; restore it in a simulation of its scene and dt"
             )
         parts = copied(dict(snapshot.parts))
         self._clock, self._resting = parts["clock"], parts["resting"]
@@ -485,7 +485,9 @@ class Simulation:
 
     def __reduce__(self) -> NoReturn:
         """Copies and pickles are rejected, for two would share one engine."""
-        raise TypeError("a simulation cannot be copied or pickled; restore its 'snapshot' in another of the same scene")
+        raise TypeError(
+            "a simulation cannot be copied or pickled; restore its 'snapshot' in another simulation of the scene"
+        )
 
 
 @dataclass

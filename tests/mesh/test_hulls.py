@@ -43,10 +43,10 @@ def test_a_hull_is_the_same_when_it_is_read_again(
 
 def test_points_that_enclose_nothing_are_kept_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
-    with pytest.raises(ValueError, match="enclose nothing"):
+    with pytest.raises(ValueError, match="enclose no volume"):
         hulls.convex_hull(square)
     monkeypatch.setattr(hulls, "_computed", refuse)
-    with pytest.raises(ValueError, match="enclose nothing"):
+    with pytest.raises(ValueError, match="enclose no volume"):
         hulls.convex_hull(square)
     np.testing.assert_array_equal(np.abs(hulls.hull_planes(square)[:, :3]).sum(axis=0), [2.0, 2.0, 2.0])
 

@@ -192,7 +192,7 @@ def test_a_capsule_along_x_is_turned(lab) -> None:
 
 def test_a_file_without_bodies_cannot_run(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text("bodies: []\n")
-    with pytest.raises(ligature.SceneError, match="yields no body to simulate"):
+    with pytest.raises(ligature.SceneError, match="contains no body to simulate"):
         ligature.load(tmp_path / "m.yaml")
 
 

@@ -116,7 +116,7 @@ def _matrix(key: Key, node: Node) -> tuple[tuple[float, ...], ...]:
     if len(rows) != 4 or any(len(row) != 4 for row in rows):
         raise BadValue(node, "four rows of four numbers")
     if np.linalg.matrix_rank(np.array(rows)) < 4:
-        raise BadValue(node, "four independent rows: this one has no inverse, so it shows nothing", unusable=True)
+        raise BadValue(node, "four linearly independent rows; this matrix has no inverse", unusable=True)
     return rows
 
 

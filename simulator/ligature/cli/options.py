@@ -132,7 +132,9 @@ class RunOptions:
             raise ValueError("the options of the run name no scene")
         options = cls(**values)
         if not (1.0 <= options.rate <= 1000.0 and 0.0 < options.speed < math.inf):
-            raise ValueError(f"the run has {options.rate:g} updates per second at speed {options.speed:g}")
+            raise ValueError(
+                f"a run has 1 to 1000 updates per second and a speed above 0, not {options.rate:g} and {options.speed:g}"
+            )
         return options
 
 

@@ -26,7 +26,7 @@ class ConvexHull(NamedTuple):
 
 
 def convex_hull(points: Array) -> ConvexHull:
-    """The hull of ``points`` (n, d); raises ValueError when they enclose nothing."""
+    """The hull of ``points`` (n, d); raises ValueError when they enclose no volume."""
     points = np.ascontiguousarray(points, dtype=float)
     path = _path(points)
     hull = _stored(path) if path else None
@@ -35,7 +35,7 @@ def convex_hull(points: Array) -> ConvexHull:
         if path:
             _store(path, hull)
     if not len(hull.simplices):
-        raise ValueError("the points enclose nothing")
+        raise ValueError("the points enclose no volume")
     return hull
 
 
@@ -52,7 +52,7 @@ def hull_planes(points: Array) -> Array:
 
 
 def _computed(points: Array) -> ConvexHull:
-    """The hull as Qhull finds it; without facets when the points enclose nothing."""
+    """The hull as Qhull finds it; without facets when the points enclose no volume."""
     from scipy.spatial import ConvexHull as Qhull
     from scipy.spatial import QhullError
 

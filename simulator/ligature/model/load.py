@@ -85,6 +85,6 @@ def load(
     if not scene.bodies:
         # What kept the bodies out says enough.
         errors = [d for d in scene.diagnostics if d.severity >= Severity.ERROR]
-        nothing = Diagnostic(Severity.ERROR, "the file yields no body to simulate", found.start.top.mark)
+        nothing = Diagnostic(Severity.ERROR, "the file contains no body to simulate", found.start.top.mark)
         raise SceneError(*(errors or [nothing]))
     return prefixed(scene, namespace_prefix)

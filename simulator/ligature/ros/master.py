@@ -1,7 +1,7 @@
 """The ROS master: names of running simulators, and whether the master still has this node.
 
-A thread of its own watches the master, so that a master that hangs or restarts does not delay publishing. `ligature.client`
-uses this module too, so it imports nothing of the simulator.
+A thread of its own watches the master, so that a master that hangs or restarts does not delay publishing.
+`ligature.client` uses this module too, so it imports nothing of the simulator.
 """
 
 from __future__ import annotations

@@ -412,7 +412,10 @@ class Teleop:
             self.seat.camera_scale = what
             self._camera_topics.publish("scale", what)
         else:
-            raise Conflict("commands are enable and disable, a scale is above 0 and at most 1")
+            raise Conflict(
+                f"'{verb}' does not take {what!r}; a state is enable or disable, "
+                f"a scale above 0 and at most {MOST_SCALE:g}"
+            )
 
     def _on_component(self, value: tuple[str, str, Any]) -> None:
         name, verb, what = value
@@ -432,7 +435,10 @@ class Teleop:
             self.seat.change(leader, align=what)
             pair.topics.publish("align_mtm", what)
         else:
-            raise Conflict("states are enable, disable, align_MTM; a scale is above 0 and at most 1")
+            raise Conflict(
+                f"'{verb}' does not take {what!r}; a state is enable, disable or align_MTM, "
+                f"a scale above 0 and at most {MOST_SCALE:g}"
+            )
 
     def _on_rival(self, value: tuple[str, str]) -> None:
         """Hold an arm that another node moves too, so that the two do not alternate."""

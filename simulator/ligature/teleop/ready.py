@@ -49,7 +49,10 @@ def _one(text: str) -> tuple[TeleopConfig, str]:
     """The teleoperation of one device, with the topic that the user named."""
     name, equals, topic = text.partition("=")
     if name not in names() or (equals and not topic):
-        raise ValueError(f"no device '{text}' is ready; choose one of {', '.join(names())}, each also as touch=/arm1/")
+        raise ValueError(
+            f"no device '{text}' works without a file; choose one of {', '.join(names())}, "
+            "each also with a topic, such as touch=/arm1/"
+        )
     if equals and name in ("touch", "mtm"):  # topics begin with it
         topic = topic.rstrip("/") + "/"
     return config.read(FOLDER / f"{name}.yaml"), topic

@@ -58,7 +58,9 @@ class NeedleInTissue:
 
     def __init__(self, interface: Interface, paths: Paths, curvature: float, length: float, radius: float) -> None:
         if not (length > 0.0 and radius > 0.0 and curvature >= 0.0):
-            raise ValueError(f"needle of length {length}, radius {radius}, curvature {curvature} is impossible")
+            raise ValueError(
+                f"a needle has length and radius above 0 and curvature from 0, not {length}, {radius} and {curvature}"
+            )
         self._interface, self._paths, self.radius = interface, paths, radius
         self.arrays = needle_arrays()
         self.table = table_of(self.arrays)
