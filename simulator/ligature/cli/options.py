@@ -133,7 +133,7 @@ class RunOptions:
         options = cls(**values)
         if not (1.0 <= options.rate <= 1000.0 and 0.0 < options.speed < math.inf):
             raise ValueError(
-                f"a run has 1 to 1000 updates per second and a speed above 0, not {options.rate:g} and {options.speed:g}"
+                f"runs have 1 to 1000 updates per second and speeds above 0, not {options.rate:g} and {options.speed:g}"
             )
         return options
 
