@@ -526,11 +526,12 @@ def test_a_number_that_cannot_be_used_is_an_error_or_has_no_effect(kind: str, ke
         try:
             without = loaded(folder, kind, key, context, ABSENT)
         except AssertionError:
-            continue  # it is required there
+            without = None  # it is required there
         for value in beyond:
             try:
                 scene = loaded(folder, kind, key, context, value)
             except AssertionError:
                 continue
+            assert without is not None, f"{value} is taken beside {context}, where the key is required"
             assert not differences(without, scene), f"{value} is taken beside {context}"
             assert any(d.severity >= Severity.WARNING for d in scene.diagnostics), f"{value} is not reported"

@@ -219,6 +219,7 @@ def test_what_check_passes_can_be_simulated_at_any_mass_and_stiffness(
     try:
         scene = ligature.load(write(tmp_path, trimesh.creation.box((0.1, 0.1, 0.1)), "", 10**mass, more))
     except ligature.SceneError as refused:
+        assert refused.diagnostics
         assert all(d.mark is not None and d.hint for d in refused.diagnostics), refused
         return
     simulation = Simulation(scene)

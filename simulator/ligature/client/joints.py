@@ -156,6 +156,17 @@ class JointedObject(BaseObject):
         index = operator.index(joint)
         return index if self.is_joint_idx_valid(index) else None
 
+    def _write_joint(self, joint: str | int, value: float, kinds: str, kind: Any, others: Any) -> None:
+        """Command one joint; the field ``kinds`` of the command holds the kind of each joint, at first ``others``."""
+        value, index = float(value), self._index(joint)
+        if index is None or not self._takes(value):
+            return
+        with self._lock:
+            cmd = self._cmd
+            cmd.joint_cmds = grown(cmd.joint_cmds, index + 1, 0.0)
+            setattr(cmd, kinds, grown(getattr(cmd, kinds), index + 1, others))
+            cmd.joint_cmds[index], getattr(cmd, kinds)[index] = value, kind
+
     def _value(self, values: Sequence[float], joint: str | int) -> float | None:
         index = self._index(joint)
         return None if index is None or index >= len(values) else values[index]

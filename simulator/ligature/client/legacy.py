@@ -6,7 +6,7 @@ from ambf_msgs.msg import ObjectCmd, ObjectState
 from geometry_msgs.msg import Point, Pose, Quaternion
 
 from ligature.client.euler import quaternion_from_euler
-from ligature.client.joints import JointedObject, grown
+from ligature.client.joints import JointedObject
 
 
 class Object(JointedObject):
@@ -43,11 +43,4 @@ class Object(JointedObject):
         self._cmd.enable_position_controller = False
 
     def _command_joint(self, joint: str | int, value: float, position: bool) -> None:
-        value, index = float(value), self._index(joint)
-        if index is None or not self._takes(value):
-            return
-        with self._lock:
-            cmd = self._cmd
-            cmd.joint_cmds = grown(cmd.joint_cmds, index + 1, 0.0)
-            cmd.position_controller_mask = grown(cmd.position_controller_mask, index + 1, False)
-            cmd.joint_cmds[index], cmd.position_controller_mask[index] = value, position
+        self._write_joint(joint, value, "position_controller_mask", position, False)

@@ -12,7 +12,7 @@ from ambf_msgs.msg import RigidBodyCmd, RigidBodyState
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 
 from ligature.client.euler import quaternion_from_euler
-from ligature.client.joints import JointedObject, components, grown, vector
+from ligature.client.joints import JointedObject, components, vector
 
 FORCE, POSITION, VELOCITY = RigidBodyCmd.TYPE_FORCE, RigidBodyCmd.TYPE_POSITION, RigidBodyCmd.TYPE_VELOCITY
 
@@ -144,11 +144,4 @@ class RigidBody(JointedObject):
                 self._command_joint(joint, value, kind)
 
     def _command_joint(self, joint: str | int, value: float, kind: int) -> None:
-        value, index = float(value), self._index(joint)
-        if index is None or not self._takes(value):
-            return
-        with self._lock:
-            cmd = self._cmd
-            cmd.joint_cmds = grown(cmd.joint_cmds, index + 1, 0.0)
-            cmd.joint_cmds_types = grown(cmd.joint_cmds_types, index + 1, FORCE)
-            cmd.joint_cmds[index], cmd.joint_cmds_types[index] = value, kind
+        self._write_joint(joint, value, "joint_cmds_types", kind, FORCE)
