@@ -36,6 +36,7 @@ def lay_out(folder: Path) -> None:
             (folder / page).write_text(_linked(text, folder), "utf-8")
     (folder / "commands.md").write_text(reference.commands(), "utf-8")
     (folder / "topics.md").write_text(reference.topics(), "utf-8")
+    (folder / "state.md").write_text(reference.state(), "utf-8")
     (folder / "api").mkdir()
     (folder / "api" / "ligature.md").write_text(reference.top(), "utf-8")
     for package in (*reference.PUBLIC, *reference.PARTS):

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import typer
 from ligature.cli import ambf_simulator
 from ligature.cli.main import app
 from ligature.model.scene import ArmKind
+from ligature.model.state import ARM_DTYPE, FIELDS
 from ligature.ros.arms.commands import COMMANDS
 from ligature.ros.arms.events import LATCHED, LATCHED_OF_KIND
 from ligature.ros.arms.outlet import EVERY, SELDOM
@@ -156,6 +158,26 @@ def _kinds(kinds: Iterable[ArmKind]) -> str:
 
 def _first(text: str | None) -> str:
     return _cell((text or "").strip().split("\n\n")[0])
+
+
+# --- state ------------------------------------------------------------------------------------
+
+
+def state() -> str:
+    """Every field of the state record, from the table that gives its memory layout."""
+    rows = [
+        (f"`{field.name}`", f"`{np.dtype(field.type).name}`" if isinstance(field.type, str) else "record",
+         ", ".join(map(str, field.shape)), _cell(field.meaning.replace("``", "`")))
+        for field in FIELDS
+    ]  # fmt: skip
+    arm = [(f"`{name}`", ", ".join(map(str, ARM_DTYPE[name].shape))) for name in ARM_DTYPE.names or ()]
+    return (
+        "# State record\n\nGenerated from the table of the code. In Python `sim.state[name][0]` is the array of a field. Poses are x y z "
+        "qx qy qz qw, twists and wrenches linear then angular, in world axes; the linear velocity is that of the centre of mass. SI "
+        f"units. Rows are in the order of the scene's objects.\n\n{_table(('field', 'type', 'shape', 'meaning'), rows)}\n"
+        "## Fields of an arm\n\nNames are those of CRTK. Rows of `*_js` are position, velocity, effort; local poses are in the base frame of the "
+        f"arm.\n\n{_table(('field', 'shape'), arm)}"
+    )
 
 
 # --- Python -----------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import ligature
 import pytest
+from ligature.model.state import state_dtype
 
 from tests.conftest import ROOT
 
@@ -46,6 +47,13 @@ def test_every_package_has_a_page_in_the_reference() -> None:
     assert set(documented) == PACKAGES - {"cli"} | {"simulation"}  # `cli` has the generated page of commands
     listed = re.findall(r"^api/(\w+)$", (ROOT / "docs" / "python.md").read_text(), flags=re.MULTILINE)
     assert listed == ["ligature", *documented]
+
+
+def test_the_page_of_the_state_has_every_field() -> None:
+    dtype = state_dtype(ligature.load("suturing_small"))
+    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| [^|]* \| ([^|]+) \|$", reference.state(), flags=re.MULTILINE)
+    assert [name for name, _ in rows] == list(dtype.names or ())
+    assert len({meaning for _, meaning in rows}) > 50  # none is empty or a copy
 
 
 def test_the_layers_hold_every_package() -> None:

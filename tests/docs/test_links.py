@@ -13,7 +13,7 @@ from tests.conftest import ROOT
 from tests.docs.pages import ALL, PAGES
 
 LINK = re.compile(r"(?<!!)\[[^\]]*\]\(([^)\s]+)\)|!\[[^\]]*\]\(([^)\s]+)\)")
-GENERATED = {"commands.md", "topics.md", "contributing.md", "changelog.md"}
+GENERATED = {"commands.md", "state.md", "topics.md", "contributing.md", "changelog.md"}
 """Pages that only the site has."""
 
 

@@ -7,7 +7,7 @@ angular in world axes, the linear part at the centre of mass. SI units.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,95 +70,95 @@ StateRecord = NDArray[np.void]
 """One-element record array of `state_dtype`; index fields by name, then ``[0]``."""
 
 
-def state_dtype(scene: Scene) -> StateDtype:
-    """The memory layout of the state of ``scene``.
+class Field(NamedTuple):
+    """One field of a state record: NumPy's type, names or numbers of its sizes, and what it means."""
 
-    ``tick`` counts ticks, ``update`` counts updates of 1/p seconds (``WorldState.sim_step``);
-    ``stamp`` is Unix time of the update that wrote the record, zero in process.
-    ``ghost_sensed[g, b]`` reports whether body b overlaps ghost g. ``ray_*`` are the rays of all
-    sensors one after the other; ``ray_body`` is -1 for no hit. ``camera_pose`` and ``light_pose``
-    are in the parent's frame, as the messages want them; ``*_world`` beside them in world axes.
-    Of ``touch_*`` the first ``touch_count`` rows count, while contacts are watched (`WatchContacts`): where bodies
-    touch, and the force on one of the two.
-    Of ``insertion_*`` the first ``insertion_count`` rows count: hole of the scene, needle or element in it, metres of
-    it beyond the hole, where it passes and the force on it there, in world axes. In the body of tissue k the hole is
-    -1 - k, the depth is the length inside, and the place is where it went in. ``tissue_node`` are the nodes of all
-    bodies of tissue, in rows `TissueBody.rows`. ``tissue_wrench`` is all that needles, threads and bodies do to a
-    body of tissue, about the origin of its frame B; ``tissue_peak`` the largest force at one point of it,
-    ``tissue_contacts`` at how many points something pushes or rubs it, on its surface and inside. Of
-    ``puncture_*`` the first ``puncture_count`` rows of a body count: places on its surface where needles went in or
-    out, and the outward normals there.
-    ``jaw_body`` is what each jaw holds by friction or -1; ``jaw_force`` presses its fingers together, ``jaw_wrench``
-    acts on the body about the patch, ``jaw_slip`` are metres and radians slipped since it was grasped.
-    ``volume_value`` are the voxels of the volumes that plug-ins may change, in rows `VolumeBody.rows`.
-    ``plugin_value`` is what plug-ins publish, topic after topic; of ``plugin_line`` (ends of lines that they draw) the
-    first ``plugin_line_count`` rows count.
-    """
-    nb, nj = len(scene.bodies), len(scene.joints)
-    ng, na = len(scene.ghosts), len(scene.actuators)
-    nc, nl = len(scene.cameras), len(scene.lights)
-    nr = sum(len(sensor.rays) for sensor in scene.sensors)
-    return np.dtype(
-        [
-            ("tick", "u8"),
-            ("update", "u8"),
-            ("resets", "u8"),
-            ("sim_time", "f8"),
-            ("wall_time", "f8"),
-            ("stamp", "f8"),
-            ("body_pose", "f8", (nb, 7)),
-            ("body_twist", "f8", (nb, 6)),
-            ("body_wrench", "f8", (nb, 6)),
-            ("joint_position", "f8", (nj,)),
-            ("joint_velocity", "f8", (nj,)),
-            ("joint_effort", "f8", (nj,)),
-            ("ghost_world", "f8", (ng, 7)),
-            ("ghost_sensed", "?", (ng, nb)),
-            ("ray_measurement", "f8", (nr,)),
-            ("ray_point", "f8", (nr, 3)),
-            ("ray_normal", "f8", (nr, 3)),
-            ("ray_body", "i4", (nr,)),
-            ("contact_count", "i4"),
-            ("contact_sensor", "i4", (MAX_CONTACT_EVENTS,)),
-            ("contact_body", "i4", (MAX_CONTACT_EVENTS,)),
-            ("contact_distance", "f8", (MAX_CONTACT_EVENTS,)),
-            ("contact_point", "f8", (MAX_CONTACT_EVENTS, 3)),
-            ("contact_normal", "f8", (MAX_CONTACT_EVENTS, 3)),
-            ("touch_count", "i4"),
-            ("touch_point", "f8", (MAX_TOUCHES, 3)),
-            ("touch_force", "f8", (MAX_TOUCHES, 3)),
-            ("actuator_active", "?", (na,)),
-            ("actuator_body", "i4", (na,)),
-            ("camera_pose", "f8", (nc, 7)),
-            ("camera_world", "f8", (nc, 7)),
-            ("light_pose", "f8", (nl, 7)),
-            ("light_world", "f8", (nl, 7)),
-            ("rod_tension", "f8", (nb,)),
-            ("insertion_count", "i4"),
-            ("insertion_hole", "i4", (MAX_INSERTIONS,)),
-            ("insertion_body", "i4", (MAX_INSERTIONS,)),
-            ("insertion_depth", "f8", (MAX_INSERTIONS,)),
-            ("insertion_point", "f8", (MAX_INSERTIONS, 3)),
-            ("insertion_force", "f8", (MAX_INSERTIONS, 3)),
-            ("tissue_node", "f8", (scene.tissues[-1].rows.stop if scene.tissues else 0, 3)),
-            ("tissue_wrench", "f8", (len(scene.tissues), 6)),
-            ("tissue_peak", "f8", (len(scene.tissues),)),
-            ("tissue_contacts", "i4", (len(scene.tissues),)),
-            ("puncture_count", "i4", (len(scene.tissues),)),
-            ("puncture_point", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),
-            ("puncture_normal", "f8", (len(scene.tissues), MAX_PUNCTURES, 3)),
-            ("volume_value", "u1", (scene.volumes[-1].rows.stop if scene.volumes else 0,)),
-            ("jaw_body", "i4", (len(scene.jaws),)),
-            ("jaw_force", "f8", (len(scene.jaws),)),
-            ("jaw_wrench", "f8", (len(scene.jaws), 6)),
-            ("jaw_slip", "f8", (len(scene.jaws), 2)),
-            ("arm", ARM_DTYPE, (len(scene.arms),)),
-            ("plugin_value", "f8", (sum(sum(plugin.publishes.values()) for plugin in scene.plugins),)),
-            ("plugin_line_count", "i4"),
-            ("plugin_line", "f8", (MAX_LINES if scene.plugins else 0, 2, 3)),
-            ("plugin_line_colour", "u1", (MAX_LINES if scene.plugins else 0, 3)),
-        ]
-    )
+    name: str
+    type: str | np.dtype[np.void]
+    shape: tuple[str | int, ...]
+    meaning: str
+
+
+FIELDS = (
+    Field("tick", "u8", (), "ticks since the start"),
+    Field("update", "u8", (), "updates since the start, of 1/p seconds each; ``WorldState.sim_step``"),
+    Field("resets", "u8", (), "resets since the start"),
+    Field("sim_time", "f8", (), "simulated seconds since the start"),
+    Field("wall_time", "f8", (), "wall seconds since the start; zero in process"),
+    Field("stamp", "f8", (), "Unix time of the update that wrote the record; zero in process"),
+    Field("body_pose", "f8", ("bodies", 7), "pose of each body frame"),
+    Field("body_twist", "f8", ("bodies", 6), "velocity of each body"),
+    Field("body_wrench", "f8", ("bodies", 6), "reaction on each body of its joints with ``enable feedback``"),
+    Field("joint_position", "f8", ("joints",), "rad or m"),
+    Field("joint_velocity", "f8", ("joints",), "rad/s or m/s"),
+    Field("joint_effort", "f8", ("joints",), "N m or N of joints with ``enable feedback``, else 0"),
+    Field("ghost_world", "f8", ("ghosts", 7), "pose of each ghost"),
+    Field("ghost_sensed", "?", ("ghosts", "bodies"), "whether a body overlaps a ghost"),
+    Field("ray_measurement", "f8", ("rays",), "1 minus the hit fraction, 0 for no hit; rays of all sensors in turn"),
+    Field("ray_point", "f8", ("rays", 3), "where each ray hits"),
+    Field("ray_normal", "f8", ("rays", 3), "normal of the surface there"),
+    Field("ray_body", "i4", ("rays",), "the body that each ray hits, -1 for none"),
+    Field("contact_count", "i4", (), "contact points of contact sensors; valid rows of ``contact_*``"),
+    Field("contact_sensor", "i4", (MAX_CONTACT_EVENTS,), "index of the sensor"),
+    Field("contact_body", "i4", (MAX_CONTACT_EVENTS,), "the body that touches the sensor's body"),
+    Field("contact_distance", "f8", (MAX_CONTACT_EVENTS,), "gap; below zero where they overlap"),
+    Field("contact_point", "f8", (MAX_CONTACT_EVENTS, 3), "where they touch"),
+    Field("contact_normal", "f8", (MAX_CONTACT_EVENTS, 3), "normal there"),
+    Field("touch_count", "i4", (), "contact points while `WatchContacts` is on; valid rows of ``touch_*``"),
+    Field("touch_point", "f8", (MAX_TOUCHES, 3), "where bodies touch"),
+    Field("touch_force", "f8", (MAX_TOUCHES, 3), "force on one of the two"),
+    Field("actuator_active", "?", ("actuators",), "whether an actuator holds a body"),
+    Field("actuator_body", "i4", ("actuators",), "the body that it holds, -1 for none"),
+    Field("camera_pose", "f8", ("cameras", 7), "pose of each camera in its parent's frame, as in messages"),
+    Field("camera_world", "f8", ("cameras", 7), "the same in the world"),
+    Field("light_pose", "f8", ("lights", 7), "pose of each light in its parent's frame, as in messages"),
+    Field("light_world", "f8", ("lights", 7), "the same in the world"),
+    Field("rod_tension", "f8", ("bodies",), "tension of each body that is an element of a thread, N"),
+    Field("insertion_count", "i4", (), "needles and threads in holes and tissue; valid rows of ``insertion_*``"),
+    Field("insertion_hole", "i4", (MAX_INSERTIONS,), "index of the hole; -1 - k in the body of tissue k"),
+    Field("insertion_body", "i4", (MAX_INSERTIONS,), "the needle or element in it"),
+    Field("insertion_depth", "f8", (MAX_INSERTIONS,), "length beyond the hole; in tissue, length inside"),
+    Field("insertion_point", "f8", (MAX_INSERTIONS, 3), "where it passes the hole; in tissue, where it went in"),
+    Field("insertion_force", "f8", (MAX_INSERTIONS, 3), "force on it there"),
+    Field("tissue_node", "f8", ("tissue nodes", 3), "nodes of all bodies of tissue, in rows `TissueBody.rows`"),
+    Field("tissue_wrench", "f8", ("tissues", 6), "total wrench on a body of tissue, about its body's origin"),
+    Field("tissue_peak", "f8", ("tissues",), "largest force at one point of it"),
+    Field("tissue_contacts", "i4", ("tissues",), "points at which something acts on it, on its surface and inside"),
+    Field("puncture_count", "i4", ("tissues",), "punctures of a body of tissue; valid rows of ``puncture_*``"),
+    Field("puncture_point", "f8", ("tissues", MAX_PUNCTURES, 3), "places on the surface where needles went in or out"),
+    Field("puncture_normal", "f8", ("tissues", MAX_PUNCTURES, 3), "outward normals there"),
+    Field("volume_value", "u1", ("voxels",), "voxels of volumes that plug-ins may change, in rows `VolumeBody.rows`"),
+    Field("jaw_body", "i4", ("jaws",), "the body that a jaw holds by friction, -1 for none"),
+    Field("jaw_force", "f8", ("jaws",), "force that presses its fingers together"),
+    Field("jaw_wrench", "f8", ("jaws", 6), "wrench of the jaw on the body, about the contact patch"),
+    Field("jaw_slip", "f8", ("jaws", 2), "slip since the body was grasped, m and rad"),
+    Field("arm", ARM_DTYPE, ("arms",), "state of each arm, see `ARM_DTYPE`"),
+    Field("plugin_value", "f8", ("plug-in values",), "what plug-ins publish, topic by topic"),
+    Field("plugin_line_count", "i4", (), "lines that plug-ins draw; valid rows of ``plugin_line*``"),
+    Field("plugin_line", "f8", ("plug-in lines", 2, 3), "ends of each line"),
+    Field("plugin_line_colour", "u1", ("plug-in lines", 3), "its colour"),
+)
+"""The fields of a state record in their order. Indices are those of the scene, ``scene.bodies`` and so on."""
+
+
+def _sizes(scene: Scene) -> dict[str, int]:
+    """How many there are of what `FIELDS` name."""
+    return {
+        "bodies": len(scene.bodies), "joints": len(scene.joints), "ghosts": len(scene.ghosts),
+        "rays": sum(len(sensor.rays) for sensor in scene.sensors), "actuators": len(scene.actuators),
+        "cameras": len(scene.cameras), "lights": len(scene.lights), "tissues": len(scene.tissues),
+        "tissue nodes": scene.tissues[-1].rows.stop if scene.tissues else 0,
+        "voxels": scene.volumes[-1].rows.stop if scene.volumes else 0,
+        "jaws": len(scene.jaws), "arms": len(scene.arms),
+        "plug-in values": sum(sum(plugin.publishes.values()) for plugin in scene.plugins),
+        "plug-in lines": MAX_LINES if scene.plugins else 0,
+    }  # fmt: skip
+
+
+def state_dtype(scene: Scene) -> StateDtype:
+    """The memory layout of the state of ``scene``, field by field as in `FIELDS`."""
+    sizes = _sizes(scene)
+    return np.dtype([(f.name, f.type, tuple(sizes[n] if isinstance(n, str) else n for n in f.shape)) for f in FIELDS])
 
 
 def new_state(scene: Scene) -> StateRecord:
