@@ -94,19 +94,19 @@ class Snapshot:
 
 
 MOST_UNHELD = 8
-"""Simulations that nobody holds any more and that may wait to be freed."""
+"""Number of unreferenced simulations that may wait to be freed."""
 
 _simulations: weakref.WeakSet[Simulation] = weakref.WeakSet()
-"""All that are in memory."""
+"""All simulations in memory."""
 
 _crowd = MOST_UNHELD
-"""Number of `_simulations` at which those that nobody holds are freed."""
+"""Number of `_simulations` at which unreferenced ones are freed."""
 
 
 def _free_unheld() -> None:
-    """Free simulations that nobody holds, once there are many.
+    """Free unreferenced simulations once there are many.
 
-    Each is a cycle of references of 30 to 100 MB, and Python's collector goes by numbers of objects, not by their size.
+    Each is a reference cycle of 30 to 100 MB, and Python's collector counts objects, not bytes.
     """
     global _crowd
     if len(_simulations) >= _crowd:
@@ -209,7 +209,7 @@ class Simulation:
             ArmCommand: self.arms.apply,
             PluginCommand: self._plugins.receive,
             WatchContacts: lambda c: self._touches.watch(c.enabled),
-            MarkPhase: lambda _: None,  # for who keeps the commands
+            MarkPhase: lambda _: None,  # only for recordings of the commands
             Release: self._release,
             Reset: lambda c: self.reset(bodies_only=c.bodies_only),
         }
@@ -226,9 +226,9 @@ class Simulation:
         return self._clock.tick * self.dt
 
     def step(self, ticks: int = 1) -> None:
-        """Advance by ``ticks`` ticks and write the state; how ticks are shared out over calls changes nothing.
+        """Advance by ``ticks`` ticks and write the state. The number of ticks per call does not affect the result.
 
-        Raises ValueError for less than no ticks, TypeError for what is no whole number.
+        Raises ValueError for a negative number of ticks, TypeError if it is not a whole number.
         """
         self._check_open()
         if ticks < 0:
@@ -390,9 +390,9 @@ class Simulation:
             self.arms.release(command.index)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Put the root body of a tree at ``pose`` (7,) at rest, and a thread that hangs on it alone along with it.
+        """Move the root body of a tree to ``pose`` (7,), at rest, together with a thread that is attached to it alone.
 
-        Raises ValueError for a link of an arm.
+        Raises ValueError for a body that a joint holds, such as a link of an arm.
         """
         self._check_open()
         BodyCommand(body, CommandType.POSITION, tuple(pose)).check()
@@ -424,8 +424,8 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """The whole dynamic state: this simulation and a restored one continue with the same bits.
 
-        Bullet keeps contacts that nobody can read. A snapshot drops them here, too, as `restore` does: a run that
-        is snapshot goes on with other last bits than one that is not.
+        Bullet keeps contacts in a form that cannot be read. Therefore a snapshot clears them in this simulation too, as
+        `restore` does: a run continues with different last bits after a snapshot than without it.
         """
         self._check_open()
         parts = {

@@ -1,4 +1,4 @@
-"""What a file is that is not of the kind that was expected, by how it begins, and what to do with it."""
+"""Recognises files of an unexpected kind by their beginning, and names what to do with them."""
 
 from __future__ import annotations
 

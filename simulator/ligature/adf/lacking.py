@@ -1,4 +1,4 @@
-"""Why a path leads to no file that can be read, and what would be right."""
+"""Explains why a path is not a readable file, and what would be right."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Pacer:
         self._budget = 0
 
     def pace(self, command: Pace) -> None:
-        """Run at another speed; what was late before is forgotten."""
+        """Change the speed; the delay so far is dropped."""
         self._wall_period = self._period / command.speed
         self._next = None
 

@@ -1,8 +1,8 @@
-"""How every process of a run learns from a signal that it shall end.
+"""Ends every process of a run on a signal such as SIGTERM.
 
-A signal may arrive while the handler of another one runs, and between any two instructions of the thread that it
-interrupts: a handler that takes a lock waits for ever for the very thread that it has interrupted. The handler here
-stores one truth value and arms one timer of the kernel, which is safe at any moment and any number of times.
+A signal can arrive while the handler of another one runs, and between any two instructions of the interrupted thread: a
+handler that takes a lock would wait forever for the thread that it interrupted. The handler here only sets a flag and
+arms a kernel timer, which is safe at any moment and any number of times.
 """
 
 from __future__ import annotations

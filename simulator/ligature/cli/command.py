@@ -1,7 +1,7 @@
-"""Where the commands begin, and what ends them: interrupts amid imports, missing packages, paths and full disks.
+"""The entry point of the commands: handles interrupts during imports, missing packages, bad paths and full disks.
 
 Python turns SIGINT into an exception, which is lost where it arrives while the import system releases a lock, or in a
-module that passes over errors: one start of 150 that were interrupted went on as if nothing had been said. Commands
+module that passes over errors: one start of 150 that were interrupted continued as if nothing had happened. Commands
 import what they need when they need it, so this holds as long as they run.
 """
 

@@ -1,4 +1,4 @@
-"""What a run is: the options that all processes of one run share, and how they travel to them."""
+"""The options that all processes of a run share, and how the supervisor passes them on."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""How every process of a run begins, and how it leaves a run that it cannot be part of.
+"""Starts every process of a run, and ends it with a message if it cannot take part.
 
-Each has one argument, the run's options as text, and reports to the supervisor by lines (`ligature.process`).
+The only argument of a process is the run's options as text; it reports to the supervisor by lines (`ligature.process`).
 """
 
 from __future__ import annotations

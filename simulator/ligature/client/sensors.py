@@ -1,4 +1,4 @@
-"""Handles of what only senses: rays, contacts, ghost volumes. Poses are in the parent's frame, ranges in metres."""
+"""Handles of sensors: rays, contacts, ghost volumes. Poses are in the parent's frame, ranges in metres."""
 
 from __future__ import annotations
 

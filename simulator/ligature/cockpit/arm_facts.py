@@ -1,4 +1,4 @@
-"""What the page knows of an arm: its joints with their travel, its jaw, and where its base stands. Metres, radians."""
+"""Constant data of an arm for the page: joints with their limits, jaw, pose of the base. Metres, radians."""
 
 from __future__ import annotations
 

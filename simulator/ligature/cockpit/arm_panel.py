@@ -1,4 +1,4 @@
-"""An arm on the page: how it is, for everybody, and the controls of who operates, in millimetres and degrees."""
+"""An arm on the page: its state for all viewers, and its controls for the operator, in millimetres and degrees."""
 
 from __future__ import annotations
 

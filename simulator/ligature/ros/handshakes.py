@@ -1,8 +1,8 @@
-"""Clients that connect and say nothing, or nonsense, stop nobody else.
+"""Accepts connections of ROS clients such that a silent or malformed one does not block others.
 
-rospy reads what a client says first on the one thread that takes connections, for as long as that takes: a client that
-stops there keeps all later subscribers and callers waiting, and the first that talks nonsense ends the thread. Here
-each connection introduces itself on a thread of its own, within a time.
+rospy reads the handshake of a client on the only thread that accepts connections, without a timeout: a client that
+sends nothing blocks all later subscribers and callers, and a malformed handshake ends the thread. Here each handshake
+has a thread of its own and a timeout.
 """
 
 from __future__ import annotations

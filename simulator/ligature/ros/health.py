@@ -1,6 +1,6 @@
-"""How the topics of a running system do: who publishes, who listens, how often something comes.
+"""The state of the topics of a running system: publishers, subscribers, rates.
 
-Rates are measured by listening, to one topic at a time and only for a moment, so that the looking itself costs little.
+Rates are measured by subscribing to one topic at a time for a moment, so that the measurement itself costs little.
 """
 
 from __future__ import annotations

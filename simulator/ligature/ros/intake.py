@@ -1,7 +1,7 @@
-"""How much a client may send at once: larger messages are passed over as they arrive, never held in memory.
+"""Limits the size of messages from clients: larger ones are discarded as they arrive, without being stored.
 
-rospy collects a message of whatever length, up to 4 GiB, turns it into objects that take four times as much, and keeps
-the last one of each connection. Commands have a few hundred bytes.
+rospy buffers messages of up to 4 GiB, converts them to objects of four times that size, and keeps the last one of each
+connection. Commands have a few hundred bytes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""What a ROS master holds of nodes, which outlasts those that were killed.
+"""Removes registrations of killed nodes from a ROS master, which keeps them.
 
-A name is free when its node does not answer. What that node registered is removed before another takes the name: the
-master would shut down whoever has the old address by now, and tell clients nothing of topics that are gone.
+A name is free if its node does not answer. The node's registrations are removed before another node takes the name:
+otherwise the master would shut down the program that has the old address now, and would not notify clients of topics
+that no longer exist.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Starts a node that many clients connect to at the same moment, whatever some of them do.
 
-rospy lets five connections wait to be taken. A recorder of everything, or a surgeon's console, opens a hundred at once;
-those beyond the five are dropped by the kernel and tried again after 1, 3, 7, 15 seconds: topics seem silent so long.
+rospy's queue holds five connections. A recorder of all topics, or a surgeon's console, opens a hundred at once; the
+kernel drops those beyond the queue, and they are retried after 1, 3, 7, 15 seconds: topics seem silent meanwhile.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What tells knots in a thread apart whatever their shape, and how well a throw was made around a vessel.
+"""Distinguishes knots in a thread independently of their shape, and scores throws around a vessel.
 
 Metres, newtons, world axes.
 """

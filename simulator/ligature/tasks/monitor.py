@@ -1,4 +1,4 @@
-"""Watches a task while it is done: passages, forces, ways, drops. SI units, world axes."""
+"""Measures an attempt at a task: passages, forces, path lengths, drops. SI units, world axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who drives whom: the YAML file of a teleoperation, read with a place for everything that is wrong in it.
+"""Reads teleoperation files (YAML): devices, pairs, settings; reports every error with its file, line and column.
 
 Metres, radians, newtons, seconds. `docs/teleoperation.md` shows a file.
 """

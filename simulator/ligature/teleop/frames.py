@@ -1,4 +1,4 @@
-"""Where the arms' frames stand to each other, from what arms, set-up joints and tf report. Metres.
+"""Poses of the arms' frames relative to each other, from arms, set-up joints and tf. Metres.
 
 Each frame is known in one parent. What tf reports has preference over the set-up joints, which report the same frames.
 """

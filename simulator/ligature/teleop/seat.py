@@ -1,4 +1,4 @@
-"""The operator's seat: which leader moves which follower, pedals, and handing arms over while everything runs.
+"""The pairs of a teleoperation: which leader drives which follower, pedals, and changes of followers during a run.
 
 Names are those of the arms and devices (``MTMR``, ``PSM1``). Any leader may be paired with several followers, of which
 it drives one at a time; a follower obeys one leader only. Seconds, metres, radians.
