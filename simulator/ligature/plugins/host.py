@@ -122,19 +122,53 @@ class Volume:
         return _local(self._pose(), _point(point))
 
     def cut(self, start: Sequence[float] | Array, end: Sequence[float] | Array, radius: float) -> int:
-        """Remove the voxels whose middles a ball meets on its way from ``start`` to ``end``, (3,) in world axes.
+        """Remove the voxels whose centres a moving ball touches.
 
-        Returns how many. Raises RuntimeError outside `Plugin.before_step`, and ValueError for what no ball has.
+        Parameters
+        ----------
+        start, end
+            Centre of the ball at the start and at the end of its motion, (3,) in the world, metres.
+        radius
+            Radius of the ball in metres.
+
+        Returns
+        -------
+        int
+            The number of voxels that were removed.
+
+        Raises
+        ------
+        RuntimeError
+            Outside `Plugin.before_step`.
+        ValueError
+            If a point is not three finite numbers, or the radius not a finite number above 0.
         """
         self._host._check_before("volumes are cut in before_step")
         T = self._pose()
         return self._voxels.cut(_local(T, _point(start)), _local(T, _point(end)), _radius(radius))
 
     def overlap(self, centre: Sequence[float] | Array, radius: float) -> tuple[float, Array]:
-        """What a ball shares with the inside: m³, and the direction (3,) out of it, of unit length or 0.
+        """Volume in which a ball and the inside overlap, and the direction out of it.
 
-        The direction is that from the middle of what they share to ``centre``, in world axes; there is none where
-        these two are one to `CENTROID_ERROR` radii, as deep inside.
+        Parameters
+        ----------
+        centre
+            Centre of the ball, (3,) in the world, metres.
+        radius
+            Radius of the ball in metres.
+
+        Returns
+        -------
+        float
+            Volume of the overlap in m³.
+        Array
+            Unit vector (3,) in world axes from the centroid of the overlap to ``centre``; zero if these two are closer
+            than `CENTROID_ERROR` radii, as deep inside.
+
+        Raises
+        ------
+        ValueError
+            If the centre is not three finite numbers, or the radius not a finite number above 0.
         """
         T = self._pose()
         found = self._voxels.overlap(_local(T, _point(centre)), _radius(radius))
@@ -166,17 +200,24 @@ def _radius(radius: float) -> float:
 
 
 class Host:
-    """The simulation as plug-ins have it.
+    """The interface of a plug-in to the simulation: `Plugin.host`.
 
     Parameters
     ----------
     scene
-        What is simulated: bodies, joints, sensors with their names and indices.
+        The simulated scene: bodies, joints, sensors with their names and indices.
     dt
-        Length of a tick.
-    bodies, joint, tick, apply, volumes
-        What answers for the simulation: bodies and threads, the state (3,) of a joint by its index, ticks since the
-        start, what takes commands, and the volumes by their bodies.
+        Length of a tick in seconds.
+    bodies
+        Poses, twists, contacts and rays of bodies and threads, and pushes on them.
+    joint
+        Returns position, velocity and effort (3,) of a joint by its index.
+    tick
+        Returns the number of ticks since the start.
+    apply
+        Takes commands.
+    volumes
+        The volumes that plug-ins may cut, by the indices of their bodies.
     """
 
     def __init__(
@@ -198,7 +239,7 @@ class Host:
 
     @contextmanager
     def before_step(self) -> Iterator[None]:
-        """Within it, pushes are accepted."""
+        """A context in which pushes and cuts are accepted."""
         self._before = True
         try:
             yield
@@ -207,7 +248,7 @@ class Host:
 
     @contextmanager
     def after_step(self) -> Iterator[None]:
-        """Within it, time is that of the end of the tick."""
+        """A context in which `time` is the end of the tick."""
         self._ahead = 1
         try:
             yield
@@ -216,7 +257,7 @@ class Host:
 
     @property
     def time(self) -> float:
-        """Simulated seconds since the start, those of the tick that has just ended included."""
+        """Simulated seconds since the start, including the tick that has just ended."""
         return (self._tick() + self._ahead) * self.dt
 
     def body(self, text: str) -> int:
@@ -233,30 +274,44 @@ class Host:
         return _found("joint", self._joint_names, text)
 
     def pose(self, body: int) -> Array:
-        """Pose (7,) of a body frame, of an element of a thread, too."""
+        """Pose (7,) of the frame of a body or thread element: x y z qx qy qz qw, world, metres."""
         return self._bodies.pose7(body)
 
     def twist(self, body: int) -> Array:
-        """Linear velocity of the centre of mass and angular velocity, (6,)."""
+        """Linear velocity of the centre of mass and angular velocity, (6,) in world axes, m/s and rad/s."""
         return self._bodies.twist(body)
 
     def joint_state(self, joint: int) -> tuple[float, float]:
-        """Position and velocity of a joint; raises LookupError for one that closes a loop."""
+        """Position and velocity of a joint, rad or m, and per second; raises LookupError if it closes a loop."""
         position, velocity = self._joint(joint)[:2].tolist()
         return position, velocity
 
     def contacts(self, body: int, threshold: float = 0.0) -> list[Contact]:
-        """Where ``body`` touches others, or is at most ``threshold`` away: points and normals on the others."""
+        """Contact points of ``body`` with others, up to a gap of ``threshold`` metres: points and normals on these."""
         return self._bodies.contacts(body, threshold)
 
     def rays(self, starts: Array, ends: Array) -> RayHits:
-        """The closest hit of each segment from ``starts`` to ``ends``, both (n, 3); body -1 where there is none."""
+        """The closest hit of each segment from ``starts`` to ``ends``, (n, 3) in the world; body -1 for no hit."""
         return self._bodies.ray_test(np.asarray(starts, dtype=float), np.asarray(ends, dtype=float))
 
     def push(self, body: int, force: Sequence[float] | Array, point: Sequence[float] | Array | None = None) -> None:
-        """Push ``body`` in this tick with ``force`` (3,) at ``point`` (3,), by default its origin.
+        """Push a body in this tick.
 
-        Raises RuntimeError outside `Plugin.before_step`, and ValueError for numbers that no force has.
+        Parameters
+        ----------
+        body
+            Index of the body or thread element.
+        force
+            Force (3,) in world axes, newtons, at most `MAX_FORCE`.
+        point
+            Where the force acts, (3,) in the world, metres; by default the origin of the body frame.
+
+        Raises
+        ------
+        RuntimeError
+            Outside `Plugin.before_step`.
+        ValueError
+            If force or point are not three finite numbers, or the force is too large.
         """
         self._check_before("bodies are pushed in before_step")
         where = self.pose(body)[:3] if point is None else np.asarray(point, dtype=float)
@@ -272,9 +327,9 @@ class Host:
             raise RuntimeError(f"{what}, where actions apply to one tick")
 
     def apply(self, command: Command) -> None:
-        """Give a command of `ligature.model.commands` or `ligature.robots.commands`, as front ends do.
+        """Apply a ``command`` of `ligature.model.commands` or `ligature.robots.commands`, as front ends do.
 
-        Raises ValueError for an invalid one, and for a reset, which belongs between ticks.
+        Raises ValueError for an invalid command, and for a reset, which is possible between ticks only.
         """
         if isinstance(command, Reset):
             raise ValueError("a plug-in cannot reset the simulation that it is part of")
