@@ -142,7 +142,7 @@ def test_a_snapshot_fits_its_own_scene_and_tick_alone(
         with pytest.raises(ValueError, match="of another scene"):
             other.restore(snapshot)
         assert other.state_hash() == before
-    with pytest.raises(TypeError, match="is no snapshot"):
+    with pytest.raises(TypeError, match="is not a snapshot"):
         other.restore({})  # type: ignore[arg-type]
     taken_of.close()
     other.close()
