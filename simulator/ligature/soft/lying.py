@@ -35,6 +35,7 @@ from ligature.tissue.layout import GROUP, LEAVING, MOST_POINTS, Field, Points, T
 from ligature.tissue.strand import Strand, open_strand, strand
 
 Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
 Integers = NDArray[np.int64]
 Tables = tuple[Integers, Integers, Integers, Integers, Integers, Integers]
 """Of the tissue, what lies on it, the thread in its paths, the rod's nodes and springs, and the frame."""
@@ -237,7 +238,7 @@ def _on_face(field: Field, q: int, p: Array, found: Array, corner: Array) -> flo
 
 
 @inlined
-def _edge(x: Array, i: int, j: int, h: int, k: int, share: float) -> tuple[float, float, float]:
+def _edge(x: Array, i: int, j: int, h: int, k: int, share: float) -> Vector:
     """The vector from node i to j, blended by ``share`` with that from h to k."""
     return (
         (1 - share) * (x[j, 0] - x[i, 0]) + share * (x[k, 0] - x[h, 0]),
@@ -327,12 +328,9 @@ def _meet(field: Field, points: Points, lying: Lying, e: int, radius: float) -> 
 
 
 @inlined
-def _press(t: Tissue, lying: Lying, nodes: Nodes, s: Springs, f: FrameArrays, r: int, dt: float) -> None:
-    """Make a spring of one element's contact, if it is under pressure."""
-    points, e, i, n = t.points, lying.element[r], lying.point[r], lying.normal[r]
-    W, F, K, mean = lying.W, lying.force[r], lying.K, points.mean[i]
-    _place(lying, nodes, f, e, dt)
-    p, d = lying.at[0], lying.at[1]
+def _let_move(t: Tissue, lying: Lying, i: int) -> Vector:
+    """Where point ``i`` comes to by all forces but the thread's; fills ``lying.W``, its compliance to the latter."""
+    points, W = t.points, lying.W
     for a in range(3):
         for b in range(3):
             W[a, b] = 0.0
@@ -347,43 +345,42 @@ def _press(t: Tissue, lying: Lying, nodes: Nodes, s: Springs, f: FrameArrays, r:
                     W[a, b] += C[a, b]
             if not lying.mine[j]:
                 x, y, z = x + C[0, b] * change, y + C[1, b] * change, z + C[2, b] * change
-    normal, trace, own = 0.0, W[0, 0] + W[1, 1] + W[2, 2], points.C[i, i]
-    least = 0.0
+    return x, y, z
+
+
+@inlined
+def _compliance(W: Array, own: Array, n: Array) -> tuple[float, float]:
+    """Compliance in m/N along ``n`` and across it: that of ``W`` (3, 3), and at least that of ``own`` (3, 3)."""
+    normal, least, trace = 0.0, 0.0, W[0, 0] + W[1, 1] + W[2, 2]
     for a in range(3):
         for b in range(3):
             normal += n[a] * W[a, b] * n[b]
             least += n[a] * own[a, b] * n[b]
     normal = max(normal, least)
-    beside = max(0.5 * (trace - normal), 0.5 * (own[0, 0] + own[1, 1] + own[2, 2] - least))
-    # Along the normal W is a multiple of it, and across: so forces and motions do not mix.
-    mean_n = mean[0] * n[0] + mean[1] * n[1] + mean[2] * n[2]
-    x -= normal * mean_n * n[0] + beside * (mean[0] - mean_n * n[0])
-    y -= normal * mean_n * n[1] + beside * (mean[1] - mean_n * n[1])
-    z -= normal * mean_n * n[2] + beside * (mean[2] - mean_n * n[2])
-    radius = nodes.radius[lying.first[0] + e]
-    gap = n[0] * (p[0] - x) + n[1] * (p[1] - y) + n[2] * (p[2] - z) - radius
-    moved = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
-    lying.spring[r] = -1
+    return normal, max(0.5 * (trace - normal), 0.5 * (own[0, 0] + own[1, 1] + own[2, 2] - least))
+
+
+@inlined
+def _rub(
+    lying: Lying, r: int, tissue: Vector, at: Array, normal: float, beside: float, limit: float, mass: float, dt: float
+) -> float:
+    """Fill ``lying.found[0]`` with the friction on an element of ``mass``, within ``limit``; returns its stiffness.
+
+    ``tissue`` is where the point that began the step at ``at`` comes to; ``normal`` and ``beside`` are compliances.
+    """
+    n, F, d, tried, across = lying.normal[r], lying.force[r], lying.at[1], lying.found[0], lying.found[1]
+    kt, along = 1.0 / (beside + SOFT), 0.0
     fn = F[0] * n[0] + F[1] * n[1] + F[2] * n[2]
-    # What pressed goes on until it pulled: gravity and tension would press anew in every second tick.
-    if not (fn > 0.0 or gap + moved < 0.0) or s.filled[0] == s.node.shape[0]:
-        F[0], F[1], F[2] = 0.0, 0.0, 0.0
-        for a in range(3):
-            points.force[i, a] = 0.0
-        return
-    k, kt = 1.0 / (normal + SOFT), 1.0 / (beside + SOFT)
-    force, pressed = -k * gap, max(-k * (gap + moved), 0.0)
-    limit, across = lying.friction[e] * pressed, lying.found[1]
+    moved = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
     for a in range(3):
         across[a] = F[a] - fn * n[a]
     size = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
     share = min(limit / size, 1.0) if size > 0.0 else 1.0
-    # What the last tick's friction exceeded its limit by lets the element go on faster in this one.
-    faster = min(size * (1.0 - share) * dt * dt / nodes.mass[lying.first[0] + e], START)
-    at, tried, along = points.at[i], lying.found[0], 0.0
+    # The excess of the last tick's friction over its limit lets the element move on faster in this one.
+    faster = min(size * (1.0 - share) * dt * dt / mass, START)
     for a in range(3):
         # The tissue's own motion under the force of the last tick.
-        held = (x if a == 0 else (y if a == 1 else z)) - beside * across[a] - normal * fn * n[a] - at[a]
+        held = tissue[a] - beside * across[a] - normal * fn * n[a] - at[a]
         tried[a] = share * across[a] + kt * held
         along += tried[a] * n[a]
         d[a] -= moved * n[a] + (faster / size * across[a] if faster > 0.0 else 0.0)
@@ -397,6 +394,13 @@ def _press(t: Tissue, lying: Lying, nodes: Nodes, s: Springs, f: FrameArrays, r:
         kt *= limit / size
         for a in range(3):
             tried[a] *= limit / size
+    return kt
+
+
+@inlined
+def _set_spring(lying: Lying, s: Springs, f: FrameArrays, r: int, force: float, k: float, kt: float, dt: float) -> None:
+    """Give the rod a spring: ``force`` and stiffness ``k`` along the normal, friction and ``kt`` across it."""
+    K, n, p, tried, start = lying.K, lying.normal[r], lying.at[0], lying.found[0], lying.found[1]
     for a in range(6):
         for b in range(6):
             K[a, b] = 0.0
@@ -405,14 +409,43 @@ def _press(t: Tissue, lying: Lying, nodes: Nodes, s: Springs, f: FrameArrays, r:
             K[a, b] = (k - kt) * n[a] * n[b] + (kt if a == b else 0.0)
     vx, vy, vz = velocity_at(f, p[0], p[1], p[2])
     row = s.filled[0]
-    s.filled[0], s.node[row], lying.spring[r] = row + 1, lying.first[0] + e, row
+    s.filled[0], s.node[row], lying.spring[r] = row + 1, lying.first[0] + lying.element[r], row
     turn_six(f.R, K, s.K[row])
-    load, start = s.load[row], lying.found[1]
+    load = s.load[row]
     for a in range(3):
         start[a] = force * n[a] + tried[a] + dt * (K[a, 0] * vx + K[a, 1] * vy + K[a, 2] * vz)
     for a in range(3):
         load[a] = f.R[a, 0] * start[0] + f.R[a, 1] * start[1] + f.R[a, 2] * start[2]
         load[3 + a] = 0.0
+
+
+@inlined
+def _press(t: Tissue, lying: Lying, nodes: Nodes, s: Springs, f: FrameArrays, r: int, dt: float) -> None:
+    """Make a spring of one element's contact, if it is under pressure."""
+    points, e, i, n, F = t.points, lying.element[r], lying.point[r], lying.normal[r], lying.force[r]
+    node, mean = lying.first[0] + e, points.mean[i]
+    _place(lying, nodes, f, e, dt)
+    p, d = lying.at[0], lying.at[1]
+    x, y, z = _let_move(t, lying, i)
+    normal, beside = _compliance(lying.W, points.C[i, i], n)
+    # Along the normal W is a multiple of it, and across: so forces and motions do not mix.
+    mean_n = mean[0] * n[0] + mean[1] * n[1] + mean[2] * n[2]
+    x -= normal * mean_n * n[0] + beside * (mean[0] - mean_n * n[0])
+    y -= normal * mean_n * n[1] + beside * (mean[1] - mean_n * n[1])
+    z -= normal * mean_n * n[2] + beside * (mean[2] - mean_n * n[2])
+    gap = n[0] * (p[0] - x) + n[1] * (p[1] - y) + n[2] * (p[2] - z) - nodes.radius[node]
+    moved = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+    lying.spring[r] = -1
+    fn = F[0] * n[0] + F[1] * n[1] + F[2] * n[2]
+    # A contact that pressed stays until it pulls: gravity and tension would begin it anew in every second tick.
+    if not (fn > 0.0 or gap + moved < 0.0) or s.filled[0] == s.node.shape[0]:
+        for a in range(3):
+            F[a], points.force[i, a] = 0.0, 0.0
+        return
+    k = 1.0 / (normal + SOFT)
+    limit = lying.friction[e] * max(-k * (gap + moved), 0.0)
+    kt = _rub(lying, r, (x, y, z), points.at[i], normal, beside, limit, nodes.mass[node], dt)
+    _set_spring(lying, s, f, r, -k * gap, k, kt, dt)
 
 
 @kernel

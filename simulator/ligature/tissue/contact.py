@@ -186,10 +186,9 @@ def _add_recoil(D: Array, light: float, spin: Array, first: Array, second: Array
         D[2, b] += h2 * (wx * first[1] - wy * first[0])
 
 
-@kernel
-def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
-    """Forces of all points of contact in this tick, and where friction anchors; returns how many there are."""
-    touching, work, partners = contacts.touching, contacts.solve, contacts.partners
+@inlined
+def _gather(touching: Touching, points: Points, work: Solve) -> int:
+    """List the points of contact, and by what the forces of all other points differ from the last step's means."""
     n, used = 0, points.filled[0]
     for r in range(touching.used.shape[0]):
         if touching.used[r]:
@@ -205,42 +204,58 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
         j = points.used[k]
         for m in range(3):
             work.change[j, m] = (0.0 if work.own_point[j] else points.force[j, m]) - points.mean[j, m]
-    for a in range(n):
-        r = work.rows[a]
-        i, b = touching.point[r], touching.body[r]
-        centre, twist, normal = partners.centre[b], partners.twist[b], touching.normal[r]
-        at, u, w, arm = points.at[i], work.u[a], work.w[a], work.lever[a]
+    return n
+
+
+@inlined
+def _find_gap(contacts: Contacts, points: Points, a: int, s: float, dt: float) -> None:
+    """Gap along the normal and stretch across it of a point without forces of contact, into ``work.w``; its levers."""
+    touching, work, partners = contacts.touching, contacts.solve, contacts.partners
+    r = work.rows[a]
+    i, b = touching.point[r], touching.body[r]
+    centre, twist, normal = partners.centre[b], partners.twist[b], touching.normal[r]
+    at, u, w, arm = points.at[i], work.u[a], work.w[a], work.lever[a]
+    for k in range(3):
+        arm[k] = at[k] - centre[k]
+        work.own[a, k] = at[k] - partners.centre[0, k]
+    # Where friction anchors, at the end of the tick.
+    times(partners.R[b], touching.anchor[r], u)
+    lx, ly, lz = u[0], u[1], u[2]
+    u[0] += centre[0] + dt * (twist[0] + twist[4] * lz - twist[5] * ly)
+    u[1] += centre[1] + dt * (twist[1] + twist[5] * lx - twist[3] * lz)
+    u[2] += centre[2] + dt * (twist[2] + twist[3] * ly - twist[4] * lx)
+    x, y, z = displaced(points, i, s, work.change)
+    w[0], w[1], w[2] = x - u[0], y - u[1], z - u[2]
+    along = w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2]
+    vx = dt * (twist[0] + twist[4] * arm[2] - twist[5] * arm[1])
+    vy = dt * (twist[1] + twist[5] * arm[0] - twist[3] * arm[2])
+    vz = dt * (twist[2] + twist[3] * arm[1] - twist[4] * arm[0])
+    gap = max(touching.distance[r], -RECOVERY)
+    gap += normal[0] * (x - at[0] - vx) + normal[1] * (y - at[1] - vy) + normal[2] * (z - at[2] - vz)
+    for k in range(3):
+        w[k] += (gap - along) * normal[k]
+
+
+@inlined
+def _fill_compliance(contacts: Contacts, points: Points, a: int, n: int, dt: float) -> None:
+    """How point ``a`` moves by a force at each of the ``n`` points: tissue and recoil, into ``work.D``."""
+    touching, work, partners = contacts.touching, contacts.solve, contacts.partners
+    i, b = touching.point[work.rows[a]], touching.body[work.rows[a]]
+    for c in range(n):
+        j = touching.point[work.rows[c]]
+        D = work.D[a, c]
         for k in range(3):
-            arm[k] = at[k] - centre[k]
-            work.own[a, k] = at[k] - partners.centre[0, k]
-        # Where friction anchors, at the end of the tick.
-        times(partners.R[b], touching.anchor[r], u)
-        lx, ly, lz = u[0], u[1], u[2]
-        u[0] += centre[0] + dt * (twist[0] + twist[4] * lz - twist[5] * ly)
-        u[1] += centre[1] + dt * (twist[1] + twist[5] * lx - twist[3] * lz)
-        u[2] += centre[2] + dt * (twist[2] + twist[3] * ly - twist[4] * lx)
-        x, y, z = displaced(points, i, s, work.change)
-        w[0], w[1], w[2] = x - u[0], y - u[1], z - u[2]
-        along = w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2]
-        vx = dt * (twist[0] + twist[4] * arm[2] - twist[5] * arm[1])
-        vy = dt * (twist[1] + twist[5] * arm[0] - twist[3] * arm[2])
-        vz = dt * (twist[2] + twist[3] * arm[1] - twist[4] * arm[0])
-        gap = max(touching.distance[r], -RECOVERY)
-        gap += normal[0] * (x - at[0] - vx) + normal[1] * (y - at[1] - vy) + normal[2] * (z - at[2] - vz)
-        for k in range(3):
-            w[k] += (gap - along) * normal[k]
-    for a in range(n):
-        i, b = touching.point[work.rows[a]], touching.body[work.rows[a]]
-        for c in range(n):
-            j = touching.point[work.rows[c]]
-            D = work.D[a, c]
-            for k in range(3):
-                for m in range(3):
-                    D[k, m] = points.C[i, j, k, m]
-            if partners.light[0] > 0.0:
-                _add_recoil(D, partners.light[0], partners.spin[0], work.own[a], work.own[c], dt * dt)
-            if partners.light[b] > 0.0 and touching.body[work.rows[c]] == b:
-                _add_recoil(D, partners.light[b], partners.spin[b], work.lever[a], work.lever[c], dt * dt)
+            for m in range(3):
+                D[k, m] = points.C[i, j, k, m]
+        if partners.light[0] > 0.0:
+            _add_recoil(D, partners.light[0], partners.spin[0], work.own[a], work.own[c], dt * dt)
+        if partners.light[b] > 0.0 and touching.body[work.rows[c]] == b:
+            _add_recoil(D, partners.light[b], partners.spin[b], work.lever[a], work.lever[c], dt * dt)
+
+
+@inlined
+def _relax_all(touching: Touching, work: Solve, n: int, recoils: bool) -> None:
+    """Solve the forces of the ``n`` points by projected Gauss–Seidel, from those of the last tick."""
     for a in range(n):
         for k in range(3):
             work.u[a, k] = work.w[a, k]
@@ -248,30 +263,46 @@ def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
                 f = touching.force[work.rows[c]]
                 D = work.D[a, c]
                 work.u[a, k] += D[k, 0] * f[0] + D[k, 1] * f[1] + D[k, 2] * f[2]
-    for _ in range(SWEEPS if partners.light[0] == 0.0 else SWEEPS_FREE):
+    for _ in range(SWEEPS_FREE if recoils else SWEEPS):
         change, most = 0.0, 0.0
         for a in range(n):
             change = max(change, _relax(touching, work, n, a))
             f = touching.force[work.rows[a]]
             most = max(most, f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
-        if partners.light[0] > 0.0 and change <= SETTLED * SETTLED * most:
+        if recoils and change <= SETTLED * SETTLED * most:
             break
+
+
+@inlined
+def _conclude(contacts: Contacts, points: Points, a: int) -> None:
+    """Pass the force of a point to the tissue, and move the anchor of friction on by what the bristle does not hold."""
+    touching, work, partners = contacts.touching, contacts.solve, contacts.partners
+    r = work.rows[a]
+    f, normal, u = touching.force[r], touching.normal[r], work.u[a]
+    for k in range(3):
+        points.force[touching.point[r], k] = f[k]
+    if touching.part[r] < 0:
+        return
+    along_f = f[0] * normal[0] + f[1] * normal[1] + f[2] * normal[2]
+    along_u = u[0] * normal[0] + u[1] * normal[1] + u[2] * normal[2]
+    for k in range(3):
+        work.w[a, k] = u[k] - along_u * normal[k] + SOFT * (f[k] - along_f * normal[k])
+    times_transposed(partners.R[touching.body[r]], work.w[a], work.u[a])
+    for k in range(3):
+        touching.anchor[r, k] += work.u[a, k]
+
+
+@kernel
+def press(contacts: Contacts, points: Points, s: float, dt: float) -> int:
+    """Forces of all points of contact in this tick, and where friction anchors; returns how many there are."""
+    n = _gather(contacts.touching, points, contacts.solve)
     for a in range(n):
-        r = work.rows[a]
-        f, normal, u = touching.force[r], touching.normal[r], work.u[a]
-        i = touching.point[r]
-        if touching.part[r] < 0:
-            points.force[i, 0], points.force[i, 1], points.force[i, 2] = f[0], f[1], f[2]
-            continue
-        along_f = f[0] * normal[0] + f[1] * normal[1] + f[2] * normal[2]
-        along_u = u[0] * normal[0] + u[1] * normal[1] + u[2] * normal[2]
-        # What the bristle does not hold moves its anchor on.
-        for k in range(3):
-            points.force[i, k] = f[k]
-            work.w[a, k] = u[k] - along_u * normal[k] + SOFT * (f[k] - along_f * normal[k])
-        times_transposed(partners.R[touching.body[r]], work.w[a], work.u[a])
-        for k in range(3):
-            touching.anchor[r, k] += work.u[a, k]
+        _find_gap(contacts, points, a, s, dt)
+    for a in range(n):
+        _fill_compliance(contacts, points, a, n, dt)
+    _relax_all(contacts.touching, contacts.solve, n, contacts.partners.light[0] > 0.0)
+    for a in range(n):
+        _conclude(contacts, points, a)
     return n
 
 

@@ -30,6 +30,7 @@ from ligature.tissue.rows import (
 )
 
 Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
 Integers = NDArray[np.int64]
 
 AXIAL, ACROSS, TIP, ENTRY, ENTRY_ACROSS, SLIDE, RUB = 0, 1, 2, 3, 4, 5, 6
@@ -275,91 +276,102 @@ def _find_bases(points: Points, held: Held, rows: Bristles, s: float) -> None:
             rows.base[i, 0], rows.base[i, 1], rows.base[i, 2] = displaced(points, i, s, rows.change)
 
 
-@kernel
-def gather(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Array, s: float) -> int:
-    """Make the rows of a tick; returns how many."""
-    m = 0
-    where, tip_path, contact = held.tip[0], held.tip[1], held.tip[2]
-    _find_bases(points, held, rows, s)
-    for u in range(points.filled[0]):
-        i = points.used[u]
-        if held.engaged[i] == 0:
-            continue
-        qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, held.sigma[i])
-        rx, ry, rz = qx - shape[11], qy - shape[12], qz - shape[13]
-        bx, by, bz = rows.base[i, 0], rows.base[i, 1], rows.base[i, 2]
-        dx, dy, dz = qx - bx, qy - by, qz - bz
-        # Along: what friction holds, and how the tissue moves by itself.
-        at = points.at[i]
-        slid = tx * (at[0] - bx) + ty * (at[1] - by) + tz * (at[2] - bz)
-        set_row(rows, m, AXIAL, i, tx, ty, tz, rx, ry, rz)
-        rows.rest[m] = held.sigma[i] - held.anchor[i] + slid
-        limit = points.friction[i] * held.share[i]
-        rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = -limit, limit, points.soft[i], held.side[i, 0]
+@inlined
+def _hold_across(
+    rows: Bristles, m: int, kind: int, i: int, t: Vector, n: Vector, arm: Vector, away: Vector, limit: float,
+    soft: float, side: Integers,
+) -> int:  # fmt: skip
+    """Hold point ``i`` across ``t``, along ``n`` first, within ``limit``; returns the number of the next row.
+
+    ``arm`` is from the centre of mass, ``away`` the stretch, ``side`` (3,) ends with the limits of the last tick.
+    """
+    nx, ny, nz = n
+    for turn in range(2):
+        if turn == 1:
+            nx, ny, nz = t[1] * nz - t[2] * ny, t[2] * nx - t[0] * nz, t[0] * ny - t[1] * nx
+        set_row(rows, m, kind, i, nx, ny, nz, arm[0], arm[1], arm[2])
+        rows.rest[m] = nx * away[0] + ny * away[1] + nz * away[2]
+        rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = -limit, limit, soft, side[1 + turn]
         m += 1
-        # Across: the first direction is that of the last force, so that its limit is that of the whole.
-        fx, fy, fz = held.across[i, 0], held.across[i, 1], held.across[i, 2]
-        along = fx * tx + fy * ty + fz * tz
-        fx, fy, fz = fx - along * tx, fy - along * ty, fz - along * tz
-        size = math.sqrt(fx * fx + fy * fy + fz * fz)
-        if size > 1e-9:
-            nx, ny, nz = fx / size, fy / size, fz / size
-        offset, torn = held.offset[i], held.torn[i]
-        ox, oy, oz = offset[0] + torn[0], offset[1] + torn[1], offset[2] + torn[2]
-        # A node that has just been passed stands for no length yet; it tears no sooner than half of the others.
-        limit = points.strength[i] * max(held.share[i], LEAST_SHARE)
-        for turn in range(2):
-            if turn == 1:
-                nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
-            set_row(rows, m, ACROSS, i, nx, ny, nz, rx, ry, rz)
-            rows.rest[m] = nx * (dx - ox) + ny * (dy - oy) + nz * (dz - oz)
-            rows.low[m], rows.high[m], rows.soft[m] = -limit, limit, points.soft[i]
-            rows.side[m] = held.side[i, 1 + turn]
-            m += 1
-    tx, ty, tz, nx, ny, nz = shape[3], shape[4], shape[5], shape[6], shape[7], shape[8]
+    return m
+
+
+@inlined
+def _hold_node(points: Points, held: Held, rows: Bristles, shape: Array, i: int, m: int) -> int:
+    """Rows of a node that the needle passes: friction along it, the hold across; returns the number of the next row."""
+    qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, held.sigma[i])
+    rx, ry, rz = qx - shape[11], qy - shape[12], qz - shape[13]
+    bx, by, bz = rows.base[i, 0], rows.base[i, 1], rows.base[i, 2]
+    # Along: what friction holds, and how the tissue moves by itself.
+    at = points.at[i]
+    slid = tx * (at[0] - bx) + ty * (at[1] - by) + tz * (at[2] - bz)
+    set_row(rows, m, AXIAL, i, tx, ty, tz, rx, ry, rz)
+    rows.rest[m] = held.sigma[i] - held.anchor[i] + slid
+    limit = points.friction[i] * held.share[i]
+    rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = -limit, limit, points.soft[i], held.side[i, 0]
+    # Across: the first direction is that of the last force, so that its limit is that of the whole.
+    fx, fy, fz = held.across[i, 0], held.across[i, 1], held.across[i, 2]
+    along = fx * tx + fy * ty + fz * tz
+    fx, fy, fz = fx - along * tx, fy - along * ty, fz - along * tz
+    size = math.sqrt(fx * fx + fy * fy + fz * fz)
+    if size > 1e-9:
+        nx, ny, nz = fx / size, fy / size, fz / size
+    offset, torn = held.offset[i], held.torn[i]
+    ox, oy, oz = offset[0] + torn[0], offset[1] + torn[1], offset[2] + torn[2]
+    away = (qx - bx - ox, qy - by - oy, qz - bz - oz)
+    # A node that has just been passed stands for no length yet; it tears no sooner than half of the others.
+    limit = points.strength[i] * max(held.share[i], LEAST_SHARE)
+    t, n, arm = (tx, ty, tz), (nx, ny, nz), (rx, ry, rz)
+    return _hold_across(rows, m + 1, ACROSS, i, t, n, arm, away, limit, points.soft[i], held.side[i])
+
+
+@inlined
+def _cut_ahead(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Array, m: int) -> int:
+    """The row of a tip that cuts its path, or breaks through its end; returns the number of the next row."""
+    path, front = held.tip[1], -1
+    for k in range(paths.count[path]):
+        if held.engaged[paths.node[path, k]]:
+            front = k
+    if front < 0:
+        return m
+    i = paths.node[path, front]
     rx, ry, rz = shape[0] - shape[11], shape[1] - shape[12], shape[2] - shape[13]
-    if where in (CUTS, TENTS, LEAVES):
-        front = -1
-        for k in range(paths.count[tip_path]):
-            if held.engaged[paths.node[tip_path, k]]:
-                front = k
-        if front >= 0:
-            i = paths.node[tip_path, front]
-            at = points.at[i]
-            set_row(rows, m, TIP, i, tx, ty, tz, rx, ry, rz)
-            slid = 0.0
-            for a in range(3):
-                slid += shape[3 + a] * (at[a] - rows.base[i, a])
-            rows.rest[m] = paths.s[tip_path, front] + held.sigma[i] - paths.cut[tip_path] + slid
-            rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = 0.0, held.limit[0], points.soft[i], held.tip_side[0]
-            m += 1
-    elif where in (TOUCHES, SLIDES):
-        i = contact
-        dx, dy, dz = shape[0] - rows.base[i, 0], shape[1] - rows.base[i, 1], shape[2] - rows.base[i, 2]
-        kind, other = ENTRY, ENTRY_ACROSS
-        low, high, bound = 0.0, held.limit[0], held.limit[0]
-        if where == SLIDES:
-            kind, other = SLIDE, RUB
-            tx, ty, tz = -held.normal[0], -held.normal[1], -held.normal[2]
-            high, bound = 1e9, max(TIP_FRICTION * held.pressed[0], held.limit[0])
-            # Across the normal: along the tip's way, and the third.
-            along = shape[3] * tx + shape[4] * ty + shape[5] * tz
-            nx, ny, nz = shape[3] - along * tx, shape[4] - along * ty, shape[5] - along * tz
-            size = math.sqrt(nx * nx + ny * ny + nz * nz)
-            nx, ny, nz = nx / size, ny / size, nz / size
-        dx, dy, dz = dx - held.offset[i, 0], dy - held.offset[i, 1], dz - held.offset[i, 2]
-        set_row(rows, m, kind, i, tx, ty, tz, rx, ry, rz)
-        rows.rest[m] = tx * dx + ty * dy + tz * dz
-        rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = low, high, points.soft[i], held.tip_side[0]
-        m += 1
-        for turn in range(2):
-            if turn == 1:
-                nx, ny, nz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
-            set_row(rows, m, other, i, nx, ny, nz, rx, ry, rz)
-            rows.rest[m] = nx * dx + ny * dy + nz * dz
-            rows.low[m], rows.high[m], rows.soft[m] = -bound, bound, points.soft[i]
-            rows.side[m] = held.tip_side[1 + turn]
-            m += 1
+    set_row(rows, m, TIP, i, shape[3], shape[4], shape[5], rx, ry, rz)
+    slid = 0.0
+    for a in range(3):
+        slid += shape[3 + a] * (points.at[i, a] - rows.base[i, a])
+    rows.rest[m] = paths.s[path, front] + held.sigma[i] - paths.cut[path] + slid
+    rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = 0.0, held.limit[0], points.soft[i], held.tip_side[0]
+    return m + 1
+
+
+@inlined
+def _touch_surface(points: Points, held: Held, rows: Bristles, shape: Array, m: int) -> int:
+    """Rows of a tip on the surface, which holds it or lets it slide; returns the number of the next row."""
+    i = held.tip[2]
+    tx, ty, tz, nx, ny, nz = shape[3], shape[4], shape[5], shape[6], shape[7], shape[8]
+    kind, across, high, bound = ENTRY, ENTRY_ACROSS, held.limit[0], held.limit[0]
+    if held.tip[0] == SLIDES:
+        kind, across = SLIDE, RUB
+        tx, ty, tz = -held.normal[0], -held.normal[1], -held.normal[2]
+        high, bound = 1e9, max(TIP_FRICTION * held.pressed[0], held.limit[0])
+        # Across the normal: along the tip's direction, and the third.
+        along = shape[3] * tx + shape[4] * ty + shape[5] * tz
+        nx, ny, nz = shape[3] - along * tx, shape[4] - along * ty, shape[5] - along * tz
+        size = math.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx / size, ny / size, nz / size
+    dx, dy, dz = shape[0] - rows.base[i, 0], shape[1] - rows.base[i, 1], shape[2] - rows.base[i, 2]
+    dx, dy, dz = dx - held.offset[i, 0], dy - held.offset[i, 1], dz - held.offset[i, 2]
+    t, n, arm = (tx, ty, tz), (nx, ny, nz), (shape[0] - shape[11], shape[1] - shape[12], shape[2] - shape[13])
+    set_row(rows, m, kind, i, tx, ty, tz, arm[0], arm[1], arm[2])
+    rows.rest[m] = tx * dx + ty * dy + tz * dz
+    rows.low[m], rows.high[m], rows.soft[m], rows.side[m] = 0.0, high, points.soft[i], held.tip_side[0]
+    return _hold_across(rows, m + 1, across, i, t, n, arm, (dx, dy, dz), bound, points.soft[i], held.tip_side)
+
+
+@inlined
+def _fill_compliance(points: Points, rows: Bristles, m: int) -> None:
+    """The tissue's compliance between the first ``m`` rows, into ``rows.C``."""
     for a in range(m):
         e = rows.e[a]
         for b in range(a + 1):
@@ -369,6 +381,23 @@ def gather(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Arra
                 value += e[i] * (C[i, 0] * f[0] + C[i, 1] * f[1] + C[i, 2] * f[2])
             rows.C[a, b] = value
             rows.C[b, a] = value
+
+
+@kernel
+def gather(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Array, s: float) -> int:
+    """Make the rows of a tick; returns how many."""
+    m = 0
+    _find_bases(points, held, rows, s)
+    for u in range(points.filled[0]):
+        i = points.used[u]
+        if held.engaged[i] != 0:
+            m = _hold_node(points, held, rows, shape, i, m)
+    where = held.tip[0]
+    if where in (CUTS, TENTS, LEAVES):
+        m = _cut_ahead(points, paths, held, rows, shape, m)
+    elif where in (TOUCHES, SLIDES):
+        m = _touch_surface(points, held, rows, shape, m)
+    _fill_compliance(points, rows, m)
     return m
 
 
