@@ -319,7 +319,7 @@ LINKER_LOGS = {
 
 
 @pytest.mark.parametrize("driver", LINKER_LOGS)
-def test_a_linker_is_told_from_a_compiler(driver: str) -> None:
+def test_errors_of_a_linker_are_distinguished_from_those_of_a_compiler(driver: str) -> None:
     files = ligature.model.shapes.ShaderFiles(Path("own.vert"), Path("own.frag"))
     (found,) = findings(f"GLSL Linker failed\n\n{LINKER_LOGS[driver]}", files)
     assert found.message.startswith("does not link with own.frag: ") and "vWay" in found.message
