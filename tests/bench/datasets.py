@@ -19,7 +19,7 @@ from ligature.datasets import DatasetWriter
 from ligature.datasets.lerobot import export
 
 from tests.bench import ledger
-from tests.bench.scenes import chain_step_us
+from tests.bench.reference import chain_step_us
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 from record_dataset import GESTURES, PHASES, TASK, record

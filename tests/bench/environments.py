@@ -17,8 +17,8 @@ import numpy as np
 from ligature.environments.suturing import CONTROL
 
 from tests.bench import ledger
+from tests.bench.reference import chain_step_us
 from tests.bench.resets import median_ms
-from tests.bench.scenes import chain_step_us
 
 SECONDS = 10.0
 MAX_STEPS = 100

@@ -18,7 +18,7 @@ from ligature.cli.bench import measure
 from ligature.model.scene import Scene
 
 from tests.bench import ledger
-from tests.bench.scenes import chain_step_us
+from tests.bench.reference import chain_step_us
 
 ROOT = ledger.ROOT
 SECONDS, RATE = 1.0, 200.0

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import ligature
 
 from tests.bench import ledger
-from tests.bench.scenes import chain_step_us
+from tests.bench.reference import chain_step_us
 
 ROUNDS = 15
 

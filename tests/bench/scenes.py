@@ -10,44 +10,21 @@ import json
 import os
 import statistics
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import ligature  # imports Bullet without its banner
+import ligature
 from ligature.cli.bench import measure
 from ligature.model.scene import Scene
 from ligature.simulation import PHASES
 
 from tests.bench import ledger
+from tests.bench.reference import chain_step_us
 
 ROOT = Path(__file__).resolve().parents[2]
 ROUNDS = 3
 SECONDS = 2.0
-
-
-def chain_step_us() -> float:
-    """Microseconds of one step of the reference: 40 bodies and point joints hanging in Bullet."""
-    import pybullet
-
-    client = pybullet.connect(pybullet.DIRECT)
-    pybullet.setGravity(0, 0, -9.8, physicsClientId=client)
-    pybullet.setPhysicsEngineParameter(fixedTimeStep=1e-3, numSolverIterations=50, physicsClientId=client)
-    shape = pybullet.createCollisionShape(pybullet.GEOM_CAPSULE, radius=2e-3, height=8e-3, physicsClientId=client)
-    last = pybullet.createMultiBody(0, -1, physicsClientId=client)
-    for i in range(40):
-        body = pybullet.createMultiBody(0.03, shape, basePosition=[0, 0, -0.012 * (i + 0.5)], physicsClientId=client)
-        low, high = [0, 0, -0.006 if i else 0], [0, 0, 0.006]
-        pybullet.createConstraint(
-            last, -1, body, -1, pybullet.JOINT_POINT2POINT, [0, 0, 0], low, high, physicsClientId=client
-        )
-        last = body
-    begin = time.perf_counter()
-    for _ in range(1000):
-        pybullet.stepSimulation(physicsClientId=client)
-    pybullet.disconnect(client)
-    return (time.perf_counter() - begin) * 1e3
 
 
 def scenes() -> list[tuple[str, Scene]]:

@@ -19,7 +19,7 @@ from ligature.cli.master import command, master_answers
 
 from tests.bench import ledger
 from tests.bench.on_ros import CORPUS, processor_seconds
-from tests.bench.scenes import chain_step_us
+from tests.bench.reference import chain_step_us
 from tests.waiting import until
 
 ROUNDS = 3

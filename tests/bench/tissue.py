@@ -23,7 +23,7 @@ from ligature.tissue.block import TissueBlock
 from ligature.tissue.elastic import ElasticGrid
 
 from tests.bench import ledger
-from tests.bench.scenes import chain_step_us
+from tests.bench.reference import chain_step_us
 from tests.soft import conftest as kit
 from tests.tissue.conftest import SprungNeedle
 
