@@ -37,7 +37,7 @@ _IMPORT = re.compile(rb"^from (ligature[\w.]*) import (\([^)]*\)|[^\n]*)", re.MU
 _DIGESTED = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
     "kernels.py", "kernel_cache.py", "unrolled.py", "grasping/fingers.py", "model/state.py", "physics/loop_arrays.py",
-    "suture/layout.py", "suture/passages.py", "tissue/layout.py", "tissue/contact_arrays.py",
+    "suture/colliders.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py", "tissue/contact_arrays.py",
 )  # fmt: skip
 """Sources without kernels whose contents are compiled into kernels."""
 

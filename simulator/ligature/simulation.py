@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic
 from ligature.arms import ArmSet
+from ligature.coasting import PHASES as COASTED
+from ligature.coasting import Coasting
 from ligature.grasping import ActuatorAttachments, ActuatorGrasps, Grasps
 from ligature.model.commands import (
     ActuatorCommand,
@@ -192,13 +194,12 @@ class Simulation:
             (self.phases[phase], [s for s in subsystems if type(s).step is not Subsystem.step])
             for phase, subsystems in self._tick.items()
         ]
+        self._coasting = Coasting(self._world, self._suture)
         self._beside_bodies = [
-            s for _, subsystems in self._phases for s in subsystems if not isinstance(s, World | Controllers)
+            s for _, subsystems in self._phases for s in subsystems if not isinstance(s, World | Controllers | Suture)
         ]
-        self._beside_bodies.sort(
-            key=lambda s: (type(s).idle_ticks is not Subsystem.idle_ticks, s is not self._suture, s is self.arms)
-        )
-        """Whoever else steps; first those that may never be idle, last the arms, which look at all joints."""
+        self._beside_bodies.sort(key=lambda s: (type(s).idle_ticks is not Subsystem.idle_ticks, s is self.arms))
+        """Whoever steps beside bodies and threads; first those that may never be idle, last the arms."""
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._handlers: dict[type[Message], Callable[[Any], None]] = {
@@ -234,7 +235,7 @@ class Simulation:
         if ticks < 0:
             raise ValueError(f"ticks is {ticks}; it must be 0 or more")
         while ticks > 0:
-            passed = self._coast(ticks) if ticks > 1 else 0
+            passed = self._coast(ticks)
             if not passed:
                 self._advance()
                 passed = 1
@@ -244,8 +245,13 @@ class Simulation:
 
     def _advance(self) -> None:
         """One tick: commands become motor targets and forces, threads and grasps exchange impulses, bodies move."""
+        self._step_phases(self._phases)
+        self._clock.advance()
+
+    def _step_phases(self, phases: Sequence[tuple[Stopwatch, Sequence[Subsystem]]]) -> None:
+        """Step the subsystems of ``phases`` of a tick."""
         tick, now = self._clock.since_reset, clock.perf_counter()
-        for stopwatch, subsystems in self._phases:
+        for stopwatch, subsystems in phases:
             for subsystem in subsystems:
                 if self._resting and self._rests(subsystem):
                     continue
@@ -255,28 +261,38 @@ class Simulation:
                     self._leave_out(subsystem, error)
             begin, now = now, clock.perf_counter()
             stopwatch.seconds += now - begin
-        self._clock.advance()
 
     def _coast(self, ticks: int) -> int:
-        """Advance by up to ``ticks`` in which only bodies and their joints have work, in one call; returns how many."""
+        """Advance by up to ``ticks`` in which only bodies and threads have work, in one call; returns how many."""
         if self._resting:
             return 0
         tick = self._clock.since_reset
         for subsystem in self._beside_bodies:
             ticks = min(ticks, subsystem.idle_ticks(tick))
-            if ticks < 2:
+            if ticks < 1:
                 return 0
-        with self.phases["bodies"]:
-            try:
-                passed = self._world.coast(ticks)
-            except Exception as error:  # nothing ends a run but its user
-                self._leave_out(self._world, error)
-                passed = 1
+        try:
+            passed, begun = self._coasting.pass_ticks(ticks)
+        except Exception as error:  # nothing ends a run but its user
+            self._leave_out(self._world, error)
+            passed, begun = 1, False
+        for phase, seconds in zip(COASTED, self._coasting.spent.tolist(), strict=True):
+            self.phases[phase].seconds += seconds
         if passed:
             for subsystem in self._beside_bodies:
                 subsystem.pass_idle(passed)
             self._clock.advance(passed)
-        return passed
+        if begun:
+            self._finish()
+        return passed + begun
+
+    def _finish(self) -> None:
+        """Do what is left of a tick in which controllers have acted and nothing else of their phase has work."""
+        (_, controlling), *left = self._phases
+        for subsystem in controlling:
+            subsystem.pass_idle(1)
+        self._step_phases(left)
+        self._clock.advance()
 
     def _leave_out(self, subsystem: Subsystem, error: Exception) -> None:
         """Reset and skip, for a while, a subsystem whose step raised; then it continues without commands."""

@@ -163,13 +163,14 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             self._exchange_impulses()
 
     def idle_ticks(self, tick: int) -> int:
-        """The ticks until a jaw that may grasp something searches; none while jaws or actuators hold."""
+        """The ticks until a driven jaw that may grasp something searches; none while jaws or actuators hold."""
         if self._actuator_grasps or any(self._jaw_grasps) or any(self._thread_grasps):
             return 0
         searching = [index for index, idle in enumerate(self._idle) if not idle]
         if any(self._near[index] for index in searching):
             return 0
-        return min((-(tick + index) % SEARCH_PERIOD for index in searching), default=ALWAYS)
+        driven = (index for index in searching if self._fingers[index].driven())
+        return min((-(tick + index) % SEARCH_PERIOD for index in driven), default=ALWAYS)
 
     def _search(self, index: int) -> None:
         """Close gently on the nearest body between the fingers; grasp it when both pads touch it."""

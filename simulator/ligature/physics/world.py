@@ -20,7 +20,6 @@ from ligature.model.subsystem import Subsystem, copied
 from ligature.physics.body_commands import BodyCommands
 from ligature.physics.chunks import MOST_REPLACED, Chunks
 from ligature.physics.closures import Closures
-from ligature.physics.coasting import coast, prepare
 from ligature.physics.collisions import Collisions
 from ligature.physics.contact_wrenches import ContactWrenches
 from ligature.physics.damping import Damping
@@ -33,6 +32,7 @@ from ligature.physics.joints import Joints
 from ligature.physics.masses import Masses
 from ligature.physics.mobility import mobility
 from ligature.physics.parting import Parting
+from ligature.physics.preparing import prepare
 from ligature.physics.queries import BulletQueries
 from ligature.physics.readout import Readout
 from ligature.physics.trees import read_bodies
@@ -107,6 +107,8 @@ class World(Subsystem):
         What the rest of the world exerts on bodies.
     chunks
         What of volumes that may change collides.
+    always
+        What `prepare` takes, but the length of a tick.
     """
 
     def __init__(self, scene: Scene, dt: float = 1e-3) -> None:
@@ -139,7 +141,7 @@ class World(Subsystem):
         self._readout = Readout(engine.client, self.scene, engine.trees, engine.motions, engine.place_of)
         self._parting = Parting(engine)
         motions, damping, lifts = engine.motions, self._damping, self._lifts
-        self._always = (
+        self.always = (
             motions.handle, motions.table, self.joints.table, engine.place_table, damping.trees, damping.factors,
             lifts.bodies, lifts.forces,
         )  # fmt: skip
@@ -224,7 +226,7 @@ class World(Subsystem):
     def _prepare(self) -> None:
         """Laws of joints, damping and gravity, as one compiled call where that can reach Bullet."""
         if self.engine.motions.handle:
-            prepare(*self._always, self.dt)
+            prepare(*self.always, self.dt)
         else:
             self.joints.act()
             self._damping.step()
@@ -250,21 +252,21 @@ class World(Subsystem):
         if not sound:
             self._heal()
 
-    def coast(self, ticks: int) -> int:
-        """Advance by up to ``ticks`` as one compiled call, where nothing but joints, damping and gravity acts in them.
+    @property
+    def coasts(self) -> bool:
+        """Whether nothing but joints, damping, gravity and impulses acts on bodies as long as no command comes.
 
-        Returns how many ticks passed, with the same bits as those of `pre_step` and `step`; 0 where anything else acts.
+        Ticks are then what compiled code does with `always`.
         """
-        if (
+        return not (
             not self.engine.motions.handle or self.commands.all or self.masses.added or self.collisions.waits
             or self._parting.watches or self.chunks.bodies or self.scene.closures
-        ):  # fmt: skip
-            return 0
-        self.impulses.clear()
-        passed, sound = coast(*self._always, self.dt, MAX_SPEED, ticks)
+        )  # fmt: skip
+
+    def conclude(self, sound: bool) -> None:
+        """Put back what diverged in ticks of compiled code, unless all is ``sound``."""
         if not sound:
             self._heal()
-        return int(passed)
 
     def _heal(self) -> None:
         """Reset trees that diverged to their initial poses, with all trees that loops join to them."""

@@ -42,7 +42,7 @@ class Colliders:
 
     ``bodies`` are those that have parts, in order, and ``row_of`` where each stands among them; ``motion`` (b, 13)
     holds pose of the inertial frame and twist as they were last read, ``local`` (n, 7) the poses of the parts in the
-    inertial frames of their bodies.
+    inertial frames of their bodies. Compiled code takes ``table`` of a `Watch` and ``indices`` (b,) of the bodies.
     """
 
     def __init__(self, scene: Scene, dt: float) -> None:
@@ -56,14 +56,14 @@ class Colliders:
         body = np.array([part[0] for part in parts], dtype=np.int64)
         self._dt = dt
         self.bodies = sorted(set(body.tolist()))
-        self._indices = np.array(self.bodies, dtype=np.int64)
+        self.indices = np.array(self.bodies, dtype=np.int64)
         own = self._watch = watch(len(self.bodies), n)
         own.local[:] = np.array([matrix_pose7(part[1]) for part in parts]).reshape(n, 7)
         own.extent[:] = np.array([part[5] for part in parts]).reshape(n, 2, 3)
         for k, b in enumerate(self.bodies):
             own.ranges[k] = np.flatnonzero(body == b)[[0, -1]] + [0, 1]
         own.static[:] = own.still[:] = [scene.bodies[b].static for b in self.bodies]
-        self._table = table_of(own)
+        self.table = table_of(own)
         planes = [part[4] for part in parts]
         ends = np.cumsum([0] + [len(p) for p in planes])
         self._slices = {b: slice(*r) for b, r in zip(self.bodies, own.ranges.tolist(), strict=True)}
@@ -79,6 +79,8 @@ class Colliders:
             "friction": np.array([scene.bodies[b].friction for b in body]),
         }
         self._nearby: list[int] = []
+        self._looked = False
+        """Whether bodies were read ahead of `update`."""
         self.motion, self.local = own.motion, own.local
 
     def shapes(self, elements: int) -> Shapes:
@@ -100,11 +102,22 @@ class Colliders:
 
         The list is another one as soon as it holds other bodies.
         """
-        if self.bodies:
-            bodies.read_motions(self._indices, self._watch.seen)
-            if look(self._table, corners, self._dt, LOOKS, NEAR):
+        if self.bodies and not self._looked:
+            bodies.read_motions(self.indices, self._watch.seen)
+            if look(self.table, corners, self._dt, LOOKS, NEAR):
                 self._list_near()
+        self._looked = False
         return self._nearby
+
+    @property
+    def nearby(self) -> list[int]:
+        """The bodies that are near the rods, as `update` returned them."""
+        return self._nearby
+
+    def look_ahead(self) -> None:
+        """Compiled code has read the bodies for the coming `update`, and others are near."""
+        self._looked = True
+        self._list_near()
 
     def restart(self) -> None:
         """Read all poses in the next update."""

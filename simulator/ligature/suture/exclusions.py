@@ -48,6 +48,11 @@ class Exclusions:
         """Look for overlaps with ``parts`` in the next tick: they, or the rod, were put somewhere."""
         self._due[parts], self._waits = True, True
 
+    @property
+    def idle(self) -> bool:
+        """Whether `step` does nothing until something is put somewhere."""
+        return not (self._waits or self._any)
+
     def step(self) -> list[tuple[int, int, float]]:
         """Find what is inside bodies after a move, and push it out; returns part, element, depth of deep overlaps."""
         found = self._find() if self._waits else []

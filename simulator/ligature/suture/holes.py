@@ -18,7 +18,7 @@ from ligature.model.frames import inverse
 from ligature.model.piercing import Hole, Tissue
 from ligature.model.scene import Scene
 from ligature.model.state import MAX_INSERTIONS, StateRecord
-from ligature.model.subsystem import kept, put_back
+from ligature.model.subsystem import ALWAYS, kept, put_back
 from ligature.suture import passages as arrays
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.passage_forces import react, solve_needle
@@ -130,6 +130,18 @@ class Holes:
             self._search()
         if self._passages.filled[0]:
             self._follow()
+
+    @property
+    def waits(self) -> int:
+        """For how many ticks `begin` only counts them, and `end` does nothing."""
+        if self.idle:
+            return ALWAYS
+        return 0 if self._passages.filled[0] else self._countdown
+
+    def wait(self, ticks: int) -> None:
+        """Count ``ticks`` in which nothing else was to be done."""
+        if not self.idle:
+            self._countdown -= ticks
 
     def end(self) -> None:
         """Solve needles without a rod and apply the reactions to the holes, after the rods have advanced."""

@@ -25,7 +25,7 @@ from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.springs import CAPACITY, read_other_loads, springs
-from ligature.suture.substeps import run_tick
+from ligature.suture.ticking import RodTick, tick_rod
 from ligature.tables import table_of
 
 Array = NDArray[np.float64]
@@ -141,8 +141,9 @@ class Rod:
         self._nodes = self._new_nodes()
         self.shapes = shapes or layout.no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
-        self._touches = tuple(layout.touches(capacity) for _ in range(3))
-        self._touch_tables = tuple(table_of(touches) for touches in self._touches)
+        self._buffers = self._touches = tuple(layout.touches(capacity) for _ in range(3))
+        self._touch_tables = np.array([table_of(touches) for touches in self._buffers])
+        self._order = np.arange(3)
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
         self.self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._arrays = layout.rod_arrays(
@@ -152,12 +153,17 @@ class Rod:
         )  # fmt: skip
         self._table = table_of(self._arrays)
         self._permanent = [self._constraint_of(attachment) for attachment in others]
-        self._mobile = {self.node_of[p.body]: p.body for p in partners if p.mass > 0.0}
+        self._mobile = np.full(self._total, -1)
+        for partner in partners:
+            if partner.mass > 0.0:
+                self._mobile[self.node_of[partner.body]] = partner.body
         self._fixed = {p.body: p.fixed for p in partners}
         self._near: list[int] | None = None
         self._lent = 0
         """Springs that others have filled for the tick."""
         self._met, self._motion = np.zeros((0, 2), np.int64), np.zeros((0, 13))
+        self._tick: RodTick | None = None
+        self._tick_table = np.zeros(0, np.int64)
         self._apart: list[int] = []
         self._movable: list[tuple[int, int]] = []
         self._pulled: dict[int, tuple[Array, float, Array]] = {}
@@ -166,9 +172,9 @@ class Rod:
         self._positions, self._corners = self._nodes.x[self._own], np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
         self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
-        self.take_passages(passages(1), 0)
         self.springs = springs(CAPACITY + n)
         self._spring_table = table_of(self.springs)
+        self.take_passages(passages(1), 0)
         self.impulse, self.tension = self._arrays.impulse, self._arrays.tension
         self.reset()
 
@@ -318,7 +324,8 @@ class Rod:
 
     def take_passages(self, held: Passages, owner: int) -> None:
         """Include the passages of ``held`` with this ``owner`` in the solve from now on."""
-        self._passages, self._passage_table, self._owner = held, table_of(held), owner
+        self._passages, self._passage_table, self._owner = held, table_of(held), np.array([owner])
+        self._tick = None
 
     def pull_partner(self, body: int, acceleration: Array, mass: float, inertia: Array) -> None:
         """Set ``acceleration`` (3,), ``mass`` and ``inertia`` (3,) of a movable partner for the coming tick.
@@ -431,7 +438,6 @@ class Rod:
         self._lent = int(self.springs.filled[0])
         if near is not self._near:
             self._gather_partners(colliders, near)
-        self._motion = colliders.motion
         for body in self._apart:
             self.place(body, *bodies.motion(body))
         for body, node in self._movable:
@@ -439,7 +445,7 @@ class Rod:
 
     def _gather_partners(self, colliders: Colliders, near: list[int]) -> None:
         """Collect the partners of this tick: their shapes, the source of their motion, and which of them can move."""
-        self._near = near
+        self._near, self._motion, self._tick = near, colliders.motion, None
         self.shapes.node[:] = -1
         for body in near:
             self.shapes.node[colliders.parts_of(body)] = self.node_of[body]
@@ -486,6 +492,7 @@ class Rod:
         nodes = [(self._first + g.element, self.node_of[g.body], 0) for g in held]
         nodes += [(self._first, self.node_of[p.body], 1) for p in self._pads for _ in p.points]
         points = np.array([*(g.points for g in held), *(p for pads in self._pads for p in _grasp_rows(pads))])
+        self._tick = None
         return np.array(nodes, dtype=np.int64).reshape(-1, 3), points.reshape(-1, 3, 2, 3)
 
     def _find_grasped(self) -> None:
@@ -510,25 +517,40 @@ class Rod:
 
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
-        pushed = self._arrays.pushed[: self._pushed].tolist()
-        return [(self._mobile[node], self.impulse[node]) for node in pushed if node in self._mobile]
+        pushed = self._arrays.pushed[: self._pushed]
+        bodies = self._mobile[pushed].tolist()
+        return [(body, self.impulse[node]) for body, node in zip(bodies, pushed.tolist(), strict=True) if body >= 0]
 
     def step(self) -> None:
         """Advance by one tick; `impulse` then holds the impulse on each partner."""
-        last, next_, scratch = self._touch_tables
         if self._pads:
             self._find_grasped()
-        constraints, points = self._constraint_rows
         self._begin_pushes()
-        run_tick(
-            self._table, last, next_, scratch, self._passage_table, self._owner, self._spring_table, constraints,
-            points, self._motion, self._met,
-        )  # fmt: skip
+        tick_rod(self.tick_table)
         self._end_pushes()
-        _, _, self.newton_steps, in_scratch, self._pushed, finite = self._arrays.counts.tolist()
-        self.settled_soundly = bool(finite)
+        self.conclude()
         self._end_pulls()
-        self._touches, self._touch_tables = _turned(self._touches, in_scratch), _turned(self._touch_tables, in_scratch)
+
+    @property
+    def tick_table(self) -> NDArray[np.int64]:
+        """What a tick takes, as the table of a `RodTick`."""
+        if self._tick is None:
+            self._tick = RodTick(
+                self._table, self._touch_tables, self._order, self._passage_table, self._owner, self._spring_table,
+                *self._constraint_rows, self._motion, self._met, self._positions, self._mobile,
+            )  # fmt: skip
+            self._tick_table = table_of(self._tick)
+        return self._tick_table
+
+    def conclude(self) -> None:
+        """Take over what the last tick left in the arrays."""
+        _, _, self.newton_steps, _, self._pushed, finite = self._arrays.counts.tolist()
+        self.settled_soundly = bool(finite)
+        self._touches = tuple(self._buffers[k] for k in self._order.tolist())
+
+    def coasts(self, near: list[int]) -> bool:
+        """Whether the coming ticks take nothing but `tick_table`, as long as no other bodies are ``near``."""
+        return near is self._near and not (self._apart or self._pads or self._external or self._pulled)
 
     def impulse_on(self, body: int) -> Array:
         """Linear and angular impulse (6,) of the last tick on a partner, about its centre of mass."""
@@ -542,12 +564,6 @@ TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "
 
 _KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly")
 """Attributes of a `Rod` that do."""
-
-
-def _turned(buffers: tuple[Any, ...], in_scratch: int) -> tuple[Any, ...]:
-    """The last, next and scratch buffer of the coming tick: what this one left in the next, or the scratch, is last."""
-    last, next_, scratch = buffers
-    return (scratch, last, next_) if in_scratch else (next_, scratch, last)
 
 
 def _grasp_rows(pads: JawPads) -> list[Array]:

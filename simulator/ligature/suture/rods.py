@@ -22,6 +22,7 @@ from ligature.suture.exclusions import Exclusions
 from ligature.suture.rod import Partner, Rod
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 NEXT_TO_PADS = 3
 """Elements next to the one between pads that do not touch the fingers."""
@@ -58,6 +59,8 @@ class Rods:
         self._places = {
             body: (number, e) for number, rod in enumerate(self.rods) for e, body in enumerate(rod.description.bodies)
         }
+        self._tick_tables: list[Integers] = []
+        self._ticks = np.zeros((0, 0), np.int64)
 
     def _rod(self, scene: Scene, description: RodDescription, dt: float) -> Rod:
         elements = len(description.mass)
@@ -90,6 +93,26 @@ class Rods:
             rod.step()
             for body, impulse in rod.pushes():
                 bodies.apply_impulse(body, impulse[:3], impulse[3:])
+            if not rod.settled_soundly:
+                self._heal(rod)
+
+    @property
+    def coasts(self) -> bool:
+        """Whether the coming ticks take nothing but `tick_tables` until a command comes or other bodies are near."""
+        near = self.colliders.nearby
+        return all(rod.coasts(near) for rod in self.rods) and all(exclusions.idle for exclusions in self._exclusions)
+
+    def tick_tables(self) -> Integers:
+        """What a tick of each rod takes, (r, w): the tables of `ligature.suture.ticking.RodTick`."""
+        tables = [rod.tick_table for rod in self.rods]
+        if list(map(id, tables)) != list(map(id, self._tick_tables)):
+            self._tick_tables, self._ticks = tables, np.array(tables)
+        return self._ticks
+
+    def conclude(self) -> None:
+        """Take over ticks of compiled code from the arrays, and put back what diverged in the last one."""
+        for rod in self.rods:
+            rod.conclude()
             if not rod.settled_soundly:
                 self._heal(rod)
 

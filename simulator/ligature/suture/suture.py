@@ -44,6 +44,20 @@ class Suture(Subsystem):
         """Always where nothing can ever be done, else none."""
         return ALWAYS if self._idle else 0
 
+    def coasting_ticks(self) -> int:
+        """For how many ticks `step` is what compiled code does with `Rods.tick_tables`, if no command comes."""
+        if self._idle:
+            return ALWAYS
+        return self.holes.waits if self.rods.coasts else 0
+
+    def conclude(self, ticks: int, begun: bool) -> None:
+        """Take over ``ticks`` of compiled code; whether another one has ``begun``, in which other bodies are near."""
+        self.holes.wait(ticks)
+        if ticks:
+            self.rods.conclude()
+        if begun:
+            self.rods.colliders.look_ahead()
+
     def write_state(self, state: StateRecord) -> None:
         """Write elements and insertions."""
         self.rods.write_state(state)

@@ -1,4 +1,4 @@
-"""Ticks in which only bodies and joints have work are one compiled call, with the bits of as many single ticks."""
+"""Ticks in which only bodies, joints and threads have work are one compiled call, with the bits of single ticks."""
 
 from __future__ import annotations
 
@@ -33,20 +33,21 @@ def firm(scene: Scene) -> Scene:
 
 @pytest.fixture
 def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Simulation, Simulation, list[int]]]:
-    """Two simulations, of which the second one never coasts, and the ticks that the first one coasts."""
+    """Two simulations, of which the second one never coasts, and the ticks that the first one coasts or begins."""
 
     def make(of: Scene | None = None) -> tuple[Simulation, Simulation, list[int]]:
         of = of or scene()
-        first, second, passed = Simulation(of), Simulation(of), [0]
-        coast = first._world.coast
+        first, second, passed = Simulation(of), Simulation(of), [0, 0]
+        coast = first._coasting.pass_ticks
 
-        def counted(ticks: int) -> int:
-            found = coast(ticks)
+        def counted(ticks: int) -> tuple[int, bool]:
+            found, begun = coast(ticks)
             passed[0] += found
-            return found
+            passed[1] += begun
+            return found, begun
 
-        monkeypatch.setattr(first._world, "coast", counted)
-        monkeypatch.setattr(second._world, "coast", lambda ticks: 0)
+        monkeypatch.setattr(first._coasting, "pass_ticks", counted)
+        monkeypatch.setattr(second._coasting, "pass_ticks", lambda ticks: (0, False))
         return first, second, passed
 
     return make
@@ -113,6 +114,83 @@ def test_an_arm_off_its_course_stops_in_the_same_tick(
     assert passed[0] > 60
 
 
+@cache
+def sutured() -> Scene:
+    """A needle with its thread, a pad and an arm."""
+    return ligature.load(ROOT / "scenes" / "suturing_small" / "launch.yaml")
+
+
+def _needle(scene: Scene) -> int:
+    return next(body.index for body in scene.bodies if body.identity.name == "Needle")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_thread_that_coasts_has_the_bits_of_one_that_does_not(
+    seed: int, pair: Callable[..., tuple[Simulation, Simulation, list[int]]]
+) -> None:
+    *runs, passed = pair(sutured())
+    rng, needle = np.random.default_rng(seed), _needle(sutured())
+    start = runs[0]._world.pose7(needle)
+    for k in range(24):
+        aside, up = rng.uniform(-0.08, 0.08, 2), rng.uniform(0.0, 0.06)
+        goal = (*(start[:3] + [*aside, up]), *start[3:])
+        push = tuple((0.02 * rng.standard_normal(6)).tolist())
+        commands: list[Command] = {
+            0: [BodyCommand(needle, CommandType.POSITION, goal)],
+            1: [Release("body", needle)],
+            2: [Adopt(0), ServoJr(0, tuple(rng.uniform(-0.02, 0.02, 6).tolist()))],
+            3: [BodyCommand(needle, CommandType.FORCE, push)],
+            4: [Release("arm", 0), Release("body", needle)],
+        }.get(int(rng.integers(8)), [])
+        thrown, ticks = rng.integers(6) == 0, int(rng.integers(1, 60))
+        for simulation in runs:
+            for command in commands:
+                simulation.apply(command)
+            if thrown:
+                simulation.apply(Release("body", needle))
+                simulation.set_pose(needle, np.array(goal))
+            simulation.step(ticks)
+            if k == 11:
+                simulation.restore(simulation.snapshot())
+        assert len({simulation.state_hash() for simulation in runs}) == 1, (k, commands, ticks)
+    assert passed[0] > 60
+
+
+def test_a_coast_ends_in_the_tick_in_which_other_bodies_come_near_a_thread(
+    pair: Callable[..., tuple[Simulation, Simulation, list[int]]],
+) -> None:
+    *runs, passed = pair(sutured())
+    needle = _needle(sutured())
+    pose = runs[0]._world.pose7(needle)
+    pose[2] += 0.08
+    for simulation in runs:
+        simulation.set_pose(needle, pose)
+    for k in range(40):
+        for simulation in runs:
+            simulation.step(10)
+        assert len({simulation.state_hash() for simulation in runs}) == 1, k
+    assert passed[0] > 60
+    assert passed[1] > 0
+
+
+def test_a_thread_that_diverges_while_coasting_is_put_back_in_the_same_tick(
+    pair: Callable[..., tuple[Simulation, Simulation, list[int]]],
+) -> None:
+    *runs, passed = pair(sutured())
+    for simulation in runs:
+        simulation.step(20)
+    begin = passed[0]
+    for simulation in runs:
+        (rod,) = simulation._suture.rods.rods
+        rod.nodes.v[rod.first + 5] = 0.0, 0.0, 1e7
+        simulation.step(20)
+    assert passed[0] > begin
+    found = [[p.code for p in simulation.problems] for simulation in runs]
+    assert found[0] == found[1]
+    assert "diverged" in found[0]
+    assert len({simulation.state_hash() for simulation in runs}) == 1
+
+
 def test_a_body_that_diverges_while_coasting_is_put_back_in_the_same_tick(
     pair: Callable[..., tuple[Simulation, Simulation, list[int]]],
 ) -> None:
@@ -138,11 +216,11 @@ def test_a_coast_that_fails_is_reported_and_the_run_goes_on(monkeypatch: pytest.
     simulation = Simulation(scene())
     simulation.step(20)
 
-    def broken(ticks: int) -> int:
+    def broken(ticks: int) -> tuple[int, bool]:
         raise ZeroDivisionError("broken on purpose")
 
     with monkeypatch.context() as patch:
-        patch.setattr(simulation._world, "coast", broken)
+        patch.setattr(simulation._coasting, "pass_ticks", broken)
         before = simulation._clock.tick
         simulation.step(20)
         assert simulation._clock.tick == before + 20

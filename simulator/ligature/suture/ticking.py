@@ -1,0 +1,75 @@
+"""Ticks of rods for compiled code that does other parts of a tick, too: what one takes is one table for each rod."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.kernels import inlined, kernel
+from ligature.suture.substeps import open_rod, run_tick
+from ligature.tables import opener
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class RodTick(NamedTuple):
+    """What a tick of one rod takes; groups of arrays are the tables of `ligature.tables`."""
+
+    rod: Integers
+    touches: Integers  # (3, t) three buffers of contact points
+    order: Integers  # (3,) which of them has the last tick's, which is for the next one's, which is scratch
+    passages: Integers
+    owner: Integers  # (1,) of its own among the passages
+    springs: Integers
+    constraints: Integers  # (g, 3)
+    points: Array  # (g, 3, 2, 3)
+    motion: Array  # (b, 13) of the bodies around
+    met: Integers  # (m, 2) rows of `motion`, and their nodes
+    positions: Array  # (n, 3) of the elements
+    body: Integers  # (N,) the movable body of each node, -1 for others
+
+
+open_rod_tick = opener(
+    RodTick(
+        *(np.zeros(1, np.int64), np.zeros((3, 1), np.int64), np.zeros(3, np.int64)),
+        *(np.zeros(1, np.int64) for _ in range(3)),
+        *(np.zeros((1, 3), np.int64), np.zeros((1, 3, 2, 3)), np.zeros((1, 13)), np.zeros((1, 2), np.int64)),
+        *(np.zeros((1, 3)), np.zeros(1, np.int64)),
+    )
+)
+
+
+@inlined
+def pass_tick(tick: RodTick) -> None:
+    """One tick of a rod; see `run_tick`. Its contacts then are the last tick's."""
+    last, next_, scratch = tick.order[0], tick.order[1], tick.order[2]
+    run_tick(
+        tick.rod, tick.touches[last], tick.touches[next_], tick.touches[scratch], tick.passages, tick.owner[0],
+        tick.springs, tick.constraints, tick.points, tick.motion, tick.met,
+    )  # fmt: skip
+    if open_rod(tick.rod).counts[3] == 1:
+        tick.order[0], tick.order[1], tick.order[2] = scratch, last, next_
+    else:
+        tick.order[0], tick.order[1], tick.order[2] = next_, scratch, last
+
+
+@kernel
+def tick_rod(table: Integers) -> None:
+    """`pass_tick` for a table of a `RodTick`."""
+    pass_tick(open_rod_tick(table))
+
+
+@inlined
+def surround(ticks: Integers, corners: Array) -> None:
+    """Corners (2, 3) of the box around all elements of the rods with the tables ``ticks`` (r, w)."""
+    for a in range(3):
+        corners[0, a], corners[1, a] = np.inf, -np.inf
+    for r in range(ticks.shape[0]):
+        positions = open_rod_tick(ticks[r]).positions
+        for i in range(positions.shape[0]):
+            for a in range(3):
+                corners[0, a] = min(corners[0, a], positions[i, a])
+                corners[1, a] = max(corners[1, a], positions[i, a])
