@@ -235,7 +235,7 @@ class Simulation:
         if ticks < 0:
             raise ValueError(f"ticks is {ticks}; it must be 0 or more")
         while ticks > 0:
-            passed = self._coast(ticks)
+            passed = self._coast(ticks) if ticks > 1 else 0
             if not passed:
                 self._advance()
                 passed = 1
@@ -269,7 +269,7 @@ class Simulation:
         tick = self._clock.since_reset
         for subsystem in self._beside_bodies:
             ticks = min(ticks, subsystem.idle_ticks(tick))
-            if ticks < 1:
+            if ticks < 2:
                 return 0
         try:
             passed, begun = self._coasting.pass_ticks(ticks)

@@ -32,13 +32,22 @@ class RodTick(NamedTuple):
     body: Integers  # (N,) the movable body of each node, -1 for others
 
 
+_whole, _pairs = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
 open_rod_tick = opener(
     RodTick(
-        *(np.zeros(1, np.int64), np.zeros((3, 1), np.int64), np.zeros(3, np.int64)),
-        *(np.zeros(1, np.int64) for _ in range(3)),
-        *(np.zeros((1, 3), np.int64), np.zeros((1, 3, 2, 3)), np.zeros((1, 13)), np.zeros((1, 2), np.int64)),
-        *(np.zeros((1, 3)), np.zeros(1, np.int64)),
-    )
+        rod=_whole,
+        touches=_pairs,
+        order=_whole,
+        passages=_whole,
+        owner=_whole,
+        springs=_whole,
+        constraints=_pairs,
+        points=np.zeros((1, 1, 1, 1)),
+        motion=np.zeros((1, 1)),
+        met=_pairs,
+        positions=np.zeros((1, 1)),
+        body=_whole,
+    )  # fmt: skip
 )
 
 
