@@ -95,6 +95,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         free = {body for body in tree_of if not scene.bodies[body].static}
         self._idle = [not rods.rods and not free - own for own in self._own]
         """Jaws for which there is nothing to grasp."""
+        self._searching = [index for index, idle in enumerate(self._idle) if not idle]
         self._actuators = [[a.index for a in scene.actuators if a.parent in own] for own in self._own]
         self._jaw_grasps: list[JawGrasp | None] = [None for _ in scene.jaws]
         self._thread_grasps: list[thread_grasps.ThreadGrasp | None] = [None for _ in scene.jaws]
@@ -166,11 +167,14 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         """The ticks until a driven jaw that may grasp something searches; none while jaws or actuators hold."""
         if self._actuator_grasps or any(self._jaw_grasps) or any(self._thread_grasps):
             return 0
-        searching = [index for index, idle in enumerate(self._idle) if not idle]
-        if any(self._near[index] for index in searching):
-            return 0
-        driven = (index for index in searching if self._fingers[index].driven())
-        return min((-(tick + index) % SEARCH_PERIOD for index in driven), default=ALWAYS)
+        left = ALWAYS
+        for index in self._searching:
+            if self._near[index]:
+                return 0
+            wait = -(tick + index) % SEARCH_PERIOD
+            if wait < left and self._fingers[index].driven():
+                left = wait
+        return left
 
     def _search(self, index: int) -> None:
         """Close gently on the nearest body between the fingers; grasp it when both pads touch it."""

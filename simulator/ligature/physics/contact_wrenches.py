@@ -29,10 +29,11 @@ class ContactWrenches:
 
     def any(self, bodies: Sequence[int]) -> bool:
         """Whether `on` may find anything: a quick look."""
-        if not self._impulses.bodies.isdisjoint(bodies):
+        if self._impulses.act(bodies):
             return True
-        if any(weld.parent in bodies or weld.child in bodies for weld in self._welds):
-            return True
+        for weld in self._welds:
+            if weld.parent in bodies or weld.child in bodies:
+                return True
         return self._contacts.touch(tuple(bodies), self._own(bodies))
 
     def rebuild(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,10 @@ class Impulses:
     def bodies(self) -> Set[int]:
         """The bodies that impulses act on in the coming tick so far."""
         return set(np.flatnonzero(self.acted).tolist())
+
+    def act(self, bodies: Sequence[int]) -> bool:
+        """Whether impulses act on one of ``bodies`` in the coming tick so far."""
+        return any(self.acted[body] for body in bodies)
 
     def apply(self, body: int, impulse: Array, moment: Array) -> None:
         """Change the momentum of a body by ``impulse`` (3,) and ``moment`` (3,).
