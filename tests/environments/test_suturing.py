@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.utils.seeding import np_random
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ligature.environments import MAX_STEPS, SuturingEnv, env_id, make_vec, suturing
@@ -51,6 +52,32 @@ def test_other_seeds_begin_otherwise() -> None:
     targets = [env.reset(seed=seed)[0][30:33] for seed in (1, 2)]
     env.close()
     assert np.linalg.norm(targets[0] - targets[1]) > 1e-4
+
+
+@pytest.mark.parametrize("task", ["insert", "puncture", "hand_over", "pull_through", "suture"])
+def test_hands_have_arrived_where_an_episode_begins(task: str) -> None:
+    env = SuturingEnv(task)
+    for seed in range(6):
+        env.reset(seed=seed)
+        for reading in env.readings:
+            way = inverse(pose7_matrix(reading.tip)) @ pose7_matrix(reading.setpoint)
+            assert np.linalg.norm(way[:3, 3]) < 5e-5
+            assert np.linalg.norm(rotation_vector(way[:3, :3])) < 2e-3
+    env.close()
+
+
+def test_pull_through_begins_at_any_of_its_starts_the_same_at_each_visit() -> None:
+    env, fresh = SuturingEnv("pull_through"), SuturingEnv("pull_through")
+    goal, seen = env.goal, {}
+    for seed in range(10):
+        first, _ = env.reset(seed=seed)
+        seen[int(np_random(seed)[0].integers(goal.starts))] = goal.reached(), seed, first
+    further = [seen[start][0] for start in sorted(seen)]
+    assert len(further) >= 5 and (np.diff(further) > 0.0).all()
+    for _, seed, first in reversed(seen.values()):  # in another order, and again by the one that was elsewhere since
+        assert (fresh.reset(seed=seed)[0] == first).all() and (env.reset(seed=seed)[0] == first).all()
+    env.close()
+    fresh.close()
 
 
 @pytest.mark.parametrize("reward", ["dense", "sparse"])

@@ -197,7 +197,7 @@ driven, and taken by the second arm (``suture``) | |
             )
             self._ticks = round(CONTROL / self._simulation.dt)
             self._goal: Goal = GOALS[self.task](self._simulation, self._arms)
-            self._settled = self._start()
+            self._settle()
             if self._observation != "state" or self.render_mode is not None:
                 self._simulation.cameras[self._camera]  # KeyError names those that there are
         except Exception:
@@ -206,16 +206,20 @@ driven, and taken by the second arm (``suture``) | |
         self._tip_sides = [arm.local_measured_cp()[3:] for arm in self._arms]
         self._side = self._simulation.state["body_pose"][0, self.needle, 3:].copy()
 
-    def _start(self) -> Snapshot:
-        """Where all episodes begin from: it follows from scene, task and arms, and is simulated once in a process."""
+    def _settle(self, start: int = 0) -> None:
+        """Bring the scene to a settled start; it follows from scene, task and arms, and is simulated once in a process.
+
+        The others than the first are simulated from that one, when an episode begins there for the first time.
+        """
         known = _STARTS.setdefault(self._simulation.scene, {})
-        which = type(self._goal), self._arm_names
+        which = type(self._goal), self._arm_names, start
         if which in known:
             self._simulation.restore(known[which])
-        else:
-            self._goal.settle()
-            known[which] = self._simulation.snapshot()
-        return known[which]
+            return
+        if start:
+            self._settle()
+        self._goal.settle(start)
+        known[which] = self._simulation.snapshot()
 
     @property
     def goal(self) -> Goal:
@@ -310,7 +314,8 @@ driven, and taken by the second arm (``suture``) | |
         super().reset(seed=seed)
         if self._randomisation is not None:
             self._vary(self._randomisation)
-        self._simulation.restore(self._settled)
+        starts = self._goal.starts
+        self._settle(int(self.np_random.integers(starts)) if starts > 1 else 0)
         if self._drawn is not None:
             place(self._simulation, self._drawn)
         self._goal.begin(self.np_random)
@@ -497,8 +502,8 @@ driven, and taken by the second arm (``suture``) | |
             self._simulation.close()
 
 
-_STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], tuple[str, ...]], Snapshot]] = WeakKeyDictionary()
-"""Starts that were simulated, by scene, task and arms; the processes of a vector have them from the one that forks."""
+_STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], tuple[str, ...], int], Snapshot]] = WeakKeyDictionary()
+"""Settled starts by scene, task, arms and number; the processes of a vector have them from the one that forks."""
 
 
 def _arms(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:

@@ -107,6 +107,8 @@ class Goal:
         The task in words, for policies that take language and for datasets.
     steps
         Actions until an episode of a registered environment is cut.
+    starts
+        Settled starts, of which each episode draws one.
     """
 
     body: int
@@ -117,6 +119,7 @@ class Goal:
     arms: tuple[str, ...]
     text: str
     steps: int = 200
+    starts: int = 1
 
     _KEPT: tuple[str, ...] = ()
     """Attributes that last from action to action."""
@@ -130,8 +133,8 @@ class Goal:
         self.scenery = Scenery.of(self._simulation.scene, self.holes)
         self.body = self.scenery.needle
 
-    def settle(self) -> None:
-        """Bring the scene to where all episodes begin from: the arms above the work, all else at rest."""
+    def settle(self, start: int = 0) -> None:
+        """Bring the scene to a settled start, from start 0 to any other: the arms above the work, all else at rest."""
         for arm in self._arms:
             arm.place_jp(START)
             arm.adopt()
@@ -211,8 +214,7 @@ def take_in_hand(simulation: Simulation, arm: PsmArm, needle: int, arc: NeedleAr
     Raises ValueError when they do not hold it then.
     """
     assert arm.jaw is not None
-    arm.place_jp(arm.kinematics.inverse(T_tool[None]).q[0])
-    arm.adopt()
+    put(arm, T_tool)
     arm.jaw.servo_jp([OPEN])
     simulation.step(200)
     held = matrix_pose7(T_arc @ inverse(arc.T_body_arc))
@@ -226,12 +228,18 @@ def take_in_hand(simulation: Simulation, arm: PsmArm, needle: int, arc: NeedleAr
         raise ValueError(f"the jaws of {arm.name} do not hold the needle")
 
 
-def move(arm: PsmArm, rng: np.random.Generator, shift: float, turn: float) -> None:
-    """Have an arm go up to ``shift`` metres aside along each axis, and turn by up to ``turn``."""
+def aside(arm: PsmArm, rng: np.random.Generator, shift: float, turn: float) -> Array:
+    """A pose (4, 4) up to ``shift`` metres from the tip's set-point along each axis, turned by up to ``turn``."""
     T = pose7_matrix(arm.local_setpoint_cp())
     axis = rng.uniform(-1.0, 1.0, 3)
     R = axis_rotation(axis / np.linalg.norm(axis), float(rng.uniform(0.0, turn)))
-    arm.servo_cp(frame(R @ T[:3, :3], T[:3, 3] + rng.uniform(-shift, shift, 3)))
+    return frame(R @ T[:3, :3], T[:3, 3] + rng.uniform(-shift, shift, 3))
+
+
+def put(arm: PsmArm, T: Array) -> None:
+    """Have the tip of an arm be at a pose (4, 4) in its base, at rest: for one that neither holds nor touches."""
+    arm.place_jp(arm.kinematics.inverse(T[None]).q[0])
+    arm.adopt()
 
 
 def carry(simulation: Simulation, body: int, way: Sequence[Array]) -> None:

@@ -13,8 +13,9 @@ from ligature.environments.goals.base import (
     Dwell,
     Goal,
     Progress,
+    aside,
     base_of,
-    move,
+    put,
     take_in_hand,
 )
 from ligature.model.frames import frame, inverse, pose7_matrix
@@ -46,8 +47,8 @@ class HandOver(Goal):
     TAKE, RELEASE = 0.02, 0.02
     """What is left, in metres, until the taker holds the needle, and until the giver does not."""
     SHIFT, TURN, ASIDE = 0.004, 0.15, 0.01
-    ARRIVAL = 100
-    """Ticks until both hands are where they begin."""
+    ARRIVAL = 25
+    """Ticks until both hands are within 0.05 mm of where they begin."""
     _KEPT = ("_alone", "_taken", "_free", "_given", "_stage")
 
     def _prepare(self) -> None:
@@ -88,7 +89,7 @@ class HandOver(Goal):
             raise ValueError(f"{taker.name} has no grasp of the needle that reaches the whole throw")
         return found.tool_in_arc(self.arc)
 
-    def settle(self) -> None:
+    def settle(self, start: int = 0) -> None:
         """The needle in the giver's jaws where they meet, the taker above the work."""
         taker = self._arms[TAKER]
         taker.place_jp(self.WAITING)
@@ -97,8 +98,9 @@ class HandOver(Goal):
 
     def begin(self, rng: np.random.Generator) -> None:
         """Both hands a little elsewhere, that of the giver turned otherwise."""
-        move(self._arms[GIVER], rng, self.SHIFT, self.TURN)
-        move(self._arms[TAKER], rng, self.ASIDE, 0.0)
+        giver, taker = self._arms[GIVER], self._arms[TAKER]
+        giver.servo_cp(aside(giver, rng, self.SHIFT, self.TURN))
+        put(taker, aside(taker, rng, self.ASIDE, 0.0))
         self._simulation.step(self.ARRIVAL)
         self._alone, self._taken, self._free, self._given, self._stage = Dwell(), 0.0, Dwell(), True, 0.0
 

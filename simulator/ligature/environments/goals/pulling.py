@@ -8,7 +8,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.environments.goals.base import EARLY, HOLD, LOST, UNDONE, Dwell, Goal, Progress, base_of, carry, move
+from ligature.environments.goals.base import (
+    EARLY,
+    HOLD,
+    LOST,
+    UNDONE,
+    Dwell,
+    Goal,
+    Progress,
+    aside,
+    base_of,
+    carry,
+    put,
+)
 from ligature.environments.goals.seams import Seam
 from ligature.model.frames import inverse, matrix_pose7
 from ligature.tasks.throws import UP, NeedleArc, Throw, best_grasp
@@ -27,8 +39,10 @@ class PullThrough(Goal):
     holes = 1
     text = "grasp the needle where it comes out and pull its thread through"
     scene, arms, models, steps = "suturing", ("PSM1",), (0, 1, 2, 3), 300
-    BEFORE, BEYOND, MORE = 0.4, 0.65, 0.15
-    """Angles of the tip: before the entry where it comes from, and beyond the exit at the start, and by chance more."""
+    BEFORE, BEYOND = 0.4, 0.65
+    """Angles of the tip: before the entry where it comes from, and beyond the exit at the first start."""
+    starts, FURTHER = 16, 0.01
+    """How many starts there are; angle by which the needle is driven further in each than in the one before."""
     DRIVE, PAUSE = 0.001, 200
     """Radians of a tick while the needle is driven in; ticks until it is at rest then."""
     LENGTH = 0.03
@@ -50,18 +64,21 @@ class PullThrough(Goal):
         self._seam = Seam.of(self._simulation, self.scenery, self.arc)
         self._out = exit + (self.LENGTH + 2.0 * self.arc.radius) * UP
 
-    def settle(self) -> None:
-        """The needle driven through both holes, nobody holding it."""
+    def settle(self, start: int = 0) -> None:
+        """The needle driven through both holes, nobody holding it; at each start a little further."""
+        first = self.throw.towards_exit + self.BEYOND
+        if start:
+            self._drive(first, first + start * self.FURTHER)
+            return
         super().settle()
-        first = self.throw.arc_at(-self.BEFORE, self.arc) @ inverse(self.arc.T_body_arc)
-        self._simulation.set_pose(self.body, matrix_pose7(first))
-        self._drive(-self.BEFORE, self.throw.towards_exit + self.BEYOND)
+        before = self.throw.arc_at(-self.BEFORE, self.arc) @ inverse(self.arc.T_body_arc)
+        self._simulation.set_pose(self.body, matrix_pose7(before))
+        self._drive(-self.BEFORE, first)
 
     def begin(self, rng: np.random.Generator) -> None:
-        """The needle driven further by chance, the hand elsewhere."""
-        begin = self.throw.towards_exit + self.BEYOND
-        move(self._arms[0], rng, self.SHIFT, 0.0)
-        self._drive(begin, begin + float(rng.uniform(0.0, self.MORE)))
+        """The hand elsewhere."""
+        put(self._arms[0], aside(self._arms[0], rng, self.SHIFT, 0.0))
+        self._simulation.step(0)
         self._kept, self._done_for, self._free = Dwell(), 0.0, Dwell()
         self._held, self._drawn, self._beyond = False, 0.0, 0.0
 

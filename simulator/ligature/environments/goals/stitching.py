@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.environments.goals.base import EARLY, HOLD, LOST, REGRASP, UNDONE, Dwell, Progress, base_of, move
+from ligature.environments.goals.base import EARLY, HOLD, LOST, REGRASP, UNDONE, Dwell, Progress, aside, base_of, put
 from ligature.environments.goals.driving import Insert
 from ligature.environments.goals.seams import Pulled, Seam
 from ligature.model.frames import frame
@@ -80,7 +80,7 @@ class Suture(Insert):
         """What is through the holes now."""
         return self._seam.look()
 
-    def settle(self) -> None:
+    def settle(self, start: int = 0) -> None:
         """The needle in the driver's jaws before the entry, the puller drawn back."""
         puller = self._arms[PULLER]
         puller.place_jp(self.WAITING)
@@ -89,7 +89,8 @@ class Suture(Insert):
 
     def begin(self, rng: np.random.Generator) -> None:
         """Both hands a little elsewhere, the driver's turned otherwise."""
-        move(self._arms[PULLER], rng, self.ASIDE, 0.0)
+        puller = self._arms[PULLER]
+        put(puller, aside(puller, rng, self.ASIDE, 0.0))
         super().begin(rng)
         self._driven, self._taken, self._done_for, self._drawn = False, False, 0.0, 0.0
         self._alone, self._nobody = Dwell(), Dwell()
