@@ -25,6 +25,7 @@ class BodyCommands:
         self._engine = engine
         self._controls: dict[int, BodyControl] = {}
         self._stopped: set[int] = set()
+        self._driven, self._pushable = (np.full(len(engine.scene.bodies), value) for value in (False, True))
 
     def take(self, body: int, type_: CommandType, target: Array) -> None:
         """Take a command; it holds until the next one or `clear`."""
@@ -32,10 +33,12 @@ class BodyCommands:
         if control is None:
             control = self._controls[body] = BodyControl(self._engine.place_of[body], self._engine.dt)
         control.set(type_, target)
+        self._sort(body)
 
     def clear(self, body: int) -> None:
         """Forget the command of a body."""
         self._controls.pop(body, None)
+        self._sort(body)
 
     @property
     def all(self) -> list[tuple[int, BodyControl]]:
@@ -45,18 +48,28 @@ class BodyCommands:
     def set_stopped(self, fingers: Collection[int], stopped: bool) -> None:
         """Record that ``fingers`` are stopped on a thread, which cannot move them, or no longer."""
         self._stopped = self._stopped | set(fingers) if stopped else self._stopped - set(fingers)
+        for finger in fingers:
+            self._sort(finger)
 
     def driven(self, body: int) -> bool:
         """Whether a command sets the velocity of a body, so that a thread, however light the body, does not."""
-        return body in self._stopped or self._sets_velocity(body)
+        return bool(self._driven[body])
 
     def pushable(self, body: int) -> bool:
         """Whether an impulse moves a body: the joint of a stopped finger bears it."""
-        return body in self._stopped or not self._sets_velocity(body)
+        return bool(self._pushable[body])
 
-    def _sets_velocity(self, body: int) -> bool:
-        control = self._controls.get(body)
-        return control is not None and control.sets_velocity
+    def _sort(self, body: int) -> None:
+        """Note what `driven` and `pushable` say of a body: they are asked in every tick."""
+        control, stopped = self._controls.get(body), body in self._stopped
+        moved = control is not None and control.sets_velocity
+        self._driven[body], self._pushable[body] = stopped or moved, stopped or not moved
+
+    def _sort_all(self) -> None:
+        """The same of all bodies."""
+        self._driven[:], self._pushable[:] = False, True
+        for body in {*self._controls, *self._stopped}:
+            self._sort(body)
 
     def wrench(self, body: int) -> Array:
         """The wrench (6,) that a command applies to a body; zero for any other command."""
@@ -72,6 +85,7 @@ class BodyCommands:
     def restart(self) -> None:
         """Take all commands as if they came now; no finger is stopped."""
         before, self._controls, self._stopped = self._controls, {}, set()
+        self._sort_all()
         for body, command in before.items():
             self.take(body, command.type, command.target.copy())
 
@@ -86,3 +100,4 @@ class BodyCommands:
         for body, state in snapshot["controls"].items():
             control = self._controls[body] = BodyControl(self._engine.place_of[body], self._engine.dt)
             control.restore(state)
+        self._sort_all()

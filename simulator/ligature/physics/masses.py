@@ -17,6 +17,7 @@ from ligature.physics.articulation import inertia_of, is_alone
 from ligature.physics.bodies import Placement
 from ligature.physics.body_commands import BodyCommands
 from ligature.physics.engine import Engine
+from ligature.physics.trees import push_bodies
 from ligature.physics.welds import Welds
 
 Array = NDArray[np.float64]
@@ -50,6 +51,7 @@ class Masses:
         self._hold_counts: dict[int, int] = {}
         self._grasp_counts: dict[int, int] = {}
         self._attached_loads: dict[int, tuple[Placement, Array]] = {}
+        self._list_loads()
         self._scaled: dict[tuple[float, int], tuple[float, Array]] = {}
 
     def set_held(self, body: int, held: bool, grasped: bool = False) -> None:
@@ -101,8 +103,19 @@ class Masses:
 
     def lift(self) -> None:
         """Cancel the weight of added mass in the coming tick."""
+        engine = self._engine
+        if not self._attached_loads:
+            return
+        if engine.motions.handle:
+            push_bodies(engine.motions.handle, engine.motions.table, engine.place_table, self._laden, self._lifts)
+            return
         for place, force in self._attached_loads.values():
             place.apply_force(force)
+
+    def _list_loads(self) -> None:
+        """List bodies with added mass, and the forces (n, 3) that cancel its weight, for compiled code."""
+        self._laden = np.array(list(self._attached_loads), dtype=np.int64)
+        self._lifts = np.array([force for _, force in self._attached_loads.values()]).reshape(-1, 3)
 
     def update_commanded(self, body: int, before: bool) -> None:
         """Update the mass of a light free body that was driven ``before`` a command began or ended."""
@@ -129,6 +142,7 @@ class Masses:
             self._attached_loads[body] = place, extra * (fall - self._engine.gravity)
         else:
             self._attached_loads.pop(body, None)
+        self._list_loads()
 
     def _at_least(self, mass: float, body: int) -> tuple[float, Array]:
         """Mass and principal moments (3,) of a body, scaled up to ``mass``."""
