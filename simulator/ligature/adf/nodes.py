@@ -17,6 +17,7 @@ import yaml
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.relax import Relaxed, relax
+from ligature.adf.slips import remedy
 
 MAX_DEPTH = 64
 MAX_NODES = 1_000_000
@@ -95,7 +96,7 @@ def parse(text: str, file: Path) -> Mapping:
         return _Composer(text, Relaxed(text), file).document()
     except yaml.YAMLError as strict_error:
         relaxed = relax(text)
-        if not relaxed.lines:
+        if not relaxed.lines and not relaxed.anchors:
             raise AdfError(_yaml_diagnostic(strict_error, Relaxed(text), file)) from strict_error
         try:
             return _Composer(text, relaxed, file).document()
@@ -109,7 +110,8 @@ def _yaml_diagnostic(error: yaml.YAMLError, parsed: Relaxed, file: Path) -> Diag
         column, _ = parsed.original(mark.line, mark.column, mark.index)
         place = Mark(file, mark.line + 1, column + 1)
         message = f"invalid YAML: {getattr(error, 'problem', None) or 'it ends too early'}"
-        return Diagnostic(Severity.ERROR, message, place, str(getattr(error, "context", None) or ""), "yaml")
+        hint = remedy(parsed.text, error)
+        return Diagnostic(Severity.ERROR, message, place, hint, "yaml")
     number = getattr(error, "character", None)
     what = f"character U+{number:04X}" if isinstance(number, int) else "a character"
     return Diagnostic(
@@ -175,11 +177,11 @@ class _Composer:
             )
         span = (self._offset(event.start_mark), self._offset(event.end_mark))
         if isinstance(event, yaml.AliasEvent):
-            return self._alias(event.anchor, mark), span
+            return self._alias(self._name(event), mark), span
         if isinstance(event, yaml.ScalarEvent):
             node: Node = self._scalar(event, mark, span)
         else:
-            self._open.append(event.anchor or "")
+            self._open.append(self._name(event))
             if isinstance(event, yaml.SequenceStartEvent):
                 node = self._sequence(event, mark, span[0], depth)
             else:
@@ -188,9 +190,14 @@ class _Composer:
             if node.weight > MAX_NODES:
                 raise self._error(mark, f"aliases expand to more than {MAX_NODES} values", "use fewer aliases")
         if event.anchor:
-            node.anchor = event.anchor
-            self._anchors[event.anchor] = node
+            node.anchor = self._name(event)
+            self._anchors[node.anchor] = node
         return node, node.span
+
+    def _name(self, event: Any) -> str:
+        """The anchor or alias of ``event`` as the file has it."""
+        name = event.anchor or ""
+        return self._parsed.anchors.get(name, name)
 
     def _scalar(self, event: Any, mark: Mark, span: Span) -> Scalar:
         start = self._content(event, span[0])

@@ -1,13 +1,17 @@
-"""Indents flow collections that are indented too little, so that they can be read.
+"""Makes text readable that yaml-cpp reads and libyaml refuses: little indented flow collections, names of anchors.
 
 YAML requires the lines of a ``{…}`` or ``[…]`` to be indented deeper than their key. yaml-cpp does not check this, and
 real files rely on it (as in AMBF). Spaces are inserted only at line starts, so that every line and column
 of the original can be computed. Lines and columns count from 0, as in YAML libraries.
+
+YAML's anchors may have any character but blanks and brackets in their names, as ``&psm.jaw`` and ``&größe``; libyaml
+knows letters, digits, ``-`` and ``_``. Such names are replaced by others as long.
 """
 
 from __future__ import annotations
 
 import bisect
+import itertools
 import re
 from dataclasses import dataclass, field
 
@@ -17,10 +21,14 @@ INDENT = 32
 
 @dataclass(frozen=True)
 class Relaxed:
-    """``text`` with spaces inserted before some ``lines``; `original` gives the places before the insertion."""
+    """``text`` with spaces inserted before some ``lines``; `original` gives the places before the insertion.
+
+    ``anchors`` are the names before of those that were replaced.
+    """
 
     text: str
     lines: list[int] = field(default_factory=list)
+    anchors: dict[str, str] = field(default_factory=dict)
 
     def original(self, line: int, column: int, index: int) -> tuple[int, int]:
         """Column and index, before the insertion, of a place in ``text``."""
@@ -30,7 +38,8 @@ class Relaxed:
 
 
 def relax(text: str) -> Relaxed:
-    """``text`` with the lines inside flow collections indented."""
+    """``text`` with the lines inside flow collections indented, and with names of anchors that libyaml knows."""
+    text, anchors = _renamed(text)
     lines = text.split("\n")
     inserted: list[int] = []
     depth = 0
@@ -43,7 +52,32 @@ def relax(text: str) -> Relaxed:
         depth = _depth_after(line, depth)
         if stripped and not stripped.startswith("#"):
             opens_value = depth == 0 and _ends_open(stripped)
-    return Relaxed("\n".join(lines), inserted)
+    return Relaxed("\n".join(lines), inserted, anchors)
+
+
+def _renamed(text: str) -> tuple[str, dict[str, str]]:
+    """``text`` with anchors that libyaml knows, each as long as before, and what they were called."""
+    odd = {found["name"] for found in _TOKEN.finditer(text) if found["sign"] and not _KNOWN(found["name"])}
+    names: dict[str, str] = {}
+    for name in sorted(odd):
+        free = (letters for letters in map("".join, itertools.product(_LETTERS, repeat=len(name))))
+        names[name] = next((other for other in free if other not in text and other not in names.values()), name)
+
+    def replaced(found: re.Match[str]) -> str:
+        sign, name = found["sign"], found["name"]
+        return found[0] if sign is None else sign + names.get(name, name)
+
+    return _TOKEN.sub(replaced, text) if names else text, {new: old for old, new in names.items()}
+
+
+_TOKEN = re.compile(
+    r"""(?<![^\s:,\[{-])(?:"(?:[^"\\]|\\.)*"|'(?:[^']|'')*'|\#[^\r\n]*|(?P<sign>[&*])(?P<name>[^\s,\[\]{}]+))""",
+    re.DOTALL,
+)
+"""What is quoted, a comment, or an anchor or alias."""
+
+_KNOWN = re.compile("[0-9A-Za-z_-]+").fullmatch
+_LETTERS = "abcdefghijklmnopqrstuvwxyz0123456789"
 
 
 def _ends_open(line: str) -> bool:
