@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -23,6 +24,14 @@ EXAMPLES = bundle_root() / "examples"
 def scene_names() -> list[str]:
     """Names of the bundled scenes, as `launch_file` takes them."""
     return sorted(path.parent.name for path in SCENES.glob("*/launch.yaml"))
+
+
+def meant(path: Path) -> str:
+    """The bundled scenes where ``path`` may be the misspelled name of one; else empty."""
+    alike = difflib.get_close_matches(path.name, scene_names(), 1)
+    bare = len(path.parts) == 1 and not path.suffix
+    known = f"the scenes that come with Ligature are {', '.join(scene_names())}"
+    return (f"did you mean '{alike[0]}'?" if alike else known) if bare else ""
 
 
 def launch_file(path: Path) -> Path:

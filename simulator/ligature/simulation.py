@@ -13,7 +13,8 @@ import time as clock
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, NoReturn
+from numbers import Real
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +106,9 @@ _crowd = MOST_UNHELD
 """Number of `_simulations` at which unreferenced ones are freed."""
 
 
+Simulated = TypeVar("Simulated", bound="Simulation")
+
+
 def _free_unheld() -> None:
     """Free unreferenced simulations once there are many.
 
@@ -140,10 +144,14 @@ class Simulation:
     def __init__(
         self, scene: Scene, dt: float = 1e-3, update: float | None = None, allow_plugins: bool = False
     ) -> None:
+        if not isinstance(scene, Scene):
+            raise TypeError(
+                f"a simulation takes a scene, not {scene!r}; ligature.load(…) makes one of a file or a name"
+            )
         if scene.plugins and not allow_plugins:
             scene = replace(scene, plugins=())
         for name, value in (("dt", dt), ("update", update)):
-            if value is not None and not 0.0 < value < math.inf:
+            if value is not None and not (isinstance(value, Real) and 0.0 < value < math.inf):
                 raise ValueError(f"{name} is {value}; it must be a number of seconds above 0")
         _free_unheld()
         _simulations.add(self)
@@ -232,6 +240,7 @@ class Simulation:
         Raises ValueError for a negative number of ticks, TypeError if it is not a whole number.
         """
         self._check_open()
+        ticks = _whole(ticks)
         if ticks < 0:
             raise ValueError(f"ticks is {ticks}; it must be 0 or more")
         while ticks > 0:
@@ -494,6 +503,12 @@ class Simulation:
         self._plugins.close()
         self._world.close()
 
+    def __enter__(self: Simulated) -> Simulated:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
     def _check_open(self) -> None:
         """Raise RuntimeError after `close`: compiled code holds addresses of the engine that is gone."""
         if self._closed:
@@ -528,6 +543,17 @@ class Clock:
         """Write counts and time."""
         state["tick"], state["resets"], state["sim_time"] = self.tick, self.resets, self.tick * dt
         state["update"] = self.tick // ticks_per_update
+
+
+def _whole(ticks: Any) -> int:
+    """``ticks`` as an int: a whole number of any type; raises TypeError for anything else."""
+    try:
+        whole = int(np.asarray(ticks).item() if np.size(ticks) == 1 else ticks)
+        if not isinstance(ticks, str) and whole == ticks:
+            return whole
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise TypeError(f"ticks is {ticks!r}; it must be a whole number, as round(seconds / dt) is")
 
 
 def _digest_of(scene: Scene, state: StateRecord, dt: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import errno
 import os
 import re
@@ -13,6 +14,10 @@ from urllib.parse import unquote, urlsplit
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
 MOST_NAMES = 10_000
 """Most files of a folder among which one of another case is looked for."""
+
+
+ALIKE = 0.8
+"""How alike a name must be to be meant, of 1."""
 
 
 class Lack(NamedTuple):
@@ -59,7 +64,7 @@ def _unfound(path: Path, error: OSError) -> Lack:
 
 
 def _spelling(path: Path) -> str:
-    """The right spelling of what is missing of ``path``, if it is of another system or differs in case; else empty."""
+    """The right spelling of what is missing of ``path``: of another system, in another case, or nearly so; or empty."""
     there = path.parent
     while not there.is_dir() and there != there.parent:
         there = there.parent
@@ -80,4 +85,7 @@ def _spelling(path: Path) -> str:
     except OSError:
         return ""
     found = sorted(name for name in same if name.casefold() == wanted)
-    return f"upper and lower case differ; the folder has '{there / found[0]}'" if found else ""
+    if found:
+        return f"upper and lower case differ; the folder has '{there / found[0]}'"
+    alike = difflib.get_close_matches(path.relative_to(there).parts[0], sorted(same), 1, ALIKE)
+    return f"did you mean '{there / alike[0]}'?" if alike else ""

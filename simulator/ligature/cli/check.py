@@ -10,6 +10,7 @@ from rich.console import Console
 
 import ligature
 from ligature.adf import AdfError, Diagnostic, Document, ResolutionError, Resolver, Severity, read_any
+from ligature.bundle import meant
 from ligature.cli.numbers import counted
 from ligature.model import reach
 from ligature.model.scene import Scene
@@ -50,7 +51,7 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
     try:
         document = read_any(file, resolver, strict)
     except AdfError as error:
-        return list(error.diagnostics)
+        return [replace(found, hint=found.hint or meant(file)) for found in error.diagnostics]
     if document.kind not in ("launch", "model") or (strict and not document.ok):
         return document.diagnostics
     if document.kind == "model" and not _has_bodies(document):

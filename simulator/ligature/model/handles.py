@@ -5,18 +5,24 @@ World axes, SI units; poses are x y z qx qy qz qw.
 
 from __future__ import annotations
 
+import difflib
+import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ligature.model.commands import BodyCommand, Command, CommandType, Release
+from ligature.model.frames import matrix_pose7
 from ligature.model.lookup import UnknownNameError, find_by_text
 from ligature.model.scene import Body, Camera, Joint
 from ligature.model.state import StateRecord
 
 Array = NDArray[np.float64]
+MOST_NAMES = 10
+"""Most names to choose from in an error."""
+
 Handle = TypeVar("Handle")
 
 
@@ -53,9 +59,17 @@ class Handles(Mapping[str, Handle], Generic[Handle]):
             found = find_by_text(names, text)
             if found is not None:
                 return self._handles[found]
-        raise UnknownNameError(
-            f"'{text}' does not name exactly one {self._kind}; choose one of {', '.join(self._names[0])}"
-        )
+        raise UnknownNameError(self._unknown(text))
+
+    def _unknown(self, text: str) -> str:
+        """Why ``text`` names nothing, and what to choose from: what contains it, what is alike, or all there is."""
+        topics = self._names[0]
+        alike = difflib.get_close_matches(str(text), self._bare_names, MOST_NAMES)
+        near = [topic for topic in topics if str(text) in topic]
+        near = near or [topic for topic, name in zip(topics, self._bare_names, strict=True) if name in alike]
+        shown = (near or topics)[:MOST_NAMES]
+        more = f" and {len(near or topics) - len(shown)} more" if len(near or topics) > len(shown) else ""
+        return f"'{text}' does not name exactly one {self._kind}; choose one of {', '.join(shown)}{more}"
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names[0])
@@ -81,31 +95,32 @@ class BodyHandle:
         """Linear velocity of the centre of mass and angular velocity, (6,), world axes."""
         return np.array(self._simulation.state["body_twist"][0, self.body.index])
 
-    def set_pose(self, pose: Sequence[float]) -> None:
-        """Put the body at ``pose`` (7,) at once, at rest; for links of an arm use joint commands."""
-        self._simulation.set_pose(self.body.index, np.asarray(pose, dtype=float))
+    def set_pose(self, pose: ArrayLike) -> None:
+        """Put the body at ``pose``, (7,) or (4, 4), at once, at rest; for links of an arm use joint commands."""
+        self._simulation.set_pose(self.body.index, np.array(pose_numbers("set_pose", pose)))
 
-    def command_pose(self, pose: Sequence[float]) -> None:
-        """Drive the body to ``pose`` (7,) with its Cartesian controller."""
-        self._command(CommandType.POSITION, pose)
+    def command_pose(self, pose: ArrayLike) -> None:
+        """Drive the body to ``pose``, (7,) or (4, 4), with its Cartesian controller."""
+        self._command(CommandType.POSITION, pose_numbers("command_pose", pose))
 
-    def command_twist(self, twist: Sequence[float]) -> None:
+    def command_twist(self, twist: ArrayLike) -> None:
         """Drive the body with ``twist`` (6,)."""
-        self._command(CommandType.VELOCITY, twist)
+        self._command(CommandType.VELOCITY, numbers_of("command_twist", twist, "vx vy vz wx wy wz"))
 
-    def command_wrench(self, wrench: Sequence[float]) -> None:
+    def command_wrench(self, wrench: ArrayLike) -> None:
         """Push the body with ``wrench`` (6,) at its centre of mass."""
-        self._command(CommandType.FORCE, wrench)
+        self._command(CommandType.FORCE, numbers_of("command_wrench", wrench, "fx fy fz tx ty tz"))
 
-    def command_joints(self, values: Sequence[float], type: CommandType = CommandType.POSITION) -> None:
+    def command_joints(self, values: ArrayLike, type: CommandType = CommandType.POSITION) -> None:
         """Command the active joints below this body, in the order of ``body.joints``."""
+        targets = numbers_of("command_joints", values, "one for each joint, or fewer")
         self._simulation.apply(
             BodyCommand(
                 self.body.index,
                 CommandType.FORCE,
                 (0.0,) * 6,
-                (type,) * len(values),
-                tuple(map(float, values)),
+                (type,) * len(targets),
+                targets,
             )
         )
 
@@ -113,8 +128,34 @@ class BodyHandle:
         """Drop whatever was commanded: joints go limp, forces cease."""
         self._simulation.apply(Release("body", self.body.index))
 
-    def _command(self, type: CommandType, target: Sequence[float]) -> None:
-        self._simulation.apply(BodyCommand(self.body.index, type, tuple(map(float, target))))
+    def _command(self, type: CommandType, target: tuple[float, ...]) -> None:
+        self._simulation.apply(BodyCommand(self.body.index, type, target))
+
+
+def pose_numbers(what: str, pose: ArrayLike) -> tuple[float, ...]:
+    """A pose, (7,) or (4, 4), as seven numbers; raises ValueError for a matrix that is no pose."""
+    T = _array(what, pose, "x y z qx qy qz qw, or a (4, 4) matrix")
+    if T.shape != (4, 4):
+        return tuple(T.reshape(-1).tolist())
+    R = T[:3, :3]
+    if not (np.isfinite(T).all() and np.allclose(R @ R.T, np.eye(3), atol=1e-6) and np.linalg.det(R) > 0.0):
+        raise ValueError(f"{what} takes a matrix with a rotation in its upper left, not {R.tolist()}")
+    return tuple(matrix_pose7(T).tolist())
+
+
+def numbers_of(what: str, values: ArrayLike, wanted: str) -> tuple[float, ...]:
+    """``values`` as plain numbers, whatever holds them; raises TypeError where they are none."""
+    return tuple(_array(what, values, wanted).reshape(-1).tolist())
+
+
+def _array(what: str, values: ArrayLike, wanted: str) -> Array:
+    try:
+        array = np.asarray(values)
+        if np.iscomplexobj(array):
+            raise TypeError("complex numbers")
+        return array.astype(float)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{what} takes numbers ({wanted}), not {reprlib.repr(values)}") from error
 
 
 class JointHandle:

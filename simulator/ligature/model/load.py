@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ligature.adf import AdfError, Diagnostic, Resolver, Severity
-from ligature.bundle import launch_file
+from ligature.bundle import launch_file, meant
 from ligature.model.builder import SceneBuilder
 from ligature.model.completion import completed
 from ligature.model.conversion import converted
@@ -64,15 +65,18 @@ def load(
     ------
     SceneError
         When there is nothing to run: the file is not readable, or no body could be created.
+    TypeError
+        For ``models`` or ``devices`` that are no list of whole numbers.
     ValueError
         For a material of ``soft`` that does not exist.
     """
     start = launch_file(Path(path))
+    models, devices = indices("models", models), indices("devices", devices) or ()
     resolver = Resolver.for_file(start, [Path(root) for root in (*roots, *(Path(f).parent for f in files))])
     try:
         found = read_scene(start, resolver, models, files, arms, devices)
     except AdfError as error:
-        raise SceneError(*error.diagnostics) from error
+        raise SceneError(*(replace(d, hint=d.hint or meant(Path(path))) for d in error.diagnostics)) from error
     found.findings += soften([model.document for model in found.models], soft, found.start.top.mark)
     parts = [converted(model.document, resolver, model.shaders, found.world.gravity) for model in found.models]
     builder = SceneBuilder(found)
@@ -88,3 +92,15 @@ def load(
         nothing = Diagnostic(Severity.ERROR, "the file contains no body to simulate", found.start.top.mark)
         raise SceneError(*(errors or [nothing]))
     return prefixed(scene, namespace_prefix)
+
+
+def indices(what: str, given: object) -> tuple[int, ...] | None:
+    """A list of indices, whatever holds it, or None for None; raises TypeError, which names ``what``, for others."""
+    if given is None:
+        return None
+    try:
+        if not isinstance(given, str | bytes):
+            return tuple(operator.index(index) for index in given)  # type: ignore[attr-defined]
+    except TypeError:
+        pass
+    raise TypeError(f"{what} is {given!r}; it must be a list of whole numbers, such as [0, 1]")

@@ -8,15 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ligature.adf import AdfError
 from ligature.model.commands import PlaceCommand
-from ligature.model.handles import Handles
+from ligature.model.handles import Handles, pose_numbers
 from ligature.model.optics import Calibration, stereo_partners
 from ligature.model.scene import Camera
 from ligature.render.calibration import calibrations
 from ligature.render.camera import CameraView, view_of
+from ligature.render.context import check_process
 from ligature.render.look import Look
 from ligature.render.renderer import Renderer
 from ligature.render.sensor import IDEAL, ImageSensor
@@ -42,6 +43,7 @@ class Studio:
         """The renderer; raises `RenderUnavailable` where no OpenGL is available, RuntimeError after `close`."""
         if self._closed:
             raise RuntimeError("the simulation is closed: its cameras can take no pictures")
+        check_process()
         if self._renderer is None:
             self._renderer = Renderer(self.scene)
             if self._look is not None:
@@ -82,9 +84,9 @@ class CameraHandle:
         """What could not be drawn, after the first picture."""
         return self._studio.renderer.problems
 
-    def place(self, pose: Sequence[float]) -> None:
-        """Put the camera at ``pose`` (7,) in its parent's frame, from the next tick on."""
-        self._simulation.apply(PlaceCommand("camera", self.camera.index, tuple(map(float, pose))))
+    def place(self, pose: ArrayLike) -> None:
+        """Put the camera at ``pose``, (7,) or (4, 4), in its parent's frame, from the next tick on."""
+        self._simulation.apply(PlaceCommand("camera", self.camera.index, pose_numbers("place", pose)))
 
     def view(self, resolution: tuple[int, int] | None = None, eye: str = "") -> CameraView:
         """What is to be drawn now: eye pose, projection and the pinhole matrix ``intrinsics``."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import moderngl
 
 
@@ -9,9 +11,25 @@ class RenderUnavailable(RuntimeError):
     """No OpenGL is available on this machine; the message names what to install."""
 
 
+_process = 0
+"""The process that made the first context."""
+
+
+def check_process() -> None:
+    """Raise `RenderUnavailable` in a child that was forked after a context was made: drawing there would never end."""
+    if _process not in (0, os.getpid()):
+        raise RenderUnavailable(
+            "OpenGL does not work in a process that was forked after its parent had drawn; start it with "
+            "multiprocessing.get_context('spawn'), or take the first picture in the child"
+        )
+
+
 def create_context() -> moderngl.Context:
     """A stand-alone OpenGL 3.3 core context; raises `RenderUnavailable`."""
+    global _process
+    check_process()
     try:
+        _process = os.getpid()
         return tidy(moderngl.create_standalone_context(require=330, backend="egl"))  # type: ignore[arg-type]
     except Exception as error:
         raise RenderUnavailable(

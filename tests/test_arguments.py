@@ -1,0 +1,134 @@
+"""Arguments as programs and notebooks have them: any container of the right numbers works, others are reported."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import ligature
+import numpy as np
+import pytest
+from ligature.model.frames import pose7_matrix
+from ligature.render.context import RenderUnavailable, create_context
+
+MODEL = """
+bodies: [Needle, Table]
+cameras: [eye]
+Needle: {name: Needle, mass: 0.1, collision shape: SPHERE, collision geometry: {radius: 0.01}}
+Table: {name: Table, mass: 0}
+eye: {name: eye, location: {x: 1, y: 0, z: 0}}
+"""
+POSE = [0.25, -0.5, 1.0, 0.5, 0.5, 0.5, 0.5]
+SAME: dict[str, Callable[[list[float]], Any]] = {
+    "list": list, "tuple": tuple, "array": np.array, "row": lambda v: np.array([v]), "column": lambda v: np.array([v]).T,
+    "float32": lambda v: np.array(v, np.float32), "objects": lambda v: np.array(v, object), "masked": np.ma.array,
+    "texts": lambda v: [str(n) for n in v], "decimals": lambda v: [Decimal(n) for n in v],
+    "matrix": lambda v: pose7_matrix(v), "nested": lambda v: pose7_matrix(v).tolist(),
+    "scalars": lambda v: [np.float64(n) for n in v], "read-only": lambda v: np.broadcast_to(np.array(v), (7,)),
+}  # fmt: skip
+WRONG: dict[str, Any] = {
+    "text": "home", "nothing": None, "short": POSE[:3], "long": [*POSE, 0.0], "empty": [], "names": {"x": 1.0},
+    "no numbers": [None] * 7, "nan": [float("nan")] * 7, "infinite": [float("inf"), *POSE[1:]], "no rotation": [0.0] * 7,
+    "complex": np.array(POSE, complex), "generator": (n for n in POSE), "unequal": [[1.0], [1.0, 2.0]],
+    "scaled matrix": 2.0 * np.eye(4), "mirrored matrix": np.diag([1.0, 1.0, -1.0, 1.0]), "a function": print,
+}  # fmt: skip
+WHOLE = (3, 3.0, np.int64(3), np.uint8(3), np.float32(3.0), np.array(3), np.array([3]), Decimal(3))
+BROKEN = (1.5, "3", None, [1, 2], float("nan"), float("inf"), 1j, object())
+INDICES = ([0], (0,), np.array([0]), range(1), {0}, [np.int32(0)])
+NO_INDICES = ("0", 0, [0.0], ["0"], [None], b"0", 0.5)
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> ligature.Scene:
+    file = tmp_path / "model.yaml"
+    file.write_text(MODEL)
+    return ligature.load(file)
+
+
+@pytest.mark.parametrize("verb", ["set_pose", "command_pose", "place"])
+def test_a_pose_is_the_same_in_any_container(scene: ligature.Scene, verb: str) -> None:
+    hashes = set()
+    for container in SAME.values():
+        with ligature.Simulation(scene) as sim:
+            handle: Any = sim.cameras["eye"] if verb == "place" else sim.bodies["Needle"]
+            getattr(handle, verb)(container(POSE))
+            sim.step(3)
+            hashes.add(sim.state_hash())
+    assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("verb", ["set_pose", "command_pose", "place"])
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_is_no_pose_is_reported_and_changes_nothing(scene: ligature.Scene, verb: str, wrong: str) -> None:
+    with ligature.Simulation(scene) as sim, ligature.Simulation(scene) as other:
+        handle: Any = sim.cameras["eye"] if verb == "place" else sim.bodies["Needle"]
+        with pytest.raises((TypeError, ValueError), match=r"takes|must|not"):
+            getattr(handle, verb)(WRONG[wrong])
+        for simulation in (sim, other):
+            simulation.step(3)
+        assert sim.state_hash() == other.state_hash()
+
+
+def test_ticks_are_whole_numbers_of_any_type(scene: ligature.Scene) -> None:
+    with ligature.Simulation(scene) as sim:
+        for number, ticks in enumerate(WHOLE, 1):
+            sim.step(ticks)  # type: ignore[arg-type]
+            assert sim.state["tick"][0] == 3 * number
+        for broken in BROKEN:
+            with pytest.raises(TypeError, match="it must be a whole number"):
+                sim.step(broken)  # type: ignore[arg-type]
+
+
+def test_indices_of_models_are_whole_numbers_in_any_container() -> None:
+    for good in INDICES:
+        assert [body.identity.name for body in ligature.load("peg_transfer", models=good).bodies]  # type: ignore[arg-type]
+    for bad in NO_INDICES:
+        with pytest.raises(TypeError, match="it must be a list of whole numbers"):
+            ligature.load("peg_transfer", models=bad)  # type: ignore[arg-type]
+
+
+def test_what_is_no_scene_is_reported() -> None:
+    for thing in ("suturing", None, Path("launch.yaml"), 3):
+        with pytest.raises(TypeError, match="ligature.load"):
+            ligature.Simulation(thing)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("key", [2, 4])
+def test_a_misspelled_name_gets_the_one_that_is_meant(tmp_path: Path, key: int) -> None:
+    """One letter of a name is lost; a file and a scene as well as a body."""
+    body = "Needle"[:key] + "Needle"[key + 1 :]
+    name = "suturing"[:key] + "suturing"[key + 1 :]
+    (tmp_path / "launch.yaml").write_text(MODEL)
+    with ligature.Simulation(ligature.load(tmp_path / "launch.yaml")) as sim, pytest.raises(KeyError) as unknown:
+        sim.bodies[body]
+    assert str(unknown.value).endswith("choose one of /Needle")
+    with pytest.raises(ligature.SceneError, match="did you mean 'suturing'"):
+        ligature.load(name)
+    with pytest.raises(ligature.SceneError, match="did you mean '.*launch.yaml'"):
+        ligature.load(tmp_path / ("launch"[:key] + "launch"[key + 1 :] + ".yaml"))
+
+
+def _draw(found: Any) -> None:
+    try:
+        create_context()
+    except RenderUnavailable as error:
+        found.put(str(error))
+
+
+def test_a_child_that_was_forked_after_a_picture_reports_that_it_cannot_draw() -> None:
+    try:
+        create_context().release()
+    except RenderUnavailable:
+        pytest.skip("no OpenGL here")
+    fork = multiprocessing.get_context("fork")
+    found = fork.Queue()
+    child = fork.Process(target=_draw, args=(found,))
+    child.start()
+    try:
+        assert "'spawn'" in found.get(timeout=30)
+    finally:
+        child.kill()
+        child.join()
