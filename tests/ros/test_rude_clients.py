@@ -166,6 +166,13 @@ def test_clients_that_die_or_talk_nonsense_stop_nobody_else(
     assert "Traceback" not in simulator.output, simulator.output
 
 
+def test_every_node_of_ours_is_guarded() -> None:
+    """Only `start_node` and the drop-in client, which takes what `ambf_client` takes, begin nodes of rospy."""
+    source = Path(handshakes.__file__).parents[1]
+    begins = {str(file.relative_to(source)) for file in source.rglob("*.py") if "rospy.init_node(" in file.read_text()}
+    assert begins == {"ros/start.py", "client/layer.py"}
+
+
 def test_connections_that_stay_silent_are_closed(ports: tuple[int, int]) -> None:
     begin = time.monotonic()
     clients = [socket.create_connection(("127.0.0.1", ports[0]), timeout=SECONDS + 10.0) for _ in range(3)]

@@ -45,10 +45,11 @@ def _serve(run: Run) -> None:
 
 def _on_ros(prefix: str) -> tuple[TopicHealth, TeleopRemote]:
     """The state of ROS for the page."""
-    from ligature.ros.health import TopicHealth, begin_node
+    from ligature.ros.health import TopicHealth
+    from ligature.ros.start import start_node
     from ligature.teleop.remote import TeleopRemote
 
-    begin_node()
+    start_node("ligature_cockpit", several=True)
     remote = TeleopRemote("/" + "".join(f"{part}/" for part in prefix.split("/") if part))
     health = TopicHealth(remote.find_pairs)
     health.start()

@@ -67,11 +67,12 @@ def _configuration(file: Path | None, ready: Sequence[str], devices: tuple[int, 
 def _on_ros(
     wanted: TeleopConfig, record: Path | None, replay: Path | None, calibrate: str | None, console: Console
 ) -> int:
+    from ligature.ros.start import start_node
     from ligature.teleop.guide import calibration_of
-    from ligature.teleop.node import Teleop, begin_node
+    from ligature.teleop.node import Teleop
     from ligature.teleop.record import Recorder, Replay
 
-    begin_node()
+    start_node("ligature_teleop", several=True)
     try:
         if calibrate is not None:
             block = calibration_of(wanted, calibrate, console.input, console.print)

@@ -94,11 +94,6 @@ class TopicHealth(threading.Thread):
         self._topics = tuple(found)
 
 
-def begin_node() -> None:
-    """Make this process a ROS node that looks on; several may do so."""
-    rospy.init_node("ligature_cockpit", anonymous=True, disable_signals=True)
-
-
 def rate_of(name: str, seconds: float) -> float:
     """Messages a second on a topic, listened to for ``seconds``; the first one only starts the clock."""
     arrivals: list[float] = []

@@ -18,6 +18,7 @@ from sensor_msgs.msg import JointState
 
 from ligature.ros.bags import BagError, messages, opened, topics
 from ligature.ros.master import commanded_topics
+from ligature.ros.start import start_node
 
 TIMEOUT = 20.0
 """Seconds to wait for the simulator to be connected, and for an arm to get ready."""
@@ -37,7 +38,7 @@ def play(path: Path, joints: str, speed: float, log: Callable[[str], None]) -> i
     ``setpoint``, the arms get ready, go to where the recorded joints begin, and follow them. Raises `BagError` and
     `PlaybackError`.
     """
-    rospy.init_node("ligature_replay", anonymous=True, disable_signals=True)
+    start_node("ligature_replay", several=True)
     taken = commanded_topics()
     with opened(path) as bag:
         found = sorted(topics(bag))

@@ -8,6 +8,8 @@ from typing import Any
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from ligature.ros.start import start_node
+
 LOOKING = 10.0
 """Seconds to look for a simulator that judges."""
 
@@ -17,7 +19,7 @@ def next_score(task: str, timeout: float) -> tuple[dict[str, object], dict[str, 
 
     Raises RuntimeError when no simulator judges the task, or no report comes.
     """
-    rospy.init_node("ligature_score", anonymous=True, disable_signals=True)
+    start_node("ligature_score", several=True)
     scores: list[Any] = []
     measures: list[Any] = []
     root = f"/ligature/tasks/{task}"

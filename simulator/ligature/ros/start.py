@@ -18,15 +18,16 @@ WAITING = 512
 """Connections that may wait; the kernel's own limit is in /proc/sys/net/core/somaxconn."""
 
 
-def start_node(name: str) -> None:
+def start_node(name: str, several: bool = False) -> None:
     """Make this process the node ``name``, which takes `WAITING` connections at once and no message of any length.
 
-    Signals stay the caller's. Raises `ligature.ros.registrations.NameTaken`.
+    With ``several`` its name gets an ending of its own, so that many may run side by side. Signals stay the caller's.
+    Raises `ligature.ros.registrations.NameTaken`.
     """
-    removed = claim(f"/{name}")
+    removed = "" if several else claim(f"/{name}")
     ThreadingXMLRPCServer.request_queue_size = WAITING
     bound_messages()
-    rospy.init_node(name, disable_signals=True)
+    rospy.init_node(name, anonymous=several, disable_signals=True)
     if removed:
         rospy.logwarn(removed)
     tcpros.start_tcpros_server()

@@ -55,11 +55,6 @@ CAMERA_MOVED = (5e-4, np.deg2rad(0.2))
 NOT_RECORDED = ("reading", "rival")
 
 
-def begin_node() -> None:
-    """Make this process a ROS node; several teleoperations may run side by side."""
-    rospy.init_node("ligature_teleop", anonymous=True, disable_signals=True)
-
-
 def _asked_of_haptics(prefix: str) -> dict[str, Any]:
     """Settings of force feedback that the simulator was started with, ``-d``, ``-e``, ``-f``; empty for none."""
     try:
