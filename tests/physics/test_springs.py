@@ -5,6 +5,7 @@ Frames: joints lie along z of a frame that is turned at random; bodies start dis
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -260,3 +261,41 @@ def test_a_body_on_springs_along_and_about_many_axes_falls_no_faster_than_withou
         speed = float(np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1).max())
         assert speed < 9.8e-3 * tick + 0.5, f"{speed:.3g} m/s after {tick} ms"
     simulation.close()
+
+
+def _hung(unit: float, number: int) -> str:
+    """A body on a spring, with ``unit`` for each kilogram; what hangs there depends on ``number`` alone."""
+    rng = random.Random(number)
+    kind = rng.choice(("torsion spring", "linear spring"))
+    stiffness, damping = 10.0 ** rng.uniform(-4, 0), rng.choice((0.0, 10.0 ** rng.uniform(-6, -3)))
+    pull = rng.choice((0.0, 0.0, -1e-3, -9.81))
+    up, nowhere = "{x: 0, y: 0, z: 1}", "{x: 0, y: 0, z: 0}"
+    inertia = ", ".join(f"{axis}: {1e-4 * unit!r}" for axis in ("ix", "iy", "iz"))
+    return f"""
+gravity: {{x: 0, y: 0, z: {pull}}}
+bodies: [A, B]
+joints: [J]
+A: {{name: A, mass: 0}}
+B: {{name: B, mass: {0.01 * unit!r}, inertia: {{{inertia}}}}}
+J: {{name: J, type: {kind}, parent: A, child: B, parent axis: {up}, child axis: {up}, parent pivot: {nowhere},
+  child pivot: {nowhere}, joint limits: {{low: -10, high: 10}}, stiffness: {stiffness * unit!r},
+  damping: {damping * unit!r}, equilibrium point: {rng.uniform(0.001, 0.2)}}}
+"""
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_the_unit_of_mass_changes_no_motion(number: int, tmp_path: Path) -> None:
+    """Newton's law has one mass on both sides: with all of them a power of two times as large, no bit moves."""
+    ways = []
+    for unit in (1.0, 2.0**-12, 2.0**-25):
+        file = tmp_path / f"{unit}.yaml"
+        file.write_text(_hung(unit, number))
+        simulation = ligature.Simulation(ligature.load(file))
+        way = []
+        for _ in range(20):
+            simulation.step(10)
+            way.append(float(simulation.state["joint_position"][0, 0]))
+        simulation.close()
+        ways.append(way)
+    assert ways[0] == ways[1] == ways[2]
+    assert len(set(ways[0])) > 1

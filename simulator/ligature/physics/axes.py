@@ -56,7 +56,8 @@ STOP_GAIN = 0.2
 """Share of its way back that a stopped joint goes in a tick."""
 
 RESIDUE = 1e-12
-"""Effort of a joint that stands, in N·m or N or as part of its spring's if that is above 1, which counts as none.
+"""Effort of a joint that stands which counts as none, as a part of its spring's, or where that is small of 1 N or N·m,
+or of what the spring exerts for 1 m or rad if that is less: springs of grains are weaker than a trillionth of a newton.
 
 No spring balances a weight to the last bit: what remains moves a joint by parts of a picometre, but for ever."""
 
@@ -211,7 +212,7 @@ def _balance(axes: Axes, trees: Trees, k: int) -> None:
     velocity = trees.joints[1, k]
     if abs(velocity) < REST_SPEED:
         spring = axes.stiffness[k] * abs(axes.rest[k] - trees.joints[0, k])
-        if abs(trees.push[k] + axes.damping[k] * velocity) <= RESIDUE * max(1.0, spring):
+        if abs(trees.push[k] + axes.damping[k] * velocity) <= RESIDUE * max(min(1.0, axes.stiffness[k]), spring):
             trees.push[k] = 0.0
 
 
