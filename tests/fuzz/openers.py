@@ -80,7 +80,6 @@ OURS: dict[str, str] = {
     "mesh/decompose.py:_cached_hulls": "the cache",
     "mesh/decompose.py:_stored_hulls": "the cache",
     "mesh/decompose.py:_solid_hulls": "the cache",
-    "mesh/decompose.py:_run_coacd": "the cache",
     "mesh/hulls.py:_stored": "the cache",
     "physics/bullet.py:_segments": "memory of the process",
     "physics/bullet.py:_word": "memory of the process",

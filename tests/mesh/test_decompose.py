@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import resource
 import signal
 import subprocess
@@ -193,15 +194,17 @@ _run_coacd(stored.getvalue(), json.dumps({"threshold": 0.01, "mcts_iterations": 
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_coacd_ends_with_the_process_that_waits_for_it(number: int) -> None:
-    waiting = subprocess.Popen([sys.executable, "-c", LONG_WORK], preexec_fn=end_with_parent)
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_coacd_ends_with_the_process_that_waits_for_it_and_leaves_no_file(number: int, tmp_path: Path) -> None:
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    waiting = subprocess.Popen([sys.executable, "-c", LONG_WORK], preexec_fn=end_with_parent, env=environment)
     try:
         worker = until(lambda: _worker_of(waiting.pid), "the worker runs", 60.0)
     finally:
         waiting.send_signal(number)
         waiting.wait()
     until(lambda: not _lives(worker), "the worker ends", 60.0)
+    assert not list(tmp_path.iterdir())
 
 
 def _worker_of(parent: int) -> int | None:

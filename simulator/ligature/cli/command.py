@@ -40,8 +40,7 @@ def ambf_simulator() -> None:
 
 def _run(module: str) -> None:
     _open_streams()
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
-        signal.signal(signal.SIGINT, _interrupt)
+    take_interrupts()
     try:
         try:
             importlib.import_module(module).main()
@@ -56,6 +55,19 @@ def _run(module: str) -> None:
         _fail(text)
     except OSError as error:
         _end(error)
+
+
+def take_interrupts() -> None:
+    """Have SIGINT end this process wherever it arrives; see above."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
+        signal.signal(signal.SIGINT, _interrupt)
+
+
+def end_by(number: int) -> NoReturn:
+    """End this process by a signal, without a word."""
+    signal.signal(number, signal.SIG_DFL)
+    signal.raise_signal(number)
+    raise SystemExit(128 + number)
 
 
 def _end(error: OSError) -> NoReturn:
@@ -103,7 +115,6 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     """End the process amid an import, as if SIGINT had no handler; elsewhere raise `KeyboardInterrupt`."""
     while frame is not None:
         if frame.f_code.co_filename == _IMPORT_SYSTEM:
-            signal.signal(number, signal.SIG_DFL)
-            signal.raise_signal(number)
+            end_by(number)
         frame = frame.f_back
     raise KeyboardInterrupt

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from types import FrameType
 from rich.console import Console
 
 from ligature.bundle import EXAMPLES
+from ligature.cli.command import end_by, take_interrupts
 from ligature.cli.sampling import Sampling
 from ligature.process import end_with_parent
 
@@ -34,16 +36,16 @@ def demo(
         return 2
     if dataset is None:
         count = [] if tissue else ["--throws", str(throws)]
-        command = [sys.executable, str(example), *count, "--seed", str(seed), "--out", str(out)]
+        command = [str(example), *count, "--seed", str(seed), "--out", str(out)]
     else:
         words = [str(dataset), "--throws", str(throws), "--seed", str(seed), "--episodes", str(episodes)]
         words += (sampling or Sampling()).words()
-        command = [sys.executable, str(EXAMPLE.with_name("record_dataset.py")), *words]
+        command = [str(EXAMPLE.with_name("record_dataset.py")), *words]
     return _wait(command)
 
 
 def _wait(command: list[str]) -> int:
-    """Run a program to its end; signals go to it, so that it ends in order."""
+    """Run a Python program to its end; signals go to it, so that it ends in order. Returns a shell's exit status."""
     process: subprocess.Popen[bytes] | None = None
 
     def forward(number: int, frame: FrameType | None) -> None:
@@ -52,8 +54,24 @@ def _wait(command: list[str]) -> int:
 
     before = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        process = subprocess.Popen(command, preexec_fn=end_with_parent)
-        return process.wait()
+        process = subprocess.Popen([sys.executable, "-m", "ligature.cli.demo", *command], preexec_fn=end_with_parent)
+        status = process.wait()
+        return status if status >= 0 else 128 - status
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _play(program: str) -> None:
+    """Run a program as Python does; an interrupt ends it without a traceback."""
+    take_interrupts()
+    sys.path[0] = str(Path(program).parent)
+    try:
+        runpy.run_path(program, run_name="__main__")
+    except KeyboardInterrupt:
+        end_by(signal.SIGINT)
+
+
+if __name__ == "__main__":
+    del sys.argv[0]
+    _play(sys.argv[0])

@@ -15,7 +15,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import zipfile
 from collections.abc import Sequence
@@ -268,32 +267,33 @@ def _run_coacd(mesh: bytes, settings: str, name: str) -> bytes:
 
     Logs a line with the ``name`` of the mesh every few seconds.
     """
-    with tempfile.TemporaryDirectory(prefix="ligature-coacd-") as folder:
-        source, target = Path(folder, "mesh.npz"), Path(folder, "pieces.npz")
-        source.write_bytes(mesh)
-        words = (str(source), str(target), settings, str(os.getpid()), str(CPU_LIMIT))
-        command = [sys.executable, "-m", "ligature.mesh.coacd_process", *words]
-        status, error = _wait(command, name)
-        if status == -signal.SIGXCPU:
-            reason = f"CoACD took longer than {CPU_LIMIT} s of processor time; simplify the mesh"
-            raise DecompositionError(reason, lasting=True)
-        if status or not target.is_file():
-            lasting = status not in _FROM_OUTSIDE and not error.startswith(_MACHINE_ERRORS)
-            raise DecompositionError(f"CoACD ended with status {status}: {error}", lasting)
-        return target.read_bytes()
+    words = (settings, str(os.getpid()), str(CPU_LIMIT))
+    status, pieces, error = _wait([sys.executable, "-m", "ligature.mesh.coacd_process", *words], mesh, name)
+    if status == -signal.SIGXCPU:
+        reason = f"CoACD took longer than {CPU_LIMIT} s of processor time; simplify the mesh"
+        raise DecompositionError(reason, lasting=True)
+    if status or not pieces:
+        lasting = status not in _FROM_OUTSIDE and not error.startswith(_MACHINE_ERRORS)
+        raise DecompositionError(f"CoACD ended with status {status}: {error}", lasting)
+    return pieces
 
 
-def _wait(command: Sequence[str], name: str) -> tuple[int, str]:
-    """Exit status and last line of errors of a command."""
+def _wait(command: Sequence[str], given: bytes | None, name: str) -> tuple[int, bytes, str]:
+    """Exit status, output and last line of errors of a command that is given ``given``.
+
+    Pipes, not files: whatever ends this process, nothing is left on the disk.
+    """
     begin = time.monotonic()
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:
         try:
             while True:
                 try:
-                    _, errors = process.communicate(timeout=PROGRESS_SECONDS)
+                    output, errors = process.communicate(given, timeout=PROGRESS_SECONDS)
                     break
                 except subprocess.TimeoutExpired:
+                    given = None  # it goes on being written
                     _log.warning("still decomposing %s after %.0f s", name, time.monotonic() - begin)
         finally:
             process.kill()
-    return process.returncode, " ".join(errors.decode("utf-8", "replace").strip().splitlines()[-1:])
+    return process.returncode, output, " ".join(errors.decode("utf-8", "replace").strip().splitlines()[-1:])
