@@ -82,6 +82,8 @@ OUTS: dict[str, Callable[[Path], str]] = {
     "no name": lambda _: "",
     "system": lambda _: "/proc/written.obj",
     "long name": lambda _: "x" * 300 + ".obj",
+    "pipe": lambda folder: os.mkfifo(folder / "pipe.obj") or "pipe.obj",
+    "link to a device": lambda folder: (folder / "null.obj").symlink_to(os.devnull) or "null.obj",
 }
 BOX = "bodies: [A]\nA: {name: a, mass: 0, shape: BOX, geometry: {x: 1, y: 1, z: 1}}\n"
 URDF = "<robot name='r'><link name='a'/></robot>"

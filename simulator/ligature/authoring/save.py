@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError
 from ligature.adf.nodes import parse
-from ligature.paths import naming, real_path, reason
+from ligature.paths import naming, open_file, real_path, reason
 
 WRITERS = 16
 """Files that are written at a time."""
@@ -32,6 +33,7 @@ def save_all(files: Mapping[Path, bytes], roots: Collection[Path] | None = None)
     written. Raises `SaveError`.
     """
     files = {_real(path): data for path, data in files.items()}  # 'new/../old' is there already
+    _refuse_devices(files)
     changed = {path: data for path, data in files.items() if _content(path) != data}
     refuse_outside(changed, roots)
     folders = [folder for path in changed for folder in (path.parent, *path.parent.parents) if not folder.exists()]
@@ -68,6 +70,18 @@ def refuse_outside(files: Iterable[Path], roots: Collection[Path] | None) -> Non
         if not any(root in real.parents for root in allowed):
             listed = ", ".join(f"'{root}'" for root in allowed)
             raise SaveError(f"'{real}' lies outside {listed}, so nothing was written")
+
+
+def _refuse_devices(files: Iterable[Path]) -> None:
+    """Raise `SaveError` for a device or a pipe: a file in its place would end what others use it for."""
+    for path in files:
+        system = path.parts[1:2] in (("dev",), ("proc",)) and path.parts[2:3] != ("shm",)
+        try:
+            mode = path.stat().st_mode
+        except OSError:
+            continue
+        if system or not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            raise SaveError(f"'{path}' is a device or a pipe, which no file may replace; give another name")
 
 
 def foreign(files: Mapping[Path, bytes], own: Mapping[str, str]) -> list[Path]:
@@ -133,7 +147,8 @@ def checked_text(text: str, path: Path) -> bytes:
 
 def _content(path: Path) -> bytes | None:
     try:
-        return path.read_bytes()
+        with open_file(path) as file:
+            return file.read()
     except OSError:
         return None
 

@@ -12,8 +12,8 @@ from rich.console import Console
 
 import ligature
 from ligature.adf import AdfError
+from ligature.authoring.save import SaveError, save_all
 from ligature.cli.numbers import counted
-from ligature.paths import naming
 
 PROGRESS_SECONDS = 0.5
 """Seconds between two lines ``N of M frames``, which editors show as progress."""
@@ -53,7 +53,10 @@ def poses(
     times = ticks * 1e-3
     data = io.BytesIO()
     np.savez(data, identifiers=np.array(names), times=times, poses=np.array(frames))
-    with naming(out):
-        out.write_bytes(data.getbuffer())
+    try:
+        save_all({out: data.getvalue()})
+    except SaveError as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
     console.print(f"{out}: {counted(len(names), 'body', 'bodies')}, {counted(len(frames), 'frame')}", markup=False)
     return 0

@@ -10,14 +10,17 @@ from __future__ import annotations
 import socket
 import struct
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import rospy
 
 SECONDS = 5.0
 """Seconds that a client has to introduce itself."""
+
+READING_SECONDS = 60.0
+"""Seconds that a subscriber has to read the answer, and what a latched topic holds for it."""
 
 MOST_BYTES = 64 * 1024
 """Most bytes of an introduction; those of clients have some hundred."""
@@ -51,24 +54,34 @@ def apart(handler: Handler) -> Handler:
 
 def _introduce(handler: Handler, client: socket.socket, address: Any) -> None:
     """Hand a connection over; one that is late, or that is no client of ROS, is closed."""
-    late = threading.Timer(SECONDS, _end, (client,))
-    late.daemon = True
     try:
-        late.start()
-        _check(client)
-        handler(client, address)
+        with _within(SECONDS, client):
+            _check(client)
+        with _within(READING_SECONDS, client):
+            handler(client, address)
     except Exception as error:
         rospy.logdebug(f"closed a connection from {address}: {error}")
         _end(client)
         client.close()
+
+
+@contextmanager
+def _within(seconds: float, client: socket.socket) -> Iterator[None]:
+    """End the connection of a ``client`` for which this takes longer."""
+    late = threading.Timer(seconds, _end, (client,))
+    late.daemon = True
+    late.start()
+    try:
+        yield
     finally:
         late.cancel()
 
 
 def _check(client: socket.socket) -> None:
-    """Look how long the introduction will be, before anything is read; raises ValueError."""
+    """Wait for the whole introduction, which stays to be read; raises ValueError where it is none."""
     start = client.recv(4, socket.MSG_PEEK | socket.MSG_WAITALL)
-    if len(start) < 4 or struct.unpack("<I", start)[0] > MOST_BYTES:
+    length = struct.unpack("<I", start)[0] if len(start) == 4 else MOST_BYTES + 1
+    if length > MOST_BYTES or len(client.recv(4 + length, socket.MSG_PEEK | socket.MSG_WAITALL)) < 4 + length:
         raise ValueError("it does not introduce itself as a client of ROS does")
 
 
