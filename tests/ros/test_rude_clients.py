@@ -169,23 +169,23 @@ def test_clients_that_die_or_talk_nonsense_stop_nobody_else(
 def test_a_subscriber_may_read_slowly_what_a_latched_topic_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its introduction is over; only those who introduce themselves slowly, at any byte, are closed."""
     monkeypatch.setattr(handshakes, "SECONDS", 0.3)
-    said, large = header(HEADS[0]), b"x" * 4_000_000
+    spoken_first, large = header(HEADS[0]), b"x" * 4_000_000
 
     def answer(client: socket.socket, address: Any) -> None:
-        assert client.recv(len(said), socket.MSG_WAITALL) == said
+        assert client.recv(len(spoken_first), socket.MSG_WAITALL) == spoken_first
         client.sendall(large)
         client.close()
 
-    for spoken in (len(said), len(said) - 1, 5, 3):
+    for spoken in (len(spoken_first), len(spoken_first) - 1, 5, 3):
         ours, theirs = socket.socketpair()
         handshakes.apart(answer)(theirs, None)
-        ours.sendall(said[:spoken])
+        ours.sendall(spoken_first[:spoken])
         time.sleep(1.0)
         read = 0
         with suppress(ConnectionResetError):
             while part := ours.recv(1 << 20):
                 read += len(part)
-        assert read == (len(large) if spoken == len(said) else 0)
+        assert read == (len(large) if spoken == len(spoken_first) else 0)
         ours.close()
 
 
