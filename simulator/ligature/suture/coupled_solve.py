@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 MAX_CG = 40
 
 CG_TOLERANCE = 1e-6
-"""Residual energy, relative to the first, at which the coupling is solved, as a rule."""
+"""Residual energy, relative to the first, at which the coupling is solved."""
 
 
 @kernel
@@ -113,13 +113,10 @@ def _dot(rows: int, work: Work, a: Array, b: Array) -> float:
 
 
 @kernel
-def couple(
-    n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work, most: int, tolerance: float
-) -> None:
+def couple(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work) -> None:
     """Complete ``work.d`` and ``work.load`` by the coupling of contacts between movable nodes.
 
-    ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``. ``most`` iterations
-    leave a residual energy of ``tolerance``, relative to the first.
+    ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``.
     """
     for m in range(rows):
         if work.rows[m] >= n:
@@ -127,7 +124,7 @@ def couple(
     _move_bodies(n, rows, work, work.g, work.d)
     if high < 0:
         return
-    _iterate(n, low, high, rows, nodes, touches, work, most, tolerance)
+    _iterate(n, low, high, rows, nodes, touches, work)
     felt = work.cg[0]
     _apply_coupling(rows, nodes, touches, work, work.d, felt)
     for i in range(low, high + 1):
@@ -137,9 +134,7 @@ def couple(
 
 
 @inlined
-def _iterate(
-    n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work, most: int, tolerance: float
-) -> None:
+def _iterate(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work) -> None:
     """Conjugate gradients for ``work.d`` of the coupled nodes."""
     p, r, z, s = work.cg[0], work.cg[1], work.cg[2], work.cg[3]
     _apply_coupling(rows, nodes, touches, work, work.d, r)
@@ -149,13 +144,13 @@ def _iterate(
             r[i, a] = -r[i, a]
     _precondition(n, low, high, rows, work, r, z)
     energy = _dot(rows, work, r, z)
-    enough = tolerance * energy
+    enough = CG_TOLERANCE * energy
     # s keeps S p by recurrence, so that S itself is never applied.
     for m in range(rows):
         i = work.rows[m]
         for a in range(6):
             p[i, a], s[i, a] = z[i, a], r[i, a]
-    for _ in range(most):
+    for _ in range(MAX_CG):
         if energy <= enough:
             break
         q = z
