@@ -25,20 +25,6 @@ from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks.knots import HALF_KNOT, SquareKnotScore
 from ligature.tasks.throws import drawn_back, pose_of
-from ligature.tasks.ties import (
-    BEGIN,
-    END,
-    FARTHEST,
-    FULL,
-    THINNEST,
-    Wrap,
-    fingers_within,
-    leaning,
-    leaves,
-    level_with,
-    swept,
-    unit,
-)
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from suture import Failure, Film  # noqa: E402
@@ -51,7 +37,7 @@ STREAM = 0.02
 """Seconds between two set-points of a stream."""
 
 START = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-OPEN, FINGER_OPEN, CLOSED, SHUT = 0.8, 0.4, 0.0, -0.35
+OPEN, FINGER_OPEN, SHUT = 0.8, 0.4, -0.35
 DEEP, FINGERTIP, ROOT = 0.0075, 0.0094, 0.002
 """Metres from the control point of a tool to where it holds the thread, to the end of its fingers, and to their root,
 where a loop lies."""
@@ -59,12 +45,11 @@ where a loop lies."""
 TAKES = np.array([0.6, 0.3, -0.74])
 """Direction of the left tool: its shaft passes in front of the right jaws, and over the short end."""
 
-REACHES = np.array([-0.99, 0.0, 0.14])
-"""Direction of the right tool: along the vessel, a finger that the thread is laid around, its tip a little raised."""
+REACHES = np.array([-1.0, 0.0, 0.0])
+"""Direction of the right tool: level and along the vessel, a finger that the thread is laid around."""
 
-HELD, TAIL, BESIDE_PADS = (18, 4), 10, 4
-"""Elements from its end at which the long end is held in each throw, so that it is as long in both, and the short one;
-how many pads may bend."""
+HELD, TAIL, BESIDE_PADS = 5, 10, 4
+"""Elements from its end at which the long end is held, and the short one; how many pads may bend."""
 
 LEAN, STRETCHED, STANDS = -0.0215, 0.95, 0.007
 """Metres along the vessel where the short end is to stand; how far it is drawn out; the error that may stay."""
@@ -73,24 +58,34 @@ OVERBEND = (20.0, 36.0)
 """By how many radians a metre of its length, thrice, the short end is bent too far, since it springs back: for each
 throw, as a knot gives way, and the vessel does not."""
 
-GAP, LIFT, SNUG, LOOSE = 0.025, 0.007, 0.008, 0.006
-"""Metres between jaws and short end in which the left tool passes; by which the jaws are higher meanwhile; newtons that
-keep the loop on them, where 0.03 N would bend it into the gap between open fingers; and the most while it is laid, as
-0.02 N turn the knot of one throw."""
+GAP, SNUG = 0.0155, 0.04
+"""Metres between jaws and short end in which the left tool passes; newtons that keep the loop on the jaws."""
 
-GIVES, PATIENCE, CENTRED, CLEAR = 0.0015, 6.0, 0.0006, 0.006
-"""Metres by which a way that is too taut becomes shorter; seconds in which the jaws must find the short end; how near
-to their middle it must be, and how far before them while it is not."""
+FINGER, THINNEST = 0.0042, 0.011
+"""Radius of the jaws as the thread goes around them, and of the least circle that the left tool makes."""
 
-NEAREST_END, BESIDE_KNOT = 2, 6
-"""Elements of the short end that the jaws do not take: at its end, and beside the knot."""
+BEGIN, END = 60, 420
+"""Degrees about the jaws at which the long end begins and ends, from the side where it leaves the vessel."""
 
-RETRIES, ATTEMPTS = 4, 5
-"""How often the short end is bent anew, or jaws that closed on nothing try again; how often a throw is tried."""
+SHARES = (((60, 0.88), (270, 0.88), (END, 0.82)), ((60, 0.98), (180, 0.96), (270, 0.90), (END, 0.84)))
+"""For each throw: share of the long end's length that its way about the jaws takes, by the angle."""
+
+ASIDE = (
+    ((90, 0.0), (180, -0.005), (340, -0.005), (END, 0.006)),
+    ((60, 0.006), (150, 0.004), (210, -0.005), (340, -0.005), (END, 0.006)),
+)
+"""For each throw: metres along the vessel from the loop to the left tool, by the angle: first and last it draws the
+loop to the root of the jaws, and between it passes in front of them."""
+
+BELOW, OVER = 0.013, 0.0075
+"""Metres that the left tool keeps below the right one, and over the vessel."""
+
+RETRIES, ATTEMPTS = (0, 2, -2, 3), 3
+"""Elements beside the first choice at which jaws that closed on nothing try again; how often a throw is tried."""
 
 SLOW, BRISK, FAST, CAREFUL = 0.03, 0.06, 0.08, 0.015
-PULL, OFF, DRAWN, MOST = 0.3, 2.0, 1.0, 8.0
-"""Newtons with which a loop is drawn close, drawn off the jaws, a throw is drawn tight, and the most."""
+PULL, DRAWN, MOST = 0.3, 1.0, 8.0
+"""Newtons with which a loop is drawn close, a throw is drawn tight, and the most."""
 
 HOLDS = 10.0
 """Seconds that a knot must hold when nothing holds it."""
@@ -100,13 +95,30 @@ SHIFT, FRICTION = 0.003, (0.5, 0.6)
 
 DRAWS = (
     (-0.003, 0.03, 0.008), (-0.003, 0.045, 0.008), (-0.003, 0.06, 0.008), (-0.003, 0.066, 0.015),
-    (-0.003, 0.064, 0.03), (-0.003, 0.062, 0.045), (-0.02, 0.06, 0.05), (-0.04, 0.06, 0.05), (-0.055, 0.062, 0.055),
+    (-0.003, 0.064, 0.03), (-0.003, 0.062, 0.045), (-0.02, 0.06, 0.05), (-0.04, 0.06, 0.05),
 )  # fmt: skip
 """Where the left hand goes one after the other until the throw is tight: along and beside the vessel, and above it."""
 
 
 class Missed(Failure):
     """A throw did not succeed, but can be tried again."""
+
+
+def length_around(anchor: Array, angle: float, radius: float) -> float:
+    """Length of a taut thread from ``anchor`` (2,), around jaws at the origin, to ``radius`` at an ``angle``."""
+    away = float(np.hypot(*anchor))
+    first = np.arctan2(anchor[1], anchor[0]) + np.arccos(FINGER / away)
+    last = angle - np.arccos(min(1.0, FINGER / radius))
+    if last <= first:
+        return float(np.hypot(*(radius * np.array([np.cos(angle), np.sin(angle)]) - anchor)))
+    return float(np.sqrt(away**2 - FINGER**2) + FINGER * (last - first) + np.sqrt(max(radius**2 - FINGER**2, 0.0)))
+
+
+def radius_for(anchor: Array, angle: float, length: float, most: float = 0.045) -> float:
+    """Radius, `THINNEST` to ``most``, at which a thread of ``length`` is just taut."""
+    radii = np.linspace(THINNEST, most, 200)
+    fits = [radius for radius in radii if length_around(anchor, angle, radius) <= length]
+    return float(max(fits, default=THINNEST))
 
 
 class TwoArms:
@@ -285,23 +297,32 @@ class Knotter(TwoArms):
 
     def leaves(self) -> tuple[int, int]:
         """The elements at which the short end and the long end leave the vessel, or the knot on it."""
-        return leaves(self.points(), self.vessel, self._radius, self.throws > 0)
+        points, beside = self.points(), 1.3 * self._radius
+        away = np.linalg.norm((points - self.vessel)[:, 1:], axis=1)
+        if self.throws == 0:
+            return int(np.flatnonzero(away < beside).min()), int(np.flatnonzero(away < 1.15 * beside).max())
+        near = np.flatnonzero(np.linalg.norm(points - self.vessel, axis=1) < 0.008)
+        touching = [
+            i
+            for i in near
+            if (np.linalg.norm(points[np.abs(np.arange(len(points)) - i) >= 8] - points[i], axis=1)).min() < 0.0011
+        ]
+        return (touching[0], touching[-1]) if touching else (int(near.min()), int(near.max()))
 
-    def seen(self, name: str, first: int, last: int) -> Array:
-        """Where elements of the thread are (n, 3) in the frame of an arm's tool."""
-        T = self.tools[name]
-        return np.asarray((self.points()[first:last] - T[:3, 3]) @ T[:3, :3])
-
-    def looped(self, first: int) -> int:
-        """How many fingers of the right arm the thread, from element ``first`` to the left hand, goes around."""
-        return fingers_within(self.seen(RIGHT, first, self.must_hold(LEFT)))
+    def looped(self, first: int) -> bool:
+        """Whether the thread, from element ``first`` to the left hand, goes about the right arm's jaws or shaft."""
+        T, points = self.tools[RIGHT], self.points()[first : self.must_hold(LEFT)]
+        local = (points - T[:3, 3]) @ T[:3, :3]
+        near = (np.abs(local[:, 2] + 0.008) < 0.018) & (np.hypot(local[:, 0], local[:, 1]) < 0.007)
+        angles = np.unwrap(np.arctan2(local[near, 1], local[near, 0]))
+        return bool(near.any() and np.ptp(angles) > np.pi)
 
     # --- the short end ------------------------------------------------------------------------
 
     def stand(self) -> None:
         """The right arm bends the short end, which it holds, until it stands by itself where it is wanted."""
         self.bend()
-        for _ in range(RETRIES):
+        for _ in RETRIES:
             self.let_go()
             root, length = self._root(self.tail)
             at = self.points()[self.tail]
@@ -324,7 +345,8 @@ class Knotter(TwoArms):
 
     def _wanted(self, root: Array, length: float) -> Array:
         """Direction (3,) from its root in which the short end is to stand."""
-        return leaning(root, self.vessel[0] + LEAN, STRETCHED * length)
+        x = self.vessel[0] + LEAN - root[0]
+        return np.array([x, 0.0, np.sqrt(max((STRETCHED * length) ** 2 - x**2, 1e-6))]) / (STRETCHED * length)
 
     def bend(self) -> None:
         """First upright, then along the vessel beyond where it is to stand, and back there, where it bears nothing."""
@@ -333,10 +355,10 @@ class Knotter(TwoArms):
         wanted, R = self._wanted(root, length), self.tools[RIGHT][:3, :3]
         ways = [self.tool(REACHES, np.array([0.0, 0.0, sign]), np.zeros(3))[:3, :3] for sign in (1.0, -1.0)]
         level = min(ways, key=lambda way: float(np.linalg.norm(rotation_vector(R.T @ way))))
-        now = unit(self.points()[held] - root)
-        up = unit(np.array([-0.1, 0.15 * self.side, 1.0]))
+        now = _unit(self.points()[held] - root)
+        up = _unit(np.array([-0.1, 0.15 * self.side, 1.0]))
         turned = axis_rotation((0.0, -1.0, 0.0), OVERBEND[self.throws] * length / 3.0) @ wanted
-        beyond = unit(turned + [0.0, 0.12 * self.side, 0.0])
+        beyond = _unit(turned + [0.0, 0.12 * self.side, 0.0])
         self._sweep(root, length, now, up, R, level)
         self._sweep(root, length, up, beyond, level, level)
         self._sweep(root, length, beyond, wanted, level, level)
@@ -346,18 +368,19 @@ class Knotter(TwoArms):
         held = self.must_hold(RIGHT)
         root, length = self._root(held)
         wanted, R = self._wanted(root, length), self.tools[RIGHT][:3, :3]
-        axis = unit(np.cross(unit(stood - root), wanted))
+        axis = _unit(np.cross(_unit(stood - root), wanted))
         beyond = axis_rotation(axis, OVERBEND[self.throws] * length / 3.0) @ wanted
-        self._sweep(root, length, unit(self.points()[held] - root), beyond, R, R)
+        self._sweep(root, length, _unit(self.points()[held] - root), beyond, R, R)
         self._sweep(root, length, beyond, wanted, R, R)
 
     def _sweep(self, root: Array, length: float, a: Array, b: Array, R: Array, S: Array) -> None:
         """What the right arm holds goes about ``root`` from the direction ``a`` to ``b``; its tool turns to ``S``."""
-        turn = rotation_vector(R.T @ S)
+        angle, turn = np.arccos(np.clip(a @ b, -1.0, 1.0)), rotation_vector(R.T @ S)
         size = float(np.linalg.norm(turn))
         for share in np.linspace(0.0, 1.0, 9)[1:]:
+            way = b if angle < 1e-6 else (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
             now = R @ axis_rotation(turn / size, share * size) if size > 1e-6 else R
-            self.go({RIGHT: frame(now, root + STRETCHED * length * swept(a, b, share) - DEEP * now[:, 2])}, speed=BRISK)
+            self.go({RIGHT: frame(now, root + STRETCHED * length * way - DEEP * now[:, 2])}, speed=BRISK)
 
     def let_go(self) -> None:
         """The right arm opens, keeps the short end in the middle between its fingers, and draws back along itself."""
@@ -367,7 +390,7 @@ class Knotter(TwoArms):
         self.wait(0.3)
         for back in (0.0, 0.004):
             T = self.tools[RIGHT]
-            local = self.seen(RIGHT, 0, self.tail + 20)
+            local = (self.points()[: self.tail + 20] - T[:3, 3]) @ T[:3, :3]
             near = np.abs(local[:, 2] - DEEP + back) < 0.003
             if near.any():
                 self.go({RIGHT: frame(np.eye(3), local[near, 1].mean() * T[:3, 1] - back * T[:3, 2]) @ T}, speed=0.01)
@@ -384,94 +407,75 @@ class Knotter(TwoArms):
 
     def wrap(self) -> None:
         """The left arm lays the long end once around the open jaws of the right arm, from its own side on."""
-        first, held = self.leaves()[1], self.must_hold(LEFT)
-        finger = frame(np.eye(3), [0.0, 0.0, LIFT]) @ drawn_back(self._at_tail(self.tail), GAP)
-        # The long end rises higher than the jaws: open, or on their way, they would take it between them.
-        self.go({RIGHT: finger}, {RIGHT: CLOSED}, speed=SLOW)
+        side, first, held = self.side, self.leaves()[1], self.must_hold(LEFT)
+        free = self._length * (held - first)
+        finger = drawn_back(self._at_tail(self.tail), GAP)
+        self.go({LEFT: self._left_at(self.vessel + [-0.003, side * 0.03, 0.035])}, speed=BRISK)
+        self.go({RIGHT: finger}, {RIGHT: FINGER_OPEN}, speed=SLOW)
         centre = finger[:3, 3] + ROOT * finger[:3, 2]
-        length = self._length * (held - first)
-        way = Wrap(centre, self.points()[first], self.side, length, float(centre[2] - self.vessel[2]))
-        slack = 0.0
+        place = self.points()[first] - centre
+        anchor = np.array([side * place[1], place[2]])
+        low = centre[2] - self.vessel[2] - OVER
         for degrees in range(BEGIN, END + 1, 10):
-            self.go({LEFT: self._left_at(way.at(degrees, slack))}, speed=BRISK, until=self._too_taut)
-            if self._too_taut():
-                slack += GIVES
-                if degrees > FULL:
-                    break
-        draw = (FARTHEST - way.radius(END, slack)) * way.outwards(END) + [0.004, 0.0, 0.0]
-        snug = self._left_at(way.at(END, slack) + draw)
-        self.go({}, {RIGHT: FINGER_OPEN})
-        self.go({LEFT: snug}, speed=SLOW, until=lambda: self.pull() > SNUG)
-        if self.looped(first) < 2:
+            angle = np.radians(degrees)
+            radius = radius_for(anchor, angle, _between(SHARES[self.throws], degrees) * free)
+            if np.sin(angle) < 0.0:
+                radius = min(radius, BELOW / -np.sin(angle), max(low / -np.sin(angle), THINNEST))
+            way = np.array([0.0, side * np.cos(angle), np.sin(angle)])
+            at = centre + [_between(ASIDE[self.throws], degrees), 0.0, 0.0] + radius * way
+            self.go({LEFT: self._left_at(at)}, speed=BRISK)
+        snug = at + (0.045 - radius) * way + [0.004, 0.0, 0.0]
+        self.go({LEFT: self._left_at(snug)}, speed=SLOW, until=lambda: self.pull() > SNUG)
+        if not self.looped(first):
             raise Missed(f"the loop slipped off {RIGHT}")
-
-    def _too_taut(self) -> bool:
-        return self.pull() > LOOSE
-
-    def _near(self, last: int, keep: Callable[[], None]) -> bool:
-        """The right jaws go to where the short end is, looked at anew at each set-point; whether it is between them.
-
-        First aside, before their tips would push it away, then along themselves.
-        """
-        step, T = CAREFUL * STREAM, self.tools[RIGHT]
-        for _ in range(round(PATIENCE / STREAM)):
-            high, aside, ahead = level_with(self.seen(RIGHT, NEAREST_END, last)) - [0.0, 0.0, DEEP]
-            if abs(aside) < CENTRED and abs(ahead) < CENTRED:
-                return True
-            if abs(aside) > 2.0 * CENTRED:
-                ahead -= CLEAR
-            way = np.clip([high if abs(high) > 2.0 * CENTRED else 0.0, aside, ahead], -step, step)
-            T = self.tools[RIGHT] = frame(np.eye(3), T[:3, :3] @ way) @ T
-            keep()
-            self.tick()
-        return False
 
     def seize(self) -> None:
         """The right arm goes forward and takes the short end; the left one follows, and keeps the loop on its jaws."""
-        short, first = self.leaves()
+        first = self.leaves()[1]
         off = self.tools[LEFT][:3, 3] + DEEP * self.tools[LEFT][:3, 2] - drawn_back(self.tools[RIGHT], ROOT)[:3, 3]
         away = float(np.linalg.norm(off))
         off = off / away
 
         def keep() -> None:
             nonlocal away
-            more = CAREFUL * STREAM * np.clip((SNUG - self.pull()) / SNUG, -4.0, 0.3)
+            more = CAREFUL * STREAM * np.clip((SNUG - self.pull()) / SNUG, -4.0, 1.0)
             away = float(np.clip(away + more, THINNEST, 0.06))
             self.tools[LEFT] = self._left_at(drawn_back(self.tools[RIGHT], ROOT)[:3, 3] + away * off)
 
-        # The loop does not slip on the jaws: what the way to the short end needs of the long one must be slack before.
-        self.go({RIGHT: frame(np.eye(3), [0.0, 0.0, -LIFT]) @ self.tools[RIGHT]}, speed=SLOW, meanwhile=keep)
-        for _ in range(RETRIES):
-            if not self._near(short - BESIDE_KNOT, keep):
-                raise Missed(f"the short end is out of reach of {RIGHT}")
+        for more in RETRIES:
+            for behind in (0.006, 0.0):
+                goal = drawn_back(self._at_tail(self.tail + more), behind)
+                self.go({RIGHT: goal}, speed=CAREFUL, meanwhile=keep)
             self.go({}, {RIGHT: SHUT})
             self.wait(0.2)
             held = self.held(RIGHT)
-            if held is not None and held < short - BESIDE_KNOT:
+            if held is not None and held < self.leaves()[0] - 5:
                 break
             self.go({}, {RIGHT: FINGER_OPEN})
             self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.006)}, speed=SLOW, meanwhile=keep)
         else:
             raise Missed(f"{RIGHT} did not find the short end")
-        if self.looped(first) < 2:
+        if not self.looped(first):
             raise Missed(f"the loop slipped off {RIGHT}")
 
     def draw_through(self) -> None:
         """The right arm goes back through the loop, which the left one draws off its jaws."""
-        # The left hand is aside and not above, where the long end gets between the tips. It follows, and gives slack:
-        # a taut loop grips the jaws. The part from the vessel draws the loop off.
-        loop, held = self.tools[RIGHT][:3, 3], self.tools[LEFT][:3, 3] + DEEP * self.tools[LEFT][:3, 2]
-        away = max(float(np.linalg.norm(held - loop)) - 0.004, 1.4 * FINGERTIP)
-        self.go({LEFT: self._left_at(loop + away * unit(np.array([-0.8, self.side * 0.6, 0.1])))}, speed=BRISK)
-        first, back = self.must_hold(RIGHT) + 12, {RIGHT: [0.006, 0.0, 0.0], LEFT: [0.0065, 0.0, 0.0]}
-        for _ in range(12):
-            goals = {name: frame(np.eye(3), way) @ self.tools[name] for name, way in back.items()}
-            self.go(goals, speed=SLOW, until=lambda: self.taut() > OFF)
+        tip = self.tools[RIGHT][:3, 3] + FINGERTIP * self.tools[RIGHT][:3, 2]
+        self.go({LEFT: self._left_at(tip + [-0.012, self.side * 0.004, 0.012])}, speed=BRISK)
+        first = self.must_hold(RIGHT) + 12
+
+        def taut() -> bool:
+            return self.taut() > 0.8
+
+        for step in range(8):
+            self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.006)}, speed=SLOW, until=taut)
             if not self.looped(first):
                 return
-            if self.taut() > OFF:
-                slack = [0.003, -0.002 * self.side, 0.0]
-                self.go({LEFT: frame(np.eye(3), slack) @ self.tools[LEFT]}, speed=SLOW)
+            if taut() or step > 4:
+                off = frame(np.eye(3), [-0.012, 0.0, 0.0]) @ self.tools[LEFT]
+                self.go({LEFT: off}, speed=SLOW, until=lambda: self.pull() > PULL)
+                slack = {RIGHT: [-0.003, 0.0, 0.0], LEFT: [0.004, 0.0, 0.0]}
+                self.go({name: frame(np.eye(3), way) @ self.tools[name] for name, way in slack.items()}, speed=SLOW)
         raise Missed(f"the loop did not slip off {RIGHT}")
 
     def tighten(self) -> None:
@@ -523,21 +527,14 @@ class Knotter(TwoArms):
         self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.04)}, speed=SLOW)
         if self.held(LEFT) is None:
             self.go({LEFT: frame(np.eye(3), [0.0, 0.0, 0.03]) @ self.tools[LEFT]}, {LEFT: OPEN}, speed=BRISK)
-            self.take_long_end()
+            self.take(LEFT, TAKES, len(self.thread) - HELD, -1)
         self.go({LEFT: self._left_at(self.vessel + [-0.003, self.side * 0.03, 0.06])}, speed=BRISK)
         self.go({LEFT: self._left_at(self.vessel + [0.0, self.side * 0.05, 0.025])}, speed=BRISK)
 
-    def take_long_end(self) -> None:
-        """The left arm takes the long end where it is held in this throw."""
-        self.take(LEFT, TAKES, len(self.thread) - HELD[self.throws], -1)
-
     def give_slack(self) -> None:
-        """The left hand goes where the long end does not disturb the short one, and takes it nearer to its end."""
+        """The left hand goes where the long end does not disturb the short one."""
         hand = self.tools[LEFT][:3, 3] + DEEP * self.tools[LEFT][:3, 2] - self.vessel
         self.go({LEFT: self._left_at(self.vessel + hand * [0.0, 0.8, 1.0] + [0.0, 0.0, 0.015])}, speed=BRISK)
-        self.go({}, {LEFT: OPEN})
-        self.go({LEFT: drawn_back(self.tools[LEFT], 0.02)})
-        self.take_long_end()
 
     def leave(self) -> None:
         """Both hands let go and draw back; the knot must hold by itself."""
@@ -547,11 +544,20 @@ class Knotter(TwoArms):
 
     def make(self) -> None:
         """The whole knot."""
-        self.take_long_end()
+        self.take(LEFT, TAKES, len(self.thread) - HELD, -1)
         self.throw()
         self.give_slack()
         self.throw()
         self.leave()
+
+
+def _unit(way: Array) -> Array:
+    return np.asarray(way / np.linalg.norm(way))
+
+
+def _between(table: tuple[tuple[int, float], ...], at: float) -> float:
+    """The value of a table of (angle, value) at an angle."""
+    return float(np.interp(at, [angle for angle, _ in table], [value for _, value in table]))
 
 
 def scattered(scene: Scene, seed: int) -> Scene:

@@ -8,11 +8,42 @@ from pathlib import Path
 import ligature
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 sys.path.insert(0, str(EXAMPLES))
 
 import square_knot  # noqa: E402
+
+
+@given(st.floats(-2.0, -1.2), st.floats(0.01, 0.05), st.floats(1.1, 3.0), st.floats(0.011, 0.045))
+def test_a_taut_thread_around_the_jaws_is_half_the_hull_of_its_ends_and_the_jaws(
+    at: float, away: float, angle: float, radius: float
+) -> None:
+    """Up to half a turn: the shortest way around a circle is the part of the convex hull on that side."""
+    anchor, end = (r * np.array([np.cos(a), np.sin(a)]) for r, a in ((away, at), (radius, angle)))
+    found = square_knot.length_around(anchor, angle, radius)
+    around = np.linspace(0.0, 2.0 * np.pi, 4000)
+    circle = square_knot.FINGER * np.column_stack([np.cos(around), np.sin(around)])
+    points = np.vstack([anchor, end, circle])
+    hull = points[ConvexHull(points).vertices]  # counter-clockwise
+    start = int(np.flatnonzero((hull == anchor).all(axis=1))[0])
+    way = np.roll(hull, -start, axis=0)
+    stop = int(np.flatnonzero((way == end).all(axis=1))[0])
+    length = float(np.linalg.norm(np.diff(way[: stop + 1], axis=0), axis=1).sum())
+    assert found == pytest.approx(length, rel=2e-3)
+
+
+@given(st.floats(0.02, 0.045), st.floats(1.0, 7.3), st.floats(0.05, 0.1))
+def test_the_left_tool_never_draws_the_thread_taut_but_where_it_must_keep_clear(
+    height: float, angle: float, length: float
+) -> None:
+    anchor = np.array([0.003, -height])
+    radius = square_knot.radius_for(anchor, angle, length)
+    assert radius >= square_knot.THINNEST
+    assert radius == square_knot.THINNEST or square_knot.length_around(anchor, angle, radius) <= length
 
 
 def test_a_thread_that_nobody_wraps_has_no_knot() -> None:
@@ -33,6 +64,15 @@ def test_another_seed_lays_vessel_and_thread_elsewhere_together(seed: int) -> No
     assert np.allclose(moved, moved[0], atol=1e-9) and moved[0, 2] == 0.0
     there.step(300)
     assert there.state["rod_tension"][0].max() < 0.1
+
+
+@pytest.mark.parametrize("throw", [0, 1])
+def test_tables_of_a_throw_go_from_its_first_to_its_last_angle(throw: int) -> None:
+    """`numpy.interp` takes angles that do not rise without a word."""
+    for table in (square_knot.SHARES[throw], square_knot.ASIDE[throw]):
+        angles = [angle for angle, _ in table]
+        assert angles == sorted(set(angles)) and angles[-1] == square_knot.END
+        assert all(square_knot._between(table, angle) == value for angle, value in table)
 
 
 def test_the_short_end_stands_where_the_right_arm_bends_it() -> None:
