@@ -241,6 +241,7 @@ def test_a_disk_that_becomes_full_costs_the_cache_and_not_the_run(program: str, 
     assert "kernels cannot be kept and will be compiled again at the next start" in done.stderr
 
 
+@pytest.mark.timeout(900)
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become somebody else")
 def test_somebody_who_owns_nothing_can_simulate() -> None:
     words = ["setpriv", "--reuid=65534", "--clear-groups", sys.executable]
@@ -257,7 +258,7 @@ def test_somebody_who_owns_nothing_can_simulate() -> None:
         env = {**os.environ, "LIGATURE_CACHE": "", "XDG_CACHE_HOME": "", "HOME": "/root", "TMPDIR": str(temporary)}
         done = subprocess.run(
             [*words, "-m", "ligature", "bench", str(scene), "--seconds", "0.1"],
-            env=env, capture_output=True, text=True, timeout=280, cwd="/",
+            env=env, capture_output=True, text=True, timeout=800, cwd="/",
         )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "/root/.cache/ligature cannot be written (Permission denied)" in done.stderr

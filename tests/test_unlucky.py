@@ -121,4 +121,4 @@ def test_the_wall_clock_decides_nothing() -> None:
         for path in (ROOT / "simulator" / "ligature").rglob("*.py")
         if "time.time()" in path.read_text("utf-8")
     ]
-    assert sorted(readers) == ["cli/physics.py", "kernels.py"]
+    assert sorted(readers) == ["cli/physics.py", "kernel_cache.py"]

@@ -66,7 +66,7 @@ def _docstring(app: Any, what: str, name: str, object: Any, options: Any, lines:
 
 def _skip(app: Any, what: str, name: str, object: Any, skip: bool, options: Any) -> bool | None:
     """Leave out names for types of others: their documentation is numpy's."""
-    ours = getattr(object, "__module__", "").startswith("ligature")
+    ours = (getattr(object, "__module__", None) or "").startswith("ligature")
     return True if isinstance(object, types.GenericAlias) and not ours else None
 
 

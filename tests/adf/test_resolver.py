@@ -192,6 +192,7 @@ def test_hints_of_many_files_outside_name_one_root(lab: Path) -> None:
     assert hints == {f"allow it with --root {lab} or {SEARCH_PATH}"}
 
 
+@pytest.mark.timeout(900)
 def test_every_file_of_the_corpus_loads_from_an_archive_as_it_does_from_a_repository(
     corpus: Path, tmp_path: Path
 ) -> None:

@@ -117,6 +117,16 @@ def test_a_wrong_option_in_a_page_is_found(tmp_path: Path) -> None:
 
 def test_every_page_has_an_example_that_is_run_or_read() -> None:
     """Pages of tables and of history aside."""
-    without = {"index", "conformance", "glossary", "dependencies", "adf", "architecture", "benchmarks", "cheats"}
+    without = {
+        "index",
+        "conformance",
+        "glossary",
+        "dependencies",
+        "adf",
+        "architecture",
+        "benchmarks",
+        "cheats",
+        "questions",
+    }
     silent = {page.stem for page in PAGES if page not in RUN and not lines(page) and page.name not in ROS_PAGES}
     assert silent <= without, silent - without

@@ -1,6 +1,6 @@
 """The same YAML document in other hands: order of keys, flow and block, quotes, numbers, comments, anchors, line ends.
 
-`spelled` writes nested dicts, lists and scalars so that a reader with yaml-cpp's rules (ADF specification §1.1) finds
+`spelled` writes nested dicts, lists and scalars so that a reader with yaml-cpp's rules (as AMBF reads its files) finds
 them unchanged. Text N is the same in every run.
 """
 

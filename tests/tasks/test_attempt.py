@@ -85,7 +85,7 @@ def test_a_reported_pose_is_judged_in_the_frame_of_the_camera_body(scene: Scene)
     state["body_pose"][camera, :3] = 0.0, 0.0, 1.0
     attempt.observe(state)
     report = attempt.judge(frame(np.eye(3), (0.0, 0.004, -1.0))).report()
-    assert report["E_base"] == report["E_mid"] == report["E_tip"] == pytest.approx(0.004)
+    assert [report[name] for name in ("E_base", "E_mid", "E_tip")] == pytest.approx([0.004] * 3)
     assert report["total"] == pytest.approx(0.012)
     with pytest.raises(ValueError, match="needs the reported pose"):
         attempt.judge()
