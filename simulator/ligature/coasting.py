@@ -51,24 +51,28 @@ class Coasting:
         self.spent, self._corners = np.zeros(len(PHASES)), np.zeros((2, 3))
         self._clock = np.zeros(3, np.int64)
         self._clock[2] = self._clock.ctypes.data
+        self._coast(0)  # loads the kernel, which takes 0.1 s that a run would stand still for
 
     def pass_ticks(self, ticks: int) -> tuple[int, bool]:
         """Advance by up to ``ticks``, with the same bits as single ticks; returns how many passed.
 
         Returns also whether one more has begun, whose controllers have acted: threads, grasps and bodies are to follow.
         """
-        world, rods = self._world, self._suture.rods
         self.spent[:] = 0.0
-        ticks = min(ticks, self._suture.coasting_ticks()) if world.coasts else 0
+        ticks = min(ticks, self._suture.coasting_ticks()) if self._world.coasts else 0
         if ticks < 1:
             return 0, False
-        passed, begun, sound = coast(
+        passed, begun, sound = self._coast(ticks)
+        self._suture.conclude(passed, begun)
+        self._world.conclude(sound)
+        return passed, begun
+
+    def _coast(self, ticks: int) -> tuple[int, bool, bool]:
+        world, rods = self._world, self._suture.rods
+        return coast(
             *world.always, world.impulses.total, world.impulses.acted, rods.colliders.table, rods.colliders.indices,
             rods.tick_tables(), self._corners, self._clock, self.spent, self._dt, MAX_SPEED, ticks,
         )  # fmt: skip
-        self._suture.conclude(passed, begun)
-        world.conclude(sound)
-        return passed, begun
 
 
 @inlined
