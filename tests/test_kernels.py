@@ -248,17 +248,18 @@ def test_somebody_who_owns_nothing_can_simulate() -> None:
     if subprocess.run([*words, "-c", "import ligature"], capture_output=True, check=False).returncode:
         pytest.skip("nobody cannot read this checkout")
     with TemporaryDirectory() as place:
-        scene, temporary = Path(place, "ball.yaml"), Path(place, "temporary")
+        scene, temporary, home = (Path(place, name) for name in ("ball.yaml", "temporary", "home"))
+        home.mkdir(mode=0o700)
         scene.write_text(
             "bodies: [BODY a]\nBODY a: {name: a, mass: 1, collision shape: SPHERE, collision geometry: {radius: 0.1}}\n"
         )
         temporary.mkdir()
         temporary.chmod(0o777)
         Path(place).chmod(0o755)
-        env = {**os.environ, "LIGATURE_CACHE": "", "XDG_CACHE_HOME": "", "HOME": "/root", "TMPDIR": str(temporary)}
+        env = {**os.environ, "LIGATURE_CACHE": "", "XDG_CACHE_HOME": "", "HOME": str(home), "TMPDIR": str(temporary)}
         done = subprocess.run(
             [*words, "-m", "ligature", "bench", str(scene), "--seconds", "0.1"],
             env=env, capture_output=True, text=True, timeout=800, cwd="/",
         )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "/root/.cache/ligature cannot be written (Permission denied)" in done.stderr
+    assert f"{home}/.cache/ligature cannot be written (Permission denied)" in done.stderr

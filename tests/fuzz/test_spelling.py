@@ -78,3 +78,11 @@ def test_a_slip_is_reported_with_its_remedy(slip: str, number: int) -> None:
     (found,) = caught.value.diagnostics
     assert found.mark is not None
     assert words.format(at=at + 1) in found.hint, str(found)
+
+
+def test_many_anchors_with_odd_names_take_no_longer_than_others(tmp_path: Path) -> None:
+    """A search for free names that begins anew for each of them takes hours here."""
+    text = "".join(f"k{i}: &p.{i:05d} {i}\nq{i}: *p.{i:05d}\n" for i in range(5000))
+    found = plain(parse(text, tmp_path / "many.yaml"))
+    assert [found[f"q{i}"] for i in range(5000)] == [found[f"k{i}"] for i in range(5000)]
+    assert found["q4999"] != found["q4998"]

@@ -58,10 +58,9 @@ def relax(text: str) -> Relaxed:
 def _renamed(text: str) -> tuple[str, dict[str, str]]:
     """``text`` with anchors that libyaml knows, each as long as before, and what they were called."""
     odd = {found["name"] for found in _TOKEN.finditer(text) if found["sign"] and not _KNOWN(found["name"])}
-    names: dict[str, str] = {}
-    for name in sorted(odd):
-        free = (letters for letters in map("".join, itertools.product(_LETTERS, repeat=len(name))))
-        names[name] = next((other for other in free if other not in text and other not in names.values()), name)
+    taken = set(_WORD.findall(text)) if odd else set()
+    free = {n: map("".join, itertools.product(_LETTERS, repeat=n)) for n in set(map(len, odd))}
+    names = {name: next((other for other in free[len(name)] if other not in taken), name) for name in sorted(odd)}
 
     def replaced(found: re.Match[str]) -> str:
         sign, name = found["sign"], found["name"]
@@ -76,7 +75,8 @@ _TOKEN = re.compile(
 )
 """What is quoted, a comment, or an anchor or alias."""
 
-_KNOWN = re.compile("[0-9A-Za-z_-]+").fullmatch
+_WORD = re.compile("[0-9A-Za-z_-]+")
+_KNOWN = _WORD.fullmatch
 _LETTERS = "abcdefghijklmnopqrstuvwxyz0123456789"
 
 
