@@ -12,6 +12,9 @@ from ligature import Simulation
 from ligature.robots.ecm import Ecm
 from ligature.robots.mtm import Mtm
 from ligature.robots.psm import Psm
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
 
 CACHES: dict[str, str] = {
     # what a rod or hole works with within one tick; every row is written before it is read
@@ -85,6 +88,8 @@ CACHES: dict[str, str] = {
     # soft tissue
     "ElasticGrid._responses": "follows from the grid",
     "Field.found": "counts how often boxes were found",
+    "Field.response": "follows from the points; a restore fills it",
+    "Contacts.partners": "read from the bodies before it is used; friction follows from the scene",
     "ElasticGrid._bulk": "what of it lasts are attributes of the grid, too",
     "ScenePiercer._mount": "what of it lasts are attributes of the needle, too",
     **dict.fromkeys(
@@ -107,7 +112,6 @@ CACHES: dict[str, str] = {
             "Elimination.work",
             "Field.load",
             "Field.change",
-            "Field.response",
             "Lips._near",
             "Lips._gap",
             "NeedleInTissue._rows",
@@ -125,7 +129,6 @@ CACHES: dict[str, str] = {
             "Strand.tangent",
             "Strand.three",
             "ThreadInTissue._settles",
-            "Contacts.partners",
             "Contacts.solve",
             "Contacts.overflow",
             "Parts.live",
@@ -273,19 +276,41 @@ CACHES: dict[str, str] = {
 """Attributes that a snapshot need not hold, as ``Class.attribute``, each with the reason."""
 
 
+SCRATCH = frozenset({
+    "scratch", "scratch of a tick", "written before it is read in every tick",
+    "written by every tick before it is read", "written for every contact before it is read",
+})  # fmt: skip
+"""Reasons in `CACHES` that are claims about what a tick reads."""
+
+
 def attributes(simulation: Simulation) -> dict[str, bytes]:
     """Every value that the subsystems of a simulation reach, by its path; `CACHES` are left out."""
-    found: dict[str, bytes] = {}
+    return {path: leaf if isinstance(leaf, bytes) else leaf.tobytes() for path, leaf in _leaves(simulation).items()}
+
+
+def scratch(simulation: Simulation) -> dict[str, Array]:
+    """Every array of which `CACHES` states that a tick writes it before it reads it, by its path."""
+    lasting = _leaves(simulation)
+    return {
+        path: leaf
+        for path, leaf in _leaves(simulation, SCRATCH).items()
+        if path not in lasting and not isinstance(leaf, bytes)
+    }
+
+
+def _leaves(simulation: Simulation, also: frozenset[str] = frozenset()) -> dict[str, Array | bytes]:
+    """Arrays and other values that the subsystems reach; of `CACHES` those with the reasons ``also``."""
+    found: dict[str, Array | bytes] = {}
     seen = {id(simulation): simulation}
     for subsystem in simulation._subsystems:
-        found |= dict(_walk(type(subsystem).__name__, subsystem, seen))
+        found |= dict(_walk(type(subsystem).__name__, subsystem, seen, also))
     return found
 
 
-def _walk(path: str, value: Any, above: dict[int, Any]) -> Iterator[tuple[str, bytes]]:
+def _walk(path: str, value: Any, above: dict[int, Any], also: frozenset[str]) -> Iterator[tuple[str, Array | bytes]]:
     """Paths and values below ``value``; what is ``above`` was walked already."""
     if isinstance(value, np.ndarray) and value.dtype != object:
-        yield path, value.tobytes()
+        yield path, value
         return
     if isinstance(value, bool | int | float | str | bytes | enum.Enum | np.generic | None):
         yield path, repr(value).encode()
@@ -298,23 +323,27 @@ def _walk(path: str, value: Any, above: dict[int, Any]) -> Iterator[tuple[str, b
         counter = {"Touches": "count", "Passages": "filled"}.get(type(value).__name__)
         rows = None if counter is None else int(getattr(value, counter)[0])
         for name, item in zip(value._fields, value, strict=True):
-            yield from _attribute(path, value, name, item if rows is None or name == counter else item[:rows], above)
+            item = item if rows is None or name == counter else item[:rows]
+            yield from _attribute(path, value, name, item, above, also)
     elif isinstance(value, Mapping) and not hasattr(value, "__dict__"):
         for key in sorted(value, key=repr):
-            yield from _walk(f"{path}[{key!r}]", value[key], above)
+            yield from _walk(f"{path}[{key!r}]", value[key], above, also)
     elif isinstance(value, set | frozenset):
         yield path, repr(sorted(value, key=repr)).encode()
     elif isinstance(value, list | tuple | deque):
         yield f"{path}.len", str(len(value)).encode()
         items = value[:1] if path.endswith("_touches") else value
         for i, item in enumerate(items):
-            yield from _walk(f"{path}[{i}]", item, above)
+            yield from _walk(f"{path}[{i}]", item, above, also)
     elif hasattr(value, "__dict__") and type(value).__module__.startswith("ligature."):
         if type(value).__module__ not in ("ligature.model.scene", "ligature.model.shapes"):
             for name, item in sorted(vars(value).items()):
-                yield from _attribute(path, value, name, item, above)
+                yield from _attribute(path, value, name, item, above, also)
 
 
-def _attribute(path: str, owner: Any, name: str, item: Any, above: dict[int, Any]) -> Iterator[tuple[str, bytes]]:
-    if not any(f"{kind.__name__}.{name}" in CACHES for kind in type(owner).__mro__):
-        yield from _walk(f"{path}.{name}", item, above)
+def _attribute(
+    path: str, owner: Any, name: str, item: Any, above: dict[int, Any], also: frozenset[str]
+) -> Iterator[tuple[str, Array | bytes]]:
+    reasons = {CACHES.get(f"{kind.__name__}.{name}") for kind in type(owner).__mro__} - {None}
+    if reasons <= also:
+        yield from _walk(f"{path}.{name}", item, above, also)

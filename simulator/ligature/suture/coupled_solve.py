@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 MAX_CG = 40
 
 CG_TOLERANCE = 1e-6
-"""Residual energy, relative to the first, at which the coupling is solved."""
+"""Residual energy, relative to the first, at which the coupling is solved, as a rule."""
 
 
 @kernel
@@ -113,10 +113,13 @@ def _dot(rows: int, work: Work, a: Array, b: Array) -> float:
 
 
 @kernel
-def couple(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work) -> None:
+def couple(
+    n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work, most: int, tolerance: float
+) -> None:
     """Complete ``work.d`` and ``work.load`` by the coupling of contacts between movable nodes.
 
-    ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``.
+    ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``. ``most`` iterations
+    leave a residual energy of ``tolerance``, relative to the first.
     """
     for m in range(rows):
         if work.rows[m] >= n:
@@ -124,7 +127,7 @@ def couple(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touche
     _move_bodies(n, rows, work, work.g, work.d)
     if high < 0:
         return
-    _iterate(n, low, high, rows, nodes, touches, work)
+    _iterate(n, low, high, rows, nodes, touches, work, most, tolerance)
     felt = work.cg[0]
     _apply_coupling(rows, nodes, touches, work, work.d, felt)
     for i in range(low, high + 1):
@@ -134,7 +137,9 @@ def couple(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touche
 
 
 @inlined
-def _iterate(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work) -> None:
+def _iterate(
+    n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touches, work: Work, most: int, tolerance: float
+) -> None:
     """Conjugate gradients for ``work.d`` of the coupled nodes."""
     p, r, z, s = work.cg[0], work.cg[1], work.cg[2], work.cg[3]
     _apply_coupling(rows, nodes, touches, work, work.d, r)
@@ -144,13 +149,13 @@ def _iterate(n: int, low: int, high: int, rows: int, nodes: Nodes, touches: Touc
             r[i, a] = -r[i, a]
     _precondition(n, low, high, rows, work, r, z)
     energy = _dot(rows, work, r, z)
-    enough = CG_TOLERANCE * energy
+    enough = tolerance * energy
     # s keeps S p by recurrence, so that S itself is never applied.
     for m in range(rows):
         i = work.rows[m]
         for a in range(6):
             p[i, a], s[i, a] = z[i, a], r[i, a]
-    for _ in range(MAX_CG):
+    for _ in range(most):
         if energy <= enough:
             break
         q = z

@@ -149,6 +149,32 @@ def rigid(touches: Touches, c: int) -> bool:
     return touches.bilateral[c] and touches.friction[c] == 0.0
 
 
+@inlined
+def add_closed(nodes: Nodes, touches: Touches, work: Work, c: int) -> None:
+    """Add contact ``c``, as ``work.K`` and `Touches.push` state it, to ``work.H`` and ``work.g``."""
+    K, f, arms = work.K[c], touches.push[c], work.arms[c]
+    i, k = touches.node[c, 0], touches.node[c, 1]
+    ax, ay, az, bx, by, bz = arms[0, 0], arms[0, 1], arms[0, 2], arms[1, 0], arms[1, 1], arms[1, 2]
+    if not nodes.fixed[i]:
+        _add_spring(K, ax, ay, az, work.H[i])
+        push(work.g[i], 1.0, f[0], f[1], f[2], ax, ay, az)
+    if not nodes.fixed[k]:
+        _add_spring(K, bx, by, bz, work.H[k])
+        push(work.g[k], -1.0, f[0], f[1], f[2], bx, by, bz)
+
+
+@kernel
+def open_contacts(nodes: Nodes, touches: Touches, work: Work) -> None:
+    """Gaps, slips and levers of all contacts at the present poses."""
+    for c in range(touches.count[0]):
+        begun, arms = touches.begun[c], work.arms[c]
+        gap, wx, wy, wz, ax, ay, az, bx, by, bz = _opening(nodes, work, touches, c)
+        touches.room[c] = gap - touches.target[c]
+        begun[0], begun[1], begun[2] = wx, wy, wz
+        arms[0, 0], arms[0, 1], arms[0, 2] = ax, ay, az
+        arms[1, 0], arms[1, 1], arms[1, 2] = bx, by, bz
+
+
 @kernel
 def add_contacts(nodes: Nodes, touches: Touches, work: Work, stiffness: float, dt: float) -> None:
     """Add all closed contacts to ``work.H`` and ``work.g``."""
@@ -179,13 +205,7 @@ def add_contacts(nodes: Nodes, touches: Touches, work: Work, stiffness: float, d
         arms = work.arms[c]
         arms[0, 0], arms[0, 1], arms[0, 2] = ax, ay, az
         arms[1, 0], arms[1, 1], arms[1, 2] = bx, by, bz
-        i, k = touches.node[c, 0], touches.node[c, 1]
-        if not nodes.fixed[i]:
-            _add_spring(K, ax, ay, az, work.H[i])
-            push(work.g[i], 1.0, f[0], f[1], f[2], ax, ay, az)
-        if not nodes.fixed[k]:
-            _add_spring(K, bx, by, bz, work.H[k])
-            push(work.g[k], -1.0, f[0], f[1], f[2], bx, by, bz)
+        add_closed(nodes, touches, work, c)
 
 
 @inlined

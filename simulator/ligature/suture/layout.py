@@ -127,6 +127,13 @@ class Work(NamedTuple):
     pushed: NDArray[np.bool_]  # (N,) bodies that contacts push
     K: Array  # (C, 3, 3) contact stiffness times dt²
     arms: Array  # (C, 2, 3) levers of each contact on its nodes
+    limit: Array  # (C,) Coulomb limit of each contact in a careful step, N
+    moved: Array  # (C, 3) displacement of each contact since the step was linearised
+    aim: Array  # (C, 3) that of the last solve
+    solved: Array  # (C, 3) force on the element by the last solve, N
+    own_matrix: Array  # (N, 6, 6) H without contacts
+    own_load: Array  # (N, 6)
+    taken: Array  # (N, 6) correction so far
     felt: Array  # (2, 6, 6) what the next node feels of those eliminated on either side
     felt_load: Array  # (2, 6)
     sum6: Array  # (6,)
@@ -225,7 +232,9 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
         lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
         Y=z((total, 6, 6)), Z=z((j, 6, 6)), g=z((total, 6)), d=z((total, 6)), load=z((j, 6)),
         cg=z((4, total, 6)), coupled_load=z((j, 6)), rows=np.zeros(total, np.int64),
-        pushed=np.zeros(total, np.bool_), K=z((contacts, 3, 3)), arms=z((contacts, 2, 3)), felt=z((2, 6, 6)),
+        pushed=np.zeros(total, np.bool_), K=z((contacts, 3, 3)), arms=z((contacts, 2, 3)),
+        limit=z(contacts), moved=z((contacts, 3)), aim=z((contacts, 3)), solved=z((contacts, 3)),
+        own_matrix=z((total, 6, 6)), own_load=z((total, 6)), taken=z((total, 6)), felt=z((2, 6, 6)),
         felt_load=z((2, 6)),
         sum6=z(6), kept_x=z((total, 3)), kept_q=z((total, 4)), kept_v=z((total, 3)), kept_w=z((total, 3)),
         kept_angle=z((j, 3)), kept_load=z((j, 6)),

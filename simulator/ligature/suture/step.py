@@ -12,7 +12,7 @@ import math
 
 from ligature.kernels import inlined, kernel
 from ligature.suture.chain import factor, solve
-from ligature.suture.coupled_solve import couple, gather
+from ligature.suture.coupled_solve import CG_TOLERANCE, MAX_CG, couple, gather
 from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
 from ligature.suture.layout import Joints, Nodes, Touches, Work
 from ligature.suture.passage_forces import add_passage_forces, settle_passages
@@ -249,7 +249,7 @@ def advance(
         factor(n, top, nodes.fixed, work.H, work.lever, work.B, work.compliance, work.Y, work.Z, work.felt)
         solve(n, top, work.lever, work.B, work.Y, work.Z, work.c, work.g, work.d, work.load, work.felt_load)
         if rows > 0:
-            couple(n, low, high, rows, nodes, touches, work)
+            couple(n, low, high, rows, nodes, touches, work, MAX_CG, CG_TOLERANCE)
         changed = settle_contacts(nodes, touches, work, stiffness, dt)
         largest = correct(n, total, nodes, work)
         changed = settle_passages(passages, owner, nodes, elapsed) or changed

@@ -1,8 +1,8 @@
 """A whole tick of a rod in one call: usually one step, several where contacts do not settle.
 
 A thread that snaps into a new shape, as when a knot closes, changes its contacts faster than one step
-can follow; a tick in which they do not settle is undone and repeated in shorter steps. World
-axes, SI units.
+can follow; a tick in which they do not settle is undone and repeated in shorter steps. Where these do not settle
+either, one careful step takes their place (`ligature.suture.careful`). World axes, SI units.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.suture import layout
+from ligature.suture.careful import advance_carefully
 from ligature.suture.contacts import detect
 from ligature.suture.crossing import free_share, shorten
 from ligature.suture.passage_forces import add_passage_impulses, begin_passages, restart_passages
@@ -40,8 +41,8 @@ open_rod = opener(
 REFINEMENT, MAX_PARTS = 4, 16
 """How many steps take the place of one that did not settle, and the most in a tick."""
 
-MAX_STEPS = 16
-"""Newton steps of a tick after which steps count although contacts have not settled."""
+MAX_STEPS, MAX_CAREFUL_STEPS = 16, 200
+"""Newton steps of a tick after which a step that does not settle, or a careful one, is not divided any more."""
 
 
 @inlined
@@ -99,7 +100,7 @@ def _scale_loads(joints: layout.Joints, factor: float) -> None:
 @inlined
 def _one_step(
     rod: layout.RodArrays, old: layout.Touches, new: layout.Touches, passages: Passages, owner: int,
-    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float,
+    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float, careful: bool,
 ) -> tuple[int, bool]:  # fmt: skip
     """A step of ``h`` seconds that ends ``elapsed`` seconds after the tick began; see `advance` for what it returns."""
     nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
@@ -110,9 +111,21 @@ def _one_step(
         constants.first[0], elements, nodes, rod.shapes, old, new, work, rod.tension, rod.counts,
         constants.self_skip[0], h,
     )  # fmt: skip
+    if careful:
+        return advance_carefully(
+            n, total, nodes, joints, new, work, passages, owner, springs, constants.stiffness[0], h, begins, elapsed
+        )
     return advance(
         n, total, nodes, joints, new, work, passages, owner, springs, constants.stiffness[0], h, begins, elapsed
     )
+
+
+@inlined
+def _next_size(done: int, size: int) -> int:
+    """The largest step, of ``size`` or more, that may begin when ``done`` of the tick is done."""
+    while size < MAX_PARTS and done % (REFINEMENT * size) == 0:
+        size *= REFINEMENT
+    return size
 
 
 @kernel
@@ -142,21 +155,28 @@ def run_tick(
     old, new, in_c = a, b, False
     # In units of the smallest step: what of the tick is done, the next step, that of the loads, and of those kept.
     done, size, scale, kept = 0, MAX_PARTS, MAX_PARTS, MAX_PARTS
-    steps = 0
+    steps, careful = 0, False
     while done < MAX_PARTS:
         h = dt * size / MAX_PARTS
         if size != scale:
             _scale_loads(joints, (size / scale) ** 2)
             scale = size
         more, settled = _one_step(
-            rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS
-        )
+            rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS,
+            careful,
+        )  # fmt: skip
         steps += more
         share = free_share(first, elements, nodes, new, work, counts[1])
-        if not (settled and share == 1.0) and size > 1 and steps < MAX_STEPS:
+        most = MAX_CAREFUL_STEPS if careful else MAX_STEPS
+        divide = not (settled and share == 1.0) and size > 1 and steps < most
+        if divide or not (settled or careful):
             _take_back(nodes, joints, work)
             restart_passages(passages, owner)
-            size, scale = size // REFINEMENT, kept
+            scale = kept
+            if divide:
+                size //= REFINEMENT
+            else:
+                careful, size = True, _next_size(done, size)
             continue
         if share < 1.0:
             shorten(total, nodes, work, share)
@@ -172,8 +192,7 @@ def run_tick(
         kept = size
         old, in_c = new, not in_c
         new = c if in_c else b
-        while done % (REFINEMENT * size) == 0:
-            size *= REFINEMENT
+        size = _next_size(done, size)
     set_bends(joints)
     copy_into(shapes.pose, rod.shape_poses)
     if scale != MAX_PARTS:
