@@ -114,6 +114,7 @@ class Work(NamedTuple):
     lever: Array  # (n - 1, 2, 3)
     B: Array  # (n - 1, 3, 3)
     c: Array  # (n - 1, 6)
+    left: Array  # (2, 6) error of the first and last joint that a step leaves to later ones of its tick
     compliance: Array  # (n - 1, 6)
     H: Array  # (N, 6, 6); of H, and of Y and Z of the chain, only the lower half counts
     Y: Array  # (N, 6, 6)
@@ -229,7 +230,7 @@ def work(n: int, total: int, elements: int, contacts: int) -> Work:
     j = n - 1
     return Work(
         x=z((total, 3)), q=z((total, 4)), xp=z((total, 3)), qp=z((total, 4)), R=z((total + 1, 3, 3)),
-        lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
+        lever=z((j, 2, 3)), B=z((j, 3, 3)), c=z((j, 6)), left=z((2, 6)), compliance=z((j, 6)), H=z((total, 6, 6)),
         Y=z((total, 6, 6)), Z=z((j, 6, 6)), g=z((total, 6)), d=z((total, 6)), load=z((j, 6)),
         cg=z((4, total, 6)), coupled_load=z((j, 6)), rows=np.zeros(total, np.int64),
         pushed=np.zeros(total, np.bool_), K=z((contacts, 3, 3)), arms=z((contacts, 2, 3)),

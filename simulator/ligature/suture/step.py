@@ -94,7 +94,7 @@ def _axis_row(joints: Joints, j: int, a: int, angle: float, dt: float) -> tuple[
 
 @kernel
 def linearise(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: float) -> None:
-    """Levers, axes and rows of all joints at the present poses."""
+    """Levers, axes and rows of all joints at the present poses, but for the errors that are `Work.left`."""
     per_dt2 = 1.0 / (dt * dt)
     for i in range(total):
         if nodes.met[i]:
@@ -117,6 +117,10 @@ def linearise(n: int, total: int, nodes: Nodes, joints: Joints, work: Work, dt: 
             s = max(s, 1e-30)
             work.compliance[j, 3 + a] = 1.0 / s
             work.c[j, 3 + a] = moment / s
+    if n > 1:
+        for a in range(6):
+            work.c[0, a] -= work.left[0, a]
+            work.c[n - 2, a] -= work.left[1, a]
 
 
 @kernel

@@ -23,7 +23,7 @@ from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
 from ligature.suture.rotations import cross, turn
 from ligature.suture.springs import Springs, add_spring_impulses, begin_springs, open_springs
-from ligature.suture.step import advance, finish
+from ligature.suture.step import advance, finish, linearise
 from ligature.suture.tracking import open_passages
 from ligature.tables import copy_into, opener
 
@@ -98,11 +98,40 @@ def _scale_loads(joints: layout.Joints, factor: float) -> None:
 
 
 @inlined
+def _leave_errors(
+    n: int, first: int, elements: int, nodes: layout.Nodes, joints: layout.Joints, work: layout.Work, h: float,
+    share: float,
+) -> None:  # fmt: skip
+    """Set `Work.left`: a step of ``h`` takes off a ``share`` of how far the bodies at the rod's ends are from it.
+
+    Physics moves a body that others hold elsewhere than the rod's solve did. To take all of that off in a part of the
+    tick would give the rod a speed that grows as the part shrinks.
+    """
+    for side in range(2):
+        for a in range(6):
+            work.left[side, a] = 0.0
+    head, tail = first > 0, n > first + elements
+    if share == 1.0 or not (head or tail):
+        return
+    linearise(n, nodes.mass.shape[0], nodes, joints, work, h)
+    for side in range(2):
+        j = 0 if side == 0 else n - 2
+        for a in range(6 if (head if side == 0 else tail) else 0):
+            # What a load stretches is no error, nor is the angle of an axis that is free.
+            if a < 3 or joints.low[j, a - 3] == joints.high[j, a - 3]:
+                work.left[side, a] = (1.0 - share) * (work.c[j, a] + work.compliance[j, a] * joints.load[j, a])
+
+
+@inlined
 def _one_step(
     rod: layout.RodArrays, old: layout.Touches, new: layout.Touches, passages: Passages, owner: int,
-    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float, careful: bool,
+    springs: Springs, constraints: Integers, points: Array, h: float, begins: bool, elapsed: float, share: float,
+    careful: bool,
 ) -> tuple[int, bool]:  # fmt: skip
-    """A step of ``h`` seconds that ends ``elapsed`` seconds after the tick began; see `advance` for what it returns."""
+    """A step of ``h`` seconds, a ``share`` of what is left of the tick, that ends ``elapsed`` seconds after it began.
+
+    See `advance` for what it returns.
+    """
     nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
     n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
     new.count[0] = 0
@@ -111,6 +140,7 @@ def _one_step(
         constants.first[0], elements, nodes, rod.shapes, old, new, work, rod.tension, rod.counts,
         constants.self_skip[0], h,
     )  # fmt: skip
+    _leave_errors(n, constants.first[0], elements, nodes, joints, work, h, share)
     if careful:
         return advance_carefully(
             n, total, nodes, joints, new, work, passages, owner, springs, constants.stiffness[0], h, begins, elapsed
@@ -163,7 +193,7 @@ def run_tick(
             scale = size
         more, settled = _one_step(
             rod, old, new, passages, owner, springs, constraints, points, h, done == 0, dt * (done + size) / MAX_PARTS,
-            careful,
+            size / (MAX_PARTS - done), careful,
         )  # fmt: skip
         steps += more
         share = free_share(first, elements, nodes, new, work, counts[1])
